@@ -1,0 +1,1 @@
+"""The actors: the only code of the project that imports ray."""

@@ -1,0 +1,1 @@
+"""AeroDaaS: program drones as a service."""

@@ -1,0 +1,178 @@
+"""The base of every analysis: build the graph in the application, run in an actor.
+
+A user's analysis is one class::
+
+    class Brightness(Analytics[float]):
+        accepts = (Frame,)
+        produces = float
+
+        def process(self, item: Frame, context: Context) -> float:
+            return float(item.image.mean())
+
+The instance is sent to its actor by value before `open` is called there, so a constructor keeps
+only what is cheap to send and checks only what the user could have got wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, ClassVar, Protocol, TypeVar
+
+from typing_extensions import Self
+
+from aerodaas.data import Alert
+from aerodaas.errors import GraphError
+from aerodaas.graph import AeroStreamData, Graph, Node, Trigger
+from aerodaas.interfaces import IAeroData, IAnalyse, ICompute, INavigableAnalyse
+from aerodaas.names import PaperNames, snake_case
+from aerodaas.vehicle import VehicleState
+from aerodaas.waypoints import AeroNavigation
+
+__all__ = ["Analytics", "Context", "NavigableAnalytics"]
+
+O_co = TypeVar("O_co", covariant=True)
+
+
+class Context(Protocol):
+    """What an analysis may ask of the actor that runs it."""
+
+    def now(self) -> int:
+        """Mission clock of the item being processed, in nanoseconds."""
+        ...
+
+    def vehicle(self) -> VehicleState | None:
+        """The newest state of the robot whose data is processed; None before the first."""
+        ...
+
+    def alert(self, alert: Alert) -> None:
+        """Tell the people who watch: shown, logged and recorded."""
+        ...
+
+
+class Analytics(PaperNames, IAnalyse[O_co]):
+    """An analysis; subclasses say what they accept and produce, and implement `process`.
+
+    Life cycle in the actor: `open` once, `process` for each item (one at a time, newest first
+    come), `close` once.
+    """
+
+    accepts: ClassVar[tuple[type, ...]] = (object,)
+    """Item types that `analyse` takes."""
+    produces: ClassVar[type] = object
+    """Type of the results."""
+    name: str = ""
+    """Name of the stream; by default the class's own in snake_case."""
+
+    node: Node | None = None
+    """Place in the graph, once `analyse` or `instantiate` was called."""
+    _graph: Graph | None = None
+    _compute: str | None = None
+    _triggers: tuple[Trigger, ...] = ()
+
+    def open(self) -> None:
+        """Load models and connect; called once in the actor, before the mission starts."""
+
+    def process(self, item: Any, context: Context) -> O_co | None:  # noqa: ANN401
+        """Turn one item into a result, or None where there is nothing to say."""
+        raise NotImplementedError
+
+    def close(self) -> None:
+        """Release what `open` took."""
+
+    def deploy(self, compute: ICompute) -> Self:
+        """Run on `compute`; returns itself."""
+        self._compute = str(compute.get_compute_properties()["id"])
+        self._graph = getattr(compute, "graph", None)
+        if self.node is not None:
+            self.node.compute = self._compute
+        return self
+
+    def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co]:
+        """Analyse a stream; called again, the same analysis reads a further stream.
+
+        Raises GraphError if `data` is no stream or carries the wrong type.
+        """
+        if not isinstance(data, AeroStreamData):
+            message = (
+                f"{type(self).__name__} takes a stream, not {type(data).__name__}; "
+                "get one with sensor.get_data_stream() or another analysis"
+            )
+            raise GraphError(message)
+        robot = data.graph.nodes[data.name].robot
+        node = self.node_in(data.graph, robot)
+        data.graph.connect(data, node, self.accepts)
+        return AeroStreamData(data.graph, node.id, self.produces)
+
+    def instantiate(self) -> AeroStreamData[O_co]:
+        """Start without an input stream: `process(None, …)` is called at the analysis' own pace.
+
+        Raises GraphError if it was not deployed, for then it belongs to no environment.
+        """
+        if self._graph is None:
+            message = f"{type(self).__name__}: call deploy(compute) before instantiate()"
+            raise GraphError(message)
+        node = self.node_in(self._graph, None)
+        node.kind = "external"
+        return AeroStreamData(self._graph, node.id, self.produces)
+
+    def trigger(
+        self,
+        target: IAnalyse[Any] | Callable[[], None],
+        when: Callable[[Any], bool] | None = None,
+    ) -> Self:
+        """Wake `target` (another analysis, or a robot's method) when a result says so.
+
+        `when` gets each result; without it, every result that is not None triggers. An analysis
+        that is a target sleeps until it is woken. Raises GraphError for any other target.
+        """
+        if isinstance(target, Analytics):
+            if target.node is None:
+                message = f"{type(target).__name__}: call analyse() before it is a trigger's target"
+                raise GraphError(message)
+            target.node.dormant = True
+            trigger = Trigger(target.node.id, when)
+        else:
+            robot = getattr(getattr(target, "__self__", None), "robot_id", None)
+            command = getattr(target, "__name__", None)
+            if robot is None or command is None:
+                message = (
+                    f"a trigger wakes an analysis or a robot's method such as "
+                    f"drone.end_mission, not {target!r}"
+                )
+                raise GraphError(message)
+            trigger = Trigger(f"{robot}.{command}", when)
+        self._triggers = (*self._triggers, trigger)
+        if self.node is not None:
+            self.node.triggers.append(trigger)
+        return self
+
+    def _node_in(self, graph: Graph, robot: str | None) -> Node:
+        if self.node is None:
+            name = self.name or snake_case(type(self).__name__).removesuffix("_analytics")
+            self.node = graph.add(
+                Node(
+                    id=f"{robot}/{name}" if robot else name,
+                    kind="analytics",
+                    item=self.produces,
+                    work=self,
+                    robot=robot,
+                    compute=self._compute,
+                    triggers=list(self._triggers),
+                )
+            )
+        return self.node
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave the graph behind when sent to an actor."""
+        hidden = {"node", "_graph"}
+        return {key: value for key, value in self.__dict__.items() if key not in hidden}
+
+
+class NavigableAnalytics(Analytics[AeroNavigation], INavigableAnalyse):
+    """An analysis whose results are navigation: waypoints or velocity commands."""
+
+    produces: ClassVar[type] = AeroNavigation
+
+    def generate_navigation(self, data: IAeroData[Any]) -> AeroStreamData[AeroNavigation]:
+        """Turn analytics' results into navigation; the same as `analyse`."""
+        return self.analyse(data)

@@ -1,0 +1,1 @@
+"""Cameras: one protocol for simulated, recorded and live pictures."""

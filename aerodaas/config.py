@@ -1,0 +1,233 @@
+"""The environment file: robots, sensors, compute resources, schedulers, recording.
+
+`EnvironmentConfig.load` reads `environment.json`; its JSON schema is printed by
+`aerodaas schema`. Lengths are metres, speeds m/s, angles degrees (people write these files),
+rates Hz, times seconds.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from typing_extensions import Self
+
+from aerodaas.errors import ConfigError
+
+__all__ = [
+    "CameraConfig",
+    "ComputeConfig",
+    "EnvironmentConfig",
+    "GeofenceConfig",
+    "HomeConfig",
+    "LimitsConfig",
+    "RecordingConfig",
+    "RobotConfig",
+    "SchedulersConfig",
+    "SensorConfig",
+    "SimulationConfig",
+]
+
+Identifier = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", max_length=64)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class _Strict(BaseModel):
+    """Unknown keys are mistakes, not wishes."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class HomeConfig(_Strict):
+    """Where the local ENU frame is pinned on WGS84: degrees and metres."""
+
+    latitude: Annotated[float, Field(ge=-90, le=90)]
+    longitude: Annotated[float, Field(ge=-180, le=180)]
+    altitude: Finite = 0.0
+
+
+class GeofenceConfig(_Strict):
+    """Where the drone may be: a polygon in ENU metres, a floor and a ceiling above home."""
+
+    polygon: list[tuple[Finite, Finite]] = Field(default_factory=list)
+    """Corners (east, north); empty for no polygon."""
+    floor: Finite = 0.3
+    ceiling: Finite = 120.0
+
+    @model_validator(mode="after")
+    def _closed(self) -> Self:
+        corners = 3
+        if self.polygon and len(self.polygon) < corners:
+            message = "a geofence polygon needs at least three corners"
+            raise ValueError(message)
+        if self.ceiling <= self.floor:
+            message = "a geofence's ceiling must lie above its floor"
+            raise ValueError(message)
+        return self
+
+
+class LimitsConfig(_Strict):
+    """What the drone's actor clamps to, and how long it waits before it protects the drone."""
+
+    cruise_speed: Positive = 1.0
+    max_speed: Positive = 5.0
+    max_climb: Positive = 1.5
+    max_yaw_rate: Positive = 90.0
+    """Degrees per second."""
+    max_acceleration: Positive = 3.0
+    takeoff_height: Positive = 1.5
+    arrival_radius: Positive = 0.3
+    command_timeout: Positive = 1.0
+    """Silence of the navigation after which the drone holds."""
+    silence_return: Positive = 20.0
+    """Further silence after which it returns home."""
+    battery_return: Annotated[float, Field(ge=0, le=1)] = 0.25
+    battery_land: Annotated[float, Field(ge=0, le=1)] = 0.12
+    geofence: GeofenceConfig = GeofenceConfig()
+
+
+class SensorConfig(_Strict):
+    """One sensor. `driver` names a camera or reading; further settings go to that driver."""
+
+    id: Identifier
+    type: Literal["camera", "odometry", "gps", "battery", "status"] = "camera"
+    driver: str = "simulated"
+    rate: Positive = 15.0
+    """Items per second."""
+    settings: dict[str, Any] = Field(default_factory=dict)
+
+
+class CameraConfig(_Strict):
+    """The settings of a camera, from `SensorConfig.settings`."""
+
+    width: Annotated[int, Field(ge=16, le=8192)] = 640
+    height: Annotated[int, Field(ge=16, le=8192)] = 360
+    horizontal_fov: Annotated[float, Field(gt=1, lt=179)] = 82.6
+    """Degrees; the Tello's by default."""
+    mount: tuple[Finite, Finite, Finite] = (0.1, 0.0, 0.0)
+    """Metres forward, left and up of the body's centre."""
+    pitch: Annotated[float, Field(ge=-90, le=90)] = 0.0
+    """Degrees downwards."""
+    yaw: Annotated[float, Field(ge=-180, le=180)] = 0.0
+    """Degrees to the left."""
+    path: str | None = None
+    """Folder of pictures, video file or URL, for the drivers that read one."""
+    loop: bool = False
+
+
+class RobotConfig(_Strict):
+    """One drone: its driver, its sensors and its limits."""
+
+    id: Identifier
+    driver: str = "simulated"
+    settings: dict[str, Any] = Field(default_factory=dict)
+    """Settings of the driver, such as `url` for MAVLink."""
+    sensors: list[SensorConfig] = Field(default_factory=list)
+    limits: LimitsConfig = LimitsConfig()
+    start: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+    """Where it stands before take-off, ENU metres."""
+    start_yaw: Finite = 0.0
+    """Degrees counter-clockwise from east."""
+
+
+class ComputeConfig(_Strict):
+    """One compute resource: a class of Ray nodes by their custom resource, or an endpoint."""
+
+    id: Identifier
+    kind: Literal["edge", "cloud"] = "edge"
+    node: str | None = None
+    """A named node's address, where the kind alone does not say."""
+    executors: Annotated[int, Field(ge=1, le=256)] = 1
+    """Inferences that may run at once."""
+    settings: dict[str, Any] = Field(default_factory=dict)
+
+
+class SchedulersConfig(_Strict):
+    """Default plug-ins: a registered name or `module:Class`."""
+
+    trajectory: str = "ordered"
+    analytics: str | None = None
+    """None: each analysis runs where it is deployed, on the newest item, without a dispatcher."""
+
+
+class RecordingConfig(_Strict):
+    """What is written to the MCAP file."""
+
+    enabled: bool = True
+    path: str | None = None
+    """None: a new folder under `runs/`."""
+    images: Literal["jpeg", "none"] = "jpeg"
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
+
+
+class SimulationConfig(_Strict):
+    """The world of the simulated drones."""
+
+    world: str = "field"
+    """A world's registered name, or the path of a scenario file."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    wind: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
+    """Mean wind, ENU m/s."""
+    gust: NotNegative = 0.0
+    """Standard deviation of the gusts, m/s."""
+    sensor_noise: NotNegative = 1.0
+    """Scales the noise of the simulated odometry and GPS; 0 for none."""
+
+
+class EnvironmentConfig(_Strict):
+    """A whole environment file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, title="AeroDaaS environment")
+
+    schema_url: str | None = Field(default=None, alias="$schema")
+    name: str = "environment"
+    home: HomeConfig | None = None
+    robots: list[RobotConfig] = Field(min_length=1)
+    sensors: list[SensorConfig] = Field(default_factory=list)
+    """Sensors of the environment that no robot carries."""
+    compute: list[ComputeConfig] | Literal["auto"] = "auto"
+    schedulers: SchedulersConfig = SchedulersConfig()
+    recording: RecordingConfig = RecordingConfig()
+    simulation: SimulationConfig = SimulationConfig()
+
+    @model_validator(mode="after")
+    def _unique_ids(self) -> Self:
+        groups = {
+            "robot": [robot.id for robot in self.robots],
+            "sensor": [s.id for s in self.sensors] + [s.id for r in self.robots for s in r.sensors],
+            "compute resource": [] if self.compute == "auto" else [c.id for c in self.compute],
+        }
+        for kind, ids in groups.items():
+            twice = sorted({name for name in ids if ids.count(name) > 1})
+            if twice:
+                message = f"more than one {kind} is called {', '.join(twice)}"
+                raise ValueError(message)
+        return self
+
+    @classmethod
+    def load(cls, path: str | Path) -> EnvironmentConfig:
+        """Read an environment file; raises ConfigError that names the file and the place."""
+        try:
+            text = Path(path).read_text(encoding="utf-8")
+        except OSError as error:
+            message = f"cannot read the environment file {path}: {error.strerror}"
+            raise ConfigError(message) from None
+        try:
+            return cls.model_validate(json.loads(text))
+        except (json.JSONDecodeError, UnicodeDecodeError) as error:
+            message = f"{path} is not JSON: {error}"
+            raise ConfigError(message) from None
+        except ValidationError as error:
+            raise ConfigError(f"{path}: {_explain(error)}") from None
+
+
+def _explain(error: ValidationError) -> str:
+    problems = [
+        f"{'.'.join(str(part) for part in problem['loc']) or 'file'}: {problem['msg']}"
+        for problem in error.errors()
+    ]
+    return "; ".join(problems) + " (see `aerodaas schema`)"

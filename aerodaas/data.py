@@ -1,0 +1,267 @@
+"""The data types that streams carry, each with its units, and the containers around them.
+
+Stamps are nanoseconds of the mission clock. Positions and velocities are ENU, metres and m/s;
+angles are radians (see `aerodaas.geometry`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.errors import SourceError
+from aerodaas.geometry import CameraModel, Vector
+from aerodaas.interfaces import IAeroData
+from aerodaas.names import PaperNames
+
+__all__ = [
+    "AeroData",
+    "AeroListData",
+    "Alert",
+    "Battery",
+    "Bbox",
+    "Detection",
+    "Detections",
+    "Frame",
+    "GpsFix",
+    "Header",
+    "Image",
+    "Odom",
+    "Odometry",
+]
+
+E = TypeVar("E")
+
+
+class AeroData(PaperNames, IAeroData[E]):
+    """One item of type E that the application can read and replace."""
+
+    def __init__(self, data: E) -> None:
+        """Hold `data`."""
+        self._data = data
+
+    @property
+    def data(self) -> E:
+        """The item held."""
+        return self._data
+
+    def get_data(self) -> E:
+        """Return the item held."""
+        return self._data
+
+    def set_data(self, data: E) -> None:
+        """Replace the item held."""
+        self._data = data
+
+
+class AeroListData(AeroData[list[E]], Sequence[E]):
+    """A list of items, such as waypoints, that is itself an `AeroData`."""
+
+    def __init__(self, data: Iterable[E] = ()) -> None:
+        """Hold the items of `data`, in order."""
+        super().__init__(list(data))
+
+    @overload
+    def __getitem__(self, index: int) -> E: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[E]: ...
+    def __getitem__(self, index: int | slice) -> E | list[E]:
+        """Item or slice, as a list gives it."""
+        return self._data[index]
+
+    def __len__(self) -> int:
+        """Count the items."""
+        return len(self._data)
+
+    def __iter__(self) -> Iterator[E]:
+        """Iterate over the items in order."""
+        return iter(self._data)
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """Who measured something, which measurement it was, and when.
+
+    A result carries the header of the measurement it was made from, so that its age is known
+    wherever it arrives.
+    """
+
+    id: int
+    """Counts up from zero within one source."""
+    stamp: int
+    """Mission clock at capture, in nanoseconds."""
+    source: str
+    """Identifier of the sensor, `robot/sensor`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Odometry:
+    """Where the vehicle believes it is: ENU position and velocity, attitude and body rates."""
+
+    position: Vector
+    """Metres, ENU, from home."""
+    velocity: Vector
+    """m/s, ENU."""
+    yaw: float
+    """Radians, counter-clockwise from east."""
+    roll: float = 0.0
+    """Radians, positive with the right side down."""
+    pitch: float = 0.0
+    """Radians, positive with the nose down."""
+    yaw_rate: float = 0.0
+    """rad/s, counter-clockwise."""
+    position_sigma: float = 0.0
+    """Standard deviation of the position in metres, zero where the driver cannot tell."""
+
+    @property
+    def height(self) -> float:
+        """Metres above home."""
+        return float(self.position[2])
+
+
+@dataclass(frozen=True, slots=True)
+class GpsFix:
+    """A global position: WGS84 degrees, metres above the ellipsoid, and its accuracy."""
+
+    latitude: float
+    longitude: float
+    altitude: float
+    horizontal_sigma: float = 0.0
+    """Metres."""
+    vertical_sigma: float = 0.0
+    """Metres."""
+    satellites: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Battery:
+    """State of the flight battery."""
+
+    fraction: float
+    """Charge left, 0 to 1."""
+    voltage: float = 0.0
+    """Volts, zero where unknown."""
+    current: float = 0.0
+    """Amperes drawn, zero where unknown."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame:
+    """An immutable picture with what is needed to place it in the world."""
+
+    header: Header
+    image: NDArray[np.uint8]
+    """Height x width x 3, BGR."""
+    camera: CameraModel | None = None
+    """Calibration and mount, where known."""
+    odometry: Odometry | None = None
+    """The vehicle's odometry at capture, where known."""
+
+    def __post_init__(self) -> None:
+        """Refuse anything but 8-bit BGR."""
+        bgr_axes, bgr_channels = 3, 3
+        image = self.image
+        if image.dtype != np.uint8 or image.ndim != bgr_axes or image.shape[2] != bgr_channels:
+            message = (
+                f"{self.header.source}: a frame must be height x width x 3 of uint8 (BGR), "
+                f"not {image.shape} of {image.dtype}"
+            )
+            raise SourceError(message)
+
+    @property
+    def width(self) -> int:
+        """Pixels across."""
+        return int(self.image.shape[1])
+
+    @property
+    def height(self) -> int:
+        """Pixels down."""
+        return int(self.image.shape[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """One object found in a frame; the box is in the frame's own pixels."""
+
+    box: tuple[float, float, float, float]
+    """Left, top, right, bottom."""
+    label: str
+    score: float
+    """Confidence, 0 to 1."""
+    track_id: int | None = None
+    """Identity kept by a tracker."""
+    keypoints: NDArray[np.float32] | None = None
+    """K x 3: pixel u, pixel v, confidence; None where the model gives none."""
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Pixel u and v of the middle of the box."""
+        left, top, right, bottom = self.box
+        return (left + right) / 2, (top + bottom) / 2
+
+    @property
+    def area(self) -> float:
+        """Square pixels covered by the box."""
+        left, top, right, bottom = self.box
+        return max(0.0, right - left) * max(0.0, bottom - top)
+
+
+@dataclass(frozen=True, slots=True)
+class Detections(Sequence[Detection]):
+    """Everything found in one frame, best first, with what is known of that frame."""
+
+    header: Header
+    items: tuple[Detection, ...]
+    width: int
+    """Pixels across of the frame."""
+    height: int
+    """Pixels down of the frame."""
+    camera: CameraModel | None = None
+    odometry: Odometry | None = None
+
+    @classmethod
+    def of(cls, frame: Frame, items: Iterable[Detection]) -> Detections:
+        """Gather `items` found in `frame`, ordered by score."""
+        ordered = tuple(sorted(items, key=lambda item: -item.score))
+        return cls(frame.header, ordered, frame.width, frame.height, frame.camera, frame.odometry)
+
+    def labelled(self, *labels: str) -> tuple[Detection, ...]:
+        """Keep the detections with one of `labels`, best first."""
+        return tuple(item for item in self.items if item.label in labels)
+
+    @overload
+    def __getitem__(self, index: int) -> Detection: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Detection, ...]: ...
+    def __getitem__(self, index: int | slice) -> Detection | tuple[Detection, ...]:
+        """Detection or slice of detections."""
+        return self.items[index]
+
+    def __len__(self) -> int:
+        """Count the detections."""
+        return len(self.items)
+
+
+@dataclass(frozen=True, slots=True)
+class Alert:
+    """Something that a person should know: raised by monitoring, emergencies, the watchdogs."""
+
+    header: Header
+    kind: str
+    """Short machine-readable name, such as `battery_low`."""
+    text: str
+    """One sentence for a person."""
+    values: dict[str, Any] = field(default_factory=dict)
+    """Figures behind it, by name, in SI units."""
+
+
+Image = Frame
+"""The paper's name of a camera's item."""
+Odom = Odometry
+"""The paper's name of an odometry sensor's item."""
+Bbox = Detections
+"""The paper's name of a detector's result."""

@@ -1,0 +1,1 @@
+"""Drivers: one Vehicle protocol for simulated and real drones."""

@@ -1,0 +1,96 @@
+"""The exceptions of the project: one small tree, every message says what to do.
+
+`exit_code` is what the command line returns: 2 when the user's input is wrong (usage), 1 when
+something failed that the input could not have told.
+"""
+
+from __future__ import annotations
+
+__all__ = [
+    "AeroDaaSError",
+    "ClockError",
+    "ConfigError",
+    "GraphError",
+    "InvalidWaypointError",
+    "MissionError",
+    "ModelError",
+    "RecordingError",
+    "SchedulerError",
+    "SourceError",
+    "UnknownIdError",
+    "VehicleError",
+]
+
+
+class AeroDaaSError(Exception):
+    """Base of every error raised on purpose by this project."""
+
+    exit_code = 1
+
+
+class ConfigError(AeroDaaSError):
+    """An environment file is missing, malformed or contradicts itself."""
+
+    exit_code = 2
+
+
+class UnknownIdError(AeroDaaSError):
+    """A robot, sensor, compute resource or plug-in was asked for that nobody declared."""
+
+    exit_code = 2
+
+    def __init__(self, kind: str, wanted: str, known: list[str]) -> None:
+        """Say which `kind` of thing was `wanted` and which ones are `known`."""
+        choices = ", ".join(sorted(known)) or "none"
+        super().__init__(f"no {kind} is called {wanted!r}; known: {choices}")
+        self._args = (kind, wanted, known)
+
+    def __reduce__(self) -> tuple[type[UnknownIdError], tuple[str, str, list[str]]]:
+        """Pickle by the constructor's own arguments: errors cross process boundaries."""
+        return (type(self), self._args)
+
+
+class GraphError(AeroDaaSError):
+    """The dataflow cannot work: wrong type on an edge, missing input, a second navigator."""
+
+    exit_code = 2
+
+
+class InvalidWaypointError(AeroDaaSError, ValueError):
+    """A waypoint or command holds values that no vehicle could fly."""
+
+    exit_code = 2
+
+
+class ModelError(AeroDaaSError):
+    """A model file cannot be loaded or is not what the analytics needs."""
+
+    exit_code = 2
+
+
+class SchedulerError(AeroDaaSError):
+    """A scheduler plug-in cannot be used."""
+
+    exit_code = 2
+
+
+class SourceError(AeroDaaSError):
+    """A camera, folder of pictures, video or sensor feed cannot be read."""
+
+    exit_code = 2
+
+
+class ClockError(AeroDaaSError):
+    """Simulated time stopped advancing because a participant no longer answers."""
+
+
+class VehicleError(AeroDaaSError):
+    """A vehicle refused a command, did not connect, or was lost."""
+
+
+class MissionError(AeroDaaSError):
+    """A mission failed in flight; the drone was held, returned or landed before this was raised."""
+
+
+class RecordingError(AeroDaaSError):
+    """A recording cannot be written or read."""

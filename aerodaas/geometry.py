@@ -1,0 +1,182 @@
+"""Frames of reference: local ENU, body FLU, NED/FRD, geodetic, and the pinhole camera.
+
+Positions and velocities in this project are float64 arrays of shape (3,), in metres and m/s, in
+the local ENU frame (x east, y north, z up, origin at the environment's home). The body frame is
+FLU (x forward, y left, z up). Yaw is in radians, counter-clockwise from east. Drivers convert to
+NED, FRD or centimetres once, with the functions below. Angles follow REP 103.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import pymap3d
+from numpy.typing import NDArray
+
+__all__ = [
+    "CameraModel",
+    "GeodeticOrigin",
+    "Vector",
+    "body_to_enu",
+    "enu_to_body",
+    "enu_to_ned",
+    "flu_to_frd",
+    "frd_to_flu",
+    "ned_to_enu",
+    "rotation_from_rpy",
+    "wrap_angle",
+    "yaw_enu_to_ned",
+    "yaw_ned_to_enu",
+]
+
+Vector: TypeAlias = NDArray[np.float64]
+"""A float64 array of shape (3,)."""
+
+
+def wrap_angle(angle: float) -> float:
+    """Wrap an angle in radians to (-pi, pi]."""
+    wrapped = math.remainder(angle, math.tau)
+    return math.pi if wrapped == -math.pi else wrapped
+
+
+def enu_to_ned(vector: Vector) -> Vector:
+    """(east, north, up) to (north, east, down); the same swap undoes itself."""
+    return np.array([vector[1], vector[0], -vector[2]])
+
+
+def ned_to_enu(vector: Vector) -> Vector:
+    """(north, east, down) to (east, north, up)."""
+    return enu_to_ned(vector)
+
+
+def flu_to_frd(vector: Vector) -> Vector:
+    """(forward, left, up) to (forward, right, down); the same flip undoes itself."""
+    return np.array([vector[0], -vector[1], -vector[2]])
+
+
+def frd_to_flu(vector: Vector) -> Vector:
+    """(forward, right, down) to (forward, left, up)."""
+    return flu_to_frd(vector)
+
+
+def yaw_enu_to_ned(yaw: float) -> float:
+    """Yaw counter-clockwise from east to heading clockwise from north, in (-pi, pi]."""
+    return wrap_angle(math.pi / 2 - yaw)
+
+
+def yaw_ned_to_enu(heading: float) -> float:
+    """Heading clockwise from north to yaw counter-clockwise from east, in (-pi, pi]."""
+    return wrap_angle(math.pi / 2 - heading)
+
+
+def body_to_enu(vector: Vector, yaw: float) -> Vector:
+    """Turn a level body-frame (FLU) vector by `yaw` into the ENU frame."""
+    c, s = math.cos(yaw), math.sin(yaw)
+    return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1], vector[2]])
+
+
+def enu_to_body(vector: Vector, yaw: float) -> Vector:
+    """Turn an ENU vector into the level body frame (FLU) of a vehicle with this `yaw`."""
+    return body_to_enu(vector, -yaw)
+
+
+def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> NDArray[np.float64]:
+    """Rotation matrix (3, 3) of a body with intrinsic z-y-x angles, in radians.
+
+    It takes FLU body vectors to the parent frame. Positive pitch turns the nose down, positive
+    roll lowers the right side, as right-handed rotations about y (left) and x (forward) do.
+    """
+    cr, sr = math.cos(roll), math.sin(roll)
+    cp, sp = math.cos(pitch), math.sin(pitch)
+    cy, sy = math.cos(yaw), math.sin(yaw)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+@dataclass(frozen=True)
+class GeodeticOrigin:
+    """Where the local ENU frame is pinned on the WGS84 ellipsoid: degrees and metres."""
+
+    latitude: float
+    longitude: float
+    altitude: float = 0.0
+
+    def to_local(self, latitude: float, longitude: float, altitude: float) -> Vector:
+        """Geodetic degrees and metres to local ENU metres."""
+        enu = pymap3d.geodetic2enu(
+            latitude, longitude, altitude, self.latitude, self.longitude, self.altitude
+        )
+        return np.array([float(axis) for axis in enu])
+
+    def to_geodetic(self, position: Vector) -> tuple[float, float, float]:
+        """Local ENU metres to latitude and longitude in degrees and altitude in metres."""
+        latitude, longitude, altitude = pymap3d.enu2geodetic(
+            *position, self.latitude, self.longitude, self.altitude
+        )
+        return float(latitude), float(longitude), float(altitude)
+
+
+@dataclass(frozen=True)
+class CameraModel:
+    """A pinhole camera bolted to a body: intrinsics in pixels, mount in metres and radians.
+
+    The optical frame is x right, y down, z forward. `mount` is the camera's place in the body
+    frame (FLU); `pitch` tilts it down when positive, `yaw` turns it left when positive.
+    """
+
+    width: int
+    height: int
+    fx: float
+    fy: float
+    cx: float
+    cy: float
+    mount: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    pitch: float = 0.0
+    yaw: float = 0.0
+
+    @classmethod
+    def from_fov(
+        cls,
+        width: int,
+        height: int,
+        horizontal_fov: float,
+        *,
+        mount: tuple[float, float, float] = (0.0, 0.0, 0.0),
+        pitch: float = 0.0,
+        yaw: float = 0.0,
+    ) -> CameraModel:
+        """Square pixels and a centred principal point from a horizontal field of view in rad."""
+        focal = width / 2 / math.tan(horizontal_fov / 2)
+        return cls(width, height, focal, focal, width / 2, height / 2, mount, pitch, yaw)
+
+    @property
+    def body_from_optical(self) -> NDArray[np.float64]:
+        """Rotation (3, 3) that takes optical-frame vectors to the body frame."""
+        axes = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+        rotation: NDArray[np.float64] = rotation_from_rpy(0.0, self.pitch, self.yaw) @ axes
+        return rotation
+
+    def ray(self, u: float, v: float) -> Vector:
+        """Unit vector in the body frame (FLU) of the ray through pixel (u, v)."""
+        optical = np.array([(u - self.cx) / self.fx, (v - self.cy) / self.fy, 1.0])
+        body: Vector = self.body_from_optical @ (optical / np.linalg.norm(optical))
+        return body
+
+    def project(self, point: Vector) -> tuple[float, float, float]:
+        """Project a body-frame point: pixel u, pixel v and depth in metres along the lens axis.
+
+        A depth that is not positive means that the point lies behind the camera; u and v are
+        then not a place in the picture.
+        """
+        x, y, depth = self.body_from_optical.T @ (np.asarray(point) - np.array(self.mount))
+        if depth <= 0.0:
+            return math.nan, math.nan, float(depth)
+        return float(self.fx * x / depth + self.cx), float(self.fy * y / depth + self.cy), depth

@@ -1,0 +1,202 @@
+"""The application as a graph: what `analyse()` and `navigate()` record, and nothing else.
+
+Nodes are sensors and analytics; edges are streams. Building checks types and shapes at once and
+points at the application's own line; nothing runs before the mission starts. The runtime reads
+the finished graph and attaches itself, after which the same stream objects are live.
+"""
+
+from __future__ import annotations
+
+import inspect
+import linecache
+import typing
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+
+from aerodaas.errors import GraphError
+from aerodaas.interfaces import IAeroData
+from aerodaas.names import PaperNames
+
+if TYPE_CHECKING:
+    from aerodaas.waypoints import AeroNavigation
+
+__all__ = [
+    "AeroStreamData",
+    "Graph",
+    "NavigationEdge",
+    "Node",
+    "NodeKind",
+    "StreamReader",
+    "Trigger",
+    "application_line",
+]
+
+E = TypeVar("E")
+E_co = TypeVar("E_co", covariant=True)
+NodeKind = typing.Literal["sensor", "analytics", "external"]
+_PACKAGE = Path(__file__).resolve().parent
+
+
+def application_line() -> str:
+    """The application's line that called into this package, as `file:line: code`, or empty."""
+    frame = inspect.currentframe()
+    while frame is not None:
+        path = Path(frame.f_code.co_filename).resolve()
+        inside = path.is_relative_to(_PACKAGE) or path.parent.name in {"actors", "waypoint"}
+        if not inside:
+            code = linecache.getline(str(path), frame.f_lineno).strip()
+            return f"{path.name}:{frame.f_lineno}: {code}"
+        frame = frame.f_back
+    return ""
+
+
+def _refuse(message: str) -> GraphError:
+    line = application_line()
+    return GraphError(f"{message}\n  at {line}" if line else message)
+
+
+class StreamReader(Protocol[E_co]):
+    """A live subscription, provided by the runtime."""
+
+    def next(self, timeout: float | None) -> E_co:
+        """The next item; raises TimeoutError, or StopIteration once the mission has ended."""
+        ...
+
+
+@dataclass(frozen=True)
+class Trigger:
+    """Wakes `target` (a node's id, or a mission command by name) when a result satisfies `when`."""
+
+    target: str
+    when: Callable[[Any], bool] | None = None
+
+
+@dataclass
+class Node:
+    """One sensor or analysis."""
+
+    id: str
+    """Unique; also the name of its stream."""
+    kind: NodeKind
+    item: type
+    """Type of the items in its stream."""
+    work: Any
+    """What the actor runs: a sensor's configuration or an analysis."""
+    robot: str | None = None
+    inputs: list[str] = field(default_factory=list)
+    compute: str | None = None
+    triggers: list[Trigger] = field(default_factory=list)
+    dormant: bool = False
+    """Runs only once triggered."""
+
+
+@dataclass(frozen=True)
+class NavigationEdge:
+    """Navigation that reaches a robot: waypoints known beforehand, or a stream."""
+
+    robot: str
+    navigation: AeroNavigation
+    index: int | None = None
+    deadline: float | None = None
+    clear_on: str | None = None
+    """Stream whose first item empties the queue."""
+
+
+class Graph:
+    """The dataflow of one application."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self.nodes: dict[str, Node] = {}
+        self.navigation: list[NavigationEdge] = []
+        self.reader: Callable[[str], StreamReader[Any]] | None = None
+        """Opens a live subscription by stream; set by the runtime while a mission runs."""
+
+    def add(self, node: Node) -> Node:
+        """Add a node, giving it a fresh id where its own is taken by another."""
+        base, count = node.id, 2
+        while node.id in self.nodes:
+            node.id = f"{base}_{count}"
+            count += 1
+        self.nodes[node.id] = node
+        return node
+
+    def connect(self, source: AeroStreamData[Any], target: Node, accepts: tuple[type, ...]) -> None:
+        """Draw an edge; raises GraphError for a wrong type, a foreign graph or a cycle."""
+        if source.graph is not self:
+            message = f"{source.name} belongs to another Environment than {target.id}"
+            raise _refuse(message)
+        if not issubclass(source.item, accepts):
+            wanted = " or ".join(kind.__name__ for kind in accepts)
+            message = (
+                f"{type(target.work).__name__} takes a stream of {wanted}, "
+                f"but {source.name} carries {source.item.__name__}"
+            )
+            raise _refuse(message)
+        if target.id in self.upstream(source.name):
+            message = f"{target.id} would analyse its own results by way of {source.name}"
+            raise _refuse(message)
+        if source.name not in target.inputs:
+            target.inputs.append(source.name)
+
+    def upstream(self, name: str) -> set[str]:
+        """Ids of `name` and of everything that it is made from."""
+        found: set[str] = set()
+        waiting = [name]
+        while waiting:
+            current = waiting.pop()
+            if current not in found:
+                found.add(current)
+                waiting.extend(self.nodes[current].inputs)
+        return found
+
+    def downstream(self, name: str) -> list[Node]:
+        """The nodes that read the stream `name`."""
+        return [node for node in self.nodes.values() if name in node.inputs]
+
+
+class AeroStreamData(PaperNames, IAeroData[E], Generic[E]):
+    """The stream of one node: an edge while the graph is built, an iterator in flight."""
+
+    def __init__(self, graph: Graph, name: str, item: type) -> None:
+        """Name the stream of node `name`, which carries `item`."""
+        self.graph = graph
+        self.name = name
+        self.item = item
+        self._reader: StreamReader[E] | None = None
+
+    @property
+    def data(self) -> AeroStreamData[E]:
+        """The stream itself: its data arrives in flight."""
+        return self
+
+    def get_data(self, timeout: float | None = None) -> E:
+        """Return the next item in flight, waiting up to `timeout` seconds (None: for ever).
+
+        Raises GraphError before the mission has started, TimeoutError when nothing came, and
+        StopIteration once the mission has ended.
+        """
+        if self._reader is None:
+            if self.graph.reader is None:
+                message = (
+                    f"{self.name} has no data before the mission starts; "
+                    "call start_mission(wait=False) first"
+                )
+                raise _refuse(message)
+            self._reader = self.graph.reader(self.name)
+        return self._reader.next(timeout)
+
+    def set_data(self, data: E) -> None:
+        """Refuse: a stream's data comes from its node."""
+        message = f"{self.name} is a stream: its data comes from its node, not from {data!r}"
+        raise _refuse(message)
+
+    def __iter__(self) -> Iterator[E]:
+        """Iterate over items as they arrive."""
+        return self
+
+    def __next__(self) -> E:
+        """Return the next item; ends with the mission."""
+        return self.get_data()

@@ -1,0 +1,1 @@
+"""The mission layer: queue, state machine, safety."""

@@ -1,0 +1,1 @@
+"""The embedded simulator: world, flight dynamics, renderer."""

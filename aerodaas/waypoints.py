@@ -1,0 +1,268 @@
+"""What a drone can be told: waypoints, velocity commands, and navigation made of them."""
+
+from __future__ import annotations
+
+import enum
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
+from typing import Any, Generic, TypeAlias, TypeVar
+
+import numpy as np
+
+from aerodaas.data import AeroListData
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.geometry import GeodeticOrigin, Vector
+from aerodaas.graph import AeroStreamData
+
+__all__ = [
+    "DEFAULT_PRIORITY",
+    "AeroNavigation",
+    "NavigationType",
+    "PriorityQueue",
+    "SchedulingType",
+    "VelocityCommand",
+    "Waypoint",
+    "WaypointType",
+]
+
+DEFAULT_PRIORITY = 5
+"""Priority of navigation that states none; smaller is more urgent, as in the paper."""
+
+
+class WaypointType(str, enum.Enum):
+    """What a waypoint's x, y and z mean."""
+
+    RELATIVE = "relative"
+    """Metres east, north and up of the place where this robot took off."""
+    LOCAL = "local"
+    """Metres east, north and up of the environment's home."""
+    GLOBAL = "global"
+    """Latitude and longitude in WGS84 degrees, altitude in metres above the ellipsoid."""
+
+
+class NavigationType(str, enum.Enum):
+    """Where navigation comes from."""
+
+    DISTANCE_DRIVEN = "distance_driven"
+    """Waypoints known beforehand."""
+    ANALYTICS_DRIVEN = "analytics_driven"
+    """Waypoints or velocities that analytics makes in flight."""
+
+
+class SchedulingType(str, enum.Enum):
+    """Whether a trajectory scheduler may change the order of waypoints."""
+
+    ORDERED = "ordered"
+    UNORDERED = "unordered"
+
+
+def _require_finite(owner: str, **values: float | None) -> None:
+    for name, value in values.items():
+        if value is not None and not (
+            isinstance(value, int | float | np.floating) and math.isfinite(value)
+        ):
+            message = f"{owner}: {name} must be a finite number, not {value!r}"
+            raise InvalidWaypointError(message)
+
+
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """A place to fly to, and what to do there.
+
+    Raises InvalidWaypointError for numbers that are not finite or out of range.
+    """
+
+    id: str
+    x: float
+    """Metres east, or latitude in degrees for a global waypoint."""
+    y: float
+    """Metres north, or longitude in degrees for a global waypoint."""
+    z: float
+    """Metres up, or altitude in metres for a global waypoint."""
+    hover_duration: float = 0.0
+    """Seconds to stay after arrival."""
+    waypoint_type: WaypointType | str = WaypointType.RELATIVE
+    yaw: float | None = None
+    """Radians counter-clockwise from east on arrival; None keeps the direction of flight."""
+    speed: float | None = None
+    """m/s on the way there; None takes the robot's cruise speed."""
+    priority: int = DEFAULT_PRIORITY
+    """Smaller is more urgent; a more urgent waypoint preempts the plan."""
+    deadline: float | None = None
+    """Seconds of mission time by which to arrive; None for no deadline."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers and turn the type's name into a WaypointType."""
+        owner = f"waypoint {self.id!r}"
+        _require_finite(owner, **{name: getattr(self, name) for name in _NUMBERS})
+        try:
+            object.__setattr__(self, "waypoint_type", WaypointType(self.waypoint_type))
+        except ValueError:
+            choices = ", ".join(kind.value for kind in WaypointType)
+            message = f"{owner}: waypoint_type must be one of {choices}, not {self.waypoint_type!r}"
+            raise InvalidWaypointError(message) from None
+        if self.hover_duration < 0:
+            message = f"{owner}: hover_duration must not be negative, not {self.hover_duration}"
+            raise InvalidWaypointError(message)
+        if self.speed is not None and self.speed <= 0:
+            message = f"{owner}: speed must be positive, not {self.speed}"
+            raise InvalidWaypointError(message)
+        north_pole, date_line = 90.0, 180.0
+        if self.waypoint_type is WaypointType.GLOBAL and (
+            abs(self.x) > north_pole or abs(self.y) > date_line
+        ):
+            message = f"{owner}: ({self.x}, {self.y}) is no latitude and longitude in degrees"
+            raise InvalidWaypointError(message)
+
+    def resolve(self, takeoff: Vector, origin: GeodeticOrigin | None) -> Waypoint:
+        """The same waypoint in the local ENU frame of the environment.
+
+        `takeoff` is where this robot took off, ENU metres. Raises InvalidWaypointError if a
+        global waypoint meets an environment without a geodetic home.
+        """
+        if self.waypoint_type is WaypointType.LOCAL:
+            return self
+        if self.waypoint_type is WaypointType.RELATIVE:
+            x, y, z = np.array([self.x, self.y, self.z]) + takeoff
+        elif origin is None:
+            message = f"waypoint {self.id!r} is global, but the environment file gives no home"
+            raise InvalidWaypointError(message)
+        else:
+            x, y, z = origin.to_local(self.x, self.y, self.z)
+        return replace(self, x=float(x), y=float(y), z=float(z), waypoint_type=WaypointType.LOCAL)
+
+    @property
+    def position(self) -> Vector:
+        """x, y and z as an array of shape (3,)."""
+        return np.array([self.x, self.y, self.z], dtype=np.float64)
+
+
+_NUMBERS = tuple(
+    field.name
+    for field in fields(Waypoint)
+    if field.name in {"x", "y", "z", "hover_duration", "yaw", "speed", "deadline"}
+)
+
+
+@dataclass(frozen=True, slots=True)
+class VelocityCommand:
+    """A velocity asked for by analytics, in the level body frame (FLU).
+
+    It is valid for `valid_for` seconds from arrival at the drone; after that the drone holds.
+    Raises InvalidWaypointError for numbers that are not finite.
+    """
+
+    forward: float = 0.0
+    """m/s."""
+    left: float = 0.0
+    """m/s."""
+    up: float = 0.0
+    """m/s."""
+    yaw_rate: float = 0.0
+    """rad/s, counter-clockwise."""
+    priority: int = DEFAULT_PRIORITY
+    valid_for: float = 0.5
+    """Seconds."""
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that are not finite and a validity that is not positive."""
+        names = ("forward", "left", "up", "yaw_rate", "valid_for")
+        _require_finite("velocity command", **{name: getattr(self, name) for name in names})
+        if self.valid_for <= 0:
+            message = f"velocity command: valid_for must be positive, not {self.valid_for}"
+            raise InvalidWaypointError(message)
+
+    @property
+    def velocity(self) -> Vector:
+        """Forward, left and up as an array of shape (3,), m/s."""
+        return np.array([self.forward, self.left, self.up], dtype=np.float64)
+
+
+NavigationItem: TypeAlias = Waypoint | VelocityCommand
+
+
+class AeroNavigation(AeroListData[NavigationItem]):
+    """Navigation for a drone: a list of waypoints or commands, or a live stream of them.
+
+    `data` is a list (waypoints known now) or a stream (`AeroStreamData`) whose items arrive in
+    flight; of the latter, the list is empty and `stream` is set.
+    """
+
+    def __init__(
+        self,
+        navigation_type: NavigationType = NavigationType.DISTANCE_DRIVEN,
+        data: Iterable[NavigationItem] | AeroStreamData[Any] = (),
+        scheduling_type: SchedulingType = SchedulingType.ORDERED,
+        *,
+        priority: int | None = None,
+    ) -> None:
+        """Hold `data`; `priority`, where given, overrides that of each item.
+
+        Raises InvalidWaypointError for an item that is neither waypoint nor velocity command,
+        and for two waypoints of one id.
+        """
+        self.navigation_type = NavigationType(navigation_type)
+        self.scheduling_type = SchedulingType(scheduling_type)
+        self.priority = priority
+        self.stream: AeroStreamData[AeroNavigation] | None = None
+        if isinstance(data, AeroStreamData):
+            self.stream = data
+            super().__init__()
+            return
+        super().__init__(_checked(data, priority))
+
+    @property
+    def waypoints(self) -> list[Waypoint]:
+        """The waypoints among the items."""
+        return [item for item in self if isinstance(item, Waypoint)]
+
+    @property
+    def commands(self) -> list[VelocityCommand]:
+        """The velocity commands among the items."""
+        return [item for item in self if isinstance(item, VelocityCommand)]
+
+
+def _checked(data: Iterable[object], priority: int | None) -> list[NavigationItem]:
+    items: list[NavigationItem] = []
+    seen: set[str] = set()
+    for item in data:
+        if not isinstance(item, Waypoint | VelocityCommand):
+            message = f"navigation takes waypoints and velocity commands, not {item!r}"
+            raise InvalidWaypointError(message)
+        if isinstance(item, Waypoint):
+            if item.id in seen:
+                message = f"two waypoints are called {item.id!r}; give each its own id"
+                raise InvalidWaypointError(message)
+            seen.add(item.id)
+        items.append(item)
+    return items if priority is None else [replace(item, priority=priority) for item in items]
+
+
+N = TypeVar("N")
+
+
+class PriorityQueue(AeroNavigation, Generic[N]):
+    """Navigation of one priority, as the paper's listings write it.
+
+    >>> PriorityQueue(AeroListData([Waypoint("a", 1, 2, 3)]), priority=2)[0].priority
+    2
+    """
+
+    def __init__(
+        self,
+        data: AeroNavigation | AeroListData[Waypoint] | AeroStreamData[AeroNavigation],
+        priority: int = DEFAULT_PRIORITY,
+    ) -> None:
+        """Give every item of `data` this `priority`; smaller is more urgent."""
+        if isinstance(data, AeroNavigation):
+            super().__init__(
+                data.navigation_type,
+                data.stream if data.stream is not None else data,
+                data.scheduling_type,
+                priority=priority,
+            )
+        elif isinstance(data, AeroStreamData):
+            super().__init__(NavigationType.ANALYTICS_DRIVEN, data, priority=priority)
+        else:
+            super().__init__(NavigationType.DISTANCE_DRIVEN, data, priority=priority)

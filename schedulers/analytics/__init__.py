@@ -1,0 +1,1 @@
+"""Analytics schedulers: which inference runs where, and when."""

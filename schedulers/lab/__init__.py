@@ -1,0 +1,1 @@
+"""The laboratory: a discrete-event simulator that drives the analytics schedulers."""

@@ -1,0 +1,1 @@
+"""Trajectory schedulers: who is visited next."""
