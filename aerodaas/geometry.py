@@ -119,7 +119,7 @@ class GeodeticOrigin:
     def to_geodetic(self, position: Vector) -> tuple[float, float, float]:
         """Local ENU metres to latitude and longitude in degrees and altitude in metres."""
         latitude, longitude, altitude = pymap3d.enu2geodetic(
-            *position, self.latitude, self.longitude, self.altitude
+            position[0], position[1], position[2], self.latitude, self.longitude, self.altitude
         )
         return float(latitude), float(longitude), float(altitude)
 

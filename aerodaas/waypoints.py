@@ -6,7 +6,7 @@ import enum
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
-from typing import Any, Generic, TypeAlias, TypeVar
+from typing import Any, Generic, TypeAlias, TypeVar, cast
 
 import numpy as np
 
@@ -207,7 +207,7 @@ class AeroNavigation(AeroListData[NavigationItem]):
         self.priority = priority
         self.stream: AeroStreamData[AeroNavigation] | None = None
         if isinstance(data, AeroStreamData):
-            self.stream = data
+            self.stream = cast("AeroStreamData[AeroNavigation]", data)
             super().__init__()
             return
         super().__init__(_checked(data, priority))

@@ -1,0 +1,131 @@
+"""What a running mission says about itself: states, setpoints, decisions, message envelopes."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from aerodaas.data import Header
+from aerodaas.geometry import Vector
+from aerodaas.vehicle import Setpoint
+from aerodaas.waypoints import Waypoint
+
+__all__ = ["Decision", "Hop", "Message", "MissionState", "MissionStatus", "SetpointRecord"]
+
+E = TypeVar("E")
+
+
+class MissionState(str, enum.Enum):
+    """The 13 states of a mission (the paper's stat-stream)."""
+
+    IDLE = "idle"
+    """Nothing has been asked yet."""
+    PREFLIGHT = "preflight"
+    """Checking whether a take-off is safe."""
+    TAKING_OFF = "taking_off"
+    HOLDING = "holding"
+    """In the air, waiting for navigation."""
+    ENROUTE = "enroute"
+    """Flying to the next waypoint of the plan."""
+    LOITERING = "loitering"
+    """Staying at a waypoint for its hover duration."""
+    FOLLOWING = "following"
+    """Flying by velocity commands from analytics."""
+    DIVERTED = "diverted"
+    """Serving more urgent navigation; the plan resumes afterwards."""
+    PAUSED = "paused"
+    RETURNING = "returning"
+    LANDING = "landing"
+    LANDED = "landed"
+    """On the ground after a flight; the mission is over."""
+    ABORTED = "aborted"
+    """Over without having been completed: refused, taken over or lost; the reason says which."""
+
+
+@dataclass(frozen=True, slots=True)
+class MissionStatus:
+    """The mission at one moment."""
+
+    stamp: int
+    """Mission clock, nanoseconds."""
+    state: MissionState
+    reason: str = ""
+    """Why the mission is in this state, one sentence."""
+    target: Waypoint | None = None
+    """Waypoint being flown to or loitered at, local ENU."""
+    pending: tuple[Waypoint, ...] = ()
+    """Waypoints still to be visited after the target, in planned order."""
+    visited: tuple[str, ...] = ()
+    """Ids of the waypoints reached, in order."""
+    given_up: tuple[str, ...] = ()
+    """Ids of the waypoints that the scheduler or the safety layer refused."""
+    distance: float = 0.0
+    """Metres flown since take-off."""
+    faults: tuple[str, ...] = ()
+    """What the safety layer complains about at present."""
+
+    @property
+    def progress(self) -> float:
+        """Share of the known waypoints that have been visited, 0 to 1."""
+        known = len(self.visited) + len(self.pending) + (self.target is not None)
+        return len(self.visited) / known if known else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class SetpointRecord:
+    """One turn of the setpoint loop: what the mission asked for and what the vehicle was sent."""
+
+    stamp: int
+    asked: Setpoint | None
+    sent: Setpoint | None
+    clipped_by: tuple[str, ...] = ()
+    """Names of the limits that changed it, such as `max_speed` or `geofence`."""
+    cause: Header | None = None
+    """Measurement that the command behind this setpoint was made from, for latency."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """One decision of an analytics scheduler, with its reason."""
+
+    stamp: int
+    task: str
+    """Analysis and frame, `node#frame`."""
+    action: str
+    """`edge`, `cloud`, `drop`, `late`, `done`."""
+    reason: str = ""
+    values: dict[str, float] = field(default_factory=dict)
+    """Figures behind it: slack, expected times, utility; seconds or the table's own units."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hop:
+    """One actor's share in a message's way, on the host's monotonic clock in nanoseconds."""
+
+    node: str
+    received: int
+    published: int
+
+
+@dataclass(frozen=True, slots=True)
+class Message(Generic[E]):
+    """The envelope that streams carry."""
+
+    stream: str
+    seq: int
+    """Counts the messages of this stream; a gap seen by a reader is a drop."""
+    stamp: int
+    """Mission clock when published, nanoseconds."""
+    header: Header
+    """The measurement that this was made from."""
+    captured: int
+    """Host monotonic clock at that measurement's capture, nanoseconds."""
+    hops: tuple[Hop, ...]
+    item: E | None
+    """None: processed, with nothing to say."""
+
+    @property
+    def latency_ns(self) -> int:
+        """Nanoseconds from capture to the last actor's publishing."""
+        return (self.hops[-1].published - self.captured) if self.hops else 0
