@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Generic, TypeVar
 
 from aerodaas.data import Header
-from aerodaas.geometry import Vector
 from aerodaas.vehicle import Setpoint
 from aerodaas.waypoints import Waypoint
 
