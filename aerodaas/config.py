@@ -23,6 +23,7 @@ __all__ = [
     "GeofenceConfig",
     "HomeConfig",
     "LimitsConfig",
+    "MissionConfig",
     "RecordingConfig",
     "RobotConfig",
     "SchedulersConfig",
@@ -57,11 +58,16 @@ class GeofenceConfig(_Strict):
     """Corners (east, north); empty for no polygon."""
     floor: Finite = 0.3
     ceiling: Finite = 120.0
+    margin: NotNegative = 0.5
+    """Metres that the drone keeps from the polygon's edge and from no-fly zones."""
+    no_fly: list[list[tuple[Finite, Finite]]] = Field(default_factory=list)
+    """Polygons (east, north) inside the fence where the drone may not be, at any height."""
 
     @model_validator(mode="after")
     def _closed(self) -> Self:
         corners = 3
-        if self.polygon and len(self.polygon) < corners:
+        outlines = [self.polygon, *self.no_fly] if self.polygon else self.no_fly
+        if any(len(outline) < corners for outline in outlines):
             message = "a geofence polygon needs at least three corners"
             raise ValueError(message)
         if self.ceiling <= self.floor:
@@ -79,15 +85,46 @@ class LimitsConfig(_Strict):
     max_yaw_rate: Positive = 90.0
     """Degrees per second."""
     max_acceleration: Positive = 3.0
+    max_range: Positive = 1000.0
+    """Metres from the place of take-off that the drone may go."""
+    reaction_time: Positive = 0.3
+    """Seconds from a setpoint to the vehicle's answer, kept free before every boundary."""
+    separation: NotNegative = 2.0
+    """Metres kept from the other drones of the environment; 0 for none."""
     takeoff_height: Positive = 1.5
+    takeoff_timeout: Positive = 30.0
+    """A take-off that takes longer ends in a landing."""
+    preflight_timeout: Positive = 5.0
+    """Time given to the vehicle's own objections to go away before take-off is refused."""
     arrival_radius: Positive = 0.3
     command_timeout: Positive = 1.0
     """Silence of the navigation after which the drone holds."""
     silence_return: Positive = 20.0
     """Further silence after which it returns home."""
+    link_timeout: Positive = 3.0
+    """Loss of the vehicle's word or of its position after which the flight is cut short."""
+    return_timeout: Positive = 300.0
+    """A return that takes longer ends in a landing on the spot."""
+    endurance: Positive = 900.0
+    """Seconds that a full battery hovers; the energy model's scale."""
     battery_return: Annotated[float, Field(ge=0, le=1)] = 0.25
+    """Charge at which the drone returns, earlier where the way home needs more."""
     battery_land: Annotated[float, Field(ge=0, le=1)] = 0.12
+    """Charge at which it lands where it is, and that a return keeps in reserve."""
     geofence: GeofenceConfig = GeofenceConfig()
+
+
+class MissionConfig(_Strict):
+    """How a mission behaves where the application does not say."""
+
+    on_complete: Literal["return", "land", "hold"] = "return"
+    """What follows the last waypoint when no live stream feeds navigation."""
+    resume_after: NotNegative = 2.0
+    """Silence of urgent velocity commands after which the interrupted plan resumes."""
+    plan_timeout: Positive = 5.0
+    """Wait for a scheduler's first plan before flying the order given."""
+    stall_timeout: Positive = 60.0
+    """A waypoint that comes no nearer for so long is given up."""
 
 
 class SensorConfig(_Strict):
@@ -128,6 +165,7 @@ class RobotConfig(_Strict):
     """Settings of the driver, such as `url` for MAVLink."""
     sensors: list[SensorConfig] = Field(default_factory=list)
     limits: LimitsConfig = LimitsConfig()
+    mission: MissionConfig = MissionConfig()
     start: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
     """Where it stands before take-off, ENU metres."""
     start_yaw: Finite = 0.0
