@@ -67,9 +67,12 @@ class StreamReader(Protocol[E_co]):
 
 @dataclass(frozen=True)
 class Trigger:
-    """Wakes `target` (a node's id, or a mission command by name) when a result satisfies `when`."""
+    """Wakes an analysis, or calls a robot's method, when a result satisfies `when`."""
 
     target: str
+    """Id of the node or of the robot."""
+    method: str | None = None
+    """Name of the robot's method; None for a node."""
     when: Callable[[Any], bool] | None = None
 
 

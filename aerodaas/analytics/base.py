@@ -60,6 +60,10 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     """Item types that `analyse` takes."""
     produces: ClassVar[type] = object
     """Type of the results."""
+    isolated: bool = False
+    """True for an analysis that needs a process of its own, such as a neural network."""
+    rate: float = 1.0
+    """How often an external source (`instantiate`) is asked, in Hz."""
     name: str = ""
     """Name of the stream; by default the class's own in snake_case."""
 
@@ -130,7 +134,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
                 message = f"{type(target).__name__}: call analyse() before it is a trigger's target"
                 raise GraphError(message)
             target.node.dormant = True
-            trigger = Trigger(target.node.id, when)
+            trigger = Trigger(target.node.id, when=when)
         else:
             robot = getattr(getattr(target, "__self__", None), "robot_id", None)
             command = getattr(target, "__name__", None)
@@ -140,7 +144,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
                     f"drone.end_mission, not {target!r}"
                 )
                 raise GraphError(message)
-            trigger = Trigger(f"{robot}.{command}", when)
+            trigger = Trigger(robot, command, when)
         self._triggers = (*self._triggers, trigger)
         if self.node is not None:
             self.node.triggers.append(trigger)
