@@ -33,7 +33,7 @@ class Barrier:
     """Counts what is still under way, by source."""
 
     def __init__(self, windows: dict[str, int]) -> None:
-        """Allow `windows[source]` measurements of each source to be under way while time goes on."""
+        """Let `windows[source]` measurements of each source be under way while time goes on."""
         self._windows = windows
         self._missing: dict[str, dict[int, int]] = defaultdict(dict)
 

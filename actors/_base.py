@@ -13,6 +13,7 @@ import threading
 import time
 import traceback
 from abc import abstractmethod
+from collections import deque
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
@@ -26,6 +27,7 @@ from aerodaas.errors import AeroDaaSError
 
 __all__ = ["ActorInfo", "ActorReport", "StreamActor", "StreamCount", "failure_line"]
 
+_ALERTS_KEPT = 50
 Phase = Literal["new", "ready", "running", "done", "failed"]
 
 
@@ -57,6 +59,8 @@ class ActorReport:
     streams: dict[str, StreamCount] = field(default_factory=dict)
     sent: dict[str, int] = field(default_factory=dict)
     cpu_seconds: float = 0.0
+    alerts: tuple[Alert, ...] = ()
+    """The newest alerts, oldest first."""
     values: dict[str, Any] = field(default_factory=dict)
     """Figures of the actor's own."""
 
@@ -81,6 +85,7 @@ class StreamActor:
         self._error: AeroDaaSError | None = None
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
+        self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
         self.inbox: Inbox | None = None
         self.outlets: dict[str, Outlet] = {}
 
@@ -120,7 +125,13 @@ class StreamActor:
     def report(self) -> ActorReport:
         """How the actor fares."""
         return ActorReport(
-            self._phase, self._error, self.counts(), self.sent(), time.process_time(), self._values()
+            phase=self._phase,
+            error=self._error,
+            streams=self.counts(),
+            sent=self.sent(),
+            cpu_seconds=time.process_time(),
+            alerts=tuple(self._newest_alerts),
+            values=self._values(),
         )
 
     def stop(self) -> ActorReport:
@@ -146,7 +157,9 @@ class StreamActor:
     def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401
         """Tell the people who watch."""
         header = Header(self.alerts.sent, self.clock.now(), self.name)
-        self.alerts.measure(Alert(header, kind, text, values), header, host_time_ns())
+        alert = Alert(header, kind, text, values)
+        self._newest_alerts.append(alert)
+        self.alerts.measure(alert, header, host_time_ns())
 
     def reads(self) -> list[str]:
         """Streams that this actor reads."""

@@ -92,5 +92,6 @@ class SensorActor(StreamActor):
         self._camera.close()
 
     def _values(self) -> dict[str, Any]:
-        opened = self._phase != "new"
-        return {"skipped": self._camera.skipped, "finished": self._camera.finished} if opened else {}
+        if self._phase == "new":
+            return {}
+        return {"skipped": self._camera.skipped, "finished": self._camera.finished}

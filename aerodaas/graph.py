@@ -116,6 +116,8 @@ class Graph:
         self.navigation: list[NavigationEdge] = []
         self.reader: Callable[[str], StreamReader[Any]] | None = None
         """Opens a live subscription by stream; set by the runtime while a mission runs."""
+        self.on_launch: list[Callable[[], None]] = []
+        """Called once the streams are live."""
 
     def add(self, node: Node) -> Node:
         """Add a node, giving it a fresh id where its own is taken by another."""

@@ -1,4 +1,4 @@
-"""The only file that knows iceoryx2: publish–subscribe and event services of one stream.
+"""The only file that knows iceoryx2: publish-subscribe and event services of one stream.
 
 Its Python API is young; the version is pinned in pyproject.toml. A publisher writes a message
 once into shared memory, a reader maps it without a copy, and a full reader loses its oldest
@@ -111,7 +111,8 @@ class SharedPublisher:
             self.refused += 1
             return
         address = sample.payload().data_ptr
-        encoded.write_into(memoryview((ctypes.c_uint8 * encoded.size).from_address(address)).cast("B"))
+        block = (ctypes.c_uint8 * encoded.size).from_address(address)
+        encoded.write_into(memoryview(block).cast("B"))
         sample.assume_init().send()
         self._notifier.notify()
 
