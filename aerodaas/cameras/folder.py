@@ -74,9 +74,8 @@ class FolderCamera:
             kinds = ", ".join(sorted(_KINDS))
             message = f"the folder {self._folder} holds no pictures; put {kinds} files there"
             raise SourceError(message)
-        first = next(
-            (image for path in self._files if (image := self._read(path)) is not None), None
-        )
+        pictures = (self._read(path) for path in self._files)
+        first = next((image for image in pictures if image is not None), None)
         if first is None:
             message = (
                 f"none of the {len(self._files)} pictures in {self._folder} can be read; "

@@ -145,8 +145,8 @@ class OnnxDetector(Analytics[Detections]):
         if self._session is None:
             message = f"{self.path}: call open() before the first frame"
             raise ModelError(message)
-        outputs: list[NDArray[np.floating]] = self._session.run(None, {self._input: buffer})
-        return outputs
+        outputs = self._session.run(None, {self._input: buffer})
+        return [np.asarray(output) for output in outputs]
 
     def _gather(
         self, frame: Frame, letterbox: Letterbox, outputs: Sequence[NDArray[np.float32]]
@@ -171,6 +171,7 @@ class OnnxDetector(Analytics[Detections]):
             points = np.concatenate([letterbox.restore(points[..., :2]), points[..., 2:]], axis=2)
         # Beyond the picture's edge nothing of a box may be left after clipping.
         inside = np.flatnonzero((boxes[:, 2:] > boxes[:, :2]).all(axis=1))
+        rows = zip(inside, boxes[inside].tolist(), strict=True)
         return [
             Detection(
                 (left, top, right, bottom),
@@ -178,9 +179,7 @@ class OnnxDetector(Analytics[Detections]):
                 min(1.0, float(found.scores[index])),
                 keypoints=None if points is None else points[index],
             )
-            for index, (left, top, right, bottom) in zip(
-                inside, boxes[inside].tolist(), strict=True
-            )
+            for index, (left, top, right, bottom) in rows
         ]
 
     def _count_invalid(self, count: int) -> None:

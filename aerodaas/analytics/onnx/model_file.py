@@ -21,7 +21,10 @@ from aerodaas.errors import ModelError
 
 __all__ = ["ModelFile", "Tensor", "read_model"]
 
-_FLOATS = {"tensor(float)": np.float32, "tensor(float16)": np.float16}
+_FLOATS: dict[str, type[np.float32 | np.float16]] = {
+    "tensor(float)": np.float32,
+    "tensor(float16)": np.float16,
+}
 _PICTURE_AXES = 4
 _COLOURS = 3
 _FALLBACK_SIZE = 640

@@ -11,7 +11,8 @@ __all__ = ["best_class", "corners"]
 def corners(centred: NDArray[np.float32]) -> NDArray[np.float32]:
     """Turn N x 4 boxes of centre u, v, width, height into left, top, right, bottom."""
     half = centred[:, 2:4] / 2
-    return np.hstack([centred[:, :2] - half, centred[:, :2] + half])
+    boxes = np.hstack([centred[:, :2] - half, centred[:, :2] + half])
+    return boxes.astype(np.float32, copy=False)
 
 
 def best_class(

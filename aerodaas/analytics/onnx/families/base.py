@@ -22,7 +22,6 @@ __all__ = [
     "Decoder",
     "ModelFamily",
     "Preprocessing",
-    "anchor_count",
     "keep_finite",
     "strides_for",
 ]
@@ -113,15 +112,9 @@ class ModelFamily(Protocol):
 _STRIDES = ((8, 16, 32), (8, 16, 32, 64), (4, 8, 16, 32), (16, 32))
 
 
-def anchor_count(size: tuple[int, int], strides: Sequence[int]) -> int:
-    """Cells of all feature maps for an input of `size` (height, width) pixels."""
-    height, width = size
-    return sum(-(-height // stride) * -(-width // stride) for stride in strides)
-
-
 def strides_for(size: tuple[int, int], count: int) -> tuple[int, ...] | None:
     """The strides whose feature maps have `count` cells in all; None if there are none."""
-    return next((s for s in _STRIDES if anchor_count(size, s) == count), None)
+    return next((s for s in _STRIDES if _anchor_count(size, s) == count), None)
 
 
 def keep_finite(candidates: Candidates) -> Candidates:
@@ -134,3 +127,9 @@ def keep_finite(candidates: Candidates) -> Candidates:
     kept = candidates.take(finite)
     invalid = candidates.invalid + int(np.count_nonzero(~finite))
     return Candidates(kept.boxes, kept.scores, kept.classes, kept.keypoints, invalid)
+
+
+def _anchor_count(size: tuple[int, int], strides: Sequence[int]) -> int:
+    """Cells of all feature maps for an input of `size` (height, width) pixels."""
+    height, width = size
+    return sum(-(-height // stride) * -(-width // stride) for stride in strides)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ __all__ = ["EndToEndDecoder", "end_to_end"]
 _AXES = 3
 _SCORE, _CLASS, _ROW = 4, 5, 6
 _MOST_DETECTIONS = 3000
+_PIXELS = Preprocessing()
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class EndToEndDecoder:
 
     classes: int
     keypoints: tuple[int, int] | None = None
-    family: ClassVar[str] = "Ultralytics end to end"
-    preprocessing: ClassVar[Preprocessing] = Preprocessing()
-    overlapping: ClassVar[bool] = False
+    family: str = "Ultralytics end to end"
+    preprocessing: Preprocessing = _PIXELS
+    overlapping: bool = False
 
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +27,7 @@ __all__ = ["UltralyticsDecoder", "keypoint_shape", "read_keypoints", "ultralytic
 
 _AXES = 3
 _BOX = 4
+_PIXELS = Preprocessing()
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,9 @@ class UltralyticsDecoder:
     classes: int
     keypoints: tuple[int, int] | None = None
     """Number of keypoints and of numbers for each."""
-    family: ClassVar[str] = "Ultralytics"
-    preprocessing: ClassVar[Preprocessing] = Preprocessing()
-    overlapping: ClassVar[bool] = True
+    family: str = "Ultralytics"
+    preprocessing: Preprocessing = _PIXELS
+    overlapping: bool = True
 
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +27,7 @@ __all__ = ["YoloV5Decoder", "yolov5"]
 
 _BOX = 4
 _BOXES_A_CELL = 3
+_PIXELS = Preprocessing()
 
 
 @dataclass(frozen=True)
@@ -35,9 +35,9 @@ class YoloV5Decoder:
     """Decodes [boxes, 5 + classes]."""
 
     classes: int
-    family: ClassVar[str] = "YOLOv5"
-    preprocessing: ClassVar[Preprocessing] = Preprocessing()
-    overlapping: ClassVar[bool] = True
+    family: str = "YOLOv5"
+    preprocessing: Preprocessing = _PIXELS
+    overlapping: bool = True
 
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float

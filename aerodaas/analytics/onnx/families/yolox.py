@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +29,7 @@ __all__ = ["YoloxDecoder", "yolox"]
 
 _BOX = 4
 _LARGEST_OFFSET = 8.0
+_PIXELS = Preprocessing(scale=1.0, rgb=False, centred=False)
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class YoloxDecoder:
     strides: tuple[int, ...] = (8, 16, 32)
     decoded: bool = False
     """Whether the export has applied grid and stride (`--decode_in_inference`)."""
-    family: ClassVar[str] = "YOLOX"
-    preprocessing: ClassVar[Preprocessing] = Preprocessing(scale=1.0, rgb=False, centred=False)
-    overlapping: ClassVar[bool] = True
+    family: str = "YOLOX"
+    preprocessing: Preprocessing = _PIXELS
+    overlapping: bool = True
 
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
@@ -85,4 +85,5 @@ def _cells(size: tuple[int, int], strides: tuple[int, ...]) -> NDArray[np.float3
         rows, columns = np.mgrid[: -(-height // stride), : -(-width // stride)]
         cells = np.stack([columns, rows, np.full_like(rows, stride)], axis=-1)
         maps.append(cells.reshape(-1, 3))
-    return np.concatenate(maps).astype(np.float32)
+    table: NDArray[np.float32] = np.concatenate(maps).astype(np.float32)
+    return table
