@@ -103,7 +103,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
             )
             raise GraphError(message)
         robot = data.graph.nodes[data.name].robot
-        node = self.node_in(data.graph, robot)
+        node = self._node_in(data.graph, robot)
         data.graph.connect(data, node, self.accepts)
         return AeroStreamData(data.graph, node.id, self.produces)
 
@@ -115,7 +115,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         if self._graph is None:
             message = f"{type(self).__name__}: call deploy(compute) before instantiate()"
             raise GraphError(message)
-        node = self.node_in(self._graph, None)
+        node = self._node_in(self._graph, None)
         node.kind = "external"
         return AeroStreamData(self._graph, node.id, self.produces)
 
