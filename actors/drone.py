@@ -13,10 +13,11 @@ from typing import Any
 
 from aerodaas.actors._barrier import ACKS, Barrier
 from aerodaas.actors._base import StreamActor
-from aerodaas.actors.pilot import Pilot, RobotSpec
+from aerodaas.actors.pilot import Pilot, RobotSpec, state_stream
 from aerodaas.actors.session import CONTROL_PERIOD_NS, Session, next_due
 from aerodaas.clock import NANOSECONDS, LockstepClock
 from aerodaas.navigation.commands import Answer, Command, ReturnHome, Start
+from aerodaas.navigation.safety import Neighbour
 from aerodaas.status import Message, MissionStatus
 from aerodaas.vehicle import VehicleState
 
@@ -60,15 +61,24 @@ class DroneActor(StreamActor):
     """Flies `robots`."""
 
     def __init__(
-        self, session: Session, name: str, robots: tuple[RobotSpec, ...], conduct: Conduct
+        self,
+        session: Session,
+        name: str,
+        robots: tuple[RobotSpec, ...],
+        conduct: Conduct,
+        neighbours: tuple[str, ...] = (),
     ) -> None:
-        """Belong to `session` as `name`; `conduct` matters in lockstep only."""
-        streams = [
-            stream for robot in robots for stream in (*robot.navigation, *robot.commands)
-        ]
-        depth = _COMMAND_DEPTH
-        super().__init__(session, name, dict.fromkeys([*streams, *conduct.readers], depth))
+        """Belong to `session` as `name`; `conduct` matters in lockstep only.
+
+        `neighbours` are the robots that other actors fly, to be kept away from.
+        """
+        streams = [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
+        depths = dict.fromkeys([*streams, *conduct.readers], _COMMAND_DEPTH)
+        depths.update(dict.fromkeys((state_stream(other) for other in neighbours), 1))
+        super().__init__(session, name, depths)
         self._conduct = conduct
+        self._whereabouts: dict[str, Neighbour] = {}
+        self._neighbours = {state_stream(other): other for other in neighbours}
         self._steering = {stream for robot in robots for stream in robot.navigation}
         self._specs = robots
         self._pilots: dict[str, Pilot] = {}
@@ -187,11 +197,18 @@ class DroneActor(StreamActor):
         for pilot in self._pilots.values():
             if not self.session.lockstep:
                 pilot.advance_to(now)
-            pilot.turn(now)
-            for alert in pilot.new_alerts():
+            others = [where for name, where in self._whereabouts.items() if name != pilot.id]
+            pilot.turn(now, others)
+            state = pilot.loop.state
+            if state is not None:
+                self._whereabouts[pilot.id] = _neighbour(state)
+            for alert in pilot.mission.take_alerts():
                 self.alert(alert.kind, alert.text, **alert.values)
 
     def _take(self, message: Message[Any], now: int) -> None:
+        if message.stream in self._neighbours and isinstance(message.item, VehicleState):
+            self._whereabouts[self._neighbours[message.stream]] = _neighbour(message.item)
+            return
         for pilot in self._pilots.values():
             pilot.take(message, now)
 
@@ -211,3 +228,6 @@ class DroneActor(StreamActor):
         for pilot in self._pilots.values():
             pilot.vehicle.close()
 
+
+def _neighbour(state: VehicleState) -> Neighbour:
+    return Neighbour(state.odometry.position, state.odometry.velocity)

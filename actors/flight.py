@@ -23,7 +23,7 @@ from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.navigation.commands import Answer, Command
-from aerodaas.recording import Provenance
+from aerodaas.recording.provenance import Provenance
 
 __all__ = ["Flight", "FlightState"]
 
@@ -76,7 +76,11 @@ class Flight:
         for specs in plan.drones:
             name = f"drone/{'+'.join(spec.robot.id for spec in specs)}"
             self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
-            self._create(name, DroneActor, edge, (session, name, specs, plan.conduct))
+            mine = {spec.robot.id for spec in specs}
+            others = tuple(
+                spec.robot.id for group in plan.drones for spec in group if spec.robot.id not in mine
+            )
+            self._create(name, DroneActor, edge, (session, name, specs, plan.conduct, others))
         for camera in plan.cameras:
             args = (session, camera.stream, camera.sensor, camera.state)
             self._create(f"sensor/{camera.stream}", SensorActor, edge, args, ends=camera.ends)

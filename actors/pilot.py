@@ -3,20 +3,27 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
 
 from aerodaas.actors.session import Session, is_due
 from aerodaas.actors.streams import Outlet
 from aerodaas.clock import host_time_ns
 from aerodaas.config import RobotConfig, SensorConfig
-from aerodaas.data import Alert, Header
+from aerodaas.data import Header
+from aerodaas.errors import MissionError
+from aerodaas.geometry import GeodeticOrigin
 from aerodaas.navigation.commands import Answer, Command, StreamItem
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
+from aerodaas.navigation.planner import BackgroundPlanner, InlinePlanner
+from aerodaas.navigation.safety import Neighbour, SetpointGuard
 from aerodaas.plugins import load_plugin
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
-from aerodaas.status import Message, MissionState, MissionStatus, SetpointRecord
+from aerodaas.status import Message, MissionStatus, SetpointRecord
 from aerodaas.vehicle import SteppedVehicle, Vehicle, VehicleState
 
 __all__ = ["Pilot", "RobotSpec", "sensor_item", "state_stream", "status_stream"]
@@ -66,23 +73,41 @@ class Pilot:
 
     def __init__(self, spec: RobotSpec, session: Session) -> None:
         """Build the vehicle and the mission; nothing is connected yet."""
-        environment = session.environment
         self.spec = spec
         self.id = spec.robot.id
-        plugin = load_plugin("drivers", spec.robot.driver)
-        self.vehicle: Vehicle = plugin(spec.robot, environment)
-        self.mission = Mission(spec.robot, spec.scheduler, environment.home)
-        self.loop = SetpointLoop(self.vehicle, self.mission)
         self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
         """Milliseconds from capture to the arrival of the command made from it."""
-        self._said = 0
+        self._session = session
+        plugin = load_plugin("drivers", spec.robot.driver)
+        self.vehicle: Vehicle = plugin(spec.robot, session.environment)
 
     def open(self, outlets: dict[str, Outlet]) -> None:
-        """Connect the vehicle; publish through `outlets`, by stream."""
+        """Connect the vehicle, build its mission; publish through `outlets`, by stream."""
         self._outlets = outlets
         self.vehicle.connect()
+        robot, environment = self.spec.robot, self._session.environment
+        takeoff = self.vehicle.read().odometry.position
+        home = environment.home
+        # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
+        plan_with = InlinePlanner if self._session.lockstep else BackgroundPlanner
+        self.mission = Mission(
+            robot,
+            plan_with(self.spec.scheduler),
+            takeoff=takeoff,
+            origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
+            wind=np.array(environment.simulation.wind, dtype=np.float64),
+        )
+        guard = SetpointGuard(
+            robot.limits,
+            takeoff,
+            position_setpoints=self.vehicle.capabilities.position_setpoints,
+        )
+        self.loop = SetpointLoop(self.vehicle, self.mission, guard)
         for command in self.spec.initial:
-            self.handle(command, 0)
+            answer = self.handle(command, 0)
+            if not answer.accepted or answer.refused:
+                reasons = [answer.text, *(f"{name}: {why}" for name, why in answer.refused.items())]
+                raise MissionError(f"{self.id}: {'; '.join(text for text in reasons if text)}")
 
     @staticmethod
     def streams(spec: RobotSpec) -> list[str]:
@@ -113,9 +138,9 @@ class Pilot:
         elif message.stream in self.spec.commands:
             self.handle(message.item, now)
 
-    def turn(self, now: int) -> SetpointRecord:
+    def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
         """One turn of the setpoint loop; publishes what was decided."""
-        record = self.loop.turn(now)
+        record = self.loop.turn(now, neighbours)
         self._publish(f"{self.id}/setpoints", record, now)
         self._publish(status_stream(self.id), self.mission.status, now)
         return record
@@ -136,13 +161,7 @@ class Pilot:
     @property
     def over(self) -> bool:
         """True once the mission has ended, on the ground or out of our hands."""
-        return self.mission.status.state in {MissionState.LANDED, MissionState.ABORTED}
-
-    def new_alerts(self) -> list[Alert]:
-        """What the mission has had to say since the last call."""
-        said = self.mission.alerts[self._said :]
-        self._said += len(said)
-        return list(said)
+        return self.mission.finished
 
     def _publish(self, stream: str, item: object, now: int) -> tuple[str, int]:
         outlet = self._outlets[stream]

@@ -10,7 +10,8 @@ from aerodaas.actors._base import StreamActor
 from aerodaas.actors.session import Session
 from aerodaas.clock import host_time_ns
 from aerodaas.errors import RecordingError
-from aerodaas.recording import FlightRecorder, Provenance
+from aerodaas.recording.provenance import Provenance
+from aerodaas.recording.recorder import FlightRecorder
 
 __all__ = ["RecorderActor"]
 
