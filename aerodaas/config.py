@@ -29,6 +29,7 @@ __all__ = [
     "SchedulersConfig",
     "SensorConfig",
     "SimulationConfig",
+    "validated",
 ]
 
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", max_length=64)]
@@ -255,12 +256,19 @@ class EnvironmentConfig(_Strict):
             message = f"cannot read the environment file {path}: {error.strerror}"
             raise ConfigError(message) from None
         try:
-            return cls.model_validate(json.loads(text))
+            content = json.loads(text)
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
             message = f"{path} is not JSON: {error}"
             raise ConfigError(message) from None
-        except ValidationError as error:
-            raise ConfigError(f"{path}: {_explain(error)}") from None
+        return validated(content, str(path))
+
+
+def validated(content: object, place: str) -> EnvironmentConfig:
+    """Check the content of an environment file; raises ConfigError that names `place`."""
+    try:
+        return EnvironmentConfig.model_validate(content)
+    except ValidationError as error:
+        raise ConfigError(f"{place}: {_explain(error)}") from None
 
 
 def _explain(error: ValidationError) -> str:

@@ -67,9 +67,12 @@ class StreamReader(Protocol[E_co]):
 
 @dataclass(frozen=True)
 class Trigger:
-    """Wakes `target` (a node's id, or a mission command by name) when a result satisfies `when`."""
+    """Wakes an analysis, or calls a robot's method, when a result satisfies `when`."""
 
     target: str
+    """Id of the node or of the robot."""
+    method: str | None = None
+    """Name of the robot's method; None for a node."""
     when: Callable[[Any], bool] | None = None
 
 
@@ -113,6 +116,8 @@ class Graph:
         self.navigation: list[NavigationEdge] = []
         self.reader: Callable[[str], StreamReader[Any]] | None = None
         """Opens a live subscription by stream; set by the runtime while a mission runs."""
+        self.on_launch: list[Callable[[], None]] = []
+        """Called once the streams are live."""
 
     def add(self, node: Node) -> Node:
         """Add a node, giving it a fresh id where its own is taken by another."""

@@ -100,7 +100,7 @@ class Decision:
 
 @dataclass(frozen=True, slots=True)
 class Hop:
-    """One actor's share in a message's way, on the host's monotonic clock in nanoseconds."""
+    """One actor's share in a message's way, in nanoseconds of `clock.host_time_ns`."""
 
     node: str
     received: int
@@ -119,7 +119,7 @@ class Message(Generic[E]):
     header: Header
     """The measurement that this was made from."""
     captured: int
-    """Host monotonic clock at that measurement's capture, nanoseconds."""
+    """`clock.host_time_ns` at that measurement's capture."""
     hops: tuple[Hop, ...]
     item: E | None
     """None: processed, with nothing to say."""

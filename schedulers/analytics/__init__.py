@@ -1,1 +1,30 @@
 """Analytics schedulers: which inference runs where, and when."""
+
+from __future__ import annotations
+
+from aerodaas.schedulers.analytics.base import (
+    AnalyticsScheduler,
+    Drop,
+    Profile,
+    Resources,
+    Result,
+    RunOnEdge,
+    SendToCloud,
+    Task,
+    WakeAt,
+)
+from aerodaas.schedulers.analytics.registry import REGISTERED, load_scheduler
+
+__all__ = [
+    "REGISTERED",
+    "AnalyticsScheduler",
+    "Drop",
+    "Profile",
+    "Resources",
+    "Result",
+    "RunOnEdge",
+    "SendToCloud",
+    "Task",
+    "WakeAt",
+    "load_scheduler",
+]

@@ -1,0 +1,41 @@
+"""Streams of a flight, read in the application's own process."""
+
+from __future__ import annotations
+
+import time
+import uuid
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+from aerodaas.actors.streams import Inbox
+
+__all__ = ["LiveReader"]
+
+_DEPTH = 4
+
+
+class LiveReader:
+    """Reads the items of one stream until the flight is over; keeps the newest few."""
+
+    def __init__(self, session: str, stream: str, over: Callable[[], bool]) -> None:
+        """Read `stream` of the run `session`; `over` tells when to stop waiting."""
+        self._inbox = Inbox(session, f"application/{uuid.uuid4().hex[:8]}", {stream: _DEPTH})
+        self._waiting: deque[Any] = deque()
+        self._over = over
+
+    def next(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
+        """Return the next item that says something.
+
+        Raises TimeoutError after `timeout` seconds, StopIteration once the flight is over.
+        """
+        until = time.monotonic() + (float("inf") if timeout is None else timeout)
+        while not self._waiting:
+            for message in self._inbox.receive(min(0.2, max(0.0, until - time.monotonic()))):
+                if message.item is not None:
+                    self._waiting.append(message.item)
+            if not self._waiting and self._over():
+                raise StopIteration
+            if not self._waiting and time.monotonic() >= until:
+                raise TimeoutError(f"nothing arrived within {timeout} s")
+        return self._waiting.popleft()

@@ -1,0 +1,169 @@
+"""One drone inside its actor: vehicle, mission and setpoint loop, and the streams they feed."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from aerodaas.actors.session import Session, is_due
+from aerodaas.actors.streams import Outlet
+from aerodaas.clock import host_time_ns
+from aerodaas.config import RobotConfig, SensorConfig
+from aerodaas.data import Header
+from aerodaas.errors import MissionError
+from aerodaas.geometry import GeodeticOrigin
+from aerodaas.navigation.commands import Answer, Command, StreamItem
+from aerodaas.navigation.loop import SetpointLoop
+from aerodaas.navigation.mission import Mission
+from aerodaas.navigation.planner import BackgroundPlanner, InlinePlanner
+from aerodaas.navigation.safety import Neighbour, SetpointGuard
+from aerodaas.plugins import load_plugin
+from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
+from aerodaas.status import Message, MissionStatus, SetpointRecord
+from aerodaas.vehicle import SteppedVehicle, Vehicle, VehicleState
+
+__all__ = ["Pilot", "RobotSpec", "sensor_item", "state_stream", "status_stream"]
+
+_LATENCIES_KEPT = 100_000
+
+
+def state_stream(robot: str) -> str:
+    """Name of the stream of a robot's vehicle states."""
+    return f"{robot}/state"
+
+
+def status_stream(robot: str) -> str:
+    """Name of the stream of a robot's mission status."""
+    return f"{robot}/status"
+
+
+def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
+    """What a sensor that reads the vehicle itself yields; None where the vehicle cannot tell."""
+    readings: dict[str, object] = {
+        "odometry": state.odometry,
+        "gps": state.gps,
+        "battery": state.battery,
+        "status": status,
+    }
+    return readings[sensor.type]
+
+
+@dataclass(frozen=True)
+class RobotSpec:
+    """One robot as its actor gets it."""
+
+    robot: RobotConfig
+    sensors: tuple[SensorConfig, ...]
+    """The vehicle's own sensors (no cameras) that somebody reads."""
+    navigation: tuple[str, ...]
+    """Streams that feed its mission."""
+    commands: tuple[str, ...]
+    """Streams that carry commands from triggers and cameras."""
+    initial: tuple[Command, ...]
+    """Navigation known before take-off."""
+    scheduler: TrajectoryScheduler
+
+
+class Pilot:
+    """Flies one robot; driven by the drone's actor."""
+
+    def __init__(self, spec: RobotSpec, session: Session) -> None:
+        """Build the vehicle and the mission; nothing is connected yet."""
+        self.spec = spec
+        self.id = spec.robot.id
+        self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
+        """Milliseconds from capture to the arrival of the command made from it."""
+        self._session = session
+        plugin = load_plugin("drivers", spec.robot.driver)
+        self.vehicle: Vehicle = plugin(spec.robot, session.environment)
+
+    def open(self, outlets: dict[str, Outlet]) -> None:
+        """Connect the vehicle, build its mission; publish through `outlets`, by stream."""
+        self._outlets = outlets
+        self.vehicle.connect()
+        robot, environment = self.spec.robot, self._session.environment
+        takeoff = self.vehicle.read().odometry.position
+        home = environment.home
+        # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
+        plan_with = InlinePlanner if self._session.lockstep else BackgroundPlanner
+        self.mission = Mission(
+            robot,
+            plan_with(self.spec.scheduler),
+            takeoff=takeoff,
+            origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
+            wind=np.array(environment.simulation.wind, dtype=np.float64),
+        )
+        guard = SetpointGuard(
+            robot.limits,
+            takeoff,
+            position_setpoints=self.vehicle.capabilities.position_setpoints,
+        )
+        self.loop = SetpointLoop(self.vehicle, self.mission, guard)
+        for command in self.spec.initial:
+            answer = self.handle(command, 0)
+            if not answer.accepted or answer.refused:
+                reasons = [answer.text, *(f"{name}: {why}" for name, why in answer.refused.items())]
+                raise MissionError(f"{self.id}: {'; '.join(text for text in reasons if text)}")
+
+    @staticmethod
+    def streams(spec: RobotSpec) -> list[str]:
+        """Streams that a pilot of this robot publishes."""
+        own = [state_stream(spec.robot.id), status_stream(spec.robot.id)]
+        return [
+            *own,
+            f"{spec.robot.id}/setpoints",
+            *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
+        ]
+
+    def advance_to(self, stamp: int) -> None:
+        """Move a simulated vehicle's time on."""
+        if isinstance(self.vehicle, SteppedVehicle):
+            self.vehicle.advance_to(stamp)
+
+    def handle(self, command: Command, now: int) -> Answer:
+        """Pass a command on to the mission."""
+        return self.mission.handle(command, now)
+
+    def take(self, message: Message[Any], now: int) -> None:
+        """Pass on what came by stream: navigation, or a command of a trigger."""
+        if message.item is None:
+            return
+        if message.stream in self.spec.navigation:
+            self.latencies.append((host_time_ns() - message.captured) / 1e6)
+            self.handle(StreamItem(message.stream, message.item, message.header), now)
+        elif message.stream in self.spec.commands:
+            self.handle(message.item, now)
+
+    def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
+        """One turn of the setpoint loop; publishes what was decided."""
+        record = self.loop.turn(now, neighbours)
+        self._publish(f"{self.id}/setpoints", record, now)
+        self._publish(status_stream(self.id), self.mission.status, now)
+        return record
+
+    def observe(self, now: int, *, all_sensors: bool) -> list[tuple[str, int]]:
+        """Publish the vehicle's state and its sensors' readings; returns (stream, stamp) of each.
+
+        Without `all_sensors`, only those that are due at exactly `now`.
+        """
+        state = self.vehicle.read()
+        published = [self._publish(state_stream(self.id), state, now)]
+        for sensor in self.spec.sensors:
+            if all_sensors or is_due(sensor.rate, now):
+                item = sensor_item(sensor, state, self.mission.status)
+                published.append(self._publish(f"{self.id}/{sensor.id}", item, now))
+        return published
+
+    @property
+    def over(self) -> bool:
+        """True once the mission has ended, on the ground or out of our hands."""
+        return self.mission.finished
+
+    def _publish(self, stream: str, item: object, now: int) -> tuple[str, int]:
+        outlet = self._outlets[stream]
+        outlet.measure(item, Header(outlet.sent, now, stream), host_time_ns())
+        return stream, now

@@ -1,0 +1,246 @@
+"""From an application's graph to the actors that will run it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from aerodaas.actors._barrier import ACKS, paths
+from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
+from aerodaas.actors.cluster import Place
+from aerodaas.actors.drone import Conduct
+from aerodaas.actors.pilot import Pilot, RobotSpec, state_stream
+from aerodaas.actors.session import Session
+from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig
+from aerodaas.data import Frame
+from aerodaas.errors import GraphError
+from aerodaas.graph import Graph, NavigationEdge, Node
+from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
+from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
+
+__all__ = ["Analyses", "Cameras", "FlightPlan", "make_plan"]
+
+_CAMERA_WINDOW = 4
+_STATE_WINDOW = 16
+_COMMANDS: dict[str, Command] = {
+    "end_mission": End("an analysis asked to land"),
+    "pause_mission": Pause(),
+    "resume_mission": Resume(),
+}
+
+
+@dataclass(frozen=True)
+class Cameras:
+    """One camera's actor."""
+
+    stream: str
+    sensor: SensorConfig
+    state: str
+    ends: bool
+
+
+@dataclass(frozen=True)
+class Analyses:
+    """One analytics actor."""
+
+    name: str
+    place: Place
+    nodes: tuple[NodeSpec, ...]
+
+
+@dataclass(frozen=True)
+class FlightPlan:
+    """All actors of a run, before they are placed."""
+
+    session: Session
+    drones: tuple[tuple[RobotSpec, ...], ...]
+    """One actor for each group."""
+    cameras: tuple[Cameras, ...]
+    analyses: tuple[Analyses, ...]
+    conduct: Conduct
+    recorded: tuple[str, ...]
+    """Streams for the recorder; empty for no recording."""
+
+
+class _Planner:
+    """Reads one graph; each method answers one question about it."""
+
+    def __init__(
+        self,
+        session: Session,
+        graph: Graph,
+        compute: list[ComputeConfig],
+        scheduler: TrajectoryScheduler,
+    ) -> None:
+        self.session = session
+        self.graph = graph
+        self.scheduler = scheduler
+        self.compute = {resource.id: resource for resource in compute}
+        named = {edge.robot for edge in graph.navigation}
+        self.robots = [r for r in session.environment.robots if r.id in named]
+        self.recorded = session.environment.recording.enabled
+        self._add_cameras()
+        self.steering = {name for edge in graph.navigation for name in _streams_of(edge)}
+
+    def _add_cameras(self) -> None:
+        """Cameras that the application does not read run all the same: they are recorded."""
+        for robot in self.robots if self.recorded else ():
+            for sensor in robot.sensors:
+                stream = f"{robot.id}/{sensor.id}"
+                if sensor.type == "camera" and stream not in self.graph.nodes:
+                    self.graph.add(Node(stream, "sensor", Frame, sensor, robot.id))
+
+    def sensors(self) -> list[Node]:
+        return [node for node in self.graph.nodes.values() if node.kind == "sensor"]
+
+    def analyses(self) -> list[Node]:
+        return [node for node in self.graph.nodes.values() if node.kind != "sensor"]
+
+    def state_of(self, node: Node) -> str:
+        return state_stream(node.robot or self.robots[0].id)
+
+    def reaches_a_drone(self, stream: str) -> bool:
+        """Tell whether what `stream` carries can change what a drone does."""
+        if stream in self.steering:
+            return True
+        return any(
+            any(trigger.method for trigger in node.triggers) or self.reaches_a_drone(node.id)
+            for node in self.graph.downstream(stream)
+        )
+
+    def acknowledgements(self, stream: str) -> int:
+        return paths(self.graph, stream, self.steering, recorded=self.recorded)
+
+    def cameras(self) -> tuple[Cameras, ...]:
+        return tuple(
+            Cameras(node.id, node.work, self.state_of(node), self.reaches_a_drone(node.id))
+            for node in self.sensors()
+            if node.work.type == "camera"
+        )
+
+    def node_spec(self, node: Node) -> NodeSpec:
+        triggers = tuple(
+            TriggerSpec(
+                _trigger_stream(trigger.target, node),
+                _COMMANDS[trigger.method] if trigger.method else Wake(),
+                trigger.when,
+            )
+            for trigger in node.triggers
+        )
+        wakers = [n for n in self.analyses() if any(t.target == node.id for t in n.triggers)]
+        return NodeSpec(
+            stream=node.id,
+            work=node.work,
+            inputs=tuple(node.inputs),
+            state=self.state_of(node),
+            external=node.kind == "external",
+            dormant=node.dormant,
+            triggers=triggers,
+            acknowledges=self.acknowledgements(node.id) == 0,
+            wakes=tuple(_trigger_stream(node.id, waker) for waker in wakers),
+        )
+
+    def place_of(self, node: Node) -> Place:
+        if node.compute is None:
+            return Place()
+        resource = self.compute[node.compute]
+        return Place(resource.kind, resource.node)
+
+    def analyses_by_actor(self) -> tuple[Analyses, ...]:
+        shared: dict[Place, list[NodeSpec]] = {}
+        actors = []
+        for node in self.analyses():
+            if node.work.isolated:
+                name = f"analytics/{node.id}"
+                actors.append(Analyses(name, self.place_of(node), (self.node_spec(node),)))
+            else:
+                shared.setdefault(self.place_of(node), []).append(self.node_spec(node))
+        for place, nodes in shared.items():
+            name = f"analytics/{place.node or place.kind}"
+            actors.append(Analyses(name, place, tuple(nodes)))
+        return tuple(actors)
+
+    def robot_spec(self, robot: RobotConfig) -> RobotSpec:
+        edges = [edge for edge in self.graph.navigation if edge.robot == robot.id]
+        mine = [node for node in self.sensors() if node.robot == robot.id]
+        commanding = [f"{camera.stream}/commands" for camera in self.cameras() if camera.ends]
+        commanding += [
+            _trigger_stream(robot.id, node)
+            for node in self.analyses()
+            if any(trigger.target == robot.id for trigger in node.triggers)
+        ]
+        return RobotSpec(
+            robot=robot,
+            sensors=tuple(node.work for node in mine if node.work.type != "camera"),
+            navigation=tuple(dict.fromkeys(n for edge in edges for n in _streams_of(edge))),
+            commands=tuple(commanding),
+            initial=tuple(initial_commands(edges)),
+            scheduler=self.scheduler,
+        )
+
+    def conduct(self, specs: tuple[RobotSpec, ...], cameras: tuple[Cameras, ...]) -> Conduct:
+        rates = {camera.stream: camera.sensor.rate for camera in cameras}
+        for node in self.analyses():
+            if node.kind == "external":
+                rates[node.id] = node.work.rate
+        own = [
+            stream
+            for spec in specs
+            for stream in (
+                state_stream(spec.robot.id),
+                *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
+            )
+        ]
+        windows = {
+            source: 0 if self.reaches_a_drone(source) else size
+            for size, sources in ((_CAMERA_WINDOW, list(rates)), (_STATE_WINDOW, own))
+            for source in sources
+        }
+        readers = [
+            f"{ACKS}/{node.id}" for node in self.analyses() if not self.acknowledgements(node.id)
+        ]
+        if self.recorded:
+            readers.append(f"{ACKS}/recorder")
+        return Conduct(
+            rates=rates,
+            acknowledgements={source: self.acknowledgements(source) for source in windows},
+            windows=windows,
+            readers=tuple(readers),
+        )
+
+
+def make_plan(
+    session: Session, graph: Graph, compute: list[ComputeConfig], scheduler: TrajectoryScheduler
+) -> FlightPlan:
+    """Decide which actors a graph becomes; raises GraphError if nothing flies."""
+    planner = _Planner(session, graph, compute, scheduler)
+    if not planner.robots:
+        raise GraphError("no robot navigates: call drone.navigate(…) before start_mission()")
+    specs = tuple(planner.robot_spec(robot) for robot in planner.robots)
+    cameras = planner.cameras()
+    analyses = planner.analyses_by_actor()
+    streams = [stream for spec in specs for stream in Pilot.streams(spec)]
+    streams += [camera.stream for camera in cameras]
+    streams += [node.stream for actor in analyses for node in actor.nodes]
+    drones = (specs,) if session.lockstep else tuple((spec,) for spec in specs)
+    names = [f"drone/{'+'.join(spec.robot.id for spec in group)}" for group in drones]
+    names += [f"sensor/{camera.stream}" for camera in cameras]
+    names += [actor.name for actor in analyses]
+    return FlightPlan(
+        session=session,
+        drones=drones,
+        cameras=cameras,
+        analyses=analyses,
+        conduct=planner.conduct(specs, cameras) if session.lockstep else Conduct(),
+        recorded=(*streams, *(f"alerts/{name}" for name in names)) if planner.recorded else (),
+    )
+
+
+def _streams_of(edge: NavigationEdge) -> list[str]:
+    names = [edge.navigation.stream.name] if edge.navigation.stream is not None else []
+    return [*names, edge.clear_on] if edge.clear_on else names
+
+
+def _trigger_stream(target: str, source: Node) -> str:
+    return f"{target}/commands/{source.id}"
+
+

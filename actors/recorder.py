@@ -1,0 +1,68 @@
+"""The recorder's actor: writes every stream of the run to an MCAP file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from aerodaas.actors._barrier import ACKS
+from aerodaas.actors._base import StreamActor
+from aerodaas.actors.session import Session
+from aerodaas.clock import host_time_ns
+from aerodaas.errors import RecordingError
+from aerodaas.recording.provenance import Provenance
+from aerodaas.recording.recorder import FlightRecorder
+
+__all__ = ["RecorderActor"]
+
+_DEPTH = 64
+"""Messages of each stream that may wait; more are dropped and counted, the flight never waits."""
+
+
+class RecorderActor(StreamActor):
+    """Reads all `streams` and writes them; on a full disk it stops writing, not the flight."""
+
+    def __init__(
+        self, session: Session, path: Path, streams: tuple[str, ...], provenance: Provenance
+    ) -> None:
+        """Write the recording at `path`."""
+        super().__init__(session, "recorder", dict.fromkeys(streams, _DEPTH))
+        self._path = path
+        self._provenance = provenance
+        self._failure = ""
+
+    def _open(self) -> None:
+        self._recorder = FlightRecorder(
+            self._path, config=self.session.environment.recording, provenance=self._provenance
+        )
+        self._acks = self.outlet(f"{ACKS}/recorder") if self.session.lockstep else None
+
+    def _run(self) -> None:
+        assert self.inbox is not None  # noqa: S101 - prepare came first
+        while True:
+            messages = self.inbox.receive(0.2)
+            for message in messages:
+                if not self._failure:
+                    self._write(message)
+            if self._acks is not None and messages:
+                done = tuple((one.header.source, one.header.stamp) for one in messages)
+                self._acks.derive(done, messages[-1], host_time_ns(), messages[-1].stamp)
+            if self.stopping and not messages:
+                return
+
+    def _write(self, message: Any) -> None:  # noqa: ANN401 - any message
+        try:
+            self._recorder.write(message)
+        except RecordingError as error:
+            self._failure = str(error)
+            self.alert("recording_stopped", self._failure)
+
+    def _close(self) -> None:
+        assert self.inbox is not None  # noqa: S101 - prepare came first
+        for stream, dropped in self.inbox.dropped.items():
+            if dropped:
+                self._recorder.drops(stream, dropped)
+        self._summary = self._recorder.close()
+
+    def _values(self) -> dict[str, Any]:
+        return {"path": str(self._path), "failure": self._failure}

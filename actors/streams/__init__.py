@@ -1,0 +1,11 @@
+"""Streams between actors: keep-latest, counted drops, one behaviour over two transports.
+
+Between actors of one node a message travels in shared memory (`_shared.py`, iceoryx2); to
+another node as a Ray ObjectRef (`_remote.py`). Placement decides; nobody else sees which.
+"""
+
+from aerodaas.actors.streams._inbox import Inbox
+from aerodaas.actors.streams._outlet import Outlet, RemoteReader
+from aerodaas.actors.streams._shared import shared_memory_available
+
+__all__ = ["Inbox", "Outlet", "RemoteReader", "shared_memory_available"]

@@ -1,0 +1,100 @@
+"""What the published schedulers share: an ordered queue before the serial edge executor."""
+
+from __future__ import annotations
+
+from bisect import bisect_right, insort_right
+from collections.abc import Iterable, Mapping
+
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    AnalyticsScheduler,
+    Decision,
+    Drop,
+    Result,
+    RunOnEdge,
+    SendToCloud,
+    Task,
+)
+
+__all__ = ["EdgeQueue"]
+
+
+class EdgeQueue(AnalyticsScheduler):
+    """Tasks ordered by `key`, each start checked just in time against its expected time.
+
+    Ties keep the order of arrival. By itself it admits everything (edge only).
+    """
+
+    def __init__(self) -> None:
+        self.queue: list[Task] = []
+        self.free_at = 0
+        """When the running task is expected to end."""
+
+    def key(self, task: Task) -> float:
+        """Order of the queue, the smallest first."""
+        return task.deadline
+
+    def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:  # noqa: ARG002
+        """Queue the task."""
+        insort_right(self.queue, task, key=self.key)
+        return ()
+
+    def executor_idle(self, now: int) -> Iterable[Decision]:
+        """Start the first task that fits in its slack; drop those before it."""
+        queue = self.queue
+        decisions: list[Decision] = []
+        while queue:
+            task = queue.pop(0)
+            if now + task.profile.edge_time <= self.due(task):
+                decisions.append(self.run(task, now))
+                break
+            decisions.append(self.drop(task, now, "no time left on the edge"))
+        return decisions
+
+    def run(self, task: Task, now: int, reason: str = "first in the edge queue") -> RunOnEdge:
+        """Start `task`, expected to take its profile's time."""
+        self.free_at = now + task.profile.edge_time
+        return RunOnEdge(task, reason)
+
+    def drop(self, task: Task, now: int, reason: str) -> Drop:  # noqa: ARG002 - for overriding
+        """Give `task` up; the one place that GEMS and DEMS-A watch."""
+        return Drop(task, reason)
+
+    def due(self, task: Task) -> int:
+        """The deadline that starts are checked against."""
+        return task.deadline
+
+    def cloud_time(self, task: Task) -> int:
+        """Expected time of `task` in the cloud."""
+        return task.profile.cloud_time
+
+    def send(self, task: Task, reason: str) -> SendToCloud:
+        """Send `task` to the cloud, where it starts only while its expected time fits."""
+        return SendToCloud(task, reason, self.due(task) - self.cloud_time(task))
+
+    def to_cloud(
+        self, task: Task, now: int, reason: str = "no room on the edge"
+    ) -> Iterable[Decision]:
+        """The cloud path: the cloud if it pays and fits in the slack, else drop."""
+        if task.profile.cloud_gain <= 0:
+            return [self.drop(task, now, "the cloud costs more than the result is worth")]
+        if not self.resources.cloud_slots or now + self.cloud_time(task) > task.deadline:
+            return [self.drop(task, now, "no time left for the cloud")]
+        return [self.send(task, reason)]
+
+    def slot(self, task: Task, now: int) -> tuple[int, int]:
+        """Place of a newcomer in the queue, and when it would finish there."""
+        place = bisect_right(self.queue, self.key(task), key=self.key)
+        ahead = sum(other.profile.edge_time for other in self.queue[:place])
+        return place, max(self.free_at, now) + ahead + task.profile.edge_time
+
+    def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
+        """The edge is free as soon as its task is back."""
+        if result.started + result.task.profile.edge_time == self.free_at:
+            self.free_at = now
+        return ()
+
+    def observe(self) -> Mapping[str, float]:
+        """Length of the queue and the work in it."""
+        work = sum(task.profile.edge_time for task in self.queue)
+        return {"edge queue": len(self.queue), "edge queue (ms)": work / MILLISECOND}

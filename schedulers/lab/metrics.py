@@ -1,0 +1,126 @@
+"""What a run is judged by: completion, utility, quality of experience, use, cost."""
+
+from __future__ import annotations
+
+import math
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
+from statistics import fmean, stdev
+
+from aerodaas.schedulers.analytics.base import MIGRATED, STOLEN, Outcome, Place, Task
+from aerodaas.schedulers.lab.simulator import Trace
+
+__all__ = ["Mean", "Score", "mean_of", "score"]
+
+
+@dataclass(slots=True)
+class Score:
+    """Sums over the tasks of one or more edges; add them up with `+`."""
+
+    tasks: int = 0
+    done: int = 0
+    late: int = 0
+    """Finished too late, timed out or failed."""
+    dropped: int = 0
+    """Never started, undecided ones included."""
+    migrated: int = 0
+    stolen: int = 0
+    on_edge: int = 0
+    """Executions begun on the edge."""
+    in_cloud: int = 0
+    qos: float = 0.0
+    """Sum of the results' utilities."""
+    qoe: float = 0.0
+    """Bonuses of the windows that reached their share."""
+    cost: float = 0.0
+    edge_busy: int = 0
+    """Nanoseconds of execution on the edge."""
+    cloud_busy: int = 0
+    undecided: int = 0
+    done_by_model: dict[str, int] = field(default_factory=dict)
+    tasks_by_model: dict[str, int] = field(default_factory=dict)
+
+    def __add__(self, other: Score) -> Score:
+        """Pool two scores."""
+        total = Score()
+        for item in fields(Score):
+            mine, theirs = getattr(self, item.name), getattr(other, item.name)
+            if isinstance(mine, dict):
+                both = {key: mine.get(key, 0) + theirs.get(key, 0) for key in {**mine, **theirs}}
+                setattr(total, item.name, both)
+            else:
+                setattr(total, item.name, mine + theirs)
+        return total
+
+    @property
+    def completion(self) -> float:
+        """Share of the tasks that finished in time, 0 to 1."""
+        return self.done / self.tasks if self.tasks else 1.0
+
+
+def score(tasks: Sequence[Task], trace: Trace) -> Score:
+    """Judge one edge's run; a task counts in the QoE window in which it arrived."""
+    total = Score(tasks=len(tasks), undecided=len(trace.undecided))
+    windows: defaultdict[tuple[str, int], list[int]] = defaultdict(lambda: [0, 0])
+    for task in tasks:
+        profile = task.profile
+        total.tasks_by_model[profile.model] = total.tasks_by_model.get(profile.model, 0) + 1
+        if profile.qoe is not None:
+            windows[profile.model, task.arrival // profile.qoe.window][1] += 1
+    for result in trace.results:
+        profile = result.task.profile
+        taken = result.finished - result.started
+        if result.place is Place.EDGE:
+            total.on_edge += 1
+            total.edge_busy += taken
+            total.cost += profile.edge_cost
+        elif result.place is Place.CLOUD:
+            total.in_cloud += 1
+            total.cloud_busy += taken
+            total.cost += profile.cloud_cost
+        total.qos += result.utility
+        if result.outcome is Outcome.DONE:
+            total.done += 1
+            total.done_by_model[profile.model] = total.done_by_model.get(profile.model, 0) + 1
+            if profile.qoe is not None:
+                windows[profile.model, result.task.arrival // profile.qoe.window][0] += 1
+        elif result.place is not Place.NOWHERE:
+            total.late += 1
+    total.dropped = total.tasks - total.done - total.late
+    goals = {task.profile.model: task.profile.qoe for task in tasks if task.profile.qoe}
+    for (model, _), (done, arrived) in windows.items():
+        goal = goals[model]
+        if done >= goal.share * arrived:
+            total.qoe += goal.bonus
+    total.migrated = trace.reasons[MIGRATED]
+    total.stolen = trace.reasons[STOLEN]
+    return total
+
+
+@dataclass(frozen=True, slots=True)
+class Mean:
+    """A mean over seeds and the half width of its 95 % confidence interval (Student's t)."""
+
+    value: float
+    margin: float
+
+    def __str__(self) -> str:
+        """Mean and half width."""
+        return f"{self.value:.4g} ± {self.margin:.2g}"
+
+
+# Two-sided 95 % quantiles of Student's t for 1 to 30 degrees of freedom.
+_T = (
+    *(12.706, 4.303, 3.182, 2.776, 2.571, 2.447, 2.365, 2.306, 2.262, 2.228),
+    *(2.201, 2.179, 2.160, 2.145, 2.131, 2.120, 2.110, 2.101, 2.093, 2.086),
+    *(2.080, 2.074, 2.069, 2.064, 2.060, 2.056, 2.052, 2.048, 2.045, 2.042),
+)
+
+
+def mean_of(values: Sequence[float]) -> Mean:
+    """Mean and confidence interval; the interval of a single value is unknown (nan)."""
+    if len(values) == 1:
+        return Mean(values[0], math.nan)
+    quantile = _T[len(values) - 2] if len(values) - 2 < len(_T) else 1.96
+    return Mean(fmean(values), quantile * stdev(values) / math.sqrt(len(values)))

@@ -1,0 +1,160 @@
+"""Networks between edge and cloud: added latency, a bandwidth trace, outages."""
+
+from __future__ import annotations
+
+import csv
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError, UnknownIdError
+from aerodaas.schedulers.analytics.base import MILLISECOND
+
+__all__ = ["Network"]
+
+Curve = tuple[tuple[int, float], ...]
+"""Points (nanoseconds, value), stamps ascending."""
+
+
+@dataclass(frozen=True, slots=True)
+class Network:
+    """What the way to the cloud does to a task's nominal time there.
+
+    `latency` is in nanoseconds, linear between its points. `bandwidth` is in bytes per second, a
+    step function: the time to send `upload` bytes from the start on replaces that at `nominal`
+    bandwidth, which the nominal cloud time contains. An execution that overlaps an outage is
+    lost. The earliest end over all starts is found at the start or at the end of an outage.
+    """
+
+    name: str = "steady"
+    latency: Curve = ()
+    outages: tuple[tuple[int, int], ...] = ()
+    bandwidth: Curve = ()
+    upload: int = 40_000
+    """Bytes of a one-second segment; about 40 kB in the published setup's 25 fps clips."""
+    nominal: float = 1_250_000.0
+    """10 Mbit/s."""
+
+    @classmethod
+    def named(cls, wanted: str, duration: int) -> Network:
+        """Make a network from its name; several joined by `+` act together.
+
+        `steady`; `trapezium` or `trapezium:MS` (rises from 0 to +400 ms over the second fifth of
+        the duration, falls back over the fourth); `outage` (10 % of the duration from 30 % on
+        and 5 % from 70 % on) or `outage:30-45,80-81` (seconds); `trace:FILE` (CSV of seconds and
+        Mbit/s). Raises UnknownIdError or SchedulerError.
+        """
+        network = cls(wanted)
+        for part in wanted.split("+"):
+            kind, _, setting = part.partition(":")
+            latency, outages, bandwidth = network.latency, network.outages, network.bandwidth
+            if kind == "trapezium":
+                latency = _trapezium(_number(setting or "400", wanted), duration)
+            elif kind == "outage":
+                outages = _outages(setting, duration, wanted)
+            elif kind == "trace" and setting:
+                bandwidth = _trace(Path(setting))
+            elif kind != "steady":
+                known = ["steady", "trapezium[:MS]", "outage[:FROM-TO,...]", "trace:FILE"]
+                raise UnknownIdError("network", wanted, known)
+            network = cls(wanted, latency, outages, bandwidth)
+        return network
+
+    def cloud_time(self, nominal: int, start: int) -> int | None:
+        """Time of an execution begun at `start`, nanoseconds; None if it is lost."""
+        taken = nominal
+        if self.latency:
+            taken += int(_linear(self.latency, start))
+        if self.bandwidth:
+            taken += self._transfer(start) - int(self.upload / self.nominal * NANOSECONDS)
+            taken = max(taken, 1)
+        for begin, end in self.outages:
+            if start < end and start + taken > begin:
+                return None
+        return taken
+
+    def earliest_end(self, nominal: int, start: int) -> int | None:
+        """Earliest end of an execution begun at `start` or later; None if there is none."""
+        ends = [
+            begin + taken
+            for begin in (start, *(end for _, end in self.outages if end > start))
+            if (taken := self.cloud_time(nominal, begin)) is not None
+        ]
+        return min(ends, default=None)
+
+    def _transfer(self, start: int) -> int:
+        left = float(self.upload)
+        stamps = [stamp for stamp, _ in self.bandwidth]
+        index = max(bisect_right(stamps, start) - 1, 0)
+        now = start
+        while index + 1 < len(stamps):
+            room = (stamps[index + 1] - now) / NANOSECONDS * self.bandwidth[index][1]
+            if room >= left:
+                break
+            left -= room
+            index += 1
+            now = stamps[index]
+        return now - start + int(left / self.bandwidth[index][1] * NANOSECONDS)
+
+
+def _linear(curve: Curve, at: int) -> float:
+    if at <= curve[0][0]:
+        return curve[0][1]
+    for (left, low), (right, high) in zip(curve, curve[1:], strict=False):
+        if at < right:
+            return low + (high - low) * (at - left) / (right - left)
+    return curve[-1][1]
+
+
+def _trapezium(peak: float, duration: int) -> Curve:
+    fifth = duration // 5
+    return tuple(
+        (fifth * corner, height * MILLISECOND)
+        for corner, height in ((1, 0.0), (2, peak), (3, peak), (4, 0.0))
+    )
+
+
+def _outages(setting: str, duration: int, wanted: str) -> tuple[tuple[int, int], ...]:
+    if not setting:
+        tenth = duration // 10
+        return ((3 * tenth, 4 * tenth), (7 * tenth, 7 * tenth + tenth // 2))
+    spans = []
+    for span in setting.split(","):
+        begin, _, end = span.partition("-")
+        spans.append(
+            (int(_number(begin, wanted) * NANOSECONDS), int(_number(end, wanted) * NANOSECONDS))
+        )
+        if spans[-1][0] >= spans[-1][1]:
+            raise SchedulerError(f"network {wanted!r}: the outage {span!r} ends before it begins")
+    return tuple(spans)
+
+
+def _trace(path: Path) -> Curve:
+    try:
+        with path.open(newline="", encoding="utf-8") as file:
+            rows: Sequence[list[str]] = [row for row in csv.reader(file) if row]
+    except OSError as error:
+        raise SchedulerError(f"cannot read the bandwidth trace {path}: {error.strerror}") from None
+    name = f"trace:{path}"
+    if rows and not rows[0][0].strip().replace(".", "").isdigit():
+        rows = rows[1:]
+    try:
+        points = tuple(
+            (int(_number(row[0], name) * NANOSECONDS), _number(row[1], name) * 125_000)
+            for row in rows
+        )
+    except IndexError:
+        raise SchedulerError(f"{path}: each line holds seconds and Mbit/s") from None
+    stamps = [stamp for stamp, _ in points]
+    if not points or stamps != sorted(set(stamps)) or min(rate for _, rate in points) <= 0:
+        raise SchedulerError(f"{path}: seconds must ascend and each Mbit/s be positive")
+    return points
+
+
+def _number(text: str, wanted: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise SchedulerError(f"network {wanted!r}: {text!r} is no number") from None

@@ -1,0 +1,44 @@
+"""A sample path: everything that chance decides, drawn before any scheduler sees it."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+
+from aerodaas.schedulers.analytics.base import Task
+from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.times import ExecutionTimes
+from aerodaas.schedulers.lab.workload import Workload
+
+__all__ = ["SamplePath"]
+
+
+@dataclass(frozen=True, slots=True)
+class SamplePath:
+    """One edge's tasks and how long each would take; equal for every scheduler compared."""
+
+    tasks: list[Task]
+    edge_times: list[int]
+    """By task id, nanoseconds."""
+    cloud_times: list[int]
+    """By task id, nanoseconds, before the network's share."""
+    network: Network
+
+    @classmethod
+    def draw(
+        cls, workload: Workload, edge: int, seed: int, times: ExecutionTimes, network: Network
+    ) -> SamplePath:
+        """Draw the path of one edge; the same arguments give the same path."""
+        # One stream for each purpose: another distribution leaves the arrivals as they are.
+        tasks = workload.tasks(edge, random.Random(f"{seed}/{edge}/arrivals"))
+        edge_factors = times.factors(len(tasks), random.Random(f"{seed}/{edge}/edge"))
+        cloud_factors = times.factors(len(tasks), random.Random(f"{seed}/{edge}/cloud"))
+        edge_times = [
+            max(1, int(task.profile.edge_time * factor))
+            for task, factor in zip(tasks, edge_factors, strict=True)
+        ]
+        cloud_times = [
+            max(1, int(task.profile.cloud_time * factor))
+            for task, factor in zip(tasks, cloud_factors, strict=True)
+        ]
+        return cls(tasks, edge_times, cloud_times, network)

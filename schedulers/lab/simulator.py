@@ -1,0 +1,135 @@
+"""The discrete-event simulator: one edge, its cloud slots and a scheduler on a sample path."""
+
+from __future__ import annotations
+
+import copy
+from collections import Counter
+from dataclasses import dataclass, field
+from heapq import heappop, heappush
+
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    AnalyticsScheduler,
+    Decision,
+    Outcome,
+    Resources,
+    Result,
+    Task,
+    WakeAt,
+)
+from aerodaas.schedulers.analytics.dispatch import Dispatch
+from aerodaas.schedulers.lab.sample import SamplePath
+
+__all__ = ["Observation", "Trace", "simulate"]
+
+_FINISH, _LOST, _TIMER = range(3)
+_EVERY = 50 * MILLISECOND
+
+
+@dataclass(slots=True)
+class Observation:
+    """What a scheduler let see of itself at one moment."""
+
+    at: int
+    figures: dict[str, float]
+
+
+@dataclass(slots=True)
+class Trace:
+    """What happened on one edge."""
+
+    results: list[Result] = field(default_factory=list)
+    reasons: Counter[str] = field(default_factory=Counter)
+    """How often each reason was given for a decision."""
+    undecided: list[Task] = field(default_factory=list)
+    """Tasks about which the scheduler never decided."""
+    end: int = 0
+    """When the last event happened, nanoseconds."""
+    decisions: list[tuple[int, Decision]] = field(default_factory=list)
+    """Filled on request, as are the observations."""
+    observations: list[Observation] = field(default_factory=list)
+
+
+class _SimulatedHost:
+    """Executors that take as long as the sample path says."""
+
+    def __init__(self, path: SamplePath, resources: Resources, *, record: bool) -> None:
+        self.trace = Trace()
+        self.heap: list[tuple[int, int, int, Task | None]] = []
+        self._count = 0
+        self._path = path
+        self._timeout = resources.cloud_timeout
+        self._record = record
+
+    def run_edge(self, task: Task, now: int) -> None:
+        self._push(now + self._path.edge_times[task.id], _FINISH, task)
+
+    def run_cloud(self, task: Task, now: int) -> None:
+        taken = self._path.network.cloud_time(self._path.cloud_times[task.id], now)
+        if taken is None or taken > self._timeout:
+            self._push(now + self._timeout, _LOST, task)
+        else:
+            self._push(now + taken, _FINISH, task)
+
+    def wake_at(self, at: int) -> None:
+        self._push(at, _TIMER, None)
+
+    def decided(self, decision: Decision, now: int) -> None:
+        if not isinstance(decision, WakeAt):
+            self.trace.reasons[decision.reason] += 1
+        if self._record:
+            self.trace.decisions.append((now, decision))
+
+    def closed(self, result: Result) -> None:
+        self.trace.results.append(result)
+
+    def _push(self, at: int, kind: int, task: Task | None) -> None:
+        self._count += 1
+        heappush(self.heap, (at, kind, self._count, task))
+
+
+def simulate(
+    path: SamplePath,
+    scheduler: AnalyticsScheduler,
+    resources: Resources | None = None,
+    *,
+    record: bool = False,
+) -> Trace:
+    """Run a copy of `scheduler` over the path and return what happened.
+
+    At one moment, ends of executions come first, then timers, then arrivals. `record` keeps
+    every decision and looks at the scheduler every 50 ms. Raises SchedulerError for a decision
+    that cannot be carried out.
+    """
+    resources = resources or Resources()
+    host = _SimulatedHost(path, resources, record=record)
+    dispatch = Dispatch(copy.deepcopy(scheduler), resources, host)
+    dispatch.start(0)
+    heap, trace = host.heap, host.trace
+    now = 0
+    look_at = 0
+    for task in path.tasks:
+        arrival = task.arrival
+        while heap and heap[0][0] <= arrival:
+            now, kind, _, ended = heappop(heap)
+            _deliver(dispatch, kind, ended, now)
+        now = arrival
+        dispatch.arrived(task, now)
+        if record and now >= look_at:
+            trace.observations.append(Observation(now, dict(dispatch.scheduler.observe())))
+            look_at = now + _EVERY
+    while heap:
+        now, kind, _, ended = heappop(heap)
+        _deliver(dispatch, kind, ended, now)
+    trace.end = now
+    trace.undecided = list(dispatch.undecided.values())
+    return trace
+
+
+def _deliver(dispatch: Dispatch, kind: int, task: Task | None, now: int) -> None:
+    if task is None:
+        dispatch.timer(now)
+    elif kind == _FINISH:
+        dispatch.finished(task, now)
+    else:
+        dispatch.finished(task, now, Outcome.TIMEOUT)

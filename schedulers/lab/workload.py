@@ -1,0 +1,109 @@
+"""Workloads: which tasks arrive at which edge, and when."""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import SchedulerError, UnknownIdError
+from aerodaas.schedulers.analytics.base import Profile, Task
+from aerodaas.schedulers.analytics.profiles import ACTIVE, PASSIVE, PUBLISHED
+
+__all__ = ["SIX", "Arrival", "Workload"]
+
+SIX: tuple[str, ...] = ("2D-P", "3D-P", "4D-P", "2D-A", "3D-A", "4D-A")
+"""The published workloads: drones on one edge, with four (P) or six (A) models."""
+
+_NAME = re.compile(r"(\d+)D-([PA])(?:/(\d+))?", re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Arrival:
+    """One task of a workload that lists them, such as one taken from a recorded flight."""
+
+    at: int
+    """Nanoseconds from the start."""
+    model: str
+    source: str = ""
+    edge: int = 0
+    edge_time: int | None = None
+    """Measured on the edge, where it was."""
+    cloud_time: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Workload:
+    """Drones that send a segment of video per period to an edge; each makes a task per model.
+
+    Drones are dealt to the edges in turn, each with a phase of its own drawn from the seed;
+    models come in random order within a segment. `arrivals`, where given, replaces all of that.
+    """
+
+    name: str
+    models: Mapping[str, Profile]
+    drones: int = 1
+    edges: int = 1
+    duration: int = 300 * NANOSECONDS
+    period: int = NANOSECONDS
+    arrivals: tuple[Arrival, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        """Refuse a workload of nothing."""
+        if not self.models or min(self.drones, self.edges, self.duration, self.period) <= 0:
+            raise SchedulerError(
+                f"workload {self.name!r} needs models, drones, edges, a duration and a period"
+            )
+
+    @classmethod
+    def named(cls, name: str, duration: int = 300 * NANOSECONDS) -> Workload:
+        """Make `3D-A` (3 drones, all models), `4D-P` (four models), `80D-A/7` (over 7 edges)."""
+        match = _NAME.fullmatch(name)
+        if match is None:
+            raise UnknownIdError("workload", name, [*SIX, "80D-A/7", "a JSON file"])
+        drones, kind, edges = match.groups()
+        models = PASSIVE if kind.upper() == "P" else ACTIVE
+        return cls(
+            name.upper(),
+            {model: PUBLISHED[model] for model in models},
+            int(drones),
+            int(edges or 1),
+            duration,
+        )
+
+    def lasting(self, duration: int) -> Workload:
+        """The same for another duration."""
+        return replace(self, duration=duration)
+
+    def tasks(self, edge: int, draw: random.Random) -> list[Task]:
+        """The tasks of one edge in order of arrival, numbered from zero."""
+        if self.arrivals:
+            return self._listed(edge)
+        phases = {
+            f"drone{drone}": draw.randrange(self.period)
+            for drone in range(edge, self.drones, self.edges)
+        }
+        segments = sorted(
+            (start, name, start // self.period)
+            for name, phase in phases.items()
+            for start in range(phase, self.duration, self.period)
+        )
+        profiles = list(self.models.values())
+        tasks: list[Task] = []
+        for at, name, segment in segments:
+            draw.shuffle(profiles)
+            tasks += [
+                Task(number, profile, at, at + profile.deadline, name, segment)
+                for number, profile in enumerate(profiles, len(tasks))
+            ]
+        return tasks
+
+    def _listed(self, edge: int) -> list[Task]:
+        here = sorted((a for a in self.arrivals if a.edge == edge), key=lambda a: a.at)
+        return [
+            Task(number, profile, a.at, a.at + profile.deadline, a.source)
+            for number, a in enumerate(here)
+            for profile in [self.models[a.model]]
+        ]
