@@ -92,7 +92,7 @@ class StreamActor:
     def prepare(self) -> ActorInfo:
         """Open everything; raises the project's errors for what cannot be opened."""
         logging.captureWarnings(capture=True)
-        self.inbox = Inbox(self.session.id, self.name, self._reads)
+        self.inbox = Inbox(self.scope, self.name, self._reads)
         self.alerts = self.outlet(f"alerts/{self.name}")
         self._open()
         self._phase = "ready"
@@ -149,9 +149,14 @@ class StreamActor:
             self.inbox.close()
         return report
 
+    @property
+    def scope(self) -> str:
+        """Prefix of the stream names of this run on this node."""
+        return self.session.scope(ray.get_runtime_context().get_node_id())
+
     def outlet(self, stream: str) -> Outlet:
         """Open a stream for writing."""
-        self.outlets[stream] = Outlet(self.session.id, stream)
+        self.outlets[stream] = Outlet(self.scope, stream)
         return self.outlets[stream]
 
     def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401

@@ -147,7 +147,7 @@ class _Worker:
 
     def open(self) -> None:
         session = self._actor.session
-        self.inbox = Inbox(session.id, f"analytics/{self.node.stream}", self.depths)
+        self.inbox = Inbox(self._actor.scope, f"analytics/{self.node.stream}", self.depths)
         self._results = self._actor.outlet(self.node.stream)
         self._commands = {
             trigger.stream: self._actor.outlet(trigger.stream) for trigger in self.node.triggers

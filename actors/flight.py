@@ -118,14 +118,14 @@ class Flight:
         for member in reversed(self._members.values()):
             member.handle.start.remote(self._origin)
 
-    def poll(self) -> FlightState:
-        """Ask how everyone fares; also tells the drones that the application is alive."""
+    def poll(self, newest: int = 200) -> FlightState:
+        """Ask how everyone fares, with the `newest` latencies of each robot; also tells the drones that the application is alive."""
         if time.monotonic() >= self._next_reports:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
         robots: dict[str, RobotReport] = {}
         for name in set(self._drones.values()):
-            robots.update(self._ask(self._members[name].handle.robots.remote()))
+            robots.update(self._ask(self._members[name].handle.robots.remote(newest)))
         over = all(self._members[name].report.phase in {"done", "failed"} for name in self._ids())
         return FlightState(robots, self.reports(), over)
 
@@ -250,7 +250,8 @@ class Flight:
                 raise cause from None
             raise MissionError(f"{type(cause).__name__}: {cause}") from cause
         except RayActorError as error:
-            reason = str(error).strip().splitlines()[0]
+            # Ray puts the remote traceback first and what went wrong last.
+            reason = str(error).strip().splitlines()[-1]
             raise MissionError(f"an actor died: {reason}") from None
         except ray.exceptions.GetTimeoutError:
             raise MissionError(f"an actor did not answer within {_ANSWER_TIMEOUT:.0f} s") from None

@@ -17,12 +17,12 @@ __all__ = ["Outlet", "RemoteReader"]
 class Outlet:
     """Publishes one stream: in shared memory on this node, by reference to other nodes."""
 
-    def __init__(self, session: str, stream: str) -> None:
-        """Open `stream` of the run `session` for writing."""
+    def __init__(self, scope: str, stream: str) -> None:
+        """Open `stream` for writing; `scope` is the prefix of its name on this node."""
         self.stream = stream
         self.sent = 0
         self.remote: list[RemoteReader] = []
-        self._shared = SharedPublisher(f"{session}/{stream}") if shared_memory_available() else None
+        self._shared = SharedPublisher(f"{scope}/{stream}") if shared_memory_available() else None
 
     def measure(self, item: Any, header: Header, captured: int) -> Message[Any]:  # noqa: ANN401
         """Publish a measurement: the first message of its way. `captured` is host time in ns."""
