@@ -17,7 +17,6 @@ from panda3d.core import (
     GraphicsPipe,
     GraphicsPipeSelection,
     LMatrix4f,
-    NodePath,
     PerspectiveLens,
     Texture,
     WindowProperties,
@@ -41,7 +40,7 @@ notify-level warning
 garbage-collect-states true
 """
 
-_NEAR, _FAR = 0.05, 1200.0
+_NEAR, _FAR = 0.1, 1200.0
 """Metres."""
 
 
@@ -103,7 +102,8 @@ class Renderer:
         self._engine.render_frame()
         shape = (self._camera.height, self._camera.width, 4)
         upside_down = np.frombuffer(self._pixels.get_ram_image(), np.uint8).reshape(shape)
-        return np.asarray(cv2.flip(cv2.cvtColor(upside_down, cv2.COLOR_BGRA2BGR), 0))
+        picture = cv2.flip(cv2.cvtColor(upside_down, cv2.COLOR_BGRA2BGR), 0)
+        return picture.astype(np.uint8, copy=False)
 
     def close(self) -> None:
         """Free the buffer and the scene."""

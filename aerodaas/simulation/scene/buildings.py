@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,6 +28,16 @@ _BAY = 3.0
 
 _PROUD = 0.03
 """Metres by which windows and doors stand out from their wall."""
+
+_BARN_LENGTH = 12.0
+"""Metres from which a wooden building is a barn, with a gate."""
+
+_BESIDE_DOOR = 0.9
+"""Metres between a door and the middle of the next window, at least."""
+
+_FRAME = (0.90, 0.89, 0.86)
+_TILED_SHARE = 0.6
+"""Share of roofs in clay; the others are of slate."""
 
 _WOODS = ((1.0, 0.95, 0.9), (0.75, 0.42, 0.36), (0.8, 0.85, 0.85))
 _PLASTERS = ((1.0, 0.97, 0.90), (0.98, 0.90, 0.74), (0.86, 0.90, 0.92), (0.95, 0.82, 0.76))
@@ -56,7 +68,7 @@ def add_building(parent: NodePath, thing: Thing, palette: Palette, light: Light)
     texture = palette["facade" if walls == "plaster" else walls]
     attach(home, "walls", merged(parts).painted(tint).lit(sun), texture)
     roof = _gable_roof(length, width, height) if spec.roof == "gable" else _flat_roof(spec)
-    slate = (1.0, 1.0, 1.0) if rng.random() < 0.6 else (0.55, 0.62, 0.72)
+    slate = (1.0, 1.0, 1.0) if rng.random() < _TILED_SHARE else (0.55, 0.62, 0.72)
     cover = palette["tiles" if spec.roof == "gable" else "gravel"]
     attach(home, "roof", roof.painted(slate).lit(sun), cover, both_sides=True)
     attach(home, "openings", _openings(spec, walls).lit(sun), palette["plain"])
@@ -121,47 +133,46 @@ def _flat_roof(spec: Building) -> Mesh:
 def _openings(spec: Building, walls: str) -> Mesh:
     """A door on the south side and, but for plaster that has them drawn, windows around."""
     length, width, height = spec.size
-    south, door_height = -width / 2 - _PROUD, min(2.1, 0.8 * height)
-    barn = walls == "wood" and length > 2 * width * 0.8
-    door_width = 3.2 if barn else 1.1
-    door_height = min(3.2, 0.85 * height) if barn else door_height
-    parts = [
-        _upright((0.0, south), 0.0, door_width + 0.2, 0.0, door_height + 0.1, (0.85, 0.84, 0.8)),
-        _upright((0.0, south - 0.01), 0.0, door_width, 0.0, door_height, (0.35, 0.24, 0.17)),
-    ]
+    barn = walls == "wood" and length > _BARN_LENGTH
+    door_width, tall = (3.2, 3.2) if barn else (1.1, 2.1)
+    door = _Opening(0.0, door_width, 0.0, min(tall, 0.82 * height), (0.38, 0.27, 0.19))
+    parts = list(_framed(door, -width / 2, 0.0))
     if walls == "plaster":
         return merged(parts)
-    for extent, reach, turn in (
-        (length, width, 0.0),
-        (width, length, math.pi / 2),
-        (length, width, math.pi),
-        (width, length, -math.pi / 2),
-    ):
-        count = int(extent // 3.0)
+    sides = ((length, width), (width, length), (length, width), (width, length))
+    for side, (extent, reach) in enumerate(sides):
+        count = int(extent // _BAY)
         for k in range(count):
-            along = (k + 0.5 - count / 2) * 3.0
-            if turn == 0.0 and abs(along) < door_width / 2 + 0.9:
-                continue
-            low, high = 0.38 * height, 0.38 * height + min(1.3, 0.4 * height)
-            out = -reach / 2 - _PROUD
-            parts.append(_upright((along, out), turn, 1.3, low - 0.08, high + 0.08, (0.93,) * 3))
-            parts.append(_upright((along, out - 0.01), turn, 1.1, low, high, (0.24, 0.31, 0.38)))
+            along = (k + 0.5 - count / 2) * _BAY
+            if side > 0 or abs(along) > door_width / 2 + _BESIDE_DOOR:
+                low = 0.38 * height
+                high = low + min(1.3, 0.4 * height)
+                window = _Opening(along, 1.1, low, high, (0.24, 0.31, 0.38))
+                parts += _framed(window, -reach / 2, side * math.pi / 2)
     return merged(parts)
 
 
-def _upright(
-    place: tuple[float, float],
-    turn: float,
-    width: float,
-    low: float,
-    high: float,
-    colour: tuple[float, ...],
-) -> Mesh:
-    """A rectangle that faces south, then turned about the building's centre."""
-    x, y = place
-    half = width / 2
-    face = sheet([(x - half, y, low), (x + half, y, low), (x + half, y, high), (x - half, y, high)])
-    return face.painted(colour).moved((0, 0, 0), turn)
+@dataclass(frozen=True)
+class _Opening:
+    """A door or window: where along its wall, how wide, from where to where up, its colour."""
+
+    along: float
+    width: float
+    low: float
+    high: float
+    colour: tuple[float, float, float]
+
+
+def _framed(opening: _Opening, wall: float, turn: float) -> list[Mesh]:
+    """A pane in its frame on the south `wall`, turned about the building's centre."""
+    half, rim = opening.width / 2, 0.09
+    result = []
+    for out, margin, colour in ((_PROUD, rim, _FRAME), (2.5 * _PROUD, 0.0, opening.colour)):
+        west, east = opening.along - half - margin, opening.along + half + margin
+        low, high, y = max(0.0, opening.low - margin), opening.high + margin, wall - out
+        corners = [(west, y, low), (east, y, low), (east, y, high), (west, y, high)]
+        result.append(sheet(corners).painted(colour).moved((0, 0, 0), turn))
+    return result
 
 
 def beam(start: ArrayLike, end: ArrayLike, radius: float, sides: int = 4) -> Mesh:
@@ -183,11 +194,11 @@ def add_fence(parent: NodePath, thing: Thing, palette: Palette, light: Light) ->
         raise TypeError(f"{thing.id} is no fence")
     parts = []
     line = [np.array([*point, 0.0]) for point in spec.points]
-    for here, there in zip(line, line[1:], strict=False):
+    for here, there in itertools.pairwise(line):
         count = max(1, round(float(np.linalg.norm(there - here)) / 2.5))
         for k in range(count + 1):
             foot = here + (there - here) * k / count
-            parts.append(beam(foot, foot + (0, 0, spec.height), 0.06))
+            parts.append(beam(foot, foot + np.array([0.0, 0.0, spec.height]), 0.06))
         for share in (0.5, 0.88):
             level = np.array([0.0, 0.0, share * spec.height])
             parts.append(beam(here + level, there + level, 0.035))
@@ -219,15 +230,10 @@ def add_tower(parent: NodePath, thing: Thing, palette: Palette, light: Light) ->
         angle = math.tau * k / 3
         out = np.array([math.cos(angle), math.sin(angle), 0.0]) * (half[-1] + 0.35)
         panel = box((0.14, 0.32, 1.6), bottom=True).moved((0, 0, 0), angle)
-        parts.append(panel.moved(out + (0, 0, top - 1.9)).painted((0.88, 0.89, 0.9)))
+        parts.append(panel.moved(out + np.array([0.0, 0.0, top - 1.9])).painted((0.88, 0.89, 0.9)))
     dish = tube([0.05, 0.5, 0.62], [0.0, 0.12, 0.3], sides=12)
-    dish = Mesh(
-        dish.points[:, [2, 1, 0]],
-        dish.uv,
-        dish.normals[:, [2, 1, 0]],
-        dish.colours,
-        dish.triangles[:, ::-1],
-    )
+    swap = [2, 1, 0]
+    dish = replace(dish, points=dish.points[:, swap], normals=dish.normals[:, swap])
     parts.append(dish.moved((half[-2], 0, 0.72 * spec.height)).painted((0.93, 0.93, 0.93)))
     tower = merged(parts).moved((thing.x, thing.y, 0.0), thing.yaw)
     attach(parent, spec.id, tower.lit(light.sun), palette["plain"], both_sides=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -71,7 +72,7 @@ class CarFigure:
 
 def _body(colour: NDArray[np.float64]) -> list[Mesh]:
     parts = []
-    for (x0, z0, w0), (x1, z1, w1) in zip(_BODY, _BODY[1:], strict=False):
+    for (x0, z0, w0), (x1, z1, w1) in itertools.pairwise(_BODY):
         top = sheet([(x1, -w1, z1), (x1, w1, z1), (x0, w0, z0), (x0, -w0, z0)])
         parts.append(_upward(top).painted(colour))
         for side in (-1.0, 1.0):
@@ -91,7 +92,7 @@ def _cabin(colour: NDArray[np.float64]) -> list[Mesh]:
     low, high = 0.82, 0.66
     half = [low, high, high, low]
     parts = []
-    for i, ((x0, z0), (x1, z1)) in enumerate(zip(_CABIN, _CABIN[1:], strict=False)):
+    for i, ((x0, z0), (x1, z1)) in enumerate(itertools.pairwise(_CABIN)):
         top = sheet(
             [(x1, -half[i + 1], z1), (x1, half[i + 1], z1), (x0, half[i], z0), (x0, -half[i], z0)]
         )

@@ -52,7 +52,7 @@ def light_on_ground(light: Light) -> float:
 
 def _average(surface: str) -> NDArray[np.float64]:
     table = {
-        "grass": (0.36, 0.46, 0.18),
+        "grass": (0.44, 0.50, 0.24),
         "soil": (0.43, 0.33, 0.23),
         "asphalt": (0.40, 0.40, 0.41),
     }
@@ -76,7 +76,7 @@ def _patches(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """Slow change of brightness over the ground, which hides the repeats of its texture."""
     x, y = points[:, 0], points[:, 1]
     waves = np.sin(0.21 * x + 0.13 * y) + np.sin(0.07 * x - 0.17 * y + 1.3)
-    return np.asarray(1.0 + 0.045 * (waves + np.sin(0.031 * x + 0.043 * y + 0.5)))
+    return np.asarray(1.0 + 0.04 * (waves + np.sin(0.031 * x + 0.043 * y + 0.5)))
 
 
 def add_field(parent: NodePath, spec: CropRows, palette: Palette, light: Light) -> None:
@@ -85,8 +85,7 @@ def add_field(parent: NodePath, spec: CropRows, palette: Palette, light: Light) 
     m = _FIELD_MARGIN
     bed = _level_sheet((west - m, south - m, east + m, north + m), _TEXEL["soil"])
     parts = [bed.painted(light_on_ground(light))]
-    rows = np.arange(south + spec.spacing / 2, north, spec.spacing)
-    for y in rows:
+    for y in np.arange(south + spec.spacing / 2, north, spec.spacing).tolist():
         ridge = _level_sheet((west, y - 0.16, east, y + 0.16), _TEXEL["soil"])
         parts.append(ridge.painted(0.72 * light_on_ground(light)))
     attach(parent, "soil", merged(parts), palette["soil"], layer=Layer.FIELD)
@@ -120,7 +119,7 @@ def add_road(parent: NodePath, spec: Road, palette: Palette, light: Light) -> No
         for i in range(len(steps)):
             corners = np.array([right[i], right[i + 1], left[i + 1], left[i]])
             v = np.array([(0, 0), (lengths[i], 0), (lengths[i], 2 * half), (0, 2 * half)])
-            uv = (v + (travelled[i], 0)) / texel
+            uv = (v + np.array([travelled[i], 0.0])) / texel
             parts.append(sheet(np.c_[corners, np.zeros(4)], uv).painted(tone * bright))
     attach(parent, spec.id, merged(parts), palette[spec.surface], layer=Layer.ROAD)
 
@@ -162,7 +161,7 @@ def _cast(thing: Thing, spec: Building, light: Light) -> Mesh:
     foot = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (length / 2, width / 2)
     foot = foot @ np.array([[c, s], [-s, c]]) + (thing.x, thing.y)
     top = foot + np.array(light.shadow_offset(1.1 * walls))
-    hull = cv2.convexHull(np.float32(np.concatenate([foot, top]))).reshape(-1, 2)
+    hull = cv2.convexHull(np.concatenate([foot, top]).astype(np.float32)).reshape(-1, 2)
     return _fan(hull, _SHADOW_ALPHA)
 
 

@@ -6,6 +6,7 @@ import math
 import random
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 from panda3d.core import NodePath, SamplerState, Texture
@@ -25,7 +26,10 @@ _OVERCAST = np.array([0.74, 0.77, 0.80])
 _CLOUD_HEIGHT = 0.14
 """How strongly clouds shrink towards the horizon; smaller is stronger."""
 
-_ROWS, _COLUMNS = 128, 1024
+_DOME = 400.0
+"""Metres; nothing hides behind the sky, which is painted first."""
+
+_ROWS, _COLUMNS = 256, 1024
 
 
 @dataclass(frozen=True)
@@ -73,10 +77,11 @@ class Light:
 
 def sky_dome(parent: NodePath, light: Light) -> NodePath:
     """Attach a dome that the renderer keeps centred on the camera."""
-    dome: Mesh = blob(400.0, rings=17, sides=24, repeat=1.0)
-    up = np.clip(dome.points[:, 2] / 400.0, -1.0, 1.0)
-    dome.uv[:, 1] = np.clip(2.0 * np.arcsin(up) / np.pi, 0.004, 0.996)
-    inward = Mesh(dome.points, dome.uv, dome.normals, dome.colours, dome.triangles[:, ::-1])
+    dome = blob(_DOME, rings=19, sides=24, repeat=1.0)
+    up = np.clip(dome.points[:, 2] / _DOME, -1.0, 1.0)
+    uv = np.stack([dome.uv[:, 0], np.clip(2.0 * np.arcsin(up) / np.pi, 0.004, 0.996)], axis=-1)
+    above = dome.triangles[up[dome.triangles].max(axis=1) > 0.0]
+    inward = Mesh(dome.points, uv, dome.normals, dome.colours, above[:, ::-1])
     node = attach(parent, "sky", inward, _panorama(light), layer=Layer.SKY)
     node.node().set_final(True)
     return node
@@ -111,9 +116,12 @@ def _clouds(
     size = 512
     field = noise(size, 1.45, light.seed % 2**31)
     away = 0.13 / (np.sin(elevation) + _CLOUD_HEIGHT)
-    x = (away * np.cos(azimuth) * size).astype(int) % size
-    y = (away * np.sin(azimuth) * size).astype(int) % size
-    seen = field[y, x]
+    x = away * np.cos(azimuth) * size % size
+    y = away * np.sin(azimuth) * size % size
+    tiled = np.pad(field, ((0, 1), (0, 1)), mode="wrap").astype(np.float32)
+    seen = cv2.remap(
+        tiled, x.astype(np.float32), y.astype(np.float32), interpolation=cv2.INTER_LINEAR
+    )
     threshold = float(np.quantile(field, 1.0 - min(max(light.clouds, 0.01), 0.99)))
     depth = np.clip((seen - threshold) / 0.9, 0.0, 1.0)
     cover = depth**0.8 * np.clip(elevation / 0.12, 0.0, 1.0) * 0.92

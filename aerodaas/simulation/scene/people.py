@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
-from panda3d.core import LMatrix4f, NodePath
+from panda3d.core import LMatrix4f, NodePath, Texture
 
 from aerodaas.simulation.scenario import Person
 from aerodaas.simulation.scene.layers import attach
-from aerodaas.simulation.scene.light import Light
 from aerodaas.simulation.scene.mesh import Mesh, blob, merged, tube
 from aerodaas.simulation.scene.plants import rng_of
 from aerodaas.simulation.scene.textures import Palette, vest_texture
@@ -48,88 +49,84 @@ _RADII = {
 
 _REFERENCE_HEIGHT = 1.75
 
+_ABOVE = np.array([0.35, 0.2, 0.91])
+"""A figure turns while its light is baked in, so all are lit from above, a little ahead."""
+
 
 class PersonFigure:
     """The nodes of one person, posed anew for each picture."""
 
-    def __init__(self, parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
+    def __init__(self, parent: NodePath, thing: Thing, palette: Palette) -> None:
         """Dress the person by its seed."""
         spec = thing.spec
         if not isinstance(spec, Person):
             raise TypeError(f"{thing.id} is no person")
         rng = rng_of(thing)
-        skin = _SKINS[rng.integers(len(_SKINS))]
-        hair = _HAIRS[rng.integers(len(_HAIRS))]
-        shirt = _SHIRTS[rng.integers(len(_SHIRTS))]
-        trousers = _TROUSERS[rng.integers(len(_TROUSERS))]
-        sleeves = rng.random() < 0.5
+        skin, hair = _choose(rng, _SKINS), _choose(rng, _HAIRS)
+        shirt, trousers = _choose(rng, _SHIRTS), _choose(rng, _TROUSERS)
+        vest = spec.vest if spec.vest != "any" else str(rng.choice(sorted(_VESTS)))
+        forearm = shirt if rng.integers(2) else skin
+        colours = dict(zip(_RADII, (shirt, forearm, trousers, trousers, _SHOES), strict=True))
         self._root = parent.attach_new_node(spec.id)
-        self._nodes: list[tuple[NodePath, int, int, float]] = []
-        scale = thing.height / _REFERENCE_HEIGHT
+        self._scale = thing.height / _REFERENCE_HEIGHT
+        self._nodes: list[NodePath] = []
+        self._bones: list[tuple[int, int]] = []
+        plain = palette["plain"]
         for upper, lower in LIMBS:
             joint = upper.split("_")[1]
-            colour = {
-                "shoulder": shirt,
-                "elbow": shirt if sleeves else skin,
-                "hip": trousers,
-                "knee": trousers,
-                "ankle": _SHOES,
-            }[joint]
-            mesh = _limb(*_RADII[joint], hand=skin if joint == "elbow" else None).painted(1.0)
-            self._add(upper, lower, _coloured(mesh, colour), palette, light, scale)
-        self._add("neck", "head", _head(skin, hair), palette, light, scale)
-        torso = _torso()
-        if spec.vest == "none":
-            self._add("pelvis", "neck", _coloured(torso, shirt), palette, light, scale)
+            limb = _limb(*_RADII[joint]).painted(colours[joint])
+            if joint == "elbow":
+                limb = merged([limb, _hand().painted(skin)])
+            self._add((upper, lower), limb, plain)
+        self._add(("neck", "head"), _head(skin, hair), plain)
+        self._add(("pelvis", "neck"), _hips().painted(trousers), plain)
+        if vest == "none":
+            self._add(("pelvis", "neck"), _torso().painted(shirt), plain)
         else:
-            name = spec.vest if spec.vest != "any" else str(rng.choice(sorted(_VESTS)))
-            self._add("pelvis", "neck", torso, palette, light, scale, _VESTS[name])
-        self._add("pelvis", "neck", _coloured(_hips(), trousers), palette, light, scale)
+            self._add(("pelvis", "neck"), _torso(), vest_texture(_VESTS[vest]))
 
-    def _add(
-        self,
-        start: str,
-        end: str,
-        mesh: Mesh,
-        palette: Palette,
-        light: Light,
-        scale: float,
-        vest: tuple[float, float, float] | None = None,
-    ) -> None:
-        # The figure turns while its light is baked in, so the light comes from above for all.
-        above = np.array([0.35, 0.2, 0.91]) if light.elevation > 0.0 else np.array([0, 0, 1.0])
-        texture = palette["plain"] if vest is None else vest_texture(vest)
-        node = attach(self._root, end, mesh.lit(above), texture)
-        self._nodes.append((node, JOINTS.index(start), JOINTS.index(end), scale))
+    def _add(self, bone: tuple[str, str], mesh: Mesh, texture: Texture) -> None:
+        self._nodes.append(attach(self._root, bone[1], mesh.lit(_ABOVE), texture))
+        self._bones.append((JOINTS.index(bone[0]), JOINTS.index(bone[1])))
 
-    def pose(self, joints: NDArray[np.float64], yaw: float, *, present: bool) -> None:
+    def pose(self, joints: NDArray[np.float64], yaw: float) -> None:
         """Put the limbs between `joints` (len(JOINTS), 3), ENU metres."""
-        if not present:
+        starts, ends = np.array(self._bones).T
+        along = joints[ends] - joints[starts]
+        # A limb that points straight ahead has no front of its own; lean the reference a little.
+        forward = np.array([math.cos(yaw), math.sin(yaw), 1e-4])
+        ahead = forward - along * ((along @ forward) / np.sum(along * along, axis=1))[:, None]
+        ahead *= self._scale / np.linalg.norm(ahead, axis=1, keepdims=True)
+        left = np.cross(along, ahead) / np.linalg.norm(along, axis=1, keepdims=True)
+        matrices = np.zeros((len(starts), 4, 4))
+        matrices[:, 0, :3], matrices[:, 1, :3] = ahead, left
+        matrices[:, 2, :3], matrices[:, 3, :3] = along, joints[starts]
+        matrices[:, 3, 3] = 1.0
+        for node, matrix in zip(self._nodes, matrices.reshape(-1, 16).tolist(), strict=True):
+            node.set_mat(LMatrix4f(*matrix))
+
+    def show(self, *, present: bool) -> None:
+        """Show or hide the person."""
+        if present:
+            self._root.show()
+        else:
             self._root.hide()
-            return
-        self._root.show()
-        forward = np.array([np.cos(yaw), np.sin(yaw), 0.0])
-        for node, start, end, scale in self._nodes:
-            along = joints[end] - joints[start]
-            side = np.cross(along, forward)
-            size = np.linalg.norm(side)
-            # A limb that points straight ahead has no front of its own; any side will do.
-            side = side / size if size > 1e-6 else np.array([-np.sin(yaw), np.cos(yaw), 0.0])
-            ahead = np.cross(side, along)
-            ahead *= scale / np.linalg.norm(ahead)
-            node.set_mat(
-                LMatrix4f(*ahead, 0.0, *(-scale * -side), 0.0, *along, 0.0, *joints[start], 1.0)
-            )
 
 
-def _coloured(mesh: Mesh, colour: tuple[float, float, float]) -> Mesh:
-    return mesh.painted(colour)
+def _choose(
+    rng: np.random.Generator, colours: tuple[tuple[float, float, float], ...]
+) -> tuple[float, float, float]:
+    return colours[rng.integers(len(colours))]
 
 
-def _limb(start: float, end: float, hand: tuple[float, float, float] | None = None) -> Mesh:
-    """A tapered limb of length 1 along z, with a rounded end."""
-    del hand
-    return tube([start * 0.6, start, end, end * 0.6], [-0.06, 0.04, 0.94, 1.03], sides=7)
+def _limb(start: float, end: float) -> Mesh:
+    """A tapered limb of length 1 along z, with rounded ends."""
+    return tube([start * 0.6, start, end, end * 0.6], [-0.06, 0.04, 0.94, 1.03], sides=6)
+
+
+def _hand() -> Mesh:
+    """A hand beyond the end of a forearm of length 1."""
+    return blob(0.05, rings=5, sides=6).moved((0.0, 0.0, 1.1), scale=(0.75, 0.55, 4.0))
 
 
 def _torso() -> Mesh:
@@ -153,8 +150,9 @@ def _head(skin: tuple[float, float, float], hair: tuple[float, float, float]) ->
     face = blob(0.098, rings=8, sides=10).moved((0, 0, 0), scale=(1.0, 0.82, 1.22 * stretch))
     face = face.painted(skin).moved((0, 0, 1.0))
     cap = blob(0.106, rings=8, sides=10)
-    keep = cap.points[cap.triangles].mean(axis=1)
-    behind = (keep[:, 2] > 0.035) | ((keep[:, 0] < -0.02) & (keep[:, 2] > -0.055))
-    cap = Mesh(cap.points, cap.uv, cap.normals, cap.colours, cap.triangles[behind])
+    x, _, z = cap.points[cap.triangles].mean(axis=1).T
+    hairline, nape = 0.058, -0.055
+    hairy = (z > hairline) | ((x < 0.0) & (z > nape))
+    cap = Mesh(cap.points, cap.uv, cap.normals, cap.colours, cap.triangles[hairy])
     cap = cap.moved((0, 0, 0), scale=(1.0, 0.84, 1.2 * stretch)).painted(hair)
     return merged([neck, face, cap.moved((-0.004, 0, 1.04))])

@@ -57,15 +57,19 @@ class Scene:
         elif isinstance(spec, Person):
             feet = root.attach_new_node("feet")
             add_shadow(feet, thing, palette, light)
-            self._people.append((thing, PersonFigure(root, thing, palette, light), feet))
+            self._people.append((thing, PersonFigure(root, thing, palette), feet))
 
     def update(self, time: float, eye: tuple[float, float, float]) -> None:
         """Show the world as it is at `time` seconds, seen from `eye` (ENU metres)."""
         self._sky.set_pos(*eye)
         for thing, figure, feet in self._people:
             state = thing.state(time)
-            figure.pose(thing.joints(time), state.yaw, present=state.present)
-            feet.set_pos(state.x, state.y, 0.0)
-            feet.show() if state.present else feet.hide()
+            figure.show(present=state.present)
+            if state.present:
+                figure.pose(thing.joints(time), state.yaw)
+                feet.set_pos(state.x, state.y, 0.0)
+                feet.show()
+            else:
+                feet.hide()
         for thing, car in self._cars:
             car.pose(thing.state(time))

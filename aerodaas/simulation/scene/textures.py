@@ -1,3 +1,4 @@
+# ruff: noqa: PLR2004 - the proportions of a drawing
 """Textures drawn with numpy at start; sides are powers of two, as the software renderer needs."""
 
 from __future__ import annotations
@@ -6,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from panda3d.core import SamplerState, Texture
 
-__all__ = ["Palette", "cloud_texture", "noise", "vest_texture"]
+__all__ = ["Palette", "noise", "vest_texture"]
 
 Floats = NDArray[np.float64]
 
@@ -66,15 +67,6 @@ def vest_texture(colour: ArrayLike) -> Texture:
     return _texture("vest", cloth)
 
 
-def cloud_texture(cover: float, seed: int) -> Texture:
-    """White clouds on nothing, to be laid over the sky; `cover` is 0 to 1."""
-    field = noise(_SIZE, 1.6, seed)
-    threshold = float(np.quantile(field, 1.0 - min(max(cover, 0.01), 0.99)))
-    alpha = np.clip((field - threshold) / 1.1, 0.0, 1.0) ** 0.8
-    shade = 0.90 + 0.10 * np.clip((field - threshold) / 2.0, 0.0, 1.0)
-    return _texture("clouds", np.repeat(shade[..., None], 3, axis=-1), 0.9 * alpha)
-
-
 class Palette:
     """The textures of one world, each drawn when first asked for."""
 
@@ -92,8 +84,8 @@ class Palette:
         size = 2 * _SIZE
         blades = noise(size, 0.45, 1, 0.6)
         patches = noise(size, 1.4, 2)
-        dry = np.clip(0.35 + 0.28 * patches + 0.12 * blades, 0, 1)
-        colours = _blend((0.24, 0.40, 0.13), (0.55, 0.56, 0.27), dry)
+        dry = np.clip(0.4 + 0.13 * patches + 0.18 * blades, 0, 1)
+        colours = _blend((0.33, 0.44, 0.17), (0.60, 0.60, 0.34), dry)
         return _texture("grass", colours * (1.0 + 0.17 * blades)[..., None])
 
     def _soil(self) -> Texture:
@@ -119,7 +111,7 @@ class Palette:
         size = _SIZE // 2
         leaf, clumps = noise(size, 0.7, 11), noise(size, 1.3, 12)
         light = 0.45 + 0.20 * leaf + 0.15 * clumps
-        colours = _blend((0.10, 0.20, 0.06), (0.42, 0.56, 0.20), light)
+        colours = _blend((0.13, 0.22, 0.08), (0.50, 0.60, 0.26), light)
         return _texture("leaves", colours, (leaf + 0.4 * clumps > -0.55).astype(np.float64))
 
     def _crop(self) -> Texture:
@@ -131,7 +123,7 @@ class Palette:
         for stem in range(0, width, 16):
             for _ in range(9):
                 lean, tall = rng.normal(0.0, 15.0), rng.uniform(0.55, 1.0) * height
-                green = rng.uniform(0.75, 1.25) * np.array([0.30, 0.52, 0.15])
+                green = rng.uniform(0.75, 1.25) * np.array([0.38, 0.58, 0.20])
                 share = rows[rows < tall] / tall
                 middle = stem + 8 + rng.normal(0, 2) + lean * share**1.6
                 half = 2.6 * (1.0 - share) ** 0.6 + 0.4
