@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from aerodaas.clock import NANOSECONDS, seconds
-from aerodaas.data import Header
 from aerodaas.errors import VehicleError
 from aerodaas.navigation.actions import Action, Fly, Hold, Land, Return, TakeOff, Wait
 from aerodaas.navigation.mission import Mission
@@ -28,6 +27,9 @@ __all__ = ["SetpointLoop"]
 _REPEAT = NANOSECONDS
 """Nanoseconds after which an action that shows no effect is asked for again."""
 
+_PERIOD = 0.05
+"""Seconds between turns, where there was none before."""
+
 _DOING = {
     TakeOff: frozenset({VehicleMode.TAKING_OFF, VehicleMode.GUIDED, VehicleMode.HOLDING}),
     Land: frozenset({VehicleMode.LANDING, VehicleMode.GROUNDED}),
@@ -39,11 +41,15 @@ _DOING = {
 class SetpointLoop:
     """One drone's loop, turned by its actor 20 times a second."""
 
-    def __init__(self, vehicle: Vehicle, mission: Mission, guard: SetpointGuard) -> None:
-        """Fly `vehicle` by `mission`, with `guard` having the last word."""
+    def __init__(self, vehicle: Vehicle, mission: Mission) -> None:
+        """Fly `vehicle` by `mission`, within the mission's limits."""
         self.vehicle = vehicle
         self.mission = mission
-        self.guard = guard
+        self.guard = SetpointGuard(
+            mission.limits,
+            mission.home,
+            position_setpoints=vehicle.capabilities.position_setpoints,
+        )
         self.state: VehicleState | None = None
         """The newest state read."""
         self._before: int | None = None
@@ -60,15 +66,14 @@ class SetpointLoop:
         checking = self.mission.state is MissionState.PREFLIGHT
         objections = self.vehicle.preflight() if checking else ()
         action = self.mission.update(state, now, objections)
-        duration = 0.05 if self._before is None else seconds(now - self._before)
-        self._before = now
         try:
-            return self._carry_out(action, state, now, duration, neighbours)
+            return self._carry_out(action, state, now, neighbours)
         except VehicleError as error:
             self.mission.vehicle_refused(str(error))
             return SetpointRecord(now, None, None)
         finally:
             self._last_action = type(action)
+            self._before = now
 
     def _read(self) -> VehicleState:
         try:
@@ -84,16 +89,16 @@ class SetpointLoop:
         action: Action,
         state: VehicleState,
         now: int,
-        duration: float,
         neighbours: Iterable[Neighbour],
     ) -> SetpointRecord:
         if isinstance(action, Fly):
-            return self._send(action.setpoint, state, now, duration, neighbours, action.cause)
+            record = self._send(action.setpoint, state, now, neighbours)
+            return replace(record, cause=action.cause)
         if isinstance(action, Hold):
             stay: Setpoint = VelocitySetpoint(np.zeros(3))
             if action.position is not None and self.vehicle.capabilities.position_setpoints:
                 stay = PositionSetpoint(action.position)
-            return self._send(stay, state, now, duration, neighbours, None)
+            return self._send(stay, state, now, neighbours)
         self.guard.forget()
         if not isinstance(action, Wait):
             self._ask(action, state, now)
@@ -118,16 +123,15 @@ class SetpointLoop:
         asked: Setpoint,
         state: VehicleState,
         now: int,
-        duration: float,
         neighbours: Iterable[Neighbour],
-        cause: Header | None,
     ) -> SetpointRecord:
+        duration = _PERIOD if self._before is None else seconds(now - self._before)
         clamped = self.guard.clamp(asked, state.odometry, duration, neighbours)
         sent = self.vehicle.send(clamped.setpoint)
         names = clamped.clipped_by
         if sent is not clamped.setpoint and not _same(sent, clamped.setpoint):
             names = (*names, "vehicle")
-        return SetpointRecord(now, asked, sent, names, cause)
+        return SetpointRecord(now, asked, sent, names)
 
 
 def _same(one: Setpoint, other: Setpoint) -> bool:

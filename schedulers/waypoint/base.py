@@ -13,7 +13,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from aerodaas.geometry import Vector
 from aerodaas.graph import AeroStreamData
@@ -58,15 +58,12 @@ class NavigationEntry:
     """The queue is emptied when this navigation's stream first yields."""
 
 
+@runtime_checkable
 class NavigationSink(Protocol):
-    """A running mission, as the application's scheduler sees it."""
+    """An environment whose mission may be running."""
 
-    def add_navigation(self, entry: NavigationEntry) -> None:
-        """Queue navigation in flight."""
-        ...
-
-    def clear_navigation(self) -> None:
-        """Empty the queue in flight."""
+    def navigation_added(self, entry: NavigationEntry) -> bool:
+        """Take navigation in flight; False before the mission starts."""
         ...
 
 
@@ -85,7 +82,6 @@ class TrajectoryScheduler(PaperNames, INavigate):
         """Belong to `environment`, whose graph records the navigation."""
         self._environment = environment
         self.entries: list[NavigationEntry] = []
-        self._sink: NavigationSink | None = None
         self._cleared = False
 
     @abstractmethod
@@ -136,22 +132,18 @@ class TrajectoryScheduler(PaperNames, INavigate):
         if on is not None:
             navigation = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, on)
             self._enter(NavigationEntry(navigation, clear_first=True))
-        elif self._sink is not None:
-            self._sink.clear_navigation()
-        else:
+        elif not self._tell(NavigationEntry(AeroNavigation(), clear_first=True)):
             self.entries.clear()
             self._cleared = True
 
-    def attach(self, sink: NavigationSink | None) -> None:
-        """Send what is added and cleared from now on to a running mission; None ends that."""
-        self._sink = sink
-
     def _enter(self, entry: NavigationEntry) -> None:
-        if self._sink is not None:
-            self._sink.add_navigation(entry)
-        else:
+        if not self._tell(entry):
             self.entries.append(entry)
+
+    def _tell(self, entry: NavigationEntry) -> bool:
+        sink: object = self._environment
+        return isinstance(sink, NavigationSink) and sink.navigation_added(entry)
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the application's side behind when sent to the drone's actor."""
-        return {**self.__dict__, "_environment": None, "_sink": None, "entries": []}
+        return {**self.__dict__, "_environment": None, "entries": []}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,9 +25,7 @@ class NearestNeighborScheduler(TrajectoryScheduler):
     def plan(self, pending: Sequence[Waypoint], situation: Situation) -> Sequence[Waypoint]:
         """Chain nearest neighbours."""
         before = {
-            later: earlier
-            for group in situation.ordered
-            for earlier, later in zip(group, group[1:], strict=False)
+            later: earlier for group in situation.ordered for earlier, later in pairwise(group)
         }
         left = {waypoint.id: waypoint for waypoint in pending}
         route: list[Waypoint] = []

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -16,7 +17,6 @@ from aerodaas.navigation.commands import AddNavigation, Answer, Command, OpenStr
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
 from aerodaas.navigation.planner import InlinePlanner, Planner
-from aerodaas.navigation.safety import SetpointGuard
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.schedulers.waypoint.ordered import OrderedScheduler
 from aerodaas.status import MissionState, MissionStatus, SetpointRecord
@@ -206,7 +206,7 @@ class Flight:
     def run_to(self, state: MissionState) -> None:
         """Fly until the mission is in `state`."""
         self.run(until=lambda: self.mission.state is state)
-        assert self.mission.state is state, f"ended {self.status.state}: {self.status.reason}"
+        self.expect(state)
 
     def keep_saying(self, command: Callable[[], Command], duration: float, rate: float) -> None:
         """Repeat a command at `rate` Hz while flying for `duration` seconds."""
@@ -215,6 +215,10 @@ class Flight:
             if number % pause == 0:
                 self.tell(command())
             self.turn()
+
+    def expect(self, state: MissionState) -> None:
+        """Fail unless the mission is in `state`."""
+        assert self.mission.state is state, f"{self.status.state}: {self.status.reason}"
 
     @property
     def status(self) -> MissionStatus:
@@ -245,10 +249,7 @@ def flight(
     planner = planner or InlinePlanner(scheduler or OrderedScheduler())
     takeoff = vehicle.position.copy()
     mission = Mission(robot, planner, takeoff=takeoff, origin=origin)
-    guard = SetpointGuard(
-        robot.limits, takeoff, position_setpoints=vehicle.capabilities.position_setpoints
-    )
-    prepared = Flight(vehicle, mission, SetpointLoop(vehicle, mission, guard))
+    prepared = Flight(vehicle, mission, SetpointLoop(vehicle, mission))
     for command in (*commands, *([Start()] if start else [])):
         prepared.tell(command)
     return prepared
@@ -283,6 +284,4 @@ def square(side: float = 10.0, height: float = 1.5, hover: float = 0.0) -> list[
 
 def length(track: list[Vector]) -> float:
     """Metres flown."""
-    return math.fsum(
-        float(np.linalg.norm(b - a)) for a, b in zip(track, track[1:], strict=False)
-    )
+    return math.fsum(float(np.linalg.norm(b - a)) for a, b in pairwise(track))

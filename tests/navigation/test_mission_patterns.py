@@ -16,6 +16,7 @@ FARM = LimitsConfig(cruise_speed=0.5)
 
 
 def velocity(priority: int = 1, **axes: float) -> StreamItem:
+    """One velocity command by stream."""
     item = VelocityCommand(priority=priority, **axes)
     return StreamItem("drone/follow", AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [item]))
 
@@ -24,7 +25,7 @@ def test_static_waypoints_farm_survey() -> None:
     """(a) Four corners with 5 s of hover each, back to the start, landed, in about two minutes."""
     farm = flight(add(*square(hover=5.0)), limits=FARM)
     farm.run()
-    assert farm.status.state is S.LANDED, farm.status.reason
+    farm.expect(S.LANDED)
     assert farm.status.visited == ("wp1", "wp2", "wp3", "wp4")
     assert farm.states == [
         S.TAKING_OFF,
@@ -46,9 +47,11 @@ def test_dynamic_waypoints_are_woven_in() -> None:
     """(b) Waypoints that a remote user adds in flight are visited, the nearest first."""
     survey = flight(add(*square(), ordered=False), scheduler=NearestNeighborScheduler())
     survey.run(until=lambda: "wp2" in survey.status.visited)
-    assert survey.tell(add(Waypoint("near", 10, 3, 1.5), Waypoint("far", 0, 20, 1.5), ordered=False))
+    assert survey.tell(
+        add(Waypoint("near", 10, 3, 1.5), Waypoint("far", 0, 20, 1.5), ordered=False)
+    )
     survey.run()
-    assert survey.status.state is S.LANDED
+    survey.expect(S.LANDED)
     assert survey.status.visited == ("wp1", "wp2", "near", "wp3", "wp4", "far")
 
 
@@ -58,17 +61,17 @@ def test_sensor_driven_from_nothing() -> None:
     follow = flight(live(), limits=limits)
     follow.run_to(S.HOLDING)
     follow.keep_saying(lambda: velocity(forward=1.0), 8.0, rate=5)
-    assert follow.mission.state is S.FOLLOWING
+    follow.expect(S.FOLLOWING)
     assert follow.vehicle.position[0] > 5.0
     follow.run(1.0)
-    assert follow.mission.state is S.HOLDING
+    follow.expect(S.HOLDING)
     stood = follow.vehicle.position.copy()
     follow.run(3.0)
     assert np.linalg.norm(follow.vehicle.position - stood) < 0.5
     follow.run_to(S.RETURNING)
     assert "silent" in follow.status.reason
     follow.run()
-    assert follow.status.state is S.LANDED
+    follow.expect(S.LANDED)
     assert np.linalg.norm(follow.vehicle.position) < 0.5
 
 
@@ -80,9 +83,9 @@ def test_urgent_commands_preempt_and_the_plan_resumes() -> None:
     track.run_to(S.LOITERING)
     track.run(2.0)
     track.keep_saying(lambda: velocity(left=1.0), 5.0, rate=10)
-    assert track.mission.state is S.DIVERTED
+    track.expect(S.DIVERTED)
     assert track.vehicle.position[1] > 3.0
-    assert track.status.visited == ()
+    assert not track.status.visited
     track.run_to(S.ENROUTE)
     assert track.status.reason == "flying to a"
     track.run_to(S.LOITERING)
@@ -90,7 +93,7 @@ def test_urgent_commands_preempt_and_the_plan_resumes() -> None:
     track.run(until=lambda: "a" in track.status.visited)
     assert track.seconds - began == pytest.approx(2.0, abs=0.2)
     track.run()
-    assert track.status.state is S.LANDED
+    track.expect(S.LANDED)
     assert track.status.visited == ("a", "b")
 
 
@@ -101,7 +104,7 @@ def test_urgent_waypoints_preempt_and_the_plan_resumes() -> None:
     survey.run(3.0)
     survey.tell(add(Waypoint("event", 0, 6, 1.5, 1.0, priority=1)))
     survey.turn()
-    assert survey.mission.state is S.DIVERTED
+    survey.expect(S.DIVERTED)
     assert survey.status.target is not None
     assert survey.status.target.id == "event"
     survey.run()
@@ -123,5 +126,5 @@ def test_abort_forgets_the_plan(way: str) -> None:
             rescue.tell(ClearNavigation())
     assert rescue.tell(urgent).accepted
     rescue.run()
-    assert rescue.status.state is S.LANDED
+    rescue.expect(S.LANDED)
     assert rescue.status.visited == ("wp2", "person")
