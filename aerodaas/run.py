@@ -128,7 +128,7 @@ class Run:
         from aerodaas.console import Watching  # noqa: PLC0415
 
         assert self._flight is not None  # noqa: S101 - launched
-        with Watching(self.options, self.config, self._speed_text()) as watching:
+        with Watching(self.options, self.config) as watching:
             while time.monotonic() < until:
                 state = self.look()
                 watching.update(state)
@@ -152,12 +152,11 @@ class Run:
         assert self._flight is not None  # noqa: S101 - launched
         self._finished = True
         atexit.unregister(self._abandon)
-        reports = self._flight.stop()
+        self._flight.stop()
         for hook in self.on_end:
             hook()
         wall = time.monotonic() - self._began
-        recording = self._flight.recording
-        show_results(self.options, recording, self.state, reports, wall)
+        show_results(self.options, self._flight.recording, wall)
 
     def _abandon(self) -> None:
         """The application ended without waiting: land, then stop."""
