@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -126,14 +126,13 @@ class Flight:
 
 
 def _closed(robot: RobotFlight) -> Iterator[Band]:
-    end = robot.states[-1][0] if robot.states else 0.0
-    for band, following in zip(robot.bands, [*robot.bands[1:], None], strict=True):
-        yield Band(
-            band.state,
-            band.start,
-            following.start if following else max(end, band.end),
-            band.reason,
-        )
+    """The bands, each up to the start of the next, the last up to the last state."""
+    ends = [band.start for band in robot.bands[1:]]
+    if robot.bands:
+        last = robot.states[-1][0] if robot.states else 0.0
+        ends.append(max(last, robot.bands[-1].end))
+    for band, end in zip(robot.bands, ends, strict=True):
+        yield replace(band, end=end)
 
 
 def _state(flight: Flight, record: Record) -> None:

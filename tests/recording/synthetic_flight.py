@@ -126,7 +126,7 @@ class SyntheticFlight:
             if self.frames and step.time >= next_frame:
                 next_frame += 1 / self.frames
                 yield from self._seen(stamp, odometry, rng)
-            if count == 400:
+            if count == round(20 * self.rate):
                 header = Header(count, stamp, f"{self.robot}/monitor")
                 alert = Alert(header, "battery_low", "the battery is at 20 %", {"fraction": 0.2})
                 yield self.message("monitor", stamp, alert)
