@@ -189,7 +189,7 @@ class DroneActor(StreamActor):
 
     def _acknowledge(self, message: Message[Any]) -> None:
         if message.stream.startswith(ACKS):
-            for source, stamp in message.item:
+            for source, stamp in message.item or ():
                 self._barrier.acknowledge(source, stamp)
         elif message.stream in self._steering:
             self._barrier.acknowledge(message.header.source, message.header.stamp)

@@ -56,6 +56,8 @@ class _Member:
 
     name: str
     handle: Any
+    setup: tuple[Any, ...]
+    """What `prepare` is given."""
     info: ActorInfo | None = None
     report: ActorReport = field(default_factory=lambda: ActorReport("new"))
     pending: ray.ObjectRef[ActorReport] | None = None
@@ -89,12 +91,13 @@ class Flight:
                 actor.name,
                 AnalyticsActor,
                 actor.place,
-                (session, actor.name, actor.nodes),
+                (session, actor.name),
+                setup=actor.nodes,
                 restarts=_ANALYTICS_RESTARTS,
             )
         if self.recording is not None and provenance is not None:
-            args = (session, self.recording, plan.recorded, provenance)
-            self._create("recorder", RecorderActor, edge, args)
+            recorder = (session, self.recording, plan.recorded, provenance)
+            self._create("recorder", RecorderActor, edge, recorder)
         self._origin = 0
         self._next_reports = 0.0
         self._stopped = False
@@ -173,13 +176,14 @@ class Flight:
         args: tuple[Any, ...],
         *,
         restarts: int = 0,
+        setup: tuple[Any, ...] = (),
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         remote = ray.remote(kind).options(**options_for(place, restarts=restarts))
-        self._members[name] = _Member(name, remote.remote(*args, **kwargs))
+        self._members[name] = _Member(name, remote.remote(*args, **kwargs), setup)
 
     def _prepare(self, members: list[_Member], progress: Callable[[str], None]) -> None:
-        waiting = {member.handle.prepare.remote(): member for member in members}
+        waiting = {member.handle.prepare.remote(*member.setup): member for member in members}
         deadline = time.monotonic() + _PREPARE_TIMEOUT
         while waiting:
             ready, _ = ray.wait(list(waiting), timeout=max(0.0, deadline - time.monotonic()))
