@@ -183,7 +183,7 @@ class FlightRecorder:
                 entries = [
                     log_entry(self._session, message.stamp, LogLevel.Error, message.stream, text)
                 ]
-        if message.hops:
+        if len(message.hops) > 1:
             entries.append(_latency(message))
         return entries
 
