@@ -177,3 +177,11 @@ def test_sky_above_and_meadow_below() -> None:
     assert sky[0] > sky[2]
     assert meadow[1] > meadow[0]
     assert meadow[1] > meadow[2] > meadow[0]
+
+
+def test_a_landed_camera_still_sees_the_ground() -> None:
+    """Standing on the ground, the lower half of the picture is meadow."""
+    renderer = Renderer(world(), CAMERAS["plain"])
+    below = renderer.render(0.0, pose(0, 0, 0)).astype(float)[100:].mean(axis=(0, 1))
+    renderer.close()
+    assert below[1] > 1.3 * below[0]

@@ -167,7 +167,7 @@ def test_boxes_hold_what_they_surround() -> None:
             "more than one entity is called t",
         ),
         (
-            '{"name": "x", "entities": [{"kind": "car", "id": "c", "motion": {"points": [[0, 0]]}}]}',
+            '{"name": "x", "entities": [{"kind": "car", "id": "c", "motion": {"points": []}}]}',
             "points",
         ),
         ('{"name": "x", "entities": [{"kind": "tree", "id": "t", "at": [NaN, 0]}]}', "at.0"),
