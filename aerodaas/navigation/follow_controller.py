@@ -30,6 +30,9 @@ __all__ = ["FollowController", "FollowPhase", "Observation"]
 _LONGEST_STEP = 0.5
 """Seconds; after a longer silence the integrals would grow by what nobody saw."""
 _FIRST_STEP = 0.1
+_FARTHEST = 1000.0
+"""Metres; no camera tells a person from farther away."""
+_FARTHEST_FROM_HOME = 1e5
 _INTEGRAL_REACH = 1.2
 """Metres; a person who walks at 1 m/s is followed so far behind by the proportional part alone."""
 
@@ -203,17 +206,23 @@ def _pid(gains: tuple[float, float, float], low: float, high: float) -> PID:
 
 
 def _without_nonsense(seen: Observation) -> Observation:
-    """Leave out what holds a number that is not finite: it counts as not observed."""
+    """Leave out what holds a number that cannot be: it counts as not observed."""
     sighting = seen.sighting
-    if sighting is not None and not math.isfinite(sighting.bearing + sighting.distance):
+    if sighting is not None and not (
+        abs(sighting.bearing) <= math.pi and 0.0 <= sighting.distance <= _FARTHEST
+    ):
         sighting = None
-    at_capture = seen.at_capture if _is_finite(seen.at_capture) else None
-    now = seen.now if _is_finite(seen.now) else None
+    at_capture = seen.at_capture if _is_sane(seen.at_capture) else None
+    now = seen.now if _is_sane(seen.now) else None
     return replace(seen, sighting=sighting, at_capture=at_capture, now=now)
 
 
-def _is_finite(odometry: Odometry | None) -> bool:
-    return odometry is not None and math.isfinite(float(odometry.position.sum()) + odometry.yaw)
+def _is_sane(odometry: Odometry | None) -> bool:
+    return (
+        odometry is not None
+        and bool((np.abs(odometry.position) <= _FARTHEST_FROM_HOME).all())
+        and math.isfinite(odometry.yaw)
+    )
 
 
 def _clip(value: float, limit: float) -> float:

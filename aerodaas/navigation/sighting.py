@@ -72,7 +72,7 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     if camera is None or not all(map(math.isfinite, detection.box)):
         return None
     level = np.eye(3)
-    if odometry is not None:
+    if odometry is not None and math.isfinite(odometry.roll + odometry.pitch):
         level = rotation_from_rpy(odometry.roll, odometry.pitch, 0.0)
     scale_u, scale_v = camera.width / detections.width, camera.height / detections.height
     u, v = detection.centre
