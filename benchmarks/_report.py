@@ -14,11 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import psutil
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.measure import Measurement
 from rich.table import Table
 
 __all__ = ["Report"]
 
+_WIDEST = 400
 _ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -49,13 +52,24 @@ class Report:
 
     def show(self) -> None:
         """Print the table."""
-        table = Table(title=self.name, caption=_machine_line(), caption_justify="left")
+        table = Table(
+            title=self.name,
+            caption=_machine_line(),
+            caption_justify="left",
+            box=SIMPLE_HEAD,
+            padding=(0, 1),
+            pad_edge=False,
+        )
         table.add_column("case", no_wrap=True)
         for figure, unit in self.units.items():
-            table.add_column(f"{figure}\n{unit}", justify="right")
+            table.add_column(f"{figure}\n{unit}", justify="right", no_wrap=True)
         for case, figures in self.rows:
-            table.add_row(case, *(f"{value:.4g}" for value in figures.values()))
+            table.add_row(case, *(f"{value:.3g}" for value in figures.values()))
         console = Console()
+        # A figure cut short is worth nothing: a narrow terminal wraps instead.
+        wide = Console(width=_WIDEST)
+        whole = Measurement.get(wide, wide.options, table).maximum
+        console.width = max(console.width, whole)
         console.print(table)
         for text in self.notes:
             console.print(text)

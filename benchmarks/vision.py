@@ -28,9 +28,9 @@ UNITS = {
     "post": "ms",
     "pre+post": "% infer",
     "total": "ms",
-    "total p99": "ms",
+    "p99": "ms",
     "bare ort": "ms",
-    "boxes": "/ frame",
+    "boxes": "a frame",
 }
 
 
@@ -94,7 +94,7 @@ def _time(path: Path, pictures: list[Frame], rounds: int, threads: int) -> dict[
         "post": post,
         "pre+post": 100 * (pre + post) / inference,
         "total": statistics.median(totals),
-        "total p99": float(np.percentile(totals, 99)),
+        "p99": float(np.percentile(totals, 99)),
         "bare ort": 1000 * statistics.median(alone),
         "boxes": boxes / rounds,
     }
