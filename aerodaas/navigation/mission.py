@@ -387,7 +387,7 @@ class Mission:
         ):
             return Return()
         if state.mode is VehicleMode.GROUNDED:
-            self._to(MissionState.LANDED)
+            self._to(MissionState.LANDED, self._machine.reason)
             return Wait()
         position = state.odometry.position
         if self._return_height is None:
@@ -397,14 +397,17 @@ class Mission:
         way = above - position
         late = seconds(self._now - self._machine.since) > self.limits.return_timeout
         if late or math.hypot(way[0], way[1]) <= self.limits.arrival_radius:
-            self._to(MissionState.LANDING, "the return took too long" if late else "above home")
+            reason = self._machine.reason
+            self._to(
+                MissionState.LANDING, f"the return took too long; {reason}" if late else reason
+            )
             return Land()
         return Fly(setpoint_towards(above, position, None, self.limits.cruise_speed))
 
     def _land(self, state: VehicleState) -> Action:
         self._leg = None
         if state.mode is VehicleMode.GROUNDED and not state.armed:
-            self._to(MissionState.LANDED)
+            self._to(MissionState.LANDED, self._machine.reason)
             return Wait()
         waited = seconds(self._now - self._machine.since)
         if state.mode is VehicleMode.LOST and waited > self.limits.return_timeout:
