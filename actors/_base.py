@@ -25,7 +25,14 @@ from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError
 
-__all__ = ["ActorInfo", "ActorReport", "StreamActor", "StreamCount", "failure_line"]
+__all__ = [
+    "ActorInfo",
+    "ActorReport",
+    "SentCount",
+    "StreamActor",
+    "StreamCount",
+    "failure_line",
+]
 
 _ALERTS_KEPT = 50
 Phase = Literal["new", "ready", "running", "done", "failed"]
@@ -51,13 +58,23 @@ class StreamCount:
 
 
 @dataclass(frozen=True)
+class SentCount:
+    """What an actor has published on one stream."""
+
+    count: int
+    median_ms: float | None
+    """From capture to publishing, of the newest messages; None before the first."""
+    p99_ms: float | None
+
+
+@dataclass(frozen=True)
 class ActorReport:
     """How an actor fares."""
 
     phase: Phase
     error: AeroDaaSError | None = None
     streams: dict[str, StreamCount] = field(default_factory=dict)
-    sent: dict[str, int] = field(default_factory=dict)
+    sent: dict[str, SentCount] = field(default_factory=dict)
     cpu_seconds: float = 0.0
     alerts: tuple[Alert, ...] = ()
     """The newest alerts, oldest first."""
@@ -92,7 +109,7 @@ class StreamActor:
     def prepare(self) -> ActorInfo:
         """Open everything; raises the project's errors for what cannot be opened."""
         logging.captureWarnings(capture=True)
-        self.inbox = Inbox(self.session.id, self.name, self._reads)
+        self.inbox = Inbox(self.scope, self.name, self._reads)
         self.alerts = self.outlet(f"alerts/{self.name}")
         self._open()
         self._phase = "ready"
@@ -149,9 +166,14 @@ class StreamActor:
             self.inbox.close()
         return report
 
+    @property
+    def scope(self) -> str:
+        """Prefix of the stream names of this run on this node."""
+        return self.session.scope(ray.get_runtime_context().get_node_id())
+
     def outlet(self, stream: str) -> Outlet:
         """Open a stream for writing."""
-        self.outlets[stream] = Outlet(self.session.id, stream)
+        self.outlets[stream] = Outlet(self.scope, stream)
         return self.outlets[stream]
 
     def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401
@@ -174,9 +196,9 @@ class StreamActor:
             for stream, received in self.inbox.received.items()
         }
 
-    def sent(self) -> dict[str, int]:
-        """Messages published, by stream."""
-        return {stream: outlet.sent for stream, outlet in self.outlets.items()}
+    def sent(self) -> dict[str, SentCount]:
+        """What was published, by stream."""
+        return {stream: _sent(outlet) for stream, outlet in self.outlets.items()}
 
     @property
     def stopping(self) -> bool:
@@ -211,3 +233,11 @@ class StreamActor:
 
     def _values(self) -> dict[str, Any]:
         return {}
+
+
+def _sent(outlet: Outlet) -> SentCount:
+    newest = sorted(outlet.latencies)
+    if not newest:
+        return SentCount(outlet.sent, None, None)
+    middle, high = newest[len(newest) // 2], newest[int(0.99 * (len(newest) - 1))]
+    return SentCount(outlet.sent, middle, high)

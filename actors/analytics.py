@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors._barrier import ACKS
-from aerodaas.actors._base import StreamActor, StreamCount, failure_line
+from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
 from aerodaas.actors.session import Session, is_due, next_due
 from aerodaas.actors.streams import Inbox, Outlet
 from aerodaas.analytics.base import Analytics
@@ -62,13 +62,18 @@ class NodeSpec:
 
 
 class AnalyticsActor(StreamActor):
-    """Runs the analyses of `nodes`."""
+    """Runs the analyses that `prepare` is given."""
 
-    def __init__(self, session: Session, name: str, nodes: tuple[NodeSpec, ...]) -> None:
+    def __init__(self, session: Session, name: str) -> None:
         """Belong to `session` as `name`."""
         super().__init__(session, name, {})
+        self._workers: list[_Worker] = []
+
+    def prepare(self, *nodes: NodeSpec) -> ActorInfo:
+        """Open the analyses `nodes`; raises what their `open` raises."""
+        # Not in the constructor: Ray would keep the models in its object store for restarts.
         self._workers = [_Worker(self, node) for node in nodes]
-        self._lock = threading.Lock()
+        return super().prepare()
 
     def _open(self) -> None:
         for worker in self._workers:
@@ -147,7 +152,7 @@ class _Worker:
 
     def open(self) -> None:
         session = self._actor.session
-        self.inbox = Inbox(session.id, f"analytics/{self.node.stream}", self.depths)
+        self.inbox = Inbox(self._actor.scope, f"analytics/{self.node.stream}", self.depths)
         self._results = self._actor.outlet(self.node.stream)
         self._commands = {
             trigger.stream: self._actor.outlet(trigger.stream) for trigger in self.node.triggers

@@ -6,7 +6,7 @@ import contextlib
 import logging
 import os
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import ray
 
@@ -15,6 +15,7 @@ from aerodaas.errors import AeroDaaSError, ConfigError
 
 __all__ = ["Place", "connect", "discover", "disconnect", "options_for"]
 
+_KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
 _SHARE = 0.001
 """Share of a node's `edge` or `cloud` resource that an actor takes: it says where, not how much."""
 _STORE_BYTES = 128 * 2**20
@@ -90,9 +91,9 @@ def discover() -> list[ComputeConfig]:
     """The compute resources that the connected cluster offers: one for each kind of node."""
     found: dict[str, ComputeConfig] = {}
     for node in ray.nodes():
-        for kind in ("edge", "cloud"):
+        for kind in _KINDS:
             if node["Alive"] and kind in node["Resources"]:
-                found[kind] = ComputeConfig(id=kind, kind=kind)  # type: ignore[arg-type]
+                found[kind] = ComputeConfig(id=kind, kind=kind)
     return list(found.values())
 
 

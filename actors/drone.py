@@ -16,6 +16,7 @@ from aerodaas.actors._base import StreamActor
 from aerodaas.actors.pilot import Pilot, RobotSpec, state_stream
 from aerodaas.actors.session import CONTROL_PERIOD_NS, Session, next_due
 from aerodaas.clock import NANOSECONDS, LockstepClock
+from aerodaas.errors import AeroDaaSError
 from aerodaas.navigation.commands import Answer, Command, ReturnHome, Start
 from aerodaas.navigation.safety import Neighbour
 from aerodaas.status import Message, MissionStatus
@@ -188,7 +189,7 @@ class DroneActor(StreamActor):
 
     def _acknowledge(self, message: Message[Any]) -> None:
         if message.stream.startswith(ACKS):
-            for source, stamp in message.item:
+            for source, stamp in message.item or ():
                 self._barrier.acknowledge(source, stamp)
         elif message.stream in self._steering:
             self._barrier.acknowledge(message.header.source, message.header.stamp)
@@ -202,7 +203,7 @@ class DroneActor(StreamActor):
             state = pilot.loop.state
             if state is not None:
                 self._whereabouts[pilot.id] = _neighbour(state)
-            for alert in pilot.mission.take_alerts():
+            for alert in pilot.new_alerts():
                 self.alert(alert.kind, alert.text, **alert.values)
 
     def _take(self, message: Message[Any], now: int) -> None:
@@ -223,6 +224,11 @@ class DroneActor(StreamActor):
                 pilot.handle(ReturnHome(reason), self.clock.now())
             self.alert("application_lost", reason)
         self._orphaned = silent
+
+    def _fail(self, error: AeroDaaSError) -> None:
+        for pilot in self._pilots.values():
+            pilot.abandon()
+        super()._fail(error)
 
     def _close(self) -> None:
         for pilot in self._pilots.values():

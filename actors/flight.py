@@ -56,6 +56,8 @@ class _Member:
 
     name: str
     handle: Any
+    setup: tuple[Any, ...]
+    """What `prepare` is given."""
     info: ActorInfo | None = None
     report: ActorReport = field(default_factory=lambda: ActorReport("new"))
     pending: ray.ObjectRef[ActorReport] | None = None
@@ -89,12 +91,13 @@ class Flight:
                 actor.name,
                 AnalyticsActor,
                 actor.place,
-                (session, actor.name, actor.nodes),
+                (session, actor.name),
+                setup=actor.nodes,
                 restarts=_ANALYTICS_RESTARTS,
             )
         if self.recording is not None and provenance is not None:
-            args = (session, self.recording, plan.recorded, provenance)
-            self._create("recorder", RecorderActor, edge, args)
+            recorder = (session, self.recording, plan.recorded, provenance)
+            self._create("recorder", RecorderActor, edge, recorder)
         self._origin = 0
         self._next_reports = 0.0
         self._stopped = False
@@ -118,14 +121,14 @@ class Flight:
         for member in reversed(self._members.values()):
             member.handle.start.remote(self._origin)
 
-    def poll(self) -> FlightState:
-        """Ask how everyone fares; also tells the drones that the application is alive."""
+    def poll(self, newest: int = 200) -> FlightState:
+        """Ask how everyone fares, with the `newest` latencies of each robot; also tells the drones that the application is alive."""
         if time.monotonic() >= self._next_reports:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
         robots: dict[str, RobotReport] = {}
         for name in set(self._drones.values()):
-            robots.update(self._ask(self._members[name].handle.robots.remote()))
+            robots.update(self._ask(self._members[name].handle.robots.remote(newest)))
         over = all(self._members[name].report.phase in {"done", "failed"} for name in self._ids())
         return FlightState(robots, self.reports(), over)
 
@@ -173,13 +176,14 @@ class Flight:
         args: tuple[Any, ...],
         *,
         restarts: int = 0,
+        setup: tuple[Any, ...] = (),
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         remote = ray.remote(kind).options(**options_for(place, restarts=restarts))
-        self._members[name] = _Member(name, remote.remote(*args, **kwargs))
+        self._members[name] = _Member(name, remote.remote(*args, **kwargs), setup)
 
     def _prepare(self, members: list[_Member], progress: Callable[[str], None]) -> None:
-        waiting = {member.handle.prepare.remote(): member for member in members}
+        waiting = {member.handle.prepare.remote(*member.setup): member for member in members}
         deadline = time.monotonic() + _PREPARE_TIMEOUT
         while waiting:
             ready, _ = ray.wait(list(waiting), timeout=max(0.0, deadline - time.monotonic()))
@@ -250,7 +254,8 @@ class Flight:
                 raise cause from None
             raise MissionError(f"{type(cause).__name__}: {cause}") from cause
         except RayActorError as error:
-            reason = str(error).strip().splitlines()[0]
+            # Ray puts the remote traceback first and what went wrong last.
+            reason = str(error).strip().splitlines()[-1]
             raise MissionError(f"an actor died: {reason}") from None
         except ray.exceptions.GetTimeoutError:
             raise MissionError(f"an actor did not answer within {_ANSWER_TIMEOUT:.0f} s") from None

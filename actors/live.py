@@ -8,6 +8,9 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+import ray
+
+from aerodaas.actors.session import Session
 from aerodaas.actors.streams import Inbox
 
 __all__ = ["LiveReader"]
@@ -18,9 +21,10 @@ _DEPTH = 4
 class LiveReader:
     """Reads the items of one stream until the flight is over; keeps the newest few."""
 
-    def __init__(self, session: str, stream: str, over: Callable[[], bool]) -> None:
+    def __init__(self, session: Session, stream: str, over: Callable[[], bool]) -> None:
         """Read `stream` of the run `session`; `over` tells when to stop waiting."""
-        self._inbox = Inbox(session, f"application/{uuid.uuid4().hex[:8]}", {stream: _DEPTH})
+        scope = session.scope(ray.get_runtime_context().get_node_id())
+        self._inbox = Inbox(scope, f"application/{uuid.uuid4().hex[:8]}", {stream: _DEPTH})
         self._waiting: deque[Any] = deque()
         self._over = over
 

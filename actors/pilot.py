@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,14 +14,14 @@ from aerodaas.actors.session import Session, is_due
 from aerodaas.actors.streams import Outlet
 from aerodaas.clock import host_time_ns
 from aerodaas.config import RobotConfig, SensorConfig
-from aerodaas.data import Header
-from aerodaas.errors import MissionError
+from aerodaas.data import Alert, Header
+from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.geometry import GeodeticOrigin
 from aerodaas.navigation.commands import Answer, Command, StreamItem
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
 from aerodaas.navigation.planner import BackgroundPlanner, InlinePlanner
-from aerodaas.navigation.safety import Neighbour, SetpointGuard
+from aerodaas.navigation.safety import Neighbour
 from aerodaas.plugins import load_plugin
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.status import Message, MissionStatus, SetpointRecord
@@ -78,6 +79,7 @@ class Pilot:
         self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
         """Milliseconds from capture to the arrival of the command made from it."""
         self._session = session
+        self._told = 0
         plugin = load_plugin("drivers", spec.robot.driver)
         self.vehicle: Vehicle = plugin(spec.robot, session.environment)
 
@@ -97,12 +99,7 @@ class Pilot:
             origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
             wind=np.array(environment.simulation.wind, dtype=np.float64),
         )
-        guard = SetpointGuard(
-            robot.limits,
-            takeoff,
-            position_setpoints=self.vehicle.capabilities.position_setpoints,
-        )
-        self.loop = SetpointLoop(self.vehicle, self.mission, guard)
+        self.loop = SetpointLoop(self.vehicle, self.mission)
         for command in self.spec.initial:
             answer = self.handle(command, 0)
             if not answer.accepted or answer.refused:
@@ -162,6 +159,17 @@ class Pilot:
     def over(self) -> bool:
         """True once the mission has ended, on the ground or out of our hands."""
         return self.mission.finished
+
+    def new_alerts(self) -> list[Alert]:
+        """What the mission has had to say since the last call."""
+        alerts = list(self.mission.alerts[self._told :])
+        self._told += len(alerts)
+        return alerts
+
+    def abandon(self) -> None:
+        """Our own code has failed: have the vehicle land by itself."""
+        with contextlib.suppress(AeroDaaSError):
+            self.vehicle.land()
 
     def _publish(self, stream: str, item: object, now: int) -> tuple[str, int]:
         outlet = self._outlets[stream]

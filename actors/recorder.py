@@ -10,6 +10,7 @@ from aerodaas.actors._base import StreamActor
 from aerodaas.actors.session import Session
 from aerodaas.clock import host_time_ns
 from aerodaas.errors import RecordingError
+from aerodaas.geometry import GeodeticOrigin
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
 
@@ -32,8 +33,14 @@ class RecorderActor(StreamActor):
         self._failure = ""
 
     def _open(self) -> None:
+        environment = self.session.environment
+        home = environment.home
         self._recorder = FlightRecorder(
-            self._path, config=self.session.environment.recording, provenance=self._provenance
+            self._path,
+            config=environment.recording,
+            provenance=self._provenance,
+            home=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
+            fences={robot.id: robot.limits.geofence for robot in environment.robots},
         )
         self._acks = self.outlet(f"{ACKS}/recorder") if self.session.lockstep else None
 

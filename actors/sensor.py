@@ -59,8 +59,9 @@ class SensorActor(StreamActor):
             self.clock.sleep_until(due)
             for message in self.inbox.receive(0.0):
                 self._take(message)
-            self._capture(due, lockstep=False)
-            due = next_due(self._sensor.rate, max(due, self.clock.now() - 1))
+            now = self.clock.now()
+            self._capture(now, lockstep=False)
+            due = next_due(self._sensor.rate, now)
 
     def _take(self, message: Message[Any]) -> None:
         if isinstance(message.item, VehicleState):
@@ -72,7 +73,7 @@ class SensorActor(StreamActor):
         taken = host_time_ns()
         if picture is not None:
             # A live camera hands out a picture that is some milliseconds old already.
-            age = 0 if lockstep else max(0, self.clock.now() - picture.stamp)
+            age = 0 if lockstep else max(0, stamp - picture.stamp)
             header = Header(self._frames.sent, picture.stamp, self._stream)
             frame = self._frame(header, picture)
             self._frames.measure(frame, header, taken - int(self.session.host_seconds(age) * 1e9))

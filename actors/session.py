@@ -26,6 +26,10 @@ class Session:
     origin_ns: int = field(default_factory=host_time_ns)
     """Host time at which mission time is zero."""
 
+    def scope(self, node_id: str) -> str:
+        """Prefix of the run's stream names on one Ray node; two nodes may share a host."""
+        return f"{self.id}/{node_id[:12]}"
+
     def starting_at(self, origin_ns: int) -> Session:
         """The same run with mission time zero at this host time."""
         return replace(self, origin_ns=origin_ns)

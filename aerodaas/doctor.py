@@ -117,7 +117,9 @@ def _packages() -> Iterator[Finding]:
 def _providers() -> Iterator[Finding]:
     import onnxruntime  # noqa: PLC0415 - slow to load
 
-    names = [name.removesuffix("ExecutionProvider") for name in onnxruntime.get_available_providers()]
+    names = [
+        name.removesuffix("ExecutionProvider") for name in onnxruntime.get_available_providers()
+    ]
     yield Finding("inference on", ", ".join(names))
 
 

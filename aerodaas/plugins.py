@@ -20,6 +20,7 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
     "drivers": {"simulated": "aerodaas.drivers.simulated:SimulatedVehicle"},
     "cameras": {
         "simulated": "aerodaas.cameras.simulated:SimulatedCamera",
+        "recorded": "aerodaas.cameras.recorded:recorded_camera",
         "folder": "aerodaas.cameras.folder:FolderCamera",
         "video": "aerodaas.cameras.video:VideoCamera",
     },

@@ -57,8 +57,8 @@ class Run:
         from aerodaas.actors import cluster  # noqa: PLC0415 - ray only where it is needed
         from aerodaas.actors.flight import Flight  # noqa: PLC0415
         from aerodaas.actors.live import LiveReader  # noqa: PLC0415
+        from aerodaas.console import Starting  # noqa: PLC0415
         from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
-        from aerodaas.view import Starting  # noqa: PLC0415
 
         with Starting(self.options) as starting:
             starting.step("starting Ray")
@@ -74,7 +74,7 @@ class Run:
                 flight.stop()
                 raise
         self._flight = flight
-        session = plan.session.id
+        session = plan.session
         self.graph.reader = lambda stream: LiveReader(session, stream, lambda: self._finished)
         for callback in self.graph.on_launch:
             callback()
@@ -85,6 +85,12 @@ class Run:
         if self._flight is None or self._finished:
             raise MissionError(f"{robot} is no longer flying")
         return self._flight.command(robot, command)
+
+    def look(self, newest: int = 200) -> FlightState:
+        """Return the present state, with the `newest` latencies of each robot."""
+        assert self._flight is not None  # noqa: S101 - launched
+        self.state = self._flight.poll(newest)
+        return self.state
 
     def wait(self) -> None:
         """Watch until every mission has ended; raises what they ended with.
@@ -119,14 +125,14 @@ class Run:
         return "max" if self.lockstep else f"{self.options.speed or 1.0:g}"
 
     def _watch(self, until: float) -> None:
-        from aerodaas.view import Watching  # noqa: PLC0415
+        from aerodaas.console import Watching  # noqa: PLC0415
 
         assert self._flight is not None  # noqa: S101 - launched
-        with Watching(self.options, self.config, self._speed_text()) as watching:
+        with Watching(self.options, self.config) as watching:
             while time.monotonic() < until:
-                self.state = self._flight.poll()
-                watching.update(self.state)
-                if self.state.over:
+                state = self.look()
+                watching.update(state)
+                if state.over:
                     return
                 time.sleep(_POLL_SECONDS)
 
@@ -141,17 +147,16 @@ class Run:
             return
 
     def _finish(self) -> None:
-        from aerodaas.view import show_results  # noqa: PLC0415
+        from aerodaas.console import show_results  # noqa: PLC0415
 
         assert self._flight is not None  # noqa: S101 - launched
         self._finished = True
         atexit.unregister(self._abandon)
-        reports = self._flight.stop()
+        self._flight.stop()
         for hook in self.on_end:
             hook()
         wall = time.monotonic() - self._began
-        recording = self._flight.recording
-        show_results(self.options, recording, self.state, reports, wall)
+        show_results(self.options, self._flight.recording, wall)
 
     def _abandon(self) -> None:
         """The application ended without waiting: land, then stop."""
@@ -161,9 +166,7 @@ class Run:
 
     def _raise_problems(self) -> None:
         assert self._flight is not None  # noqa: S101 - launched
-        problems = [
-            str(report.error) for report in self._flight.reports().values() if report.error
-        ]
+        problems = [str(report.error) for report in self._flight.reports().values() if report.error]
         problems += [
             line
             for report in self._flight.reports().values()
@@ -188,5 +191,3 @@ def _recording_path(options: RunOptions, config: EnvironmentConfig) -> Path | No
         now = datetime.now().astimezone()
         wanted = Path("runs") / f"{name}-{now:%Y%m%d-%H%M%S}"
     return wanted if wanted.suffix == ".mcap" else wanted / _RECORDING
-
-

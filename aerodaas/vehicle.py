@@ -12,6 +12,7 @@ from typing import Protocol, TypeAlias, runtime_checkable
 
 from aerodaas.data import Battery, GpsFix, Odometry
 from aerodaas.geometry import Vector
+from aerodaas.records import travels
 
 __all__ = [
     "Capabilities",
@@ -43,6 +44,7 @@ class VehicleMode(str, enum.Enum):
     """No word from the vehicle within its link time-out."""
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class PositionSetpoint:
     """Fly to a place: ENU metres, yaw in radians (None keeps the present yaw), speed in m/s."""
@@ -52,6 +54,7 @@ class PositionSetpoint:
     speed: float | None = None
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class VelocitySetpoint:
     """Fly at a velocity: ENU m/s, yaw rate in rad/s counter-clockwise."""
@@ -79,6 +82,7 @@ class Capabilities:
     """m/s that the vehicle itself can do vertically."""
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class VehicleState:
     """The newest knowledge about a vehicle."""

@@ -3,7 +3,6 @@
 from aerodaas import (
     AeroNavigation,
     Environment,
-    MonitoringAnalytics,
     NavigationType,
     NearestNeighborScheduler,
     SchedulingType,
@@ -20,7 +19,6 @@ def main() -> None:
     env.set_trajectory_scheduler(scheduler)
 
     odometry = drone.get_sensor_by_id("odom").get_data_stream()
-    MonitoringAnalytics(["battery", "height", "gps"]).deploy(edge).analyse(odometry)
 
     corners = [(0, 0), (0, 10), (10, 10), (10, 0)]
     survey = [Waypoint(f"wp{i}", x, y, 1.5, hover_duration=5) for i, (x, y) in enumerate(corners, 1)]

@@ -6,14 +6,17 @@ then each buffer, aligned to 64 bytes. Little-endian, as both ends run the same 
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 import struct
+from operator import attrgetter
 from typing import Any
 
 from aerodaas.status import Message
 
 __all__ = ["Encoded", "decode"]
 
+_fields = attrgetter(*(field.name for field in dataclasses.fields(Message)))
 _ALIGNMENT = 64
 _HEAD = struct.Struct("<II")
 
@@ -28,7 +31,7 @@ class Encoded:
     def __init__(self, message: Message[Any]) -> None:
         """Pickle the message, leaving the memory of its arrays where it is."""
         buffers: list[pickle.PickleBuffer] = []
-        self._pickle = pickle.dumps(message, protocol=5, buffer_callback=buffers.append)
+        self._pickle = pickle.dumps(_fields(message), protocol=5, buffer_callback=buffers.append)
         self._buffers = [buffer.raw() for buffer in buffers]
         lengths = [buffer.nbytes for buffer in self._buffers]
         self._head = _HEAD.pack(len(lengths), len(self._pickle)) + struct.pack(
@@ -70,5 +73,4 @@ def decode(source: memoryview) -> Message[Any]:
         cursor = _aligned(cursor)
         buffers.append(source[cursor : cursor + length])
         cursor += length
-    message: Message[Any] = pickle.loads(source[start:end], buffers=buffers)  # noqa: S301 - our own processes
-    return message
+    return Message(*pickle.loads(source[start:end], buffers=buffers))  # noqa: S301 - our own bytes

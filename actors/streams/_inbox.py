@@ -26,8 +26,11 @@ class Inbox:
     the messages' `seq` and is counted in `dropped`.
     """
 
-    def __init__(self, session: str, name: str, depths: Mapping[str, int]) -> None:
-        """Read the streams of the run `session` named in `depths`; `name` is the reader's own."""
+    def __init__(self, scope: str, name: str, depths: Mapping[str, int]) -> None:
+        """Read the streams named in `depths`; `scope` is the prefix of their names on this node.
+
+        `name` is the reader's own, unique within the scope.
+        """
         self.received: dict[str, int] = dict.fromkeys(depths, 0)
         self.dropped: dict[str, int] = dict.fromkeys(depths, 0)
         self._next: dict[str, int] = {}
@@ -39,9 +42,9 @@ class Inbox:
         self._subscribers: dict[str, SharedSubscriber] = {}
         self._waiter: SharedWaiter | None = None
         if shared_memory_available():
-            self._waiter = SharedWaiter(f"{session}/inbox/{name}")
+            self._waiter = SharedWaiter(f"{scope}/inbox/{name}")
             for stream, depth in depths.items():
-                subscriber = SharedSubscriber(f"{session}/{stream}", min(depth, MAX_DEPTH))
+                subscriber = SharedSubscriber(f"{scope}/{stream}", min(depth, MAX_DEPTH))
                 self._waiter.attach(subscriber)
                 self._subscribers[stream] = subscriber
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from typing import Any
 
 from aerodaas.actors.streams._codec import Encoded
@@ -13,16 +14,20 @@ from aerodaas.status import Hop, Message
 
 __all__ = ["Outlet", "RemoteReader"]
 
+_LATENCIES_KEPT = 256
+
 
 class Outlet:
     """Publishes one stream: in shared memory on this node, by reference to other nodes."""
 
-    def __init__(self, session: str, stream: str) -> None:
-        """Open `stream` of the run `session` for writing."""
+    def __init__(self, scope: str, stream: str) -> None:
+        """Open `stream` for writing; `scope` is the prefix of its name on this node."""
         self.stream = stream
         self.sent = 0
+        self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
+        """Milliseconds from capture to publishing, newest last."""
         self.remote: list[RemoteReader] = []
-        self._shared = SharedPublisher(f"{session}/{stream}") if shared_memory_available() else None
+        self._shared = SharedPublisher(f"{scope}/{stream}") if shared_memory_available() else None
 
     def measure(self, item: Any, header: Header, captured: int) -> Message[Any]:  # noqa: ANN401
         """Publish a measurement: the first message of its way. `captured` is host time in ns."""
@@ -48,6 +53,7 @@ class Outlet:
         hops: tuple[Hop, ...],
         item: Any,  # noqa: ANN401
     ) -> Message[Any]:
+        self.latencies.append((hops[-1].published - captured) / 1e6)
         message = Message(self.stream, self.sent, stamp, header, captured, hops, item)
         self.sent += 1
         encoded = Encoded(message)

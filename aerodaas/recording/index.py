@@ -36,6 +36,7 @@ BROKEN = (
 )
 """What reading damaged bytes may raise."""
 
+_MAGIC = 8
 _RECORD_HEAD = 9
 _LOOSE = 1 << 20
 """Bytes up to which messages outside chunks are gathered into one block."""
@@ -130,13 +131,13 @@ def _from_summary(file: BinaryIO, summary: Summary) -> FileIndex:
 
 def _scan(file: BinaryIO, size: int) -> FileIndex:
     index = FileIndex(complete=False)
-    offset = 8
+    offset = _MAGIC
     while offset + _RECORD_HEAD <= size:
         file.seek(offset)
         opcode, length = struct.unpack("<BQ", file.read(_RECORD_HEAD))
         end = offset + _RECORD_HEAD + length
-        if end > size or opcode in {Opcode.DATA_END, Opcode.FOOTER}:
-            index.complete = opcode == Opcode.DATA_END and end <= size
+        if end > size or opcode == Opcode.FOOTER:
+            index.complete = end + _MAGIC == size
             break
         try:
             _enter(index, file, opcode, offset, end)

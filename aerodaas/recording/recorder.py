@@ -9,10 +9,12 @@ from __future__ import annotations
 import threading
 from collections import Counter
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
+import cv2
 from foxglove import Schema
 from foxglove.messages import LogLevel
 from mcap.writer import Writer
@@ -146,7 +148,8 @@ class FlightRecorder:
                         self._finish()
                     except OSError as error:
                         self._fail(error)
-                self._output.close()
+                with suppress(OSError):
+                    self._output.close()
                 self._summary = RecordingSummary(
                     path=self.path,
                     channels=dict(self._counts),
@@ -173,14 +176,14 @@ class FlightRecorder:
         if message.item is not None:
             try:
                 entries = list(convert(message.item, message, self._session))
-            except (TypeError, ValueError, OverflowError, AttributeError) as error:
+            except (TypeError, ValueError, OverflowError, AttributeError, cv2.error) as error:
                 # An item that contradicts its own type must cost neither the flight nor the rest.
                 self.drops(message.stream)
                 text = f"cannot record a {type(message.item).__name__}: {error}"
                 entries = [
                     log_entry(self._session, message.stamp, LogLevel.Error, message.stream, text)
                 ]
-        if message.hops:
+        if len(message.hops) > 1:
             entries.append(_latency(message))
         return entries
 
@@ -254,6 +257,7 @@ class FlightRecorder:
             except OSError as error:
                 with self._lock:
                     self._fail(error)
+                return
 
 
 def _latency(message: Message[Any]) -> Entry:

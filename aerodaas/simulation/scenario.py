@@ -7,9 +7,8 @@ places of scattered trees, is drawn from the seed.
 
 from __future__ import annotations
 
+import itertools
 import json
-from importlib import resources
-from importlib.resources.abc import Traversable
 from pathlib import Path
 from typing import Annotated, Literal, TypeAlias
 
@@ -37,6 +36,8 @@ __all__ = [
     "load_scenario",
     "scenario_names",
 ]
+
+_WORLDS = Path(__file__).parent / "worlds"
 
 Finite = Annotated[float, Field(allow_inf_nan=False, ge=-10_000, le=10_000)]
 Length = Annotated[float, Field(gt=0, le=2_000)]
@@ -70,7 +71,7 @@ class Motion(_Strict):
 
     @model_validator(mode="after")
     def _moves(self) -> Self:
-        if any(here == there for here, there in zip(self.points, self.points[1:], strict=False)):
+        if any(here == there for here, there in itertools.pairwise(self.points)):
             raise ValueError("two points in a row are the same place")
         return self
 
@@ -223,8 +224,7 @@ class Scenario(_Strict):
 
 def scenario_names() -> list[str]:
     """Names of the scenarios that ship with the project."""
-    folder = resources.files(__package__) / "worlds"
-    return sorted(file.name[:-5] for file in folder.iterdir() if file.name.endswith(".json"))
+    return sorted(file.stem for file in _WORLDS.glob("*.json"))
 
 
 def load_scenario(world: str) -> Scenario:
@@ -232,16 +232,12 @@ def load_scenario(world: str) -> Scenario:
 
     Raises ConfigError that names the file and the place in it.
     """
-    source: Traversable
-    if world in scenario_names():
-        source = resources.files(__package__) / "worlds" / f"{world}.json"
-    else:
-        source = Path(world)
-        if not source.is_file():
-            known = ", ".join(scenario_names())
-            raise ConfigError(
-                f"no world is called {world!r} and no scenario file lies there; known: {known}"
-            )
+    source = _WORLDS / f"{world}.json" if world in scenario_names() else Path(world)
+    if not source.is_file():
+        known = ", ".join(scenario_names())
+        raise ConfigError(
+            f"no world is called {world!r} and no scenario file lies there; known: {known}"
+        )
     try:
         return Scenario.model_validate(json.loads(source.read_text(encoding="utf-8")))
     except OSError as error:

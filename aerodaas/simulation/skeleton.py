@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from numpy.typing import NDArray
 from aerodaas.geometry import rotation_from_rpy
 
 __all__ = ["JOINTS", "KEYPOINTS", "LIMBS", "Posture", "joints"]
+
+_Point: TypeAlias = tuple[float, float, float]
 
 JOINTS = (
     "pelvis",
@@ -90,6 +93,9 @@ _TORSO, _SHOULDER_DROP, _HEAD = 0.56, 0.05, 0.17
 _STRIDE = 1.35
 """Metres of two steps."""
 
+_FOOT_ANGLE = 1.32
+"""Radians between shin and foot, toes a little down."""
+
 _LYING = 0.14
 """Height of the pelvis above the ground when lying."""
 
@@ -111,19 +117,17 @@ class Posture:
 def joints(height: float, posture: Posture) -> NDArray[np.float64]:
     """Positions (len(JOINTS), 3) of the joints of a person of `height` metres."""
     phase = math.tau * posture.travelled / _STRIDE
-    place: dict[str, NDArray[np.float64]] = {"pelvis": np.zeros(3)}
-    place["neck"] = np.array([0.03 * posture.stepping, 0.0, _TORSO])
+    neck = (0.03 * posture.stepping, 0.0, _TORSO)
+    head = (neck[0] + 0.02, 0.0, _TORSO + _HEAD - 0.02)
+    place: dict[str, _Point] = {"pelvis": (0.0, 0.0, 0.0), "neck": neck, "head": head}
+    place["nose"] = (head[0] + 0.11, 0.0, head[2] - 0.01)
     for side, sign, offset in (("left", 1.0, 0.0), ("right", -1.0, math.pi)):
         swing = math.sin(phase + offset) * posture.stepping
         lift = max(0.0, math.cos(phase + offset)) * posture.stepping
         _leg(place, side, sign, swing, lift)
         _arm(place, side, sign, swing, posture.raised if side == "right" else 0.0)
-    head = place["neck"] + np.array([0.02, 0.0, _HEAD - 0.02])
-    place["head"] = head
-    place["nose"] = head + np.array([0.11, 0.0, -0.01])
-    for side, sign in (("left", 1.0), ("right", -1.0)):
-        place[f"{side}_eye"] = head + np.array([0.09, sign * 0.035, 0.025])
-        place[f"{side}_ear"] = head + np.array([0.0, sign * 0.085, 0.0])
+        place[f"{side}_eye"] = (head[0] + 0.09, sign * 0.035, head[2] + 0.025)
+        place[f"{side}_ear"] = (head[0], sign * 0.085, head[2])
     body = np.array([place[name] for name in JOINTS])
     body[:, 2] += _ANKLE - min(place["left_ankle"][2], place["right_ankle"][2])
     if posture.fallen > 0.0:
@@ -133,34 +137,32 @@ def joints(height: float, posture: Posture) -> NDArray[np.float64]:
     return np.asarray(body * (height / _REFERENCE_HEIGHT))
 
 
-def _leg(
-    place: dict[str, NDArray[np.float64]], side: str, sign: float, swing: float, lift: float
-) -> None:
-    thigh, knee = 0.42 * swing, 0.08 + 0.85 * lift
-    hip = np.array([0.0, sign * _HIP_HALF, 0.0])
-    place[f"{side}_hip"] = hip
-    place[f"{side}_knee"] = hip + _swung(thigh + 0.5 * knee * lift, _THIGH)
-    shin = thigh + 0.5 * knee * lift - knee
-    place[f"{side}_ankle"] = place[f"{side}_knee"] + _swung(shin, _SHIN)
-    toe = np.array([math.cos(shin), 0.0, math.sin(shin) - 0.25])
-    place[f"{side}_toe"] = place[f"{side}_ankle"] + _FOOT * toe / np.linalg.norm(toe)
+def _leg(place: dict[str, _Point], side: str, sign: float, swing: float, lift: float) -> None:
+    bend = 0.08 + 0.85 * lift
+    thigh = 0.42 * swing + 0.5 * bend * lift
+    shin = thigh - bend
+    hip = (0.0, sign * _HIP_HALF, 0.0)
+    knee = _from(hip, thigh, _THIGH)
+    ankle = _from(knee, shin, _SHIN)
+    place[f"{side}_hip"], place[f"{side}_knee"], place[f"{side}_ankle"] = hip, knee, ankle
+    place[f"{side}_toe"] = _from(ankle, shin + _FOOT_ANGLE, _FOOT)
 
 
-def _arm(
-    place: dict[str, NDArray[np.float64]], side: str, sign: float, swing: float, raised: float
-) -> None:
-    shoulder = place["neck"] + np.array([0.0, sign * _SHOULDER_HALF, -_SHOULDER_DROP])
-    place[f"{side}_shoulder"] = shoulder
+def _arm(place: dict[str, _Point], side: str, sign: float, swing: float, raised: float) -> None:
+    neck = place["neck"]
+    shoulder = (neck[0], sign * _SHOULDER_HALF, neck[2] - _SHOULDER_DROP)
     hanging, forearm = -0.5 * swing, -0.5 * swing + 0.35
-    out = sign * (0.12 + 0.1 * raised)
-    turn = raised * (math.pi - 0.15)
-    place[f"{side}_elbow"] = shoulder + _swung(hanging * (1 - raised) + turn, _UPPER_ARM, out)
-    place[f"{side}_wrist"] = place[f"{side}_elbow"] + _swung(
-        forearm * (1 - raised) + turn, _FOREARM, 0.5 * out
+    out, turn = sign * (0.12 + 0.1 * raised), raised * (math.pi - 0.15)
+    elbow = _from(shoulder, hanging * (1 - raised) + turn, _UPPER_ARM, out)
+    place[f"{side}_shoulder"], place[f"{side}_elbow"] = shoulder, elbow
+    place[f"{side}_wrist"] = _from(elbow, forearm * (1 - raised) + turn, _FOREARM, 0.5 * out)
+
+
+def _from(start: _Point, angle: float, length: float, out: float = 0.0) -> _Point:
+    """End of a limb that hangs from `start`, turned forward by `angle` and sideways by `out`."""
+    reach = length / math.sqrt(1.0 + out * out)
+    return (
+        start[0] + reach * math.sin(angle),
+        start[1] + reach * out,
+        start[2] - reach * math.cos(angle),
     )
-
-
-def _swung(angle: float, length: float, out: float = 0.0) -> NDArray[np.float64]:
-    """Return a vector that hangs down, turned forward by `angle` and sideways by `out`."""
-    down = np.array([math.sin(angle), out, -math.cos(angle)])
-    return np.asarray(length * down / np.linalg.norm(down))

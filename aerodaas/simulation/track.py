@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import bisect
+import itertools
 import math
 import random
 from dataclasses import dataclass
@@ -45,7 +46,7 @@ class Track:
         points = [*motion.points, motion.points[0]] if motion.end == "loop" else motion.points
         self._points = _rounded(points, motion.corner, closed=motion.end == "loop")
         self._lengths = [0.0]
-        for here, there in zip(self._points, self._points[1:], strict=False):
+        for here, there in itertools.pairwise(self._points):
             self._lengths.append(self._lengths[-1] + math.dist(here, there))
 
     @property

@@ -6,9 +6,10 @@ that every process computes the same world for itself.
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,6 @@ from aerodaas.simulation.scenario import (
     Building,
     Car,
     CropRows,
-    EntitySpec,
     Fence,
     Motion,
     Person,
@@ -69,7 +69,7 @@ class State:
     yaw: float
     """Radians counter-clockwise from east."""
     present: bool = True
-    posture: Posture = Posture()
+    posture: Posture = field(default_factory=Posture)
     speed: float = 0.0
 
 
@@ -197,10 +197,11 @@ class World:
         """Place everything."""
         self.scenario = scenario
         self.seed = seed
-        things: list[Thing] = []
-        for spec in scenario.entities:
-            if not isinstance(spec, Trees):
-                things.append(_place(spec, f"{seed}/{spec.id}"))
+        things = [
+            _place(spec, f"{seed}/{spec.id}")
+            for spec in scenario.entities
+            if not isinstance(spec, Trees)
+        ]
         obstacles = [box for thing in things for box in thing.boxes(0.0)]
         roads = [spec for spec in scenario.entities if isinstance(spec, Road)]
         walks = [
@@ -230,9 +231,9 @@ class World:
         return [box for thing in self.things for box in thing.boxes(time)]
 
 
-def _place(spec: EntitySpec, seed: str) -> Thing:
-    if isinstance(spec, Trees):
-        raise TypeError("trees are scattered, not placed")
+def _place(
+    spec: Tree | Building | CropRows | Road | Fence | Person | Car | Tower, seed: str
+) -> Thing:
     draw = random.Random(f"{seed}/place")
     if isinstance(spec, CropRows | Road | Fence):
         return Thing(spec, seed)
@@ -286,10 +287,7 @@ def _within(place: tuple[float, float], area: tuple[float, float, float, float] 
 
 def _distance(place: tuple[float, float], points: list[tuple[float, float]]) -> float:
     """Distance from a place to a line through `points`."""
-    return min(
-        _distance_to_piece(place, here, there)
-        for here, there in zip(points, points[1:], strict=False)
-    )
+    return min(_distance_to_piece(place, here, there) for here, there in itertools.pairwise(points))
 
 
 def _distance_to_piece(
@@ -306,7 +304,7 @@ def _distance_to_piece(
 
 def _fence_boxes(spec: Fence) -> list[Box]:
     result = []
-    for (x0, y0), (x1, y1) in zip(spec.points, spec.points[1:], strict=False):
+    for (x0, y0), (x1, y1) in itertools.pairwise(spec.points):
         centre = ((x0 + x1) / 2, (y0 + y1) / 2, spec.height / 2)
         size = (math.dist((x0, y0), (x1, y1)), 0.1, spec.height)
         result.append(Box(spec.id, "fence", centre, size, math.atan2(y1 - y0, x1 - x0)))

@@ -41,6 +41,7 @@ REGISTERED: dict[str, str] = {
     "gems": f"{_HERE}.gems:Gems",
     "kalmia": f"{_HERE}.kalmia:Kalmia",
     "dedas": f"{_HERE}.dedas:Dedas",
+    "margin": f"{_HERE}.margin:Margin",
 }
 """Names to `module:Class`, imported when asked for."""
 

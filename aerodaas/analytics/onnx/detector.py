@@ -40,6 +40,7 @@ class OnnxDetector(Analytics[Detections]):
 
     accepts: ClassVar[tuple[type, ...]] = (Frame,)
     produces: ClassVar[type] = Detections
+    isolated = True
 
     def __init__(
         self,

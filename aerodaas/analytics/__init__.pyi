@@ -1,0 +1,14 @@
+from .base import Analytics as Analytics
+from .base import NavigableAnalytics as NavigableAnalytics
+from .follow import FollowAnalytics as FollowAnalytics
+from .followers import (
+    CarFollowAnalytics as CarFollowAnalytics,
+)
+from .followers import (
+    PersonFollowAnalytics as PersonFollowAnalytics,
+)
+from .followers import (
+    VipFollowAnalytics as VipFollowAnalytics,
+)
+from .onnx.detector import OnnxDetector as OnnxDetector
+from .vip_detection import VipDetectionAnalytics as VipDetectionAnalytics

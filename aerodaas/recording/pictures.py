@@ -1,0 +1,81 @@
+"""Pictures and detections of a recording, as the types that streams carry."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from typing import Any
+
+import cv2
+import numpy as np
+
+from aerodaas.data import Detection, Detections, Frame, Header, Odometry
+from aerodaas.recording.reader import Record, Recording
+
+__all__ = ["detections", "frames"]
+
+
+def frames(recording: Recording, topics: Collection[str] | None = None) -> Iterator[Frame]:
+    """Every picture in the order of recording, decoded; a broken one is left out.
+
+    A recording of others has no frame numbers: the message's sequence and frame id serve.
+    """
+    heads: dict[str, Record] = {}
+    schemas = ("aerodaas.Frame", "foxglove.CompressedImage")
+    for record in recording.records(schemas=schemas, topics=topics):
+        if record.schema == "aerodaas.Frame":
+            heads[record.topic] = record
+            continue
+        data = np.frombuffer(record.value.data, np.uint8)
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+        if image is None:
+            continue
+        head = heads.get(record.topic.removesuffix("/image")) or heads.get(
+            record.topic.removesuffix("/image") + "/frame"
+        )
+        picture = np.asarray(image, dtype=np.uint8)
+        if head is None or head.captured != record.captured:
+            header = Header(record.sequence, record.captured, record.value.frame_id)
+            yield Frame(header, picture)
+        else:
+            value = head.value
+            header = Header(value["id"], value["stamp"], value["source"])
+            yield Frame(header, picture, odometry=_odometry(value.get("odometry")))
+
+
+def detections(recording: Recording) -> Iterator[tuple[str, Detections]]:
+    """Topic and detections, in the order of recording."""
+    for record in recording.records(schemas=("aerodaas.Detections",)):
+        value = record.value
+        header = Header(value["id"], value["stamp"], value["source"])
+        items = tuple(_detection(item) for item in value["items"])
+        yield record.topic, Detections(header, items, value["width"], value["height"])
+
+
+def _odometry(value: dict[str, Any] | None) -> Odometry | None:
+    if value is None:
+        return None
+    position, velocity = (
+        np.array([value[name][axis] for axis in "xyz"], dtype=np.float64)
+        for name in ("position", "velocity")
+    )
+    return Odometry(
+        position,
+        velocity,
+        value["yaw"],
+        value["roll"],
+        value["pitch"],
+        value["yaw_rate"],
+        value["position_sigma"],
+    )
+
+
+def _detection(value: dict[str, Any]) -> Detection:
+    left, top, right, bottom = value["box"]
+    points = value.get("keypoints")
+    return Detection(
+        (left, top, right, bottom),
+        value["label"],
+        value["score"],
+        value.get("track_id"),
+        None if points is None else np.array(points, dtype=np.float32),
+    )

@@ -1,0 +1,97 @@
+"""Online distributions of execution times, and the chance of finishing within a given time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import erf, sqrt
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
+
+__all__ = ["Belief", "ExecutionBeliefs", "chance"]
+
+_PRIOR_VARIATION = 0.05
+_PRIOR_WEIGHT = 5
+_SLOWEST = 0.02
+"""Least weight of a new observation: the estimates never stop following."""
+_DRIFT = (15.0 * MILLISECOND) ** 2 / NANOSECONDS
+"""Variance that the shared delay gains per nanosecond: 15 ms after one second."""
+_OUTLIER = 4.0
+_CERTAIN = 4.0
+
+
+@dataclass(slots=True)
+class Belief:
+    """One model's execution time in one place: normal, nanoseconds."""
+
+    mean: float
+    sigma: float
+
+
+class ExecutionBeliefs:
+    """Per model a normal distribution around the profile's time, plus a delay shared by all.
+
+    A model's own offset and variance are running averages of what was observed. The shared delay
+    (the network's share, the same for every model) is a scalar Kalman filter (Kalman, 1960)
+    whose state is a random walk, so that the results of every model tell about all of them.
+    """
+
+    def __init__(self, *, shared: bool) -> None:
+        self.delay = 0.0
+        """Shared delay, nanoseconds."""
+        self._shared = shared
+        self._uncertainty = 0.0
+        self._at = 0
+        self._models: dict[str, list[float]] = {}
+        self._cache: dict[str, Belief] = {}
+
+    def observe(self, profile: Profile, taken: int, now: int) -> None:
+        """Learn from one execution."""
+        model = self._model(profile)
+        offset, variance, count = model
+        error = taken - profile_time(profile, shared=self._shared) - offset - self.delay
+        if self._shared:
+            self._uncertainty += _DRIFT * (now - self._at)
+            self._at = now
+            gain = self._uncertainty / (self._uncertainty + variance)
+            self.delay += gain * error
+            self._uncertainty *= 1 - gain
+            error_left = error * (1 - gain)
+        else:
+            error_left = error
+        weight = max(1 / (count + _PRIOR_WEIGHT + 1), _SLOWEST)
+        model[0] += weight * error_left
+        model[1] += weight * (error * error - variance)
+        model[2] += 1
+        self._cache.clear()
+
+    def belief(self, profile: Profile, now: int) -> Belief:
+        """The present belief about a model's execution time."""
+        found = self._cache.get(profile.model)
+        if found is None:
+            offset, variance, _ = self._model(profile)
+            mean = profile_time(profile, shared=self._shared) + offset + self.delay
+            spread = variance + self._uncertainty + (MILLISECOND * MILLISECOND)
+            found = self._cache[profile.model] = Belief(mean, sqrt(spread))
+        return found
+
+    def _model(self, profile: Profile) -> list[float]:
+        found = self._models.get(profile.model)
+        if found is None:
+            nominal = profile_time(profile, shared=self._shared)
+            found = self._models[profile.model] = [0.0, (_PRIOR_VARIATION * nominal) ** 2, 0]
+        return found
+
+
+def profile_time(profile: Profile, *, shared: bool) -> int:
+    return profile.cloud_time if shared else profile.edge_time
+
+
+def chance(belief: Belief, room: float) -> float:
+    """Probability that an execution takes at most `room` nanoseconds."""
+    z = (room - belief.mean) / belief.sigma
+    if z > _CERTAIN:
+        return 1.0
+    if z < -_CERTAIN:
+        return 0.0
+    return 0.5 + 0.5 * erf(z * 0.7071067811865476)
