@@ -263,24 +263,46 @@ def test_what_follows_the_last_waypoint(on_complete: Any, state: S) -> None:  # 
     assert survey.vehicle.position[0] == pytest.approx(5.0, abs=0.4)
 
 
+FIELD = [(-5.0, -5.0), (25.0, -5.0), (25.0, 25.0), (-5.0, 25.0)]
+
+
+def test_obstacles_are_flown_around_there_and_back() -> None:
+    """A no-fly zone between the drone, its waypoint and home costs a detour, nothing else."""
+    zone = [(4.0, -5.0), (6.0, -5.0), (6.0, 20.0), (4.0, 20.0)]
+    around = LimitsConfig(geofence=GeofenceConfig(polygon=FIELD, no_fly=[zone]), cruise_speed=2.0)
+    survey = flight(add(Waypoint("behind", 10, 0, 1.5)), limits=around)
+    survey.run()
+    survey.expect(S.LANDED)
+    assert survey.status.visited == ("behind",)
+    assert np.linalg.norm(survey.vehicle.position) < 0.5
+    assert 80.0 < survey.status.distance < 95.0
+    assert not any(3.6 < p[0] < 6.4 and p[1] < 20.4 for p in survey.track)
+
+
 def test_a_waypoint_that_cannot_be_reached_is_given_up() -> None:
-    """A wall in the way costs the stall time-out, not the mission."""
-    around = LimitsConfig(
-        geofence=GeofenceConfig(
-            polygon=[(-5, -5), (25, -5), (25, 25), (-5, 25)],
-            no_fly=[[(4, -5), (6, -5), (6, 20), (4, 20)]],
-        )
-    )
+    """A wall without a gap costs the waypoint behind it, not the mission."""
+    wall = [(4.0, -6.0), (6.0, -6.0), (6.0, 26.0), (4.0, 26.0)]
+    divided = LimitsConfig(geofence=GeofenceConfig(polygon=FIELD, no_fly=[wall]))
     blocked = flight(
-        add(Waypoint("behind", 10, 0, 1.5), Waypoint("here", 1, 1, 1.5)),
-        limits=around,
-        options=MissionConfig(stall_timeout=5.0),
+        add(Waypoint("behind", 10, 0, 1.5), Waypoint("here", 1, 1, 1.5)), limits=divided
     )
     blocked.run()
     blocked.expect(S.LANDED)
     assert blocked.status.visited == ("here",)
     assert blocked.status.given_up == ("behind",)
-    assert max(position[0] for position in blocked.track) < 4.0
+    assert max(position[0] for position in blocked.track) < 3.6
+
+
+def test_a_drone_that_comes_no_nearer_gives_up() -> None:
+    """A headwind that cannot be beaten costs the stall time-out, not the mission."""
+    vehicle = KinematicVehicle(wind=(-1.0, 0.0, 0.0))
+    windy = flight(
+        add(Waypoint("upwind", 10, 0, 1.5)),
+        vehicle=vehicle,
+        options=MissionConfig(stall_timeout=5.0),
+    )
+    windy.run_to(S.RETURNING)
+    assert windy.status.given_up == ("upwind",)
 
 
 def test_a_plan_that_the_battery_cannot_fly_is_announced() -> None:
