@@ -24,15 +24,15 @@ import numpy as np
 import psutil
 import ray
 import typer
+from _latency_ours import HEIGHT, RATE, WIDTH, PatternCamera, ReadFrame, Steer
 from _report import Report
-from latency_nodes.ours import HEIGHT, RATE, WIDTH, PatternCamera, ReadFrame, Steer
 from ray.cluster_utils import Cluster
 from rich.progress import Progress
 
 from aerodaas import Environment
 from aerodaas.options import RunOptions, current_options
 
-_NODES = Path(__file__).parent / "latency_nodes"
+_DORA_NODE = Path(__file__).parent / "_latency_dora.py"
 _WARM_UP = 3.0
 UNITS = {"median": "ms", "p99": "ms", "cpu": "% of a core", "frames": ""}
 
@@ -104,7 +104,7 @@ def measure_dora(seconds: float, folder: Path) -> Round:
     """Run the same four nodes in dora."""
     result = folder / "dora.json"
     result.unlink(missing_ok=True)
-    script = str(_NODES / "dora_node.py")
+    script = str(_DORA_NODE)
     frames = int((seconds + _WARM_UP) * RATE)
     inputs = {
         "camera": {"tick": f"dora/timer/hz/{RATE}"},
@@ -205,13 +205,9 @@ def main(
             for a, b in zip(ours, theirs, strict=True)
         ]
         latency, cpu = (statistics.median(ratio) for ratio in zip(*pairs, strict=True))
-        report.note(
-            f"ours over dora's, median of pairs: latency {latency:.2f}, CPU {cpu:.2f}"
-        )
+        report.note(f"ours over dora's, median of pairs: latency {latency:.2f}, CPU {cpu:.2f}")
     _add(report, "AeroDaaS, analysis on a second Ray node (ObjectRefs)", far)
-    report.note(
-        "CPU: all processes of the system together, Ray's own included; 100 % = one core"
-    )
+    report.note("CPU: all processes of the system together, Ray's own included; 100 % = one core")
     report.show()
     if json_path is not None:
         report.write(json_path)
