@@ -4,8 +4,17 @@ Between actors of one node a message travels in shared memory (`_shared.py`, ice
 another node as a Ray ObjectRef (`_remote.py`). Placement decides; nobody else sees which.
 """
 
+from aerodaas.actors.streams._codec import decode as decode_message
+from aerodaas.actors.streams._codec import encode as encode_message
 from aerodaas.actors.streams._inbox import Inbox
 from aerodaas.actors.streams._outlet import Outlet, RemoteReader
 from aerodaas.actors.streams._shared import shared_memory_available
 
-__all__ = ["Inbox", "Outlet", "RemoteReader", "shared_memory_available"]
+__all__ = [
+    "Inbox",
+    "Outlet",
+    "RemoteReader",
+    "decode_message",
+    "encode_message",
+    "shared_memory_available",
+]
