@@ -77,9 +77,9 @@ def test_camera_rate() -> None:
     """From the stamps of the frames."""
     desk, monitor = Desk(), MonitoringAnalytics(["camera"])
     picture = np.zeros((2, 2, 3), np.uint8)
-    for number in range(2):
-        header = Header(number, number * NANOSECONDS // 15, "drone/cam")
-        readings = monitor.process(Frame(header, picture), desk)
+    first, second = (Header(i, i * NANOSECONDS // 15, "drone/cam") for i in range(2))
+    monitor.process(Frame(first, picture), desk)
+    readings = monitor.process(Frame(second, picture), desk)
     assert readings.values["camera.rate"] == pytest.approx(15.0)
 
 
