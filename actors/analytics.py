@@ -291,5 +291,3 @@ class _Worker:
 
     def alert(self, alert: Alert) -> None:
         self._actor.alert(alert.kind, alert.text, **alert.values)
-
-

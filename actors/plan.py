@@ -325,5 +325,3 @@ def _streams_of(edge: NavigationEdge) -> list[str]:
 
 def _trigger_stream(target: str, source: Node) -> str:
     return f"{target}/commands/{source.id}"
-
-
