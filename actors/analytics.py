@@ -15,7 +15,7 @@ from typing import Any
 
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
-from aerodaas.actors.session import Session, is_due, next_due
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
 from aerodaas.actors.streams import Inbox, Outlet
 from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.clock import host_time_ns
@@ -25,7 +25,6 @@ from aerodaas.vehicle import VehicleState
 
 __all__ = ["AnalyticsActor", "NodeSpec", "TriggerSpec", "Wake"]
 
-_LOCKSTEP_DEPTH = 64
 _WAKE_DEPTH = 8
 
 
@@ -49,7 +48,8 @@ class NodeSpec:
 
     stream: str
     work: Analytics[Any]
-    inputs: tuple[str, ...]
+    inputs: dict[str, int]
+    """Streams that it reads, and how many messages of each may wait."""
     state: str
     """Stream of the states of the vehicle that its data belongs to."""
     external: bool
@@ -138,11 +138,10 @@ class _Worker:
 
     def __init__(self, actor: AnalyticsActor, node: NodeSpec) -> None:
         self.node = node
-        depth = _LOCKSTEP_DEPTH if actor.session.lockstep else 1
-        clocked = depth if node.external else 1
+        ticks = node.external and actor.session.lockstep
         self.depths = {
-            node.state: clocked,
-            **dict.fromkeys(node.inputs, depth),
+            node.state: MESSAGE_DEPTH if ticks else 1,
+            **node.inputs,
             **dict.fromkeys(node.wakes, _WAKE_DEPTH),
         }
         self.busy = 0.0

@@ -11,7 +11,7 @@ from aerodaas.actors.cluster import Place
 from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
 from aerodaas.actors.drone import Conduct
 from aerodaas.actors.pilot import Pilot, RobotSpec, state_stream
-from aerodaas.actors.session import Session
+from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.analytics.base import Analytics
 from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig, TaskConfig
 from aerodaas.data import Frame
@@ -79,8 +79,8 @@ class FlightPlan:
     analyses: tuple[Analyses, ...]
     dispatch: Dispatching | None
     conduct: Conduct
-    recorded: tuple[str, ...]
-    """Streams for the recorder; empty for no recording."""
+    recorded: dict[str, int]
+    """Streams for the recorder and how many messages of each may wait; empty for none."""
 
 
 class _Planner:
@@ -198,7 +198,10 @@ class _Planner:
         return NodeSpec(
             stream=done_stream(node.id) if managed else node.id,
             work=node.work,
-            inputs=(task_stream(node.id),) if managed else tuple(node.inputs),
+            inputs={
+                name: self.depth(name) if self.session.lockstep else 1
+                for name in ([task_stream(node.id)] if managed else node.inputs)
+            },
             state=self.state_of(node),
             external=node.kind == "external",
             dormant=node.dormant,
@@ -208,6 +211,12 @@ class _Planner:
             answers_always=managed,
             wakes=tuple(_trigger_stream(node.id, waker) for waker in wakers),
         )
+
+    def depth(self, stream: str) -> int:
+        """How many messages may wait for a reader of `stream` that wants them all."""
+        node = self.graph.nodes.get(stream.removesuffix(task_stream("")))
+        frames = stream.endswith(task_stream("")) or (node is not None and node.item is Frame)
+        return FRAME_DEPTH if frames else MESSAGE_DEPTH
 
     def place_of(self, node: Node) -> Place:
         if node.compute is None:
@@ -307,6 +316,7 @@ def make_plan(
     names += [f"sensor/{camera.stream}" for camera in cameras]
     names += [actor.name for actor in analyses]
     names += ["dispatcher"] if dispatch is not None else []
+    streams += [f"alerts/{name}" for name in names]
     return FlightPlan(
         session=session,
         drones=drones,
@@ -314,7 +324,7 @@ def make_plan(
         analyses=analyses,
         dispatch=dispatch,
         conduct=planner.conduct(specs, cameras) if session.lockstep else Conduct(),
-        recorded=(*streams, *(f"alerts/{name}" for name in names)) if planner.recorded else (),
+        recorded={stream: planner.depth(stream) for stream in streams} if planner.recorded else {},
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from aerodaas.actors._base import StreamActor, StreamCount
-from aerodaas.actors.session import Session, is_due, next_due
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
 from aerodaas.cameras.base import Camera, Picture
 from aerodaas.clock import host_time_ns
 from aerodaas.config import SensorConfig
@@ -16,8 +16,6 @@ from aerodaas.status import Message
 from aerodaas.vehicle import VehicleState
 
 __all__ = ["SensorActor"]
-
-_LOCKSTEP_DEPTH = 64
 
 
 class SensorActor(StreamActor):
@@ -30,7 +28,7 @@ class SensorActor(StreamActor):
 
         With `ends`, the mission is over once the camera has no more pictures.
         """
-        depth = _LOCKSTEP_DEPTH if session.lockstep else 1
+        depth = MESSAGE_DEPTH if session.lockstep else 1
         super().__init__(session, f"sensor/{stream}", {state: depth})
         self._stream = stream
         self._sensor = sensor

@@ -17,12 +17,16 @@ from aerodaas.status import Message
 __all__ = ["SharedPublisher", "SharedSubscriber", "SharedWaiter", "shared_memory_available"]
 
 MAX_READERS = 16
-MAX_DEPTH = 64
+MAX_DEPTH = 32
 """Messages that a reader may leave waiting."""
 MAX_BORROWED = 16
 """Messages that a reader may hold on to while it goes on receiving."""
-_SLOTS = 48
-"""Messages of a stream that exist at once; memory is only touched when they are used."""
+_SLOTS = 128
+"""Messages of a stream that exist at once; memory is only touched when they are used.
+
+More than two readers together may hold: where they run out, iceoryx2 moves to a larger segment,
+which costs milliseconds a message.
+"""
 _INITIAL_BYTES = 4096
 
 
