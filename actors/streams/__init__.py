@@ -6,6 +6,14 @@ another node as a Ray ObjectRef (`_remote.py`). Placement decides; nobody else s
 
 from aerodaas.actors.streams._inbox import Inbox
 from aerodaas.actors.streams._outlet import Outlet, RemoteReader
-from aerodaas.actors.streams._shared import shared_memory_available
+from aerodaas.actors.streams._remote import UNDER_WAY
+from aerodaas.actors.streams._shared import MAX_DEPTH, shared_memory_available
 
-__all__ = ["Inbox", "Outlet", "RemoteReader", "shared_memory_available"]
+__all__ = [
+    "MAX_DEPTH",
+    "UNDER_WAY",
+    "Inbox",
+    "Outlet",
+    "RemoteReader",
+    "shared_memory_available",
+]
