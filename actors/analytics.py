@@ -57,6 +57,8 @@ class NodeSpec:
     triggers: tuple[TriggerSpec, ...]
     acknowledges: bool
     """True in lockstep for an analysis whose results nobody reads."""
+    answers_always: bool
+    """True under a dispatcher, which waits for an answer to each task."""
     wakes: tuple[str, ...]
     """Streams on which a dormant analysis is woken."""
 
@@ -223,7 +225,7 @@ class _Worker:
             result = self._process(message.item, message.header.stamp)
         if result is not None:
             self._fire(result, message)
-        if result is not None or self._actor.session.lockstep:
+        if result is not None or self._actor.session.lockstep or self.node.answers_always:
             self._results.derive(result, message, received, self._stamp(message))
         self._acknowledge(message)
 

@@ -15,8 +15,10 @@ from ray.exceptions import RayActorError, RayError, RayTaskError
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.cluster import Place, options_for
+from aerodaas.actors.dispatcher import DispatcherActor
 from aerodaas.actors.drone import DroneActor, RobotReport
-from aerodaas.actors.plan import FlightPlan
+from aerodaas.actors.executor import CloudExecutor
+from aerodaas.actors.plan import Dispatching, FlightPlan
 from aerodaas.actors.recorder import RecorderActor
 from aerodaas.actors.sensor import SensorActor
 from aerodaas.clock import host_time_ns
@@ -74,6 +76,8 @@ class Flight:
         self.recording = recording if plan.recorded else None
         self._drones: dict[str, str] = {}
         self._members: dict[str, _Member] = {}
+        self._executors: list[Any] = []
+        self._opening: list[Any] = []
         session, edge = plan.session, Place()
         for specs in plan.drones:
             name = f"drone/{'+'.join(spec.robot.id for spec in specs)}"
@@ -95,6 +99,8 @@ class Flight:
                 setup=actor.nodes,
                 restarts=_ANALYTICS_RESTARTS,
             )
+        if plan.dispatch is not None:
+            self._create_dispatcher(plan.dispatch)
         if self.recording is not None and provenance is not None:
             recorder = (session, self.recording, plan.recorded, provenance)
             self._create("recorder", RecorderActor, edge, recorder)
@@ -116,6 +122,8 @@ class Flight:
         `progress` is told what has become ready.
         """
         self._prepare(list(self._members.values()), progress)
+        for reference in self._opening:
+            ray.get(reference, timeout=_PREPARE_TIMEOUT)
         self._origin = host_time_ns()
         # Those that only listen go first, so that nobody speaks to an empty room.
         for member in reversed(self._members.values()):
@@ -161,8 +169,8 @@ class Flight:
             for reference in done:
                 with contextlib.suppress(RayError, AeroDaaSError):
                     references[reference].report = ray.get(reference)
-        for member in self._members.values():
-            ray.kill(member.handle)
+        for handle in (*(member.handle for member in self._members.values()), *self._executors):
+            ray.kill(handle)
         return self.reports()
 
     def _ids(self) -> set[str]:
@@ -181,6 +189,18 @@ class Flight:
     ) -> None:
         remote = ray.remote(kind).options(**options_for(place, restarts=restarts))
         self._members[name] = _Member(name, remote.remote(*args, **kwargs), setup)
+
+    def _create_dispatcher(self, dispatch: Dispatching) -> None:
+        executor = None
+        if dispatch.cloud is not None:
+            options = options_for(dispatch.cloud, restarts=_ANALYTICS_RESTARTS)
+            slots = dispatch.resources.cloud_slots
+            remote: Any = ray.remote(CloudExecutor)
+            executor = remote.options(**options, max_concurrency=slots).remote()
+            self._executors.append(executor)
+            self._opening.append(executor.prepare.remote(dispatch.works))
+        args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
+        self._create("dispatcher", DispatcherActor, Place(), args, setup=(executor,))
 
     def _prepare(self, members: list[_Member], progress: Callable[[str], None]) -> None:
         waiting = {member.handle.prepare.remote(*member.setup): member for member in members}

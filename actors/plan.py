@@ -3,21 +3,30 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from aerodaas.actors._barrier import ACKS, paths
 from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
 from aerodaas.actors.cluster import Place
+from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
 from aerodaas.actors.drone import Conduct
 from aerodaas.actors.pilot import Pilot, RobotSpec, state_stream
 from aerodaas.actors.session import Session
-from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig
+from aerodaas.analytics.base import Analytics
+from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig, TaskConfig
 from aerodaas.data import Frame
 from aerodaas.errors import GraphError
 from aerodaas.graph import Graph, NavigationEdge, Node
 from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    AnalyticsScheduler,
+    Profile,
+    Resources,
+)
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 
-__all__ = ["Analyses", "Cameras", "FlightPlan", "make_plan"]
+__all__ = ["Analyses", "Cameras", "Dispatching", "FlightPlan", "make_plan"]
 
 _CAMERA_WINDOW = 4
 _STATE_WINDOW = 16
@@ -48,6 +57,18 @@ class Analyses:
 
 
 @dataclass(frozen=True)
+class Dispatching:
+    """The dispatcher's actor, and the cloud's executor if there is one."""
+
+    scheduler: AnalyticsScheduler
+    managed: tuple[Managed, ...]
+    resources: Resources
+    cloud: Place | None
+    works: dict[str, Analytics[Any]]
+    """The managed analyses, by stream, for the cloud."""
+
+
+@dataclass(frozen=True)
 class FlightPlan:
     """All actors of a run, before they are placed."""
 
@@ -56,6 +77,7 @@ class FlightPlan:
     """One actor for each group."""
     cameras: tuple[Cameras, ...]
     analyses: tuple[Analyses, ...]
+    dispatch: Dispatching | None
     conduct: Conduct
     recorded: tuple[str, ...]
     """Streams for the recorder; empty for no recording."""
@@ -70,10 +92,12 @@ class _Planner:
         graph: Graph,
         compute: list[ComputeConfig],
         scheduler: TrajectoryScheduler,
+        dispatch_with: AnalyticsScheduler | None,
     ) -> None:
         self.session = session
         self.graph = graph
         self.scheduler = scheduler
+        self.dispatch_with = dispatch_with
         self.compute = {resource.id: resource for resource in compute}
         named = {edge.robot for edge in graph.navigation}
         self.robots = [r for r in session.environment.robots if r.id in named]
@@ -117,6 +141,49 @@ class _Planner:
             if node.work.type == "camera"
         )
 
+    def is_managed(self, node: Node) -> bool:
+        """The dispatcher manages the analyses of frames that are heavy enough to be isolated."""
+        if self.dispatch_with is None or not node.work.isolated or not node.inputs:
+            return False
+        return all(self.graph.nodes[name].item is Frame for name in node.inputs)
+
+    def managed(self) -> list[Node]:
+        return [node for node in self.analyses() if self.is_managed(node)]
+
+    def dispatching(self) -> Dispatching | None:
+        nodes = self.managed()
+        if self.dispatch_with is None or not nodes:
+            return None
+        clouds = [resource for resource in self.compute.values() if resource.kind == "cloud"]
+        slots = sum(resource.executors for resource in clouds)
+        if self.session.lockstep:
+            # Simulated time stands still while an analysis runs, so there is nothing to offload.
+            clouds, slots = [], 0
+        return Dispatching(
+            scheduler=self.dispatch_with,
+            managed=tuple(
+                Managed(n.id, tuple(n.inputs), self.profile(n), self.acknowledgements(n.id) == 0)
+                for n in nodes
+            ),
+            resources=Resources(cloud_slots=slots),
+            cloud=Place(clouds[0].kind, clouds[0].node) if clouds else None,
+            works={node.id: node.work for node in nodes},
+        )
+
+    def profile(self, node: Node) -> Profile:
+        """The analysis' figures from the environment file, by its name without the robot."""
+        known = self.session.environment.schedulers.tasks
+        told = known.get(node.id.rpartition("/")[2], TaskConfig())
+        return Profile(
+            model=node.id,
+            benefit=told.benefit,
+            deadline=int(told.deadline * MILLISECOND),
+            edge_time=int(told.edge_time * MILLISECOND),
+            cloud_time=int(told.cloud_time * MILLISECOND),
+            edge_cost=told.edge_cost,
+            cloud_cost=told.cloud_cost,
+        )
+
     def node_spec(self, node: Node) -> NodeSpec:
         triggers = tuple(
             TriggerSpec(
@@ -126,16 +193,18 @@ class _Planner:
             )
             for trigger in node.triggers
         )
+        managed = self.is_managed(node)
         wakers = [n for n in self.analyses() if any(t.target == node.id for t in n.triggers)]
         return NodeSpec(
-            stream=node.id,
+            stream=done_stream(node.id) if managed else node.id,
             work=node.work,
-            inputs=tuple(node.inputs),
+            inputs=(task_stream(node.id),) if managed else tuple(node.inputs),
             state=self.state_of(node),
             external=node.kind == "external",
             dormant=node.dormant,
             triggers=triggers,
-            acknowledges=self.acknowledgements(node.id) == 0,
+            acknowledges=self.acknowledgements(node.id) == 0 and not managed,
+            answers_always=managed,
             wakes=tuple(_trigger_stream(node.id, waker) for waker in wakers),
         )
 
@@ -209,10 +278,17 @@ class _Planner:
 
 
 def make_plan(
-    session: Session, graph: Graph, compute: list[ComputeConfig], scheduler: TrajectoryScheduler
+    session: Session,
+    graph: Graph,
+    compute: list[ComputeConfig],
+    scheduler: TrajectoryScheduler,
+    dispatch_with: AnalyticsScheduler | None = None,
 ) -> FlightPlan:
-    """Decide which actors a graph becomes; raises GraphError if nothing flies."""
-    planner = _Planner(session, graph, compute, scheduler)
+    """Decide which actors a graph becomes; raises GraphError if nothing flies.
+
+    With an analytics scheduler to `dispatch_with`, heavy analyses run when and where it says.
+    """
+    planner = _Planner(session, graph, compute, scheduler, dispatch_with)
     if not planner.robots:
         raise GraphError("no robot navigates: call drone.navigate(…) before start_mission()")
     specs = tuple(planner.robot_spec(robot) for robot in planner.robots)
@@ -220,16 +296,21 @@ def make_plan(
     analyses = planner.analyses_by_actor()
     streams = [stream for spec in specs for stream in Pilot.streams(spec)]
     streams += [camera.stream for camera in cameras]
-    streams += [node.stream for actor in analyses for node in actor.nodes]
+    streams += [node.id for node in planner.analyses()]
+    dispatch = planner.dispatching()
+    if dispatch is not None:
+        streams.append(DECISIONS)
     drones = (specs,) if session.lockstep else tuple((spec,) for spec in specs)
     names = [f"drone/{'+'.join(spec.robot.id for spec in group)}" for group in drones]
     names += [f"sensor/{camera.stream}" for camera in cameras]
     names += [actor.name for actor in analyses]
+    names += ["dispatcher"] if dispatch is not None else []
     return FlightPlan(
         session=session,
         drones=drones,
         cameras=cameras,
         analyses=analyses,
+        dispatch=dispatch,
         conduct=planner.conduct(specs, cameras) if session.lockstep else Conduct(),
         recorded=(*streams, *(f"alerts/{name}" for name in names)) if planner.recorded else (),
     )

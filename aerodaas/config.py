@@ -29,6 +29,7 @@ __all__ = [
     "SchedulersConfig",
     "SensorConfig",
     "SimulationConfig",
+    "TaskConfig",
     "validated",
 ]
 
@@ -185,10 +186,29 @@ class ComputeConfig(_Strict):
     settings: dict[str, Any] = Field(default_factory=dict)
 
 
+class TaskConfig(_Strict):
+    """What a scheduler is told of one analysis, by its name; times in milliseconds.
+
+    Benefit and costs are in one unit of the user's choice.
+    """
+
+    benefit: Positive = 1.0
+    deadline: Positive = 1000.0
+    """From the frame's arrival at the dispatcher."""
+    edge_time: Positive = 100.0
+    """Expected execution on the edge."""
+    cloud_time: Positive = 300.0
+    """Expected time from sending a frame to the cloud until its result is back."""
+    edge_cost: NotNegative = 0.0
+    cloud_cost: NotNegative = 0.0
+
+
 class SchedulersConfig(_Strict):
     """Default plug-ins: a registered name or `module:Class`."""
 
     trajectory: str = "ordered"
+    tasks: dict[str, TaskConfig] = Field(default_factory=dict)
+    """What the analytics scheduler is told of each analysis, by the analysis' name."""
     analytics: str | None = None
     """None: each analysis runs where it is deployed, on the newest item, without a dispatcher."""
 

@@ -33,6 +33,7 @@ __all__ = [
     "Image",
     "Odom",
     "Odometry",
+    "Readings",
 ]
 
 E = TypeVar("E")
@@ -264,6 +265,19 @@ class Alert:
     """One sentence for a person."""
     values: dict[str, Any] = field(default_factory=dict)
     """Figures behind it, by name, in SI units."""
+
+
+@travels
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """What monitoring read, by name, in SI units; a compound reading is `gps.latitude` and so on.
+
+    `state` is the index of the mission's state in `MissionState`.
+    """
+
+    stamp: int
+    """Mission clock, nanoseconds."""
+    values: dict[str, float]
 
 
 Image = Frame

@@ -18,6 +18,8 @@ from aerodaas.options import current_options
 from aerodaas.overrides import overridden
 from aerodaas.plugins import load_plugin
 from aerodaas.run import Run
+from aerodaas.schedulers.analytics.base import AnalyticsScheduler
+from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.waypoint.base import NavigationEntry, TrajectoryScheduler
 from aerodaas.waypoints import AeroNavigation
 
@@ -49,6 +51,7 @@ class Environment(PaperNames, IEnvironment):
         self.run: Run | None = None
         self._robots = {robot.id: Robot(self, robot) for robot in self.config.robots}
         self._trajectory: TrajectoryScheduler | None = None
+        self._dispatch_with: AnalyticsScheduler | None = None
         self._compute: list[ComputeConfig] | None = None
 
     def has_env_sensors(self) -> bool:
@@ -104,8 +107,11 @@ class Environment(PaperNames, IEnvironment):
         self._trajectory = scheduler
 
     def set_analytics_scheduler(self, scheduler: Any) -> None:  # noqa: ANN401 - as the interface
-        """Plug in the analytics scheduler: a name, `module:Class`, or an instance."""
-        raise NotImplementedError
+        """Plug in the analytics scheduler: a name, `module:Class`, or an instance.
+
+        Raises UnknownIdError or SchedulerError if it cannot be used.
+        """
+        self._dispatch_with = load_scheduler(scheduler)
 
     def compute(self) -> list[ComputeConfig]:
         """The compute resources; asks the cluster where the file says "auto"."""
@@ -125,6 +131,12 @@ class Environment(PaperNames, IEnvironment):
             name = self.config.schedulers.trajectory
             self._trajectory = load_plugin("waypoint_schedulers", name)(self)
         return self._trajectory
+
+    def analytics_scheduler(self) -> AnalyticsScheduler | None:
+        """The scheduler plugged in, or the one that the environment file names, if any."""
+        if self._dispatch_with is None and self.config.schedulers.analytics is not None:
+            self._dispatch_with = load_scheduler(self.config.schedulers.analytics)
+        return self._dispatch_with
 
     def navigation_added(self, entry: NavigationEntry) -> bool:
         """Take navigation that a scheduler was given; False before the mission starts."""

@@ -119,7 +119,9 @@ class Run:
         speed = None if self.lockstep else (self.options.speed or 1.0)
         session = Session(self.config, speed)
         scheduler = self._environment.trajectory_scheduler()
-        return make_plan(session, self.graph, self._environment.compute(), scheduler)
+        dispatch_with = self._environment.analytics_scheduler()
+        compute = self._environment.compute()
+        return make_plan(session, self.graph, compute, scheduler, dispatch_with)
 
     def _speed_text(self) -> str:
         return "max" if self.lockstep else f"{self.options.speed or 1.0:g}"

@@ -24,16 +24,17 @@ import numpy as np
 import psutil
 import ray
 import typer
-from _report import Figure, Report
-from latency_nodes.ours import HEIGHT, RATE, WIDTH, PatternCamera, ReadFrame, Steer
+from _latency_ours import HEIGHT, RATE, WIDTH, PatternCamera, ReadFrame, Steer
+from _report import Report
 from ray.cluster_utils import Cluster
 from rich.progress import Progress
 
 from aerodaas import Environment
 from aerodaas.options import RunOptions, current_options
 
-_NODES = Path(__file__).parent / "latency_nodes"
+_DORA_NODE = Path(__file__).parent / "_latency_dora.py"
 _WARM_UP = 3.0
+UNITS = {"median": "ms", "p99": "ms", "cpu": "% of a core", "frames": ""}
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ def measure_dora(seconds: float, folder: Path) -> Round:
     """Run the same four nodes in dora."""
     result = folder / "dora.json"
     result.unlink(missing_ok=True)
-    script = str(_NODES / "dora_node.py")
+    script = str(_DORA_NODE)
     frames = int((seconds + _WARM_UP) * RATE)
     inputs = {
         "camera": {"tick": f"dora/timer/hz/{RATE}"},
@@ -140,15 +141,16 @@ def measure_dora(seconds: float, folder: Path) -> Round:
 
 
 def _add(report: Report, name: str, rounds: list[Round]) -> None:
-    def middle(values: Iterator[float]) -> float:
-        return statistics.median(values)
-
+    medians = [float(np.median(one.latencies)) for one in rounds]
+    highs = [float(np.percentile(one.latencies, 99)) for one in rounds]
     report.row(
         name,
-        median=Figure(middle(float(np.median(one.latencies)) for one in rounds), "ms"),
-        p99=Figure(middle(float(np.percentile(one.latencies, 99)) for one in rounds), "ms"),
-        cpu=Figure(middle(one.cpu for one in rounds), "%"),
-        frames=Figure(sum(len(one.latencies) for one in rounds), ""),
+        {
+            "median": statistics.median(medians),
+            "p99": statistics.median(highs),
+            "cpu": statistics.median(one.cpu for one in rounds),
+            "frames": sum(len(one.latencies) for one in rounds),
+        },
     )
 
 
@@ -178,7 +180,8 @@ def main(
     python benchmarks/latency.py --seconds 10 --rounds 3 --json latency.json
     """
     title = f"capture to command, {WIDTH}x{HEIGHT} at {RATE}/s, camera-analytics-navigation-drone"
-    report = Report(title, packages=("iceoryx2", "dora-rs"))
+    packages = ("ray", "iceoryx2", *(("dora-rs",) if dora else ()))
+    report = Report(title, UNITS, packages=packages)
     ours: list[Round] = []
     theirs: list[Round] = []
     with tempfile.TemporaryDirectory() as name, Progress() as progress:
@@ -202,15 +205,12 @@ def main(
             for a, b in zip(ours, theirs, strict=True)
         ]
         latency, cpu = (statistics.median(ratio) for ratio in zip(*pairs, strict=True))
-        report.notes.append(
-            f"ours over dora's, median of pairs: latency {latency:.2f}, CPU {cpu:.2f}"
-        )
+        report.note(f"ours over dora's, median of pairs: latency {latency:.2f}, CPU {cpu:.2f}")
     _add(report, "AeroDaaS, analysis on a second Ray node (ObjectRefs)", far)
-    report.notes.append(
-        "CPU: all processes of the system together, Ray's own included; 100 % = one core"
-    )
+    report.note("CPU: all processes of the system together, Ray's own included; 100 % = one core")
     report.show()
-    report.write(json_path)
+    if json_path is not None:
+        report.write(json_path)
 
 
 if __name__ == "__main__":

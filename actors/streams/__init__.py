@@ -4,6 +4,8 @@ Between actors of one node a message travels in shared memory (`_shared.py`, ice
 another node as a Ray ObjectRef (`_remote.py`). Placement decides; nobody else sees which.
 """
 
+from aerodaas.actors.streams._codec import decode as decode_message
+from aerodaas.actors.streams._codec import encode as encode_message
 from aerodaas.actors.streams._inbox import Inbox
 from aerodaas.actors.streams._outlet import Outlet, RemoteReader
 from aerodaas.actors.streams._remote import UNDER_WAY
@@ -15,5 +17,7 @@ __all__ = [
     "Inbox",
     "Outlet",
     "RemoteReader",
+    "decode_message",
+    "encode_message",
     "shared_memory_available",
 ]

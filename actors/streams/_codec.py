@@ -14,7 +14,7 @@ from typing import Any
 
 from aerodaas.status import Message
 
-__all__ = ["Encoded", "decode"]
+__all__ = ["Encoded", "decode", "encode"]
 
 _fields = attrgetter(*(field.name for field in dataclasses.fields(Message)))
 _ALIGNMENT = 64
@@ -58,6 +58,11 @@ class Encoded:
         whole = bytearray(self.size)
         self.write_into(memoryview(whole))
         return bytes(whole)
+
+
+def encode(message: Message[Any]) -> bytes:
+    """The message as one bytes object."""
+    return Encoded(message).to_bytes()
 
 
 def decode(source: memoryview) -> Message[Any]:

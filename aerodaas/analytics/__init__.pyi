@@ -10,5 +10,6 @@ from .followers import (
 from .followers import (
     VipFollowAnalytics as VipFollowAnalytics,
 )
+from .monitoring import MonitoringAnalytics as MonitoringAnalytics
 from .onnx.detector import OnnxDetector as OnnxDetector
 from .vip_detection import VipDetectionAnalytics as VipDetectionAnalytics

@@ -107,7 +107,8 @@ class FollowAnalytics(NavigableAnalytics):
             return self._follow(item, context)
         if self.detector is None:
             return None
-        return self._follow(self.detector.process(item, context), context)
+        found = self.detector.process(item, context)
+        return None if found is None else self._follow(found, context)
 
     def _follow(self, item: Detections, context: Context) -> AeroNavigation | None:
         if item.camera is None:

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from aerodaas.geometry import Vector
 from aerodaas.waypoints import Waypoint
@@ -45,16 +46,21 @@ class EnergyModel:
 
         A climb adds the work against gravity; a descent is counted as level flight.
         """
-        air = velocity - self.wind
-        speed = math.hypot(air[0], air[1])
-        ratio = speed**2 / (2 * _INDUCED_VELOCITY**2)
-        induced = math.sqrt(math.sqrt(1 + ratio**2) - ratio)
-        climb = max(0.0, float(air[2])) / _INDUCED_VELOCITY
-        return (
-            _PROFILE * (1 + 3 * speed**2 / _TIP_SPEED**2)
+        return float(self.powers(velocity[None])[0])
+
+    def powers(self, velocities: NDArray[np.float64]) -> NDArray[np.float64]:
+        """`power` of many velocities, (..., 3) to (...)."""
+        air = velocities - self.wind
+        squared = air[..., 0] ** 2 + air[..., 1] ** 2
+        ratio = squared / (2 * _INDUCED_VELOCITY**2)
+        induced = np.sqrt(np.sqrt(1 + ratio**2) - ratio)
+        climb = np.maximum(0.0, air[..., 2]) / _INDUCED_VELOCITY
+        total: NDArray[np.float64] = (
+            _PROFILE * (1 + 3 * squared / _TIP_SPEED**2)
             + _INDUCED * (induced + climb)
-            + _PARASITE * speed**3
+            + _PARASITE * squared**1.5
         )
+        return total
 
     def hover(self, duration: float) -> float:
         """Charge for `duration` seconds in one place."""

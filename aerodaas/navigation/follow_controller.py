@@ -1,9 +1,11 @@
 """From sightings of a target to velocity commands: pure, on the mission's stamps alone.
 
 The drone turns to face the target and moves along the line of sight to keep its distance, by
-PID; where odometry is known, the target's own velocity is fed forward, so that a walking person
-is followed without lag. A target out of sight is followed where it should be for a moment; then
-the drone slows down, holds, turns in search, and gives up.
+PID. Where odometry is known, the target's own velocity is fed forward, so that a walking person
+is followed without lag: along the line of sight to the speed, across it to the turn. The drone
+so flies where its camera looks and comes to stand behind the target, as in pure pursuit. A
+target out of sight is followed where it should be for a moment; then the drone slows down,
+holds, turns in search, and gives up.
 """
 
 from __future__ import annotations
@@ -18,7 +20,6 @@ from simple_pid import PID
 
 from aerodaas.clock import seconds
 from aerodaas.data import Odometry
-from aerodaas.geometry import enu_to_body
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
 from aerodaas.navigation.sighting import Sighting
 from aerodaas.navigation.target_motion import TargetMotion
@@ -29,6 +30,11 @@ __all__ = ["FollowController", "FollowPhase", "Observation"]
 _LONGEST_STEP = 0.5
 """Seconds; after a longer silence the integrals would grow by what nobody saw."""
 _FIRST_STEP = 0.1
+_FARTHEST = 1000.0
+"""Metres; no camera tells a person from farther away."""
+_FARTHEST_FROM_HOME = 1e5
+_INTEGRAL_REACH = 1.2
+"""Metres; a person who walks at 1 m/s is followed so far behind by the proportional part alone."""
 
 
 class FollowPhase(str, enum.Enum):
@@ -143,30 +149,28 @@ class FollowController:
         return np.zeros(2), 0.0
 
     def _follow(self, seen: Observation, dt: float) -> tuple[NDArray[np.float64], float]:
-        target, feed_forward = self._target(seen)
-        yaw_rate = float(self._yaw_pid(-target.bearing, dt=dt) or 0.0)
-        speed = float(self._distance_pid(self.distance - target.distance, dt=dt) or 0.0)
-        towards = np.array([math.cos(target.bearing), math.sin(target.bearing)])
-        velocity = speed * towards + feed_forward
+        target, away, left = self._target(seen)
+        distance = max(target.distance, self.limits.nearest * self.distance)
+        yaw_rate = float(self._yaw_pid(-target.bearing, dt=dt) or 0.0) + left / distance
+        error = target.distance - self.distance
+        # Far away the integral would only wind up and carry the drone past its place.
+        self._distance_pid.Ki = self.gains.distance[1] if abs(error) < _INTEGRAL_REACH else 0.0
+        speed = float(self._distance_pid(-error, dt=dt) or 0.0) + away
         too_near = target.bound or target.distance < self.limits.nearest * self.distance
-        approach = float(velocity @ towards)
-        if too_near and approach > 0:
+        if too_near and speed > 0:
             self._distance_pid.reset()
-            velocity = velocity - approach * towards
-        return velocity, yaw_rate
+            speed = 0.0
+        return speed * np.array([math.cos(target.bearing), math.sin(target.bearing)]), yaw_rate
 
-    def _target(self, seen: Observation) -> tuple[Sighting, NDArray[np.float64]]:
-        """The target as it should be now, and its velocity in the level body frame."""
+    def _target(self, seen: Observation) -> tuple[Sighting, float, float]:
+        """The target as it should be now, and how fast it moves away and to the left."""
         last = self._last or Sighting(0.0, self.distance)
         now = seen.now or seen.at_capture
         stamp = max(seen.stamp, seen.now_stamp or 0) if seen.now else seen.stamp
         predicted = None
         if now is not None and not last.bound:
             predicted = self.motion.relative_to(now, stamp)
-        if now is None or predicted is None:
-            return last, np.zeros(2)
-        target, velocity = predicted
-        return target, enu_to_body(np.array([*velocity, 0.0]), now.yaw)[:2]
+        return predicted or (last, 0.0, 0.0)
 
     def _command(
         self, velocity: NDArray[np.float64], yaw_rate: float, seen: Observation, dt: float
@@ -202,17 +206,23 @@ def _pid(gains: tuple[float, float, float], low: float, high: float) -> PID:
 
 
 def _without_nonsense(seen: Observation) -> Observation:
-    """Leave out what holds a number that is not finite: it counts as not observed."""
+    """Leave out what holds a number that cannot be: it counts as not observed."""
     sighting = seen.sighting
-    if sighting is not None and not math.isfinite(sighting.bearing + sighting.distance):
+    if sighting is not None and not (
+        abs(sighting.bearing) <= math.pi and 0.0 <= sighting.distance <= _FARTHEST
+    ):
         sighting = None
-    at_capture = seen.at_capture if _is_finite(seen.at_capture) else None
-    now = seen.now if _is_finite(seen.now) else None
+    at_capture = seen.at_capture if _is_sane(seen.at_capture) else None
+    now = seen.now if _is_sane(seen.now) else None
     return replace(seen, sighting=sighting, at_capture=at_capture, now=now)
 
 
-def _is_finite(odometry: Odometry | None) -> bool:
-    return odometry is not None and math.isfinite(float(odometry.position.sum()) + odometry.yaw)
+def _is_sane(odometry: Odometry | None) -> bool:
+    return (
+        odometry is not None
+        and bool((np.abs(odometry.position) <= _FARTHEST_FROM_HOME).all())
+        and math.isfinite(odometry.yaw)
+    )
 
 
 def _clip(value: float, limit: float) -> float:

@@ -71,11 +71,10 @@ class Leg:
         stalled = seconds(now - self._nearer_at) > self._stall_timeout
         return LegPhase.STALLED if stalled else LegPhase.UNDER_WAY
 
-    def setpoint(self, odometry: Odometry, cruise_speed: float) -> PositionSetpoint:
-        """Where to fly now."""
+    def setpoint(self, place: Vector, position: Vector, cruise_speed: float) -> PositionSetpoint:
+        """Fly on to `place`, the waypoint or a corner on the way there, as the waypoint says."""
         waypoint = self.stop.waypoint
-        speed = waypoint.speed or cruise_speed
-        return setpoint_towards(waypoint.position, odometry.position, waypoint.yaw, speed)
+        return setpoint_towards(place, position, waypoint.yaw, waypoint.speed or cruise_speed)
 
     def _is_facing(self, yaw: float) -> bool:
         asked = self.stop.waypoint.yaw

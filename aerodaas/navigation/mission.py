@@ -32,6 +32,7 @@ from aerodaas.navigation.commands import (
     StreamItem,
 )
 from aerodaas.navigation.control import stopping_point
+from aerodaas.navigation.detour import Detour
 from aerodaas.navigation.energy import EnergyMeter, EnergyModel
 from aerodaas.navigation.geofence import Geofence
 from aerodaas.navigation.intake import DONE, Intake
@@ -97,6 +98,7 @@ class Mission:
             command_timeout=limits.command_timeout,
             resume_after=robot.mission.resume_after,
         )
+        self._detour = Detour(self.fence, limits.arrival_radius)
         self._intake = Intake(self._navigator, self._log)
         self._assessment = CALM
         self._plan_fault = ""
@@ -314,8 +316,10 @@ class Mission:
                 stop, self._now, self.limits.arrival_radius, self._options.stall_timeout
             )
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
+        position = state.odometry.position
         phase = self._leg.advance(state.odometry, self._now, self._elapsed)
-        if phase in {LegPhase.DONE, LegPhase.STALLED}:
+        place = self._detour.towards(stop.waypoint.position, position)
+        if place is None or phase in {LegPhase.DONE, LegPhase.STALLED}:
             self._finish(stop, phase)
             return self._fly(state)
         if phase is LegPhase.HOVERING:
@@ -323,7 +327,7 @@ class Mission:
         else:
             self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
         self._anchor = None
-        return Fly(self._leg.setpoint(state.odometry, self.limits.cruise_speed), stop.cause)
+        return Fly(self._leg.setpoint(place, position, self.limits.cruise_speed), stop.cause)
 
     def _awaits_plan(self, stop: Stop) -> bool:
         """Whether to hold for the plan that is being made, rather than set out for `stop`."""
@@ -336,7 +340,11 @@ class Mission:
         if phase is LegPhase.DONE:
             self._log.visited.append(stop.id)
         else:
-            reason = f"{stop.id} cannot be reached: the drone comes no nearer"
+            stalled = phase is LegPhase.STALLED
+            why = (
+                "the drone comes no nearer" if stalled else "no way inside the geofence leads there"
+            )
+            reason = f"{stop.id} cannot be reached: {why}"
             self._log.give_up(self._now, stop.id, reason)
         self._navigator.finish(stop)
 
@@ -387,7 +395,7 @@ class Mission:
         ):
             return Return()
         if state.mode is VehicleMode.GROUNDED:
-            self._to(MissionState.LANDED)
+            self._to(MissionState.LANDED, self._machine.reason)
             return Wait()
         position = state.odometry.position
         if self._return_height is None:
@@ -397,14 +405,21 @@ class Mission:
         way = above - position
         late = seconds(self._now - self._machine.since) > self.limits.return_timeout
         if late or math.hypot(way[0], way[1]) <= self.limits.arrival_radius:
-            self._to(MissionState.LANDING, "the return took too long" if late else "above home")
+            reason = self._machine.reason
+            self._to(
+                MissionState.LANDING, f"the return took too long; {reason}" if late else reason
+            )
             return Land()
-        return Fly(setpoint_towards(above, position, None, self.limits.cruise_speed))
+        place = self._detour.towards(above, position)
+        if place is None:
+            self._to(MissionState.LANDING, "no way inside the geofence leads home")
+            return Land()
+        return Fly(setpoint_towards(place, position, None, self.limits.cruise_speed))
 
     def _land(self, state: VehicleState) -> Action:
         self._leg = None
         if state.mode is VehicleMode.GROUNDED and not state.armed:
-            self._to(MissionState.LANDED)
+            self._to(MissionState.LANDED, self._machine.reason)
             return Wait()
         waited = seconds(self._now - self._machine.since)
         if state.mode is VehicleMode.LOST and waited > self.limits.return_timeout:

@@ -17,12 +17,7 @@ import numpy as np
 from aerodaas.config import LimitsConfig
 from aerodaas.data import Odometry
 from aerodaas.geometry import Vector
-from aerodaas.navigation.control import (
-    braking_speed,
-    limit_length,
-    stopping_point,
-    velocity_towards,
-)
+from aerodaas.navigation.control import braking_speed, limit_length, velocity_towards
 from aerodaas.navigation.geofence import Geofence
 from aerodaas.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 
@@ -109,13 +104,13 @@ class SetpointGuard:
         self, asked: PositionSetpoint, odometry: Odometry, neighbours: Iterable[Neighbour]
     ) -> Clamped:
         names: list[str] = []
-        target = self.fence.nearest_allowed(asked.position)
+        target = self.home + limit_length(asked.position - self.home, self.limits.max_range)
         if not np.allclose(target, asked.position, atol=1e-6):
-            names.append("geofence")
-        within = self.home + limit_length(target - self.home, self.limits.max_range)
-        if not np.array_equal(within, target) and not np.allclose(within, target, atol=1e-6):
-            target = within
             names.append("max_range")
+        inside = self.fence.nearest_allowed(target)
+        if not np.allclose(inside, target, atol=1e-6):
+            names.append("geofence")
+        target = inside
         limits = self.limits
         wished = asked.speed or limits.cruise_speed
         velocity = velocity_towards(
@@ -188,54 +183,52 @@ class SetpointGuard:
 
     def _bounds(self, odometry: Odometry, neighbours: Iterable[Neighbour]) -> list[_Bound]:
         position = odometry.position
-        bounds = [*self._fence_bounds(position), *self._height_bounds(odometry)]
+        bounds = [*self._fence_bounds(odometry), *self._height_bounds(odometry)]
         outwards = position - self.home
         away = float(np.linalg.norm(outwards))
         if away > 0.0:
             room = self.limits.max_range - away
-            bounds.append(_Bound("max_range", outwards / away, self._braking_speed(room)))
+            bounds.append(self._bound("max_range", outwards / away, room, odometry))
         for neighbour in neighbours:
             way = neighbour.position - position
             distance = float(np.linalg.norm(way))
             # Both drones brake, so each may use up half of the room between them.
             room = (distance - self.limits.separation) / 2
             if self.limits.separation > 0.0 and distance > 0.0:
-                bounds.append(_Bound("separation", way / distance, self._braking_speed(room)))
+                bounds.append(self._bound("separation", way / distance, room, odometry))
         return bounds
 
-    def _fence_bounds(self, position: Vector) -> list[_Bound]:
-        fence = self.fence
+    def _fence_bounds(self, odometry: Odometry) -> list[_Bound]:
+        fence, position = self.fence, odometry.position
         if fence.area is None:
             return []
         if not fence.inside(position):
             way = position[:2] - fence.nearest_allowed(position)[:2]
             return [_Bound("geofence", _level(way / np.linalg.norm(way)), 0.0)]
-        fastest = max(self.limits.max_speed, self.limits.max_climb)
-        reach = fence.margin + float(
-            np.linalg.norm(
-                stopping_point(
-                    np.zeros(3), np.array([fastest, 0.0, 0.0]), self.limits.max_acceleration
-                )
-            )
-            + fastest * self.limits.reaction_time
+        limits = self.limits
+        reach = fence.margin + limits.max_speed * (
+            2 * limits.reaction_time + limits.max_speed / (2 * limits.max_acceleration)
         )
         towards, distances = fence.edges_near(position, reach)
         return [
-            _Bound("geofence", _level(way), self._braking_speed(float(distance) - fence.margin))
+            self._bound("geofence", _level(way), float(distance) - fence.margin, odometry)
             for way, distance in zip(towards, distances, strict=True)
         ]
 
     def _height_bounds(self, odometry: Odometry) -> tuple[_Bound, _Bound]:
-        up = float(odometry.position[2])
+        upwards = np.array([0.0, 0.0, 1.0])
+        height = float(odometry.position[2])
         return (
-            _Bound(
-                "ceiling", np.array([0.0, 0.0, 1.0]), self._braking_speed(self.fence.ceiling - up)
-            ),
-            _Bound("floor", np.array([0.0, 0.0, -1.0]), self._braking_speed(up - self.fence.floor)),
+            self._bound("ceiling", upwards, self.fence.ceiling - height, odometry),
+            self._bound("floor", -upwards, height - self.fence.floor, odometry),
         )
 
-    def _braking_speed(self, room: float) -> float:
-        return braking_speed(room, self.limits.max_acceleration, self.limits.reaction_time)
+    def _bound(self, name: str, towards: Vector, room: float, odometry: Odometry) -> _Bound:
+        """Bound the speed by the room that is left once the vehicle answers."""
+        limits = self.limits
+        flown_on = max(0.0, float(odometry.velocity @ towards)) * limits.reaction_time
+        speed = braking_speed(room - flown_on, limits.max_acceleration, limits.reaction_time)
+        return _Bound(name, towards, speed)
 
 
 def _level(way: Vector) -> Vector:

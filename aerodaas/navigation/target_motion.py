@@ -22,6 +22,7 @@ _RANGE_NOISE, _SIDE_NOISE = 0.06, 0.02
 _LEAST_NOISE = 0.03
 _ACCELERATION = 0.7
 """Standard deviation of a walking person's acceleration, m/s^2."""
+_NEAREST = 0.1
 _FIRST_SPEED = 0.7
 """Standard deviation of a velocity not yet observed, m/s."""
 
@@ -65,19 +66,22 @@ class TargetMotion:
             self._covariance = self._covariance - gain @ self._covariance[:2]
         self._stamp = stamp
 
-    def relative_to(
-        self, odometry: Odometry, stamp: int
-    ) -> tuple[Sighting, NDArray[np.float64]] | None:
-        """Predict for `stamp`: the target as seen from `odometry`, and its velocity in ENU.
+    def relative_to(self, odometry: Odometry, stamp: int) -> tuple[Sighting, float, float] | None:
+        """Predict for `stamp` how the target is seen from `odometry`.
 
-        None before the first observation.
+        Returns the sighting and the target's velocity in m/s, away from the drone along the line
+        of sight and to the left across it. None before the first observation.
         """
         if self._state is None:
             return None
         velocity = self._state[2:]
         place = self._state[:2] + velocity * seconds(stamp - self._stamp) - odometry.position[:2]
         bearing = math.remainder(math.atan2(place[1], place[0]) - odometry.yaw, math.tau)
-        return Sighting(bearing, float(np.hypot(*place))), velocity
+        distance = float(np.hypot(*place))
+        along = place / max(distance, _NEAREST)
+        away = float(velocity @ along)
+        left = float(along[0] * velocity[1] - along[1] * velocity[0])
+        return Sighting(bearing, distance), away, left
 
     def _advance(self, dt: float) -> None:
         if self._state is None:

@@ -43,6 +43,9 @@ garbage-collect-states true
 _NEAR, _FAR = 0.1, 1200.0
 """Metres."""
 
+_LOWEST = 0.12
+"""Metres above the ground at which the landing gear holds the camera, at least."""
+
 
 class Renderer:
     """Renders one camera's view of a world; it belongs to the thread that made it.
@@ -97,6 +100,7 @@ class Renderer:
         body = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
         right, down, ahead = (body @ self._optical).T
         x, y, z = np.asarray(pose.position) + body @ np.array(self._camera.mount)
+        z = max(z, _LOWEST)
         self._eye.set_mat(LMatrix4f(*right, 0, *ahead, 0, *(-down), 0, x, y, z, 1))
         self._scene.update(time, (float(x), float(y), float(z)))
         self._engine.render_frame()

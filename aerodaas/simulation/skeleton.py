@@ -117,13 +117,14 @@ class Posture:
 def joints(height: float, posture: Posture) -> NDArray[np.float64]:
     """Positions (len(JOINTS), 3) of the joints of a person of `height` metres."""
     phase = math.tau * posture.travelled / _STRIDE
-    neck = (0.03 * posture.stepping, 0.0, _TORSO)
+    stepping = posture.stepping * (1.0 - posture.fallen)
+    neck = (0.03 * stepping, 0.0, _TORSO)
     head = (neck[0] + 0.02, 0.0, _TORSO + _HEAD - 0.02)
     place: dict[str, _Point] = {"pelvis": (0.0, 0.0, 0.0), "neck": neck, "head": head}
     place["nose"] = (head[0] + 0.11, 0.0, head[2] - 0.01)
     for side, sign, offset in (("left", 1.0, 0.0), ("right", -1.0, math.pi)):
-        swing = math.sin(phase + offset) * posture.stepping
-        lift = max(0.0, math.cos(phase + offset)) * posture.stepping
+        swing = math.sin(phase + offset) * stepping
+        lift = max(0.0, math.cos(phase + offset)) * stepping
         _leg(place, side, sign, swing, lift)
         _arm(place, side, sign, swing, posture.raised if side == "right" else 0.0)
         place[f"{side}_eye"] = (head[0] + 0.09, sign * 0.035, head[2] + 0.025)

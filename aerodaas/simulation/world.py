@@ -53,11 +53,11 @@ _GESTURE_TIME = 0.7
 _TREE_GAP = 2.5
 """Metres between a scattered tree's trunk and anything else, at least."""
 
-_BODY_MARGIN = 0.09
-"""Metres of flesh and clothes around the joints."""
+_BODY_MARGIN = (0.10, 0.06, 0.13)
+"""Metres of flesh, hair and clothes around a person's joints: ahead, sideways, up."""
 
-_VEST_MARGIN = 0.06
-"""Metres of chest around the line of the spine, forward and backward."""
+_VEST_MARGIN = (0.135, 0.02, 0.02)
+"""The same for the chest around pelvis, neck and shoulders."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,9 +178,13 @@ class Thing:
         return result
 
     def _box_around(
-        self, label: str, points: NDArray[np.float64], state: State, margin: float
+        self,
+        label: str,
+        points: NDArray[np.float64],
+        state: State,
+        margin: tuple[float, float, float],
     ) -> Box:
-        low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+        low, high = points.min(axis=0) - np.array(margin), points.max(axis=0) + np.array(margin)
         low[2] = max(0.0, low[2])
         middle, size = (low + high) / 2, high - low
         c, s = math.cos(state.yaw), math.sin(state.yaw)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from numpy.typing import NDArray
 
 from aerodaas.actors.streams._codec import Encoded, decode
 from aerodaas.data import Frame, Header
@@ -26,7 +29,7 @@ def _message(item: object) -> Message[object]:
         max_size=4,
     )
 )
-def test_arrays_of_any_shape_come_back_equal(items: list[np.ndarray]) -> None:
+def test_arrays_of_any_shape_come_back_equal(items: list[NDArray[Any]]) -> None:
     """Encoding and decoding is the identity."""
     restored = decode(memoryview(Encoded(_message(items)).to_bytes()))
     assert restored.hops == (Hop("a", 1, 2),)

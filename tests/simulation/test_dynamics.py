@@ -20,6 +20,7 @@ demands = st.lists(
 
 
 def rotor(*, gust: float = 0.0, mean: tuple[float, float, float] = (0, 0, 0)) -> Multirotor:
+    """Make a drone on the ground."""
     wind = Wind(mean, gust, "7/wind", STEP)
     return Multirotor(
         Airframe(),

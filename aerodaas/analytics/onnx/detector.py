@@ -98,7 +98,7 @@ class OnnxDetector(Analytics[Detections]):
         self._session = open_session(self._content, self.path, self.providers, self.threads)
         blank = np.zeros((1, 3, *self.size), self._dtype)
         for _ in range(_WARM_UP_RUNS):
-            self._run(blank)
+            self.infer(blank)
 
     def close(self) -> None:
         """Release the session, and say what was dropped."""
@@ -123,31 +123,44 @@ class OnnxDetector(Analytics[Detections]):
             return [self.detect([frame])[0] for frame in frames]
         if not frames or frames[0].image.size == 0:
             return [Detections.of(frame, ()) for frame in frames]
-        letterbox, buffer = self._prepared(len(frames), frames[0])
-        for frame, slot in zip(frames, buffer, strict=True):
-            letterbox.write(frame.image, slot)
-        outputs = self._run(buffer)
-        return [
-            self._gather(frame, letterbox, [np.asarray(o[index], np.float32) for o in outputs])
-            for index, frame in enumerate(frames)
-        ]
+        return self.postprocess(frames, self.infer(self.preprocess(frames)))
 
-    def _prepared(self, count: int, frame: Frame) -> tuple[Letterbox, NDArray[np.floating]]:
-        shape = (frame.height, frame.width)
+    def preprocess(self, frames: Sequence[Frame]) -> NDArray[np.floating]:
+        """Letterbox frames of one size into the network's input, count x 3 x height x width.
+
+        The array is the detector's own and is overwritten by the next call.
+        """
+        shape = (frames[0].height, frames[0].width)
         if self._letterbox is None or self._letterbox.frame != shape:
             style = self.decoder.preprocessing
             self._letterbox = Letterbox(shape, self.size, style, flexible=self._flexible)
             self._buffer = None
-        if self._buffer is None or len(self._buffer) != count:
-            self._buffer = self._letterbox.buffer(count, self._dtype)
-        return self._letterbox, self._buffer
+        if self._buffer is None or len(self._buffer) != len(frames):
+            self._buffer = self._letterbox.buffer(len(frames), self._dtype)
+        for frame, slot in zip(frames, self._buffer, strict=True):
+            self._letterbox.write(frame.image, slot)
+        return self._buffer
 
-    def _run(self, buffer: NDArray[np.floating]) -> list[NDArray[np.floating]]:
+    def infer(self, pixels: NDArray[np.floating]) -> list[NDArray[np.floating]]:
+        """Run the network; raises ModelError before `open`."""
         if self._session is None:
             message = f"{self.path}: call open() before the first frame"
             raise ModelError(message)
-        outputs = self._session.run(None, {self._input: buffer})
-        return [np.asarray(output) for output in outputs]
+        return [np.asarray(output) for output in self._session.run(None, {self._input: pixels})]
+
+    def postprocess(
+        self, frames: Sequence[Frame], outputs: Sequence[NDArray[np.floating]]
+    ) -> list[Detections]:
+        """Turn the network's outputs for the frames last preprocessed into detections."""
+        if self._letterbox is None:
+            message = f"{self.path}: preprocess the frames first"
+            raise ModelError(message)
+        return [
+            self._gather(
+                frame, self._letterbox, [np.asarray(o[index], np.float32) for o in outputs]
+            )
+            for index, frame in enumerate(frames)
+        ]
 
     def _gather(
         self, frame: Frame, letterbox: Letterbox, outputs: Sequence[NDArray[np.float32]]

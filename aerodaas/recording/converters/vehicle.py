@@ -134,7 +134,7 @@ def setpoint(item: SetpointRecord, message: Message[Any], session: Session) -> I
         "asked": _setpoint_json(item.asked),
         "sent": _setpoint_json(item.sent),
         "clipped_by": item.clipped_by,
-        "cause": item.cause,
+        "cause": item.cause._asdict() if item.cause else None,
     }
     yield Entry(topic(message.stream, "setpoint"), SETPOINT, json_bytes(value), item.stamp)
 

@@ -180,7 +180,7 @@ def beam(start: ArrayLike, end: ArrayLike, radius: float, sides: int = 4) -> Mes
     a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     length = float(np.linalg.norm(b - a))
     up = (b - a) / length
-    side = np.cross(up, (1.0, 0.0, 0.0) if abs(up[0]) < 0.9 else (0.0, 1.0, 0.0))
+    side = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
     side /= np.linalg.norm(side)
     basis = np.stack([side, np.cross(up, side), up])
     bar = tube([radius, radius], [0.0, length], sides=sides)

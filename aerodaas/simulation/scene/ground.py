@@ -168,7 +168,8 @@ def _cast(thing: Thing, spec: Building, light: Light) -> Mesh:
 def _fan(outline: ArrayLike, alpha: float) -> Mesh:
     """A flat black polygon; either sense of turning will do."""
     flat = np.asarray(outline, dtype=np.float64)
-    if np.cross(flat[1] - flat[0], flat[2] - flat[0]) < 0:
+    (ax, ay), (bx, by) = flat[1] - flat[0], flat[2] - flat[0]
+    if ax * by < ay * bx:
         flat = flat[::-1]
     points = np.c_[flat, np.zeros(len(flat))]
     rest = np.arange(1, len(points) - 1)

@@ -42,7 +42,11 @@ def attach(
     node = parent.attach_new_node(mesh.node(name))
     node.set_texture(texture)
     node.set_two_sided(both_sides)
-    if layer is not Layer.SOLID:
+    if layer is Layer.SOLID:
+        # panda3d would sort by the addresses of states, and where surfaces touch the picture
+        # would then differ from run to run; unsorted, it draws in the order of the scene.
+        node.set_bin("unsorted", 0)
+    else:
         node.set_bin("background", int(layer))
         node.set_depth_test(False)
         node.set_depth_write(False)

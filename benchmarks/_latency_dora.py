@@ -1,4 +1,4 @@
-"""One of the four nodes of the latency benchmark in dora: `dora_node.py camera|read|steer|drone`.
+"""One of the four nodes of the latency benchmark in dora: `… camera|read|steer|drone`.
 
 The frame's capture stamp travels in its first eight bytes and then as an integer, so that the
 drone's node knows how old the command is.
@@ -53,10 +53,11 @@ def steer(node: Node) -> None:
 
 def drone(node: Node) -> None:
     """Note how old each command is."""
-    ages = []
-    for event in node:
-        if event["type"] == "INPUT":
-            ages.append((time.monotonic_ns() - event["value"][0].as_py()) / 1e6)
+    ages = [
+        (time.monotonic_ns() - event["value"][0].as_py()) / 1e6
+        for event in node
+        if event["type"] == "INPUT"
+    ]
     Path(os.environ["LATENCY_RESULT"]).write_text(json.dumps(ages), encoding="utf-8")
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,7 +79,7 @@ class ReadFrame(Analytics[Reading]):
     produces: ClassVar[type] = Reading
     isolated = True
 
-    def process(self, item: Any, context: Context) -> Reading:  # noqa: ARG002
+    def process(self, item: Frame, context: Context) -> Reading:  # noqa: ARG002
         """Sum a share of the pixels."""
         return Reading(read_frame(item.image))
 
@@ -90,6 +90,6 @@ class Steer(NavigableAnalytics):
     accepts: ClassVar[tuple[type, ...]] = (Reading,)
     isolated = True
 
-    def process(self, item: Any, context: Context) -> AeroNavigation:  # noqa: ARG002
+    def process(self, item: Reading, context: Context) -> AeroNavigation:  # noqa: ARG002
         """Stand still."""
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [VelocityCommand(valid_for=1.0)])
