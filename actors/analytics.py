@@ -18,7 +18,7 @@ from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
 from aerodaas.actors.session import Session, is_due, next_due
 from aerodaas.actors.streams import Inbox, Outlet
-from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.status import Message
@@ -58,6 +58,8 @@ class NodeSpec:
     triggers: tuple[TriggerSpec, ...]
     acknowledges: bool
     """True in lockstep for an analysis whose results nobody reads."""
+    kind: ComputeKind
+    """Where its actor stands."""
     answers_always: bool
     """True under a dispatcher, which waits for an answer to each task."""
     wakes: tuple[str, ...]
@@ -280,6 +282,10 @@ class _Worker:
             with contextlib.suppress(Exception):
                 self.node.work.close()
             self.inbox.close()
+
+    @property
+    def kind(self) -> ComputeKind:
+        return self.node.kind
 
     def now(self) -> int:
         return self._now

@@ -149,8 +149,8 @@ class _Planner:
         )
 
     def is_managed(self, node: Node) -> bool:
-        """The dispatcher manages the analyses of frames that are heavy enough to be isolated."""
-        if self.dispatch_with is None or not node.work.isolated or not node.inputs:
+        """The dispatcher manages the analyses of frames that want to be scheduled."""
+        if self.dispatch_with is None or not node.work.scheduled or not node.inputs:
             return False
         return all(self.graph.nodes[name].item is Frame for name in node.inputs)
 
@@ -210,6 +210,7 @@ class _Planner:
             external=node.kind == "external",
             dormant=node.dormant,
             triggers=triggers,
+            kind=self.place_of(node).kind,
             acknowledges=self.acknowledgements(node.id) == 0 and not managed,
             answers_always=managed,
             wakes=tuple(_trigger_stream(node.id, waker) for waker in wakers),
@@ -219,7 +220,8 @@ class _Planner:
         if node.compute is None:
             return Place()
         resource = self.compute[node.compute]
-        return Place(resource.kind, resource.node)
+        # Under a dispatcher, an analysis has an executor on the edge wherever it is deployed.
+        return Place() if self.is_managed(node) else Place(resource.kind, resource.node)
 
     def analyses_by_actor(self) -> tuple[Analyses, ...]:
         shared: dict[Place, list[NodeSpec]] = {}
