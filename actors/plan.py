@@ -122,13 +122,20 @@ class _Planner:
     def state_of(self, node: Node) -> str:
         return state_stream(node.robot or self.robots[0].id)
 
-    def reaches_a_drone(self, stream: str) -> bool:
-        """Tell whether what `stream` carries can change what a drone does."""
+    def reaches_a_drone(self, stream: str, asked: frozenset[str] = frozenset()) -> bool:
+        """Tell whether what `stream` carries can change what a drone does.
+
+        By navigation, by a trigger's command, or by waking an analysis that can; `asked` are the
+        streams that the question came through.
+        """
         if stream in self.steering:
             return True
-        return any(
-            any(trigger.method for trigger in node.triggers) or self.reaches_a_drone(node.id)
-            for node in self.graph.downstream(stream)
+        node = self.graph.nodes.get(stream)
+        triggers = node.triggers if node is not None else []
+        further = {trigger.target for trigger in triggers if trigger.method is None}
+        further |= {reader.id for reader in self.graph.downstream(stream)}
+        return any(trigger.method is not None for trigger in triggers) or any(
+            self.reaches_a_drone(one, asked | {stream}) for one in further - asked
         )
 
     def acknowledgements(self, stream: str) -> int:
