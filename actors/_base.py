@@ -20,7 +20,7 @@ from typing import Any, Literal
 import ray
 
 from aerodaas.actors.session import Session
-from aerodaas.actors.streams import Inbox, Outlet, RemoteReader
+from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteReader
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError
@@ -123,8 +123,10 @@ class StreamActor:
 
     def connect(self, readers: dict[str, list[Any]]) -> None:
         """Learn which actors on other nodes read this actor's streams."""
+        # In lockstep nothing may be dropped; the barrier keeps the number under way small.
+        window = MAX_DEPTH if self.session.lockstep else UNDER_WAY
         for stream, actors in readers.items():
-            self.outlets[stream].remote = [RemoteReader(actor) for actor in actors]
+            self.outlets[stream].remote = [RemoteReader(actor, window) for actor in actors]
 
     def start(self, origin_ns: int) -> None:
         """Run in a thread; mission time is zero at host time `origin_ns`."""
