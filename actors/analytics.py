@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -17,7 +18,7 @@ from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
 from aerodaas.actors.session import Session, is_due, next_due
 from aerodaas.actors.streams import Inbox, Outlet
-from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.status import Message
@@ -57,6 +58,8 @@ class NodeSpec:
     triggers: tuple[TriggerSpec, ...]
     acknowledges: bool
     """True in lockstep for an analysis whose results nobody reads."""
+    kind: ComputeKind
+    """Where its actor stands."""
     answers_always: bool
     """True under a dispatcher, which waits for an answer to each task."""
     wakes: tuple[str, ...]
@@ -137,10 +140,8 @@ class _Worker:
     def __init__(self, actor: AnalyticsActor, node: NodeSpec) -> None:
         self.node = node
         depth = _LOCKSTEP_DEPTH if actor.session.lockstep else 1
-        clocked = depth if node.external else 1
         self.depths = {
-            node.state: clocked,
-            **dict.fromkeys(node.inputs, depth),
+            **dict.fromkeys((node.state, *node.inputs), depth),
             **dict.fromkeys(node.wakes, _WAKE_DEPTH),
         }
         self.busy = 0.0
@@ -148,8 +149,9 @@ class _Worker:
         self.last_error = ""
         self.opened = False
         self._actor = actor
-        self._dormant = node.dormant
-        self._vehicle: VehicleState | None = None
+        self._woken: int | None = None if node.dormant else -1
+        """Stamp of the measurement that woke it; None while it sleeps."""
+        self._states: deque[tuple[int, VehicleState]] = deque(maxlen=depth)
         self._now = 0
 
     def open(self) -> None:
@@ -174,12 +176,12 @@ class _Worker:
 
     def _run_inputs(self) -> None:
         for message in self._receive(0.5):
-            self._work(message)
+            if message.stream in self.node.inputs:
+                self._work(message)
 
     def _run_external(self) -> None:
         """In lockstep an external source ticks with the drone's states."""
-        for message in self.inbox.receive(0.5):
-            self._note(message)
+        for message in self._receive(0.5):
             if message.stream == self.node.state and is_due(self._rate, message.stamp):
                 self._produce(message.stamp)
 
@@ -197,31 +199,35 @@ class _Worker:
     def _produce(self, stamp: int) -> None:
         header = Header(self._results.sent, stamp, self.node.stream)
         captured = host_time_ns()
-        item = self._process(None, stamp)
+        item = self._process(None, stamp) if self._awake(stamp) else None
+        if item is not None:
+            origin = Message(self.node.stream, header.id, stamp, header, captured, (), item)
+            self._fire(item, origin)
         if item is not None or self._actor.session.lockstep:
-            message = self._results.measure(item, header, captured)
-            self._fire(item, message)
-            self._acknowledge(message)
+            self._acknowledge(self._results.measure(item, header, captured))
 
     def _receive(self, timeout: float) -> list[Message[Any]]:
-        inputs = []
-        for message in self.inbox.receive(timeout):
-            if message.stream in self.node.inputs:
-                inputs.append(message)
-            else:
-                self._note(message)
-        return inputs
+        """Take note of what has arrived, and return it."""
+        messages = self.inbox.receive(timeout)
+        if messages and self._actor.session.lockstep:
+            # A state is published before what was measured in it, but may arrive in between.
+            messages += self.inbox.receive(0.0)
+        for message in messages:
+            if message.stream == self.node.state:
+                self._states.append((message.stamp, message.item))
+            elif isinstance(message.item, Wake):
+                stamp = message.header.stamp
+                self._woken = stamp if self._woken is None else min(self._woken, stamp)
+        return messages
 
-    def _note(self, message: Message[Any]) -> None:
-        if isinstance(message.item, VehicleState):
-            self._vehicle = message.item
-        elif isinstance(message.item, Wake):
-            self._dormant = False
+    def _awake(self, stamp: int) -> bool:
+        """Tell whether to work on what was measured at `stamp`: later than what woke us."""
+        return self._woken is not None and stamp > self._woken
 
     def _work(self, message: Message[Any]) -> None:
         received = host_time_ns()
         result = None
-        if message.item is not None and not self._dormant:
+        if message.item is not None and self._awake(message.header.stamp):
             result = self._process(message.item, message.header.stamp)
         if result is not None:
             self._fire(result, message)
@@ -277,13 +283,18 @@ class _Worker:
                 self.node.work.close()
             self.inbox.close()
 
+    @property
+    def kind(self) -> ComputeKind:
+        return self.node.kind
+
     def now(self) -> int:
         return self._now
 
     def vehicle(self) -> VehicleState | None:
-        return self._vehicle
+        """In lockstep the state at the item's own time, however far the drone has flown since."""
+        lockstep = self._actor.session.lockstep
+        known = (s for at, s in reversed(self._states) if at <= self._now or not lockstep)
+        return next(known, None)
 
     def alert(self, alert: Alert) -> None:
         self._actor.alert(alert.kind, alert.text, **alert.values)
-
-

@@ -26,7 +26,7 @@ _STORE_BYTES = 128 * 2**20
 class Place:
     """Where an actor belongs."""
 
-    kind: str = "edge"
+    kind: Literal["edge", "cloud"] = "edge"
     node: str | None = None
     """IP address of one node, where the kind alone does not say."""
 

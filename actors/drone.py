@@ -131,7 +131,7 @@ class DroneActor(StreamActor):
             self._late += now - due > CONTROL_PERIOD_NS // 2
             self._turn(now)
             for pilot in self._pilots.values():
-                pilot.observe(now, all_sensors=True)
+                pilot.observe(now)
             self._watch_application()
             due = next_due(_CONTROL_RATE, now)
 
@@ -141,7 +141,8 @@ class DroneActor(StreamActor):
         due = {source: next_due(rate, -1) for source, rate in self._conduct.rates.items()}
         control = 0
         while not self._over():
-            now = min([control, *due.values()])
+            readings = [pilot.next_reading for pilot in self._pilots.values()]
+            now = min([control, *due.values(), *(stamp for stamp in readings if stamp is not None)])
             self.clock.advance_to(now)
             for pilot in self._pilots.values():
                 pilot.advance_to(now)
@@ -160,7 +161,7 @@ class DroneActor(StreamActor):
                 self._barrier.expect(source, now, counts.get(source, 0))
                 due[source] = next_due(self._conduct.rates[source], now)
         for pilot in self._pilots.values():
-            for stream, stamp in pilot.observe(now, all_sensors=False):
+            for stream, stamp in pilot.observe(now):
                 self._barrier.expect(stream, stamp, counts.get(stream, 0))
 
     def _await(self, *, drain: bool) -> None:

@@ -84,7 +84,10 @@ class Flight:
             self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
             mine = {spec.robot.id for spec in specs}
             others = tuple(
-                spec.robot.id for group in plan.drones for spec in group if spec.robot.id not in mine
+                spec.robot.id
+                for group in plan.drones
+                for spec in group
+                if spec.robot.id not in mine
             )
             self._create(name, DroneActor, edge, (session, name, specs, plan.conduct, others))
         for camera in plan.cameras:
@@ -163,9 +166,11 @@ class Flight:
         others = [m for m in self._members.values() if m.name != "recorder"]
         for group in (others, recorder):
             references = {m.handle.stop.remote(): m for m in group}
-            done, _ = ray.wait(
-                list(references), num_returns=len(references), timeout=_STOP_TIMEOUT
-            ) if references else ([], [])
+            done, _ = (
+                ray.wait(list(references), num_returns=len(references), timeout=_STOP_TIMEOUT)
+                if references
+                else ([], [])
+            )
             for reference in done:
                 with contextlib.suppress(RayError, AeroDaaSError):
                     references[reference].report = ray.get(reference)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.actors.session import Session, is_due
+from aerodaas.actors.session import Session, next_due
 from aerodaas.actors.streams import Outlet
 from aerodaas.clock import host_time_ns
 from aerodaas.config import RobotConfig, SensorConfig
@@ -80,6 +80,7 @@ class Pilot:
         """Milliseconds from capture to the arrival of the command made from it."""
         self._session = session
         self._told = 0
+        self._due = {sensor.id: next_due(sensor.rate, -1) for sensor in spec.sensors}
         plugin = load_plugin("drivers", spec.robot.driver)
         self.vehicle: Vehicle = plugin(spec.robot, session.environment)
 
@@ -142,18 +143,24 @@ class Pilot:
         self._publish(status_stream(self.id), self.mission.status, now)
         return record
 
-    def observe(self, now: int, *, all_sensors: bool) -> list[tuple[str, int]]:
-        """Publish the vehicle's state and its sensors' readings; returns (stream, stamp) of each.
+    def observe(self, now: int) -> list[tuple[str, int]]:
+        """Publish the vehicle's state and the readings of the sensors that are due by now.
 
-        Without `all_sensors`, only those that are due at exactly `now`.
+        Returns (stream, stamp) of each.
         """
         state = self.vehicle.read()
         published = [self._publish(state_stream(self.id), state, now)]
         for sensor in self.spec.sensors:
-            if all_sensors or is_due(sensor.rate, now):
+            if self._due[sensor.id] <= now:
+                self._due[sensor.id] = next_due(sensor.rate, now)
                 item = sensor_item(sensor, state, self.mission.status)
                 published.append(self._publish(f"{self.id}/{sensor.id}", item, now))
         return published
+
+    @property
+    def next_reading(self) -> int | None:
+        """When the next sensor is due; None without sensors."""
+        return min(self._due.values(), default=None)
 
     @property
     def over(self) -> bool:

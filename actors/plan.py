@@ -122,13 +122,20 @@ class _Planner:
     def state_of(self, node: Node) -> str:
         return state_stream(node.robot or self.robots[0].id)
 
-    def reaches_a_drone(self, stream: str) -> bool:
-        """Tell whether what `stream` carries can change what a drone does."""
+    def reaches_a_drone(self, stream: str, asked: frozenset[str] = frozenset()) -> bool:
+        """Tell whether what `stream` carries can change what a drone does.
+
+        By navigation, by a trigger's command, or by waking an analysis that can; `asked` are the
+        streams that the question came through.
+        """
         if stream in self.steering:
             return True
-        return any(
-            any(trigger.method for trigger in node.triggers) or self.reaches_a_drone(node.id)
-            for node in self.graph.downstream(stream)
+        node = self.graph.nodes.get(stream)
+        triggers = node.triggers if node is not None else []
+        further = {trigger.target for trigger in triggers if trigger.method is None}
+        further |= {reader.id for reader in self.graph.downstream(stream)}
+        return any(trigger.method is not None for trigger in triggers) or any(
+            self.reaches_a_drone(one, asked | {stream}) for one in further - asked
         )
 
     def acknowledgements(self, stream: str) -> int:
@@ -142,8 +149,8 @@ class _Planner:
         )
 
     def is_managed(self, node: Node) -> bool:
-        """The dispatcher manages the analyses of frames that are heavy enough to be isolated."""
-        if self.dispatch_with is None or not node.work.isolated or not node.inputs:
+        """The dispatcher manages the analyses of frames that want to be scheduled."""
+        if self.dispatch_with is None or not node.work.scheduled or not node.inputs:
             return False
         return all(self.graph.nodes[name].item is Frame for name in node.inputs)
 
@@ -203,6 +210,7 @@ class _Planner:
             external=node.kind == "external",
             dormant=node.dormant,
             triggers=triggers,
+            kind=self.place_of(node).kind,
             acknowledges=self.acknowledgements(node.id) == 0 and not managed,
             answers_always=managed,
             wakes=tuple(_trigger_stream(node.id, waker) for waker in wakers),
@@ -212,7 +220,8 @@ class _Planner:
         if node.compute is None:
             return Place()
         resource = self.compute[node.compute]
-        return Place(resource.kind, resource.node)
+        # Under a dispatcher, an analysis has an executor on the edge wherever it is deployed.
+        return Place() if self.is_managed(node) else Place(resource.kind, resource.node)
 
     def analyses_by_actor(self) -> tuple[Analyses, ...]:
         shared: dict[Place, list[NodeSpec]] = {}
@@ -323,5 +332,3 @@ def _streams_of(edge: NavigationEdge) -> list[str]:
 
 def _trigger_stream(target: str, source: Node) -> str:
     return f"{target}/commands/{source.id}"
-
-

@@ -71,6 +71,11 @@ class SensorActor(StreamActor):
         vehicle = self._vehicle
         picture = self._camera.capture(stamp, vehicle.truth if vehicle else None)
         taken = host_time_ns()
+        # Before the frame: in lockstep time may go on as soon as the frame has been worked through.
+        if self._camera.finished and self._ends and not self._ended:
+            self._ended = True
+            header = Header(0, stamp, self._stream)
+            self._commands.measure(End(f"{self._stream} has no more pictures"), header, taken)
         if picture is not None:
             # A live camera hands out a picture that is some milliseconds old already.
             age = 0 if lockstep else max(0, stamp - picture.stamp)
@@ -80,10 +85,6 @@ class SensorActor(StreamActor):
         elif lockstep:
             header = Header(self._frames.sent, stamp, self._stream)
             self._frames.measure(None, header, taken)
-        if self._camera.finished and self._ends and not self._ended:
-            self._ended = True
-            header = Header(0, stamp, self._stream)
-            self._commands.measure(End(f"{self._stream} has no more pictures"), header, taken)
 
     def _frame(self, header: Header, picture: Picture) -> Frame:
         odometry = self._vehicle.odometry if self._vehicle else None

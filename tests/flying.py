@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 from aerodaas.options import RunOptions, current_options
@@ -14,7 +15,7 @@ from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
 from aerodaas.run import Run
 
-__all__ = ["FLAT", "Flyer", "hop", "robot"]
+__all__ = ["FLAT", "Flyer", "hop", "recorded", "robot"]
 
 _FAST = {"cruise_speed": 4.0, "max_speed": 6.0, "max_acceleration": 4.0, "takeoff_height": 1.5}
 
@@ -54,11 +55,12 @@ class Flyer:
 
     @contextmanager
     def options(self, **words: Any) -> Iterator[None]:  # noqa: ANN401
-        """Options of the runs made inside, as `aerodaas run` would set them."""
+        """Options of the runs made inside, as `aerodaas run` would set them; without plots."""
         record = self.folder / "flight"
         token = current_options.set(RunOptions(**{"view": False, "record": record, **words}))
         try:
-            yield
+            with patch("aerodaas.console.show_results"):
+                yield
         finally:
             current_options.reset(token)
 

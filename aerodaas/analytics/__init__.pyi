@@ -12,5 +12,6 @@ from .followers import (
 )
 from .monitoring import MonitoringAnalytics as MonitoringAnalytics
 from .onnx.detector import OnnxDetector as OnnxDetector
+from .synthetic import SyntheticAnalytics as SyntheticAnalytics
 from .tracking import TrackingAnalytics as TrackingAnalytics
 from .vip_detection import VipDetectionAnalytics as VipDetectionAnalytics

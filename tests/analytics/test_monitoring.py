@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from aerodaas.analytics.base import ComputeKind
 from aerodaas.analytics.monitoring import MonitoringAnalytics
 from aerodaas.clock import NANOSECONDS
 from aerodaas.data import Alert, Battery, Frame, GpsFix, Header, Odometry
@@ -21,6 +22,7 @@ class Desk:
     def __init__(self) -> None:
         """Start at zero with a full battery."""
         self.stamp = 0
+        self.kind: ComputeKind = "edge"
         self.alerts: list[Alert] = []
         self.state: VehicleState | None = None
 
