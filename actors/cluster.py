@@ -13,7 +13,7 @@ import ray
 from aerodaas.config import ComputeConfig
 from aerodaas.errors import AeroDaaSError, ConfigError
 
-__all__ = ["Place", "connect", "discover", "disconnect", "options_for"]
+__all__ = ["Place", "connect", "disconnect", "discover", "options_for"]
 
 _KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
 _SHARE = 0.001

@@ -43,7 +43,6 @@ __all__ = ["DECISIONS", "DispatcherActor", "Managed", "done_stream", "task_strea
 DECISIONS = "decisions"
 """Stream of the scheduler's decisions and their outcomes."""
 _DEPTH = 64
-_CLOUD_POLL = 0.005
 _EDGE_PATIENCE = 10
 """An execution on the edge that takes so many times its expected time has failed."""
 _SLOW_DECISION = 0.05
@@ -102,8 +101,11 @@ class DispatcherActor(StreamActor):
 
     def prepare(self, cloud: Any = None) -> Any:  # noqa: ANN401 - a Ray handle; the base's info
         """Open the streams; `cloud` is the executor in the cloud, where there is one."""
-        self._cloud = Cloud(cloud, self._resources.cloud_timeout) if cloud is not None else None
-        return super().prepare()
+        info = super().prepare()
+        assert self.inbox is not None  # noqa: S101 - prepared
+        timeout = self._resources.cloud_timeout
+        self._cloud = Cloud(cloud, timeout, self.inbox.wake) if cloud is not None else None
+        return info
 
     def _open(self) -> None:
         self._decisions = self.outlet(DECISIONS)
@@ -268,8 +270,6 @@ class DispatcherActor(StreamActor):
         return self._now
 
     def _patience(self) -> float:
-        if self._cloud is not None and self._cloud.busy:
-            return _CLOUD_POLL
         if self._timers and not self.session.lockstep:
             return min(0.2, max(0.0, self.session.host_seconds(self._timers[0] - self._time())))
         return 0.2

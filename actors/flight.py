@@ -11,6 +11,7 @@ from typing import Any
 
 import ray
 from ray.exceptions import RayActorError, RayError, RayTaskError
+from typing_extensions import Self
 
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors.analytics import AnalyticsActor
@@ -111,7 +112,7 @@ class Flight:
         self._next_reports = 0.0
         self._stopped = False
 
-    def __enter__(self) -> Flight:
+    def __enter__(self) -> Self:
         """Stop the actors when left."""
         return self
 
@@ -133,7 +134,10 @@ class Flight:
             member.handle.start.remote(self._origin)
 
     def poll(self, newest: int = 200) -> FlightState:
-        """Ask how everyone fares, with the `newest` latencies of each robot; also tells the drones that the application is alive."""
+        """Ask how everyone fares, with the `newest` latencies of each robot.
+
+        Also tells the drones that the application is alive.
+        """
         if time.monotonic() >= self._next_reports:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerodaas.actors._base import StreamActor
+from aerodaas.actors._base import StreamActor, StreamCount
 from aerodaas.actors.session import Session, is_due, next_due
 from aerodaas.cameras.base import Camera, Picture
 from aerodaas.clock import host_time_ns
@@ -62,6 +62,10 @@ class SensorActor(StreamActor):
             now = self.clock.now()
             self._capture(now, lockstep=False)
             due = next_due(self._sensor.rate, now)
+
+    def counts(self) -> dict[str, StreamCount]:
+        """Nothing: of the vehicle's states only the newest matters here, by intention."""
+        return {}
 
     def _take(self, message: Message[Any]) -> None:
         if isinstance(message.item, VehicleState):

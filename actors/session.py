@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from aerodaas.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
 from aerodaas.config import EnvironmentConfig
 
-__all__ = ["CONTROL_PERIOD_NS", "Session", "next_due", "is_due"]
+__all__ = ["CONTROL_PERIOD_NS", "Session", "is_due", "next_due"]
 
 CONTROL_PERIOD_NS = NANOSECONDS // 20
 """Period of the setpoint loop: 20 Hz, ten times what PX4 asks for in offboard mode."""
