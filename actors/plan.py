@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors._barrier import ACKS, paths
+from aerodaas.actors._names import state_stream
 from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
 from aerodaas.actors.cluster import Place
 from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
 from aerodaas.actors.drone import Conduct
-from aerodaas.actors._names import state_stream
 from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import Session
 from aerodaas.analytics.base import Analytics

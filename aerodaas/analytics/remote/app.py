@@ -46,89 +46,84 @@ def build_app(mission: MissionLink, newest_frame: Callable[[], Frame | None]) ->
     app = FastAPI(title="AeroDaaS remote control", docs_url=None, redoc_url=None)
     app.add_exception_handler(RequestValidationError, _malformed)
     app.add_exception_handler(AnyHTTPException, _failed)
-    desk = _Desk(mission)
-
-    def status() -> StatusOut:
-        """Say how the mission fares."""
-        return desk.status()
-
-    def frame() -> Response:
-        """Show what the camera sees."""
-        picture = newest_frame()
-        if picture is None:
-            raise HTTPException(404, "the camera has not shown anything yet")
-        return Response(_jpeg(picture), media_type="image/jpeg")
-
-    async def add(body: WaypointsIn) -> JSONResponse:
-        """Add waypoints to the mission."""
-        try:
-            navigation = body.navigation()
-        except InvalidWaypointError as error:
-            raise HTTPException(422, str(error)) from None
-        ids = ", ".join(waypoint.id for waypoint in body.waypoints)
-        return await desk.tell(f"add {ids}", mission.fly(navigation, body.index))
-
-    async def stream(
-        socket: WebSocket, rate: Annotated[float, Query(gt=0, le=20, allow_inf_nan=False)] = 5.0
-    ) -> None:
-        """Send the status again and again until the mission is over."""
-        await socket.accept()
-        try:
-            while True:
-                await socket.send_text(desk.status().model_dump_json())
-                if desk.over:
-                    break
-                await asyncio.sleep(1.0 / rate)
-            await socket.close()
-        except (WebSocketDisconnect, RuntimeError):
-            return
-
-    answers: dict[int | str, dict[str, Any]] = {
-        code: {"model": AnswerOut} for code in (400, 401, 409, 422, 503, 504)
+    desk = _Desk(mission, newest_frame)
+    answers: dict[str, Any] = {
+        "methods": ["POST"],
+        "response_model": AnswerOut,
+        "responses": {code: {"model": AnswerOut} for code in (400, 401, 409, 422, 504)},
     }
-    app.add_api_route("/status", status, methods=["GET"], response_model=StatusOut)
-    app.add_api_route("/frame.jpg", frame, methods=["GET"], response_class=Response)
-    app.add_api_route(
-        "/waypoints", add, methods=["POST"], response_model=AnswerOut, responses=answers
-    )
-    for name, (command, help_text) in _COMMANDS.items():
-        app.add_api_route(
-            f"/{name}",
-            desk.route(name, command),
-            methods=["POST"],
-            response_model=AnswerOut,
-            responses=answers,
-            description=help_text,
-        )
-    app.add_api_websocket_route("/stream", stream)
+    app.add_api_route("/status", desk.status, response_model=StatusOut)
+    app.add_api_route("/frame.jpg", desk.frame, response_class=Response)
+    app.add_api_route("/waypoints", desk.add, **answers)
+    for name, (command, text) in _COMMANDS.items():
+        app.add_api_route(f"/{name}", desk.route(name, command), description=text, **answers)
+    app.add_api_websocket_route("/stream", desk.stream)
     return app
 
 
 class _Desk:
     """Hands requests to the mission and waits for what it says."""
 
-    def __init__(self, mission: MissionLink) -> None:
+    def __init__(self, mission: MissionLink, newest_frame: Callable[[], Frame | None]) -> None:
         self._mission = mission
+        self._newest_frame = newest_frame
         self._count = 0
 
     def status(self) -> StatusOut:
+        """Say how the mission fares."""
         status = self._mission.status()
         if status is None:
             raise HTTPException(503, "the mission has not said anything yet")
         return StatusOut.of(status, self._mission.vehicle())
 
-    @property
-    def over(self) -> bool:
-        status = self._mission.status()
-        return status is not None and status.state in TERMINAL
+    def frame(self) -> Response:
+        """Show what the camera sees."""
+        picture = self._newest_frame()
+        if picture is None:
+            raise HTTPException(404, "the camera has not shown anything yet")
+        return Response(_jpeg(picture), media_type="image/jpeg")
+
+    async def add(self, body: WaypointsIn) -> JSONResponse:
+        """Add waypoints to the mission."""
+        try:
+            navigation = body.navigation()
+        except InvalidWaypointError as error:
+            raise HTTPException(422, str(error)) from None
+        ids = ", ".join(waypoint.id for waypoint in body.waypoints)
+        return await self._tell(f"add {ids}", self._mission.fly(navigation, body.index))
 
     def route(self, name: str, command: Command) -> Callable[[], Any]:
+        """Make the route of one command."""
+
         async def tell() -> JSONResponse:
-            return await self.tell(name, self._mission.command(command))
+            return await self._tell(name, self._mission.command(command))
 
         return tell
 
-    async def tell(self, what: str, answer: Future[Answer]) -> JSONResponse:
+    async def stream(
+        self,
+        socket: WebSocket,
+        rate: Annotated[float, Query(gt=0, le=20, allow_inf_nan=False)] = 5.0,
+    ) -> None:
+        """Send the status `rate` times a second until the mission is over."""
+        await socket.accept()
+        try:
+            while True:
+                if self._mission.status() is not None:
+                    await socket.send_text(self.status().model_dump_json())
+                if self._over:
+                    break
+                await asyncio.sleep(1.0 / rate)
+            await socket.close()
+        except (WebSocketDisconnect, RuntimeError):
+            return
+
+    @property
+    def _over(self) -> bool:
+        status = self._mission.status()
+        return status is not None and status.state in TERMINAL
+
+    async def _tell(self, what: str, answer: Future[Answer]) -> JSONResponse:
         """Wait for the mission's answer; everybody who watches learns of it."""
         try:
             said = await asyncio.wait_for(asyncio.wrap_future(answer), _PATIENCE)
