@@ -103,6 +103,7 @@ class StreamActor:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
+        self._alerting = threading.Lock()
         self.inbox: Inbox | None = None
         self.outlets: dict[str, Outlet] = {}
 
@@ -179,11 +180,12 @@ class StreamActor:
         return self.outlets[stream]
 
     def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401
-        """Tell the people who watch."""
-        header = Header(self.alerts.sent, self.clock.now(), self.name)
-        alert = Alert(header, kind, text, values)
-        self._newest_alerts.append(alert)
-        self.alerts.measure(alert, header, host_time_ns())
+        """Tell the people who watch; any thread may."""
+        with self._alerting:
+            header = Header(self.alerts.sent, self.clock.now(), self.name)
+            alert = Alert(header, kind, text, values)
+            self._newest_alerts.append(alert)
+            self.alerts.measure(alert, header, host_time_ns())
 
     def reads(self) -> list[str]:
         """Streams that this actor reads."""

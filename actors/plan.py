@@ -6,13 +6,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors._barrier import ACKS, paths
+from aerodaas.actors._names import state_stream
 from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
 from aerodaas.actors.cluster import Place
 from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
 from aerodaas.actors.drone import Conduct
-from aerodaas.actors.pilot import Pilot, RobotSpec, state_stream
+from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig, TaskConfig
 from aerodaas.data import Frame
 from aerodaas.errors import GraphError
@@ -119,8 +121,11 @@ class _Planner:
     def analyses(self) -> list[Node]:
         return [node for node in self.graph.nodes.values() if node.kind != "sensor"]
 
+    def robot_of(self, node: Node) -> str:
+        return node.robot or self.robots[0].id
+
     def state_of(self, node: Node) -> str:
-        return state_stream(node.robot or self.robots[0].id)
+        return state_stream(self.robot_of(node))
 
     def reaches_a_drone(self, stream: str, asked: frozenset[str] = frozenset()) -> bool:
         """Tell whether what `stream` carries can change what a drone does.
@@ -209,6 +214,7 @@ class _Planner:
                 name: self.depth(name) if self.session.lockstep else 1
                 for name in ([task_stream(node.id)] if managed else node.inputs)
             },
+            robot=self.robot_of(node),
             state=self.state_of(node),
             external=node.kind == "external",
             dormant=node.dormant,
@@ -260,6 +266,11 @@ class _Planner:
             sensors=tuple(node.work for node in mine if node.work.type != "camera"),
             navigation=tuple(dict.fromkeys(n for edge in edges for n in _streams_of(edge))),
             commands=tuple(commanding),
+            requesters=tuple(
+                node.id
+                for node in self.analyses()
+                if isinstance(node.work, CommandingAnalytics) and self.robot_of(node) == robot.id
+            ),
             initial=tuple(initial_commands(edges)),
             scheduler=self.scheduler,
         )

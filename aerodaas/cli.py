@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `schema`, `doctor`."""
+"""The command line: `aerodaas run`, `remote`, `schema`, `doctor`."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from aerodaas import cli_remote
 from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.options import RunOptions, current_options
 from aerodaas.overrides import parse_setting
@@ -29,6 +30,7 @@ flies a simulated drone, PX4, ArduPilot or a Tello.
     aerodaas run apps/farm_survey.py --speed max
 """,
 )
+app.add_typer(cli_remote.app, name="remote")
 
 
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
