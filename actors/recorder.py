@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ class RecorderActor(StreamActor):
         self._path = path
         self._provenance = provenance
         self._failure = ""
+        self._lost: Counter[str] = Counter()
 
     def _open(self) -> None:
         environment = self.session.environment
@@ -51,6 +53,7 @@ class RecorderActor(StreamActor):
             for message in messages:
                 if not self._failure:
                     self._write(message)
+            self._note_drops()
             if self._acks is not None and messages:
                 done = tuple((one.header.source, one.header.stamp) for one in messages)
                 self._acks.derive(done, messages[-1], host_time_ns(), messages[-1].stamp)
@@ -64,11 +67,15 @@ class RecorderActor(StreamActor):
             self._failure = str(error)
             self.alert("recording_stopped", self._failure)
 
-    def _close(self) -> None:
+    def _note_drops(self) -> None:
+        """Record what was lost on its way here as it happens: the run may be killed."""
         assert self.inbox is not None  # noqa: S101 - prepare came first
         for stream, dropped in self.inbox.dropped.items():
-            if dropped:
-                self._recorder.drops(stream, dropped)
+            if dropped > self._lost[stream]:
+                self._recorder.drops(stream, dropped - self._lost[stream])
+                self._lost[stream] = dropped
+
+    def _close(self) -> None:
         self._summary = self._recorder.close()
 
     def _values(self) -> dict[str, Any]:

@@ -21,8 +21,11 @@ MAX_DEPTH = 64
 """Messages that a reader may leave waiting."""
 MAX_BORROWED = 16
 """Messages that a reader may hold on to while it goes on receiving."""
-_SLOTS = 48
-"""Messages of a stream that exist at once; memory is only touched when they are used."""
+_SLOTS = MAX_READERS * (MAX_DEPTH + MAX_BORROWED) + 2
+"""Messages of a stream that may exist at once; memory is only touched when they are used.
+
+Never fewer than all readers can hold: iceoryx2 0.10 aborts the process when they run out.
+"""
 _INITIAL_BYTES = 4096
 
 
