@@ -248,7 +248,7 @@ class _Worker:
         line = f"{self.node.stream}: {failure_line(error)}"
         if line != self.last_error:
             self.last_error = line
-            self._actor.alert("analysis_failed", line)
+            self._actor.tell("analysis_failed", line, self._now, {})
 
     def _fire(self, result: Any, origin: Message[Any]) -> None:  # noqa: ANN401
         for trigger in self.node.triggers:
@@ -284,6 +284,7 @@ class _Worker:
         return self._vehicle
 
     def alert(self, alert: Alert) -> None:
-        self._actor.alert(alert.kind, alert.text, **alert.values)
+        # In lockstep only the messages know the time, not the actor's clock.
+        self._actor.tell(alert.kind, alert.text, alert.header.stamp, alert.values)
 
 

@@ -10,10 +10,13 @@ from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor
 from aerodaas.actors.session import Session
 from aerodaas.clock import host_time_ns
+from aerodaas.data import Header
 from aerodaas.errors import RecordingError
 from aerodaas.geometry import GeodeticOrigin
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.status import Message
+from aerodaas.vitals import Vitals
 
 __all__ = ["RecorderActor"]
 
@@ -33,6 +36,8 @@ class RecorderActor(StreamActor):
         self._provenance = provenance
         self._failure = ""
         self._lost: Counter[str] = Counter()
+        self._newest = 0
+        self._readings = 0
 
     def _open(self) -> None:
         environment = self.session.environment
@@ -46,13 +51,23 @@ class RecorderActor(StreamActor):
         )
         self._acks = self.outlet(f"{ACKS}/recorder") if self.session.lockstep else None
 
+    def vitals(self, readings: dict[str, Vitals]) -> None:
+        """Record what the run's processes take, by `actor@machine`."""
+        stamp = self._newest if self.session.lockstep else self.clock.now()
+        self._readings += 1
+        for source, reading in readings.items():
+            stream = f"vitals/{source.partition('@')[0]}"
+            header = Header(self._readings, stamp, source)
+            message = Message(stream, self._readings, stamp, header, reading.taken, (), reading)
+            self._write(message)
+
     def _run(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first
         while True:
             messages = self.inbox.receive(0.2)
             for message in messages:
-                if not self._failure:
-                    self._write(message)
+                self._newest = max(self._newest, message.stamp)
+                self._write(message)
             self._note_drops()
             if self._acks is not None and messages:
                 done = tuple((one.header.source, one.header.stamp) for one in messages)
@@ -60,7 +75,9 @@ class RecorderActor(StreamActor):
             if self.stopping and not messages:
                 return
 
-    def _write(self, message: Any) -> None:  # noqa: ANN401 - any message
+    def _write(self, message: Message[Any]) -> None:
+        if self._failure:
+            return
         try:
             self._recorder.write(message)
         except RecordingError as error:

@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `schema`, `doctor`."""
+"""The command line: `aerodaas run`, `schema`, `doctor`, and what looks at recordings."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from aerodaas.commands.report import compare, report
 from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.options import RunOptions, current_options
 from aerodaas.overrides import parse_setting
@@ -112,6 +113,10 @@ def doctor(
     from aerodaas.doctor import examine  # noqa: PLC0415 - only here
 
     raise typer.Exit(0 if examine(address) else 1)
+
+
+app.command()(report)
+app.command()(compare)
 
 
 def _speed(text: str | None) -> tuple[float | None, bool | None]:

@@ -14,8 +14,14 @@ from aerodaas.recording.reader import Record, Recording
 __all__ = ["detections", "frames"]
 
 
-def frames(recording: Recording, topics: Collection[str] | None = None) -> Iterator[Frame]:
+def frames(
+    recording: Recording,
+    topics: Collection[str] | None = None,
+    stamps: Collection[int] | None = None,
+) -> Iterator[Frame]:
     """Every picture in the order of recording, decoded; a broken one is left out.
+
+    With `stamps`, only pictures captured at these mission times, and no other is decoded.
 
     A recording of others has no frame numbers: the message's sequence and frame id serve.
     """
@@ -24,6 +30,8 @@ def frames(recording: Recording, topics: Collection[str] | None = None) -> Itera
     for record in recording.records(schemas=schemas, topics=topics):
         if record.schema == "aerodaas.Frame":
             heads[record.topic] = record
+            continue
+        if stamps is not None and record.captured not in stamps:
             continue
         data = np.frombuffer(record.value.data, np.uint8)
         image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None

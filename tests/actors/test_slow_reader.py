@@ -31,8 +31,9 @@ def test_a_slow_recorder_starves_nobody() -> None:
     for inbox in slow:
         first = inbox.receive(0.0)[0]
         assert first.seq == 2 * MAX_DEPTH
-    for end in (*slow, quick, outlet):
-        end.close()
+    for inbox in (*slow, quick):
+        inbox.close()
+    outlet.close()
 
 
 def test_what_a_slow_reader_lost_is_counted() -> None:
