@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from aerodaas.commands.export import export
 from aerodaas.commands.report import compare, report
 from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.options import RunOptions, current_options
@@ -117,6 +118,7 @@ def doctor(
 
 app.command()(report)
 app.command()(compare)
+app.command()(export)
 
 
 def _speed(text: str | None) -> tuple[float | None, bool | None]:

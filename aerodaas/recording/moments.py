@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -11,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.clock import NANOSECONDS, seconds
-from aerodaas.data import Detection
 from aerodaas.recording.flight import Flight, Sighting
 from aerodaas.recording.overlay import draw_detections
-from aerodaas.recording.pictures import detections, frames
+from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording
 
 __all__ = ["Moment", "MomentPicture", "key_moments", "picture_moments"]
@@ -67,18 +65,13 @@ def picture_moments(recording: Recording, moments: list[Moment]) -> list[MomentP
     """Fetch the frames of `moments` and draw what was found in them; those without are left out."""
     wanted = {(moment.source, moment.stamp): moment for moment in moments}
     stamps = {moment.stamp for moment in moments}
-    # By box, for a tracker repeats what its detector found, and adds to it.
-    found: dict[tuple[str, int], dict[tuple[str, object], Detection]] = defaultdict(dict)
-    for _, result in detections(recording):
-        key = (result.header.source, result.header.stamp)
-        if key in wanted:
-            found[key].update({(item.label, item.box): item for item in result})
+    found = detections_by_frame(recording)
     pictures = []
     for frame in frames(recording, stamps=stamps):
         key = (frame.header.source, frame.header.stamp)
         if key in wanted:
             image = frame.image.copy()
-            draw_detections(image, found[key].values())
+            draw_detections(image, found.get(key, ()))
             pictures.append(MomentPicture(wanted[key], image))
     return pictures
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Iterator
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from aerodaas.data import Detection, Detections, Frame, Header, Odometry
 from aerodaas.recording.reader import Record, Recording
 
-__all__ = ["detections", "frames"]
+__all__ = ["detections", "detections_by_frame", "frames"]
 
 
 def frames(
@@ -57,6 +58,18 @@ def detections(recording: Recording) -> Iterator[tuple[str, Detections]]:
         header = Header(value["id"], value["stamp"], value["source"])
         items = tuple(_detection(item) for item in value["items"])
         yield record.topic, Detections(header, items, value["width"], value["height"])
+
+
+def detections_by_frame(recording: Recording) -> dict[tuple[str, int], list[Detection]]:
+    """What was found in each frame, by the frame's camera and stamp.
+
+    A tracker repeats what its detector found, and adds to it: the later word counts.
+    """
+    found: dict[tuple[str, int], dict[tuple[str, object], Detection]] = defaultdict(dict)
+    for _, result in detections(recording):
+        at = found[result.header.source, result.header.stamp]
+        at.update({(item.label, item.box): item for item in result})
+    return {key: list(items.values()) for key, items in found.items()}
 
 
 def _odometry(value: dict[str, Any] | None) -> Odometry | None:
