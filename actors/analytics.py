@@ -276,7 +276,7 @@ class _Worker:
         line = f"{self.node.stream}: {failure_line(error)}"
         if line != self.last_error:
             self.last_error = line
-            self._actor.alert("analysis_failed", line)
+            self._actor.tell("analysis_failed", line, self._now, {})
 
     def _fire(self, result: Any, origin: Message[Any]) -> None:  # noqa: ANN401
         for trigger in self.node.triggers:
@@ -319,4 +319,5 @@ class _Worker:
         return next(known, None)
 
     def alert(self, alert: Alert) -> None:
-        self._actor.alert(alert.kind, alert.text, **alert.values)
+        # In lockstep only the messages know the time, not the actor's clock.
+        self._actor.tell(alert.kind, alert.text, alert.header.stamp, alert.values)

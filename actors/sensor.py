@@ -89,7 +89,9 @@ class SensorActor(StreamActor):
             self._frames.measure(None, header, taken)
 
     def _frame(self, header: Header, picture: Picture) -> Frame:
-        odometry = self._vehicle.odometry if self._vehicle else None
+        odometry = picture.odometry
+        if odometry is None and self._vehicle is not None:
+            odometry = self._vehicle.odometry
         return Frame(header, picture.image, self._camera.model, odometry)
 
     def _close(self) -> None:
