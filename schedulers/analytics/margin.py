@@ -45,7 +45,7 @@ from aerodaas.schedulers.analytics.base import (
     Task,
     WakeAt,
 )
-from aerodaas.schedulers.analytics.estimates import ExecutionBeliefs, chance
+from aerodaas.schedulers.analytics.estimates import ExecutionBeliefs
 from aerodaas.schedulers.analytics.forecast import LATENESS, Forecast
 from aerodaas.schedulers.analytics.outlook import CloudOutlook
 from aerodaas.schedulers.analytics.planner import Job, Lane, plan
@@ -121,7 +121,7 @@ class Margin(AnalyticsScheduler):
             self.cloud.sent(task, now)
             return [SendToCloud(task, "probe of the cloud")]
         model.waiting[task] = False
-        heappush(self._due, (self._due_at(model, task, now, value), task.id, task))
+        heappush(self._due, (self._due_at(model, task, value), task.id, task))
         return self._wake_up(now)
 
     def timer(self, now: int) -> Iterable[Decision]:
@@ -137,14 +137,14 @@ class Margin(AnalyticsScheduler):
                 continue
             kept = model.waiting[task]
             value = 0.0 if kept else self._cloud_value(model, task, now)
-            due = self._due_at(model, task, now, value)
+            due = self._due_at(model, task, value)
             if due <= now and value > 0:
                 self._refresh(now)
                 if task not in self._planned:
                     decisions.append(self._send(model, task, now))
                     continue
                 model.waiting[task] = True
-                due = self._due_at(model, task, now, 0.0)
+                due = self._due_at(model, task, 0.0)
             if due <= now:
                 decisions.append(self._drop(model, task))
             else:
@@ -207,15 +207,15 @@ class Margin(AnalyticsScheduler):
         return all(cost <= other.profile.cloud_cost for other in self._models.values())
 
     def _cloud_value(self, model: _Model, task: Task, now: int) -> float:
-        return self.cloud.value(model.profile, task.deadline - now, now, model.quality.worth())
+        return self.cloud.value(model.profile, task.deadline - now, model.quality.worth())
 
-    def _due_at(self, model: _Model, task: Task, now: int, value: float) -> int:
+    def _due_at(self, model: _Model, task: Task, value: float) -> int:
         """When the task needs a decision: to leave for the cloud, or to be given up."""
         if value > 0:
             worth = max(model.profile.edge_gain - value, 0.0)
             rate = model.on_edge / model.waited
-            return int(task.deadline - self.cloud.patience(model.profile, now, worth, rate))
-        belief = self.edge.belief(model.profile, now)
+            return int(task.deadline - self.cloud.patience(model.profile, worth, rate))
+        belief = self.edge.belief(model.profile)
         return int(task.deadline - belief.mean + belief.sigma)
 
     def _wake_up(self, now: int, at: int | None = None) -> list[Decision]:
@@ -231,7 +231,7 @@ class Margin(AnalyticsScheduler):
         del model.waiting[task]
         model.waited += now - task.arrival
         self.cloud.sent(task, now)
-        return SendToCloud(task, "worth more there", self.cloud.latest_start(task, now))
+        return SendToCloud(task, "worth more there", self.cloud.latest_start(task))
 
     def _drop(self, model: _Model, task: Task) -> Drop:
         del model.waiting[task]
@@ -265,7 +265,7 @@ class Margin(AnalyticsScheduler):
         profile = model.profile
         bonus = model.quality.worth()
         benefit = profile.benefit + bonus
-        belief = self.edge.belief(profile, now)
+        belief = self.edge.belief(profile)
         soonest = begin + belief.mean - belief.sigma
         jobs: list[Job] = []
         for task, kept in model.waiting.items():
@@ -275,7 +275,7 @@ class Margin(AnalyticsScheduler):
                 jobs.append(Job(task, begin, task.deadline, benefit, cost))
                 if len(jobs) == _LOOK:
                     return Lane(belief, jobs)
-        cost = profile.edge_cost + self.cloud.value(profile, profile.deadline, now, bonus)
+        cost = profile.edge_cost + self.cloud.value(profile, profile.deadline, bonus)
         for at, source in model.forecast.due(now, int(begin + HORIZON)):
             what = (profile.model, source)
             jobs.append(Job(what, at, at + profile.deadline, benefit, cost))
@@ -289,8 +289,8 @@ class Margin(AnalyticsScheduler):
         loads: list[tuple[float, float]] = []
         for model in self._models.values():
             profile = model.profile
-            time = self.edge.belief(profile, now).mean
-            gain = profile.edge_gain - self.cloud.value(profile, profile.deadline, now)
+            time = self.edge.belief(profile).mean
+            gain = profile.edge_gain - self.cloud.value(profile, profile.deadline)
             load = model.rate * exp((model.seen - now) / _MEMORY) / age * time
             loads.append((gain / time, load))
         loads.sort(reverse=True)

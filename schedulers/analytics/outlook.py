@@ -42,32 +42,32 @@ class CloudOutlook:
         """When the newest task that came back had been sent."""
         self._last_sent = 0
 
-    def value(self, profile: Profile, room: float, now: int, bonus: float = 0.0) -> float:
+    def value(self, profile: Profile, room: float, bonus: float = 0.0) -> float:
         """Expected utility of sending a task now that has `room` left; never below zero."""
         if self.silent_since is not None or not self.resources.cloud_slots:
             return 0.0
         benefit = profile.benefit + bonus
         if benefit <= profile.cloud_cost:
             return 0.0
-        belief = self.beliefs.belief(profile, now)
+        belief = self.beliefs.belief(profile)
         room -= OVERHEAD + self._wait(belief.mean)
         return max(0.0, benefit * chance(belief, room) - profile.cloud_cost)
 
-    def patience(self, profile: Profile, now: int, worth: float, rate: float) -> float:
+    def patience(self, profile: Profile, worth: float, rate: float) -> float:
         """Room below which waiting no longer pays, nanoseconds.
 
         Waiting a little longer may win `worth`, which happens at `rate` per nanosecond, and
         makes the cloud miss with the density of its time at the room left. Both meet where
         benefit * density(z) / sigma = rate * worth, solved for z, kept between 1 and 3.
         """
-        belief = self.beliefs.belief(profile, now)
+        belief = self.beliefs.belief(profile)
         ratio = rate * worth * belief.sigma * sqrt(2 * pi) / profile.benefit
         z = min(max(sqrt(-2 * log(ratio)), 1.0), 3.0) if 0 < ratio < 1 else 1.0 + 2 * (ratio <= 0)
         return belief.mean + z * belief.sigma + 2 * OVERHEAD + self._wait(belief.mean)
 
-    def latest_start(self, task: Task, now: int) -> int:
+    def latest_start(self, task: Task) -> int:
         """When it is no longer worth its cost to start `task` in the cloud."""
-        belief = self.beliefs.belief(task.profile, now)
+        belief = self.beliefs.belief(task.profile)
         return int(task.deadline - belief.mean + belief.sigma)
 
     def sent(self, task: Task, now: int) -> None:
@@ -92,7 +92,7 @@ class CloudOutlook:
             return
         overdue = 0
         for task, sent in self._sent.items():
-            belief = self.beliefs.belief(task.profile, now)
+            belief = self.beliefs.belief(task.profile)
             late = belief.mean + _OVERDUE * belief.sigma + _GRACE + self._wait(belief.mean)
             if now - sent <= late:
                 return

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from heapq import nlargest
+from math import inf
 from operator import itemgetter
 from typing import Any
 
@@ -34,56 +35,44 @@ class Lane:
     jobs: list[Job]
 
 
+_Chain = tuple[Any, float, Lane, Job] | None
+"""The chain before, a start, a lane and a job."""
+_State = tuple[float, float, tuple[int, ...], _Chain]
+"""Merit, time when the executor is free, per lane the jobs taken or passed over, the plan."""
+
+_IDLE_SHARE = 0.5
+"""Share of the price that idle time costs where no job is known: some will arrive."""
+
+
 def plan(
     lanes: Sequence[Lane], start: float, until: float, price: float, *, width: int, gap: float
 ) -> list[tuple[float, Lane, Job]]:
     """Choose jobs and their starts from `start` to about `until`, by beam search.
 
-    A state is the executor's free time and each lane's next job; its merit the expected gains so
-    far less `price` per nanosecond passed, so that plans of different ends compare (the average-
-    reward criterion, Howard, 1960). `width` states survive each step, and no idle time above
-    `gap` is considered. Takes at most width x lanes x steps evaluations of a gain.
+    A state's merit is the expected gains so far less `price` per nanosecond passed, so that
+    plans of different ends compare (the average-reward criterion, Howard, 1960). `width` states
+    survive each step, and no idle time above `gap` is considered. Takes at most
+    width x lanes x steps evaluations of a gain.
     """
-    beam: list[tuple[float, float, tuple[int, ...], Any]] = [(0.0, start, (0,) * len(lanes), None)]
-    best_merit, best = -1e300, None
+    beam: list[_State] = [(0.0, start, (0,) * len(lanes), None)]
+    best_merit = -inf
+    best: _Chain = None
     while beam:
-        grown: dict[tuple[int, ...], tuple[float, float, tuple[int, ...], Any]] = {}
-        for merit, free, taken, chain in beam:
+        grown: dict[tuple[int, ...], _State] = {}
+        for state in beam:
             ended = True
-            for number, lane in enumerate(lanes):
-                jobs = lane.jobs
-                index = taken[number]
-                mean = lane.time.mean
-                sigma = lane.time.sigma
-                count = len(jobs)
-                while index < count and jobs[index].deadline < free + mean - sigma:
-                    index += 1
-                if index == count:
-                    continue
-                job = jobs[index]
-                begin = job.release if job.release > free else free
-                if begin - free > gap:
-                    continue
-                room = job.deadline - begin
-                sure = room - mean > 4 * sigma
-                gain = (job.benefit if sure else job.benefit * chance(lane.time, room)) - job.loss
-                if gain <= 0:
-                    continue
+            for successor in _successors(state, lanes, price, gap):
                 ended = False
-                end = begin + mean
-                value = merit + gain - price * (end - free)
-                if end >= until:
-                    if value > best_merit:
-                        best_merit, best = value, (chain, begin, lane, job)
-                    continue
-                key = (*taken[:number], index + 1, *taken[number + 1 :])
-                known = grown.get(key)
-                if known is None or known[0] < value:
-                    grown[key] = (value, end, key, (chain, begin, lane, job))
-            if ended and chain is not None:
-                value = merit - price * (until - free) * 0.5
-                if value > best_merit:
-                    best_merit, best = value, chain
+                merit, free, taken, chain = successor
+                if free >= until:
+                    if merit > best_merit:
+                        best_merit, best = merit, chain
+                elif taken not in grown or grown[taken][0] < merit:
+                    grown[taken] = successor
+            if ended:
+                merit = state[0] - price * _IDLE_SHARE * (until - state[1])
+                if merit > best_merit:
+                    best_merit, best = merit, state[3]
         beam = nlargest(width, grown.values(), key=itemgetter(0))
     steps: list[tuple[float, Lane, Job]] = []
     while best is not None:
@@ -91,3 +80,25 @@ def plan(
         steps.append((begin, lane, job))
     steps.reverse()
     return steps
+
+
+def _successors(state: _State, lanes: Sequence[Lane], price: float, gap: float) -> Iterator[_State]:
+    merit, free, taken, chain = state
+    for number, lane in enumerate(lanes):
+        jobs, belief = lane.jobs, lane.time
+        mean = belief.mean
+        index = taken[number]
+        hopeless = free + mean - belief.sigma
+        while index < len(jobs) and jobs[index].deadline < hopeless:
+            index += 1
+        if index == len(jobs):
+            continue
+        job = jobs[index]
+        begin = max(free, job.release)
+        if begin - free > gap:
+            continue
+        gain = job.benefit * chance(belief, job.deadline - begin) - job.loss
+        if gain > 0:
+            end = begin + mean
+            after = (*taken[:number], index + 1, *taken[number + 1 :])
+            yield (merit + gain - price * (end - free), end, after, (chain, begin, lane, job))
