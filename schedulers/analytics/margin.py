@@ -61,6 +61,8 @@ GAP = 250 * MILLISECOND
 WIDTH = 6
 SURPRISE = 3 * MILLISECOND
 """Departure from the expected end of an execution that calls for a new plan."""
+RETRY = 20 * MILLISECOND
+"""Between two looks for a free slot in a crowded cloud."""
 _MEMORY = 5 * NANOSECONDS
 _LOOK = 8
 """Tasks of one model that the planner considers."""
@@ -121,7 +123,7 @@ class Margin(AnalyticsScheduler):
             self.cloud.sent(task, now)
             return [SendToCloud(task, "probe of the cloud")]
         model.waiting[task] = False
-        heappush(self._due, (self._due_at(model, task, value), task.id, task))
+        heappush(self._due, (self._due_at(model, task, now, value), task.id, task))
         return self._wake_up(now)
 
     def timer(self, now: int) -> Iterable[Decision]:
@@ -137,14 +139,14 @@ class Margin(AnalyticsScheduler):
                 continue
             kept = model.waiting[task]
             value = 0.0 if kept else self._cloud_value(model, task, now)
-            due = self._due_at(model, task, value)
+            due = self._due_at(model, task, now, value)
             if due <= now and value > 0:
                 self._refresh(now)
                 if task not in self._planned:
                     decisions.append(self._send(model, task, now))
                     continue
                 model.waiting[task] = True
-                due = self._due_at(model, task, 0.0)
+                due = self._due_at(model, task, now, 0.0)
             if due <= now:
                 decisions.append(self._drop(model, task))
             else:
@@ -209,14 +211,19 @@ class Margin(AnalyticsScheduler):
     def _cloud_value(self, model: _Model, task: Task, now: int) -> float:
         return self.cloud.value(model.profile, task.deadline - now, model.quality.worth())
 
-    def _due_at(self, model: _Model, task: Task, value: float) -> int:
+    def _due_at(self, model: _Model, task: Task, now: int, value: float) -> int:
         """When the task needs a decision: to leave for the cloud, or to be given up."""
+        if value > 0 and self.cloud.slot_price > 0:
+            return now
         if value > 0:
             worth = max(model.profile.edge_gain - value, 0.0)
             rate = model.on_edge / model.waited
             return int(task.deadline - self.cloud.patience(model.profile, worth, rate))
         belief = self.edge.belief(model.profile)
-        return int(task.deadline - belief.mean + belief.sigma)
+        last = int(task.deadline - belief.mean + belief.sigma)
+        if self.cloud.crowded and not model.waiting.get(task) and model.profile.cloud_gain > 0:
+            return min(last, now + RETRY)
+        return last
 
     def _wake_up(self, now: int, at: int | None = None) -> list[Decision]:
         if self._due and (at is None or self._due[0][0] < at):
@@ -284,18 +291,25 @@ class Margin(AnalyticsScheduler):
         return Lane(belief, jobs)
 
     def _price(self, now: int) -> float:
-        """Value of edge time, per nanosecond: what the best mix of models would earn on it."""
+        """Value of edge time, per nanosecond: what the best mix of models would earn on it.
+
+        Prices the cloud's slots on the way, from the same loads.
+        """
         age = 1 - exp(-(now + NANOSECONDS / 10) / _MEMORY)
-        loads: list[tuple[float, float]] = []
+        on_edge: list[tuple[float, float]] = []
+        in_cloud: list[tuple[float, float]] = []
         for model in self._models.values():
             profile = model.profile
+            rate = model.rate * exp((model.seen - now) / _MEMORY) / age
             time = self.edge.belief(profile).mean
             gain = profile.edge_gain - self.cloud.value(profile, profile.deadline)
-            load = model.rate * exp((model.seen - now) / _MEMORY) / age * time
-            loads.append((gain / time, load))
-        loads.sort(reverse=True)
+            on_edge.append((gain / time, rate * time))
+            time = self.cloud.beliefs.belief(profile).mean
+            if profile.cloud_gain > 0:
+                in_cloud.append((profile.cloud_gain / time, rate * time))
+        self.cloud.set_slot_price(in_cloud)
         left, earned = 1.0, 0.0
-        for density, load in loads:
+        for density, load in sorted(on_edge, reverse=True):
             earned += min(left, load) * density
             left = max(0.0, left - load)
         return earned

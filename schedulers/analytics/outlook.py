@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from math import log, pi, sqrt
 
 from aerodaas.clock import NANOSECONDS
@@ -22,6 +23,8 @@ OVERHEAD = 5 * MILLISECOND
 """Between the decision to send and the sending."""
 PROBE_EVERY = NANOSECONDS
 """Least time between two tasks sent only to see whether the cloud is back."""
+_CROWDED = 0.9
+"""Share of the slots in use at which the rest is kept for the best."""
 _OVERDUE = 4.0
 """Standard deviations beyond the mean after which an answer is overdue, ..."""
 _GRACE = 100 * MILLISECOND
@@ -37,10 +40,31 @@ class CloudOutlook:
         self.resources = Resources()
         self.beliefs = ExecutionBeliefs(shared=True)
         self.silent_since: int | None = None
+        self.slot_price = 0.0
+        """Value of a slot's time per nanosecond, charged while few slots are free."""
         self._sent: dict[Task, int] = {}
         self._answered = -1
         """When the newest task that came back had been sent."""
         self._last_sent = 0
+
+    @property
+    def crowded(self) -> bool:
+        """Whether slots are so scarce that they go to the tasks that are worth most in them."""
+        return self.slot_price > 0 and len(self._sent) >= _CROWDED * self.resources.cloud_slots
+
+    def set_slot_price(self, demands: Iterable[tuple[float, float]]) -> None:
+        """Price slots by (gain per nanosecond, slots wanted) of each model.
+
+        The price is the dual of the fractional knapsack: what the first model gains that no
+        longer finds room for all its tasks; nothing if all do.
+        """
+        left = _CROWDED * self.resources.cloud_slots
+        self.slot_price = 0.0
+        for density, slots in sorted(demands, reverse=True):
+            left -= slots
+            if left < 0:
+                self.slot_price = max(density, 0.0)
+                return
 
     def value(self, profile: Profile, room: float, bonus: float = 0.0) -> float:
         """Expected utility of sending a task now that has `room` left; never below zero."""
@@ -51,7 +75,10 @@ class CloudOutlook:
             return 0.0
         belief = self.beliefs.belief(profile)
         room -= OVERHEAD + self._wait(belief.mean)
-        return max(0.0, benefit * chance(belief, room) - profile.cloud_cost)
+        gain = benefit * chance(belief, room) - profile.cloud_cost
+        if self.crowded:
+            gain -= self.slot_price * belief.mean
+        return max(0.0, gain)
 
     def patience(self, profile: Profile, worth: float, rate: float) -> float:
         """Room below which waiting no longer pays, nanoseconds.
