@@ -6,6 +6,10 @@ In the plug-in's own tests::
 
     def test_mine_keeps_the_protocol():
         check_scheduler("mine.py:Mine")
+
+    def test_mine_runs_the_shorter_task_first():
+        ends = play(Mine(), [(0, long), (0, short)])
+        assert ends[1] == End("edge", "done", 0, 90)
 """
 
 from __future__ import annotations
@@ -13,10 +17,18 @@ from __future__ import annotations
 import copy
 import pickle
 from collections import Counter
+from collections.abc import Sequence
+from typing import NamedTuple
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import AeroDaaSError, SchedulerError
-from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    AnalyticsScheduler,
+    Profile,
+    Resources,
+    Task,
+)
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.schedulers.lab.sample import SamplePath
@@ -24,7 +36,7 @@ from aerodaas.schedulers.lab.simulator import Trace, simulate
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
 
-__all__ = ["check_scheduler"]
+__all__ = ["End", "check_scheduler", "play"]
 
 _CASES: tuple[tuple[str, str, str, Resources], ...] = (
     ("2D-P", "nominal", "steady", Resources()),
@@ -76,6 +88,47 @@ def check_scheduler(
                 f"{case}: two runs over the same events differ; seed every random number, keep "
                 "nothing between runs in class or module variables, and do not iterate over sets"
             )
+
+
+class End(NamedTuple):
+    """How one task ended."""
+
+    place: str
+    outcome: str
+    started: float
+    """Milliseconds."""
+    finished: float
+
+
+def play(
+    scheduler: AnalyticsScheduler,
+    tasks: Sequence[tuple[float, Profile]],
+    *,
+    edge_ms: Sequence[float] = (),
+    cloud_ms: Sequence[float] = (),
+    network: Network | None = None,
+    resources: Resources | None = None,
+) -> list[End]:
+    """Play a hand-written case: tasks as (arrival in ms, profile), in order of arrival.
+
+    Executions take their profile's time, or `edge_ms` and `cloud_ms` where given. Returns the
+    ends in the order of the tasks.
+    """
+    path = SamplePath(
+        [
+            Task(number, profile, at, at + profile.deadline)
+            for number, (ms, profile) in enumerate(tasks)
+            for at in [round(ms * MILLISECOND)]
+        ],
+        [round(ms * MILLISECOND) for ms in edge_ms] or [p.edge_time for _, p in tasks],
+        [round(ms * MILLISECOND) for ms in cloud_ms] or [p.cloud_time for _, p in tasks],
+        network or Network(),
+    )
+    trace = simulate(path, scheduler, resources)
+    return [
+        End(r.place.value, r.outcome.value, r.started / MILLISECOND, r.finished / MILLISECOND)
+        for r in sorted(trace.results, key=lambda r: r.task.id)
+    ]
 
 
 def _simulate(
