@@ -1,0 +1,1 @@
+"""Kits that the author of a plug-in runs against their own class."""
