@@ -67,6 +67,7 @@ class DeadReckoning:
         self.time: float = -math.inf
         """When the estimate holds."""
         self._packet_at = -math.inf
+        self._standing = True
 
     @property
     def odometry(self) -> Odometry:
@@ -92,7 +93,7 @@ class DeadReckoning:
         """Carry the estimate on to `now`, with the sticks as `asked` since the last call."""
         elapsed = now - self.time
         self.time = now
-        if not 0.0 < elapsed < math.inf:
+        if self._standing or not 0.0 < elapsed < math.inf:
             return
         before = self._velocity
         target = body_to_enu(asked.velocity, self._yaw)
@@ -108,27 +109,30 @@ class DeadReckoning:
         if now - self._packet_at > _LATE * _PACKET_PERIOD:
             self._blind_for += elapsed
 
-    def correct(self, state: TelloState, now: float) -> None:
-        """Cut the estimate of `now` to what a packet that has just come allows."""
+    def correct(self, state: TelloState, now: float, *, standing: bool) -> None:
+        """Cut the estimate of `now` to what a packet that has just come allows.
+
+        While it is `standing` on the ground nothing moves, and heights count from there.
+        """
         self._packet_at = now
+        self._standing = standing
         if self._offset is None:
             self._offset = self._start_yaw + state.yaw
         yaw = self._offset - state.yaw
         self._yaw = yaw + _cut(wrap_angle(self._yaw - yaw), _YAW_STEP)
         self._roll, self._pitch = state.roll, state.pitch
+        if standing:
+            self._velocity = np.zeros(3)
+            self._yaw_rate = 0.0
+            self._position[2] = self._ground
+            self._take_off_height = self._ground - state.height
+            return
         ahead, right, down = state.velocity
         measured = body_to_enu(np.array([ahead, -right, -down]), self._offset)
         off = self._velocity - measured
         self._velocity = measured + np.clip(off, -_VELOCITY_STEP, _VELOCITY_STEP)
         height = self._take_off_height + state.height
         self._position[2] = height + _cut(float(self._position[2]) - height, _HEIGHT_STEP)
-
-    def stand(self, state: TelloState) -> None:
-        """The Tello stands on the ground: nothing moves, and its height counts from here."""
-        self._velocity = np.zeros(3)
-        self._yaw_rate = 0.0
-        self._position[2] = self._ground
-        self._take_off_height = self._ground - state.height
 
 
 def _cut(value: float, most: float) -> float:

@@ -288,9 +288,7 @@ class TelloVehicle:
             self._gauge.take(state.battery)
             self._phase.observe(state, now)
             self._predict(now)
-            self._reckoning.correct(state, now)
-            if not self._phase.airborne:
-                self._reckoning.stand(state)
+            self._reckoning.correct(state, now, standing=not self._phase.airborne)
 
     def _turned(self, now: float) -> None:
         """20 times a second, in the link's thread."""
