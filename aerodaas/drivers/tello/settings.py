@@ -93,7 +93,11 @@ def video_port(robot: RobotConfig) -> int | None:
 
     Raises ConfigError if it carries two: a Tello has one stream.
     """
-    cameras = [sensor for sensor in robot.sensors if sensor.driver == "tello"]
+    cameras = [
+        sensor
+        for sensor in robot.sensors
+        if sensor.type == "camera" and sensor.driver in {None, "tello"}
+    ]
     if len(cameras) > 1:
         names = ", ".join(sensor.id for sensor in cameras)
         raise ConfigError(f"robot {robot.id}: a Tello has one video stream, not one for {names}")
