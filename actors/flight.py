@@ -11,6 +11,7 @@ from typing import Any
 
 import ray
 from ray.exceptions import RayActorError, RayError, RayTaskError
+from typing_extensions import Self
 
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors.analytics import AnalyticsActor
@@ -84,7 +85,10 @@ class Flight:
             self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
             mine = {spec.robot.id for spec in specs}
             others = tuple(
-                spec.robot.id for group in plan.drones for spec in group if spec.robot.id not in mine
+                spec.robot.id
+                for group in plan.drones
+                for spec in group
+                if spec.robot.id not in mine
             )
             self._create(name, DroneActor, edge, (session, name, specs, plan.conduct, others))
         for camera in plan.cameras:
@@ -108,7 +112,7 @@ class Flight:
         self._next_reports = 0.0
         self._stopped = False
 
-    def __enter__(self) -> Flight:
+    def __enter__(self) -> Self:
         """Stop the actors when left."""
         return self
 
@@ -130,7 +134,10 @@ class Flight:
             member.handle.start.remote(self._origin)
 
     def poll(self, newest: int = 200) -> FlightState:
-        """Ask how everyone fares, with the `newest` latencies of each robot; also tells the drones that the application is alive."""
+        """Ask how everyone fares, with the `newest` latencies of each robot.
+
+        Also tells the drones that the application is alive.
+        """
         if time.monotonic() >= self._next_reports:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
@@ -164,9 +171,11 @@ class Flight:
         others = [m for m in self._members.values() if m.name != "recorder"]
         for group in (others, recorder):
             references = {m.handle.stop.remote(): m for m in group}
-            done, _ = ray.wait(
-                list(references), num_returns=len(references), timeout=_STOP_TIMEOUT
-            ) if references else ([], [])
+            done, _ = (
+                ray.wait(list(references), num_returns=len(references), timeout=_STOP_TIMEOUT)
+                if references
+                else ([], [])
+            )
             for reference in done:
                 with contextlib.suppress(RayError, AeroDaaSError):
                     references[reference].report = ray.get(reference)

@@ -20,18 +20,19 @@ from aerodaas.vitals import Vitals
 
 __all__ = ["RecorderActor"]
 
-_DEPTH = 64
-"""Messages of each stream that may wait; more are dropped and counted, the flight never waits."""
-
 
 class RecorderActor(StreamActor):
     """Reads all `streams` and writes them; on a full disk it stops writing, not the flight."""
 
     def __init__(
-        self, session: Session, path: Path, streams: tuple[str, ...], provenance: Provenance
+        self, session: Session, path: Path, streams: dict[str, int], provenance: Provenance
     ) -> None:
-        """Write the recording at `path`."""
-        super().__init__(session, "recorder", dict.fromkeys(streams, _DEPTH))
+        """Write the recording at `path`.
+
+        So many messages of each of the `streams` may wait; more are dropped and counted, for the
+        flight never waits.
+        """
+        super().__init__(session, "recorder", streams)
         self._path = path
         self._provenance = provenance
         self._failure = ""

@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `schema`, `doctor`, and what looks at recordings."""
+"""The command line: `aerodaas run`, `remote`, `schema`, `doctor`, and what looks at recordings."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from aerodaas import cli_remote
 from aerodaas.commands.export import export
 from aerodaas.commands.report import compare, report
 from aerodaas.errors import AeroDaaSError, ConfigError
@@ -31,6 +32,7 @@ flies a simulated drone, PX4, ArduPilot or a Tello.
     aerodaas run apps/farm_survey.py --speed max
 """,
 )
+app.add_typer(cli_remote.app, name="remote")
 
 
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})

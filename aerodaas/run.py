@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aerodaas.clock import seconds
 from aerodaas.config import EnvironmentConfig
 from aerodaas.errors import AeroDaaSError, ConfigError, MissionError
 from aerodaas.navigation.commands import Answer, Command, End
@@ -42,6 +43,7 @@ class Run:
         self._flight: Flight | None = None
         self._finished = False
         self._began = time.monotonic()
+        self._launched = self._began
 
     @property
     def lockstep(self) -> bool:
@@ -74,6 +76,7 @@ class Run:
                 flight.stop()
                 raise
         self._flight = flight
+        self._launched = time.monotonic()
         session = plan.session
         self.graph.reader = lambda stream: LiveReader(session, stream, lambda: self._finished)
         for callback in self.graph.on_launch:
@@ -149,16 +152,20 @@ class Run:
             return
 
     def _finish(self) -> None:
-        from aerodaas.console import show_results  # noqa: PLC0415
+        from aerodaas.console import show_results, show_speed  # noqa: PLC0415
 
         assert self._flight is not None  # noqa: S101 - launched
         self._finished = True
         atexit.unregister(self._abandon)
+        flown = time.monotonic() - self._launched
         self._flight.stop()
         for hook in self.on_end:
             hook()
-        wall = time.monotonic() - self._began
-        show_results(self.options, self._flight.recording, wall)
+        stamps = [robot.status.stamp for robot in self.state.robots.values()] if self.state else []
+        show_speed(
+            self.options, seconds(max(stamps, default=0)), flown, self._launched - self._began
+        )
+        show_results(self.options, self._flight.recording)
 
     def _abandon(self) -> None:
         """The application ended without waiting: land, then stop."""

@@ -96,8 +96,7 @@ class FlightSummary:
             lines[0] += " (cut off: the file was not closed or is damaged)"
         for name, robot in self.robots.items():
             lines.append(
-                f"  {name}: {robot.outcome}; {robot.waypoints_visited} of "
-                f"{robot.waypoints_planned} waypoints, {robot.distance_m:.1f} m in "
+                f"  {name}: {robot.outcome}; {_waypoints_text(robot)}{robot.distance_m:.1f} m in "
                 f"{robot.duration_s:.1f} s{_battery_text(robot)}"
             )
         for camera, count in self.frames.items():
@@ -111,6 +110,12 @@ class FlightSummary:
         lines += [f"  alert at {it['time_s']:.1f} s: {it['text']}" for it in self.alerts]
         lines += [f"  dropped {count} of {stream}" for stream, count in self.drops.items()]
         return "\n".join(lines)
+
+
+def _waypoints_text(robot: RobotFigures) -> str:
+    if not robot.waypoints_planned:
+        return ""
+    return f"{robot.waypoints_visited} of {robot.waypoints_planned} waypoints, "
 
 
 def _battery_text(robot: RobotFigures) -> str:

@@ -1,12 +1,11 @@
 """prototype."""
+
 from __future__ import annotations
 
 import os
 from collections import OrderedDict, deque
-from collections.abc import Iterable, Mapping
-from math import log, sqrt, pi
+from math import log, sqrt
 
-from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import *
 from aerodaas.schedulers.analytics.base import MILLISECOND
 from aerodaas.schedulers.analytics.estimates import ExecutionBeliefs, chance
@@ -19,8 +18,8 @@ MARGIN = 5 * MILLISECOND
 class Lane:
     def __init__(self, profile):
         self.profile = profile
-        self.tasks = deque()       # entries [task, kept]
-        self.streams = OrderedDict()   # source -> [last, period, regular]
+        self.tasks = deque()  # entries [task, kept]
+        self.streams = OrderedDict()  # source -> [last, period, regular]
         self.waited = 1e9
         self.stolen = 1.0
 
@@ -31,7 +30,7 @@ class Margin(AnalyticsScheduler):
         self.edge = ExecutionBeliefs(shared=False)
         self.cloud = ExecutionBeliefs(shared=True)
         self.free_at = 0
-        self.rate = 0.0          # value of edge time per ns
+        self.rate = 0.0  # value of edge time per ns
         self.gained = 0.0
         self.spent = 0.0
         self.last_edge = 0
@@ -45,11 +44,11 @@ class Margin(AnalyticsScheduler):
 
     # -- worth
     def alt(self, profile, slack, now):
-        """value of sending now"""
+        """Value of sending now"""
         if not self.resources.cloud_slots or profile.cloud_gain <= 0:
             return 0.0
         b = self.cloud.belief(profile, now)
-        return max(0.0, profile.benefit * chance(b, slack - MARGIN/5) - profile.cloud_cost)
+        return max(0.0, profile.benefit * chance(b, slack - MARGIN / 5) - profile.cloud_cost)
 
     def leave_slack(self, lane, now):
         b = self.cloud.belief(lane.profile, now)
@@ -85,12 +84,13 @@ class Margin(AnalyticsScheduler):
     def timer(self, now):
         out = []
         for lane in self.lanes.values():
-            if not lane.tasks: continue
+            if not lane.tasks:
+                continue
             slack = self.leave_slack(lane, now)
             for task in list(lane.tasks):
                 if task in self.kept or self.alt(task.profile, task.deadline - now, now) <= 0:
                     b = self.edge.belief(task.profile, now)
-                    if task.deadline - now <= b.mean - b.sigma+1:
+                    if task.deadline - now <= b.mean - b.sigma + 1:
                         lane.tasks.remove(task)
                         self.kept.pop(task, None)
                         out.append(Drop(task, "no time left on the edge"))
@@ -108,7 +108,13 @@ class Margin(AnalyticsScheduler):
             return [WakeAt(self.last_start(task, now))]
         lane.tasks.remove(task)
         lane.waited += now - task.arrival
-        return [SendToCloud(task, "worth more in the cloud", task.deadline - int(self.cloud.belief(task.profile, now).mean))]
+        return [
+            SendToCloud(
+                task,
+                "worth more in the cloud",
+                task.deadline - int(self.cloud.belief(task.profile, now).mean),
+            )
+        ]
 
     def plan(self, t0, now, focus=None):
         """-> best score, list of (task or None)"""
@@ -121,17 +127,30 @@ class Margin(AnalyticsScheduler):
             for task in lane.tasks:
                 a = 0.0 if task in self.kept else self.alt(profile, task.deadline - now, now)
                 if task.deadline - t0 > b.mean - b.sigma:
-                    items.append((t0, task.deadline, profile.edge_gain+profile.edge_cost, profile.edge_cost + a, task))
+                    items.append(
+                        (
+                            t0,
+                            task.deadline,
+                            profile.edge_gain + profile.edge_cost,
+                            profile.edge_cost + a,
+                            task,
+                        )
+                    )
             if FORE:
                 k = 0
                 for last, period, regular in lane.streams.values():
-                    if regular < 2: continue
+                    if regular < 2:
+                        continue
                     at = last + period
-                    if at < now - 20*MILLISECOND: continue
+                    if at < now - 20 * MILLISECOND:
+                        continue
                     at = max(at, now + 1)
-                    if at > t0 + 800 * MILLISECOND or k >= 3: break
+                    if at > t0 + 800 * MILLISECOND or k >= 3:
+                        break
                     a = self.alt(profile, profile.deadline, now)
-                    items.append((at, at + profile.deadline, profile.benefit, profile.edge_cost + a, None))
+                    items.append(
+                        (at, at + profile.deadline, profile.benefit, profile.edge_cost + a, None)
+                    )
                     k += 1
             if items:
                 lanes.append((b, items))
@@ -153,10 +172,11 @@ class Margin(AnalyticsScheduler):
                 if i == len(items):
                     continue
                 start, deadline, benefit, cost, task = items[i]
-                s = start if start > t else t
+                s = max(t, start)
                 end = s + mean
                 g = benefit * chance(b, deadline - s) - cost
-                if g <= 0: continue
+                if g <= 0:
+                    continue
                 sc = score + g - rho * (end - t)
                 chosen.append((s, task))
                 if sc > best[0]:
@@ -167,6 +187,7 @@ class Margin(AnalyticsScheduler):
                     go(end, sc, depth - 1)
                     idx[li] = i0
                 chosen.pop()
+
         go(t0, 0.0, DEPTH)
         return best[0], [t for _, t in best[1]], best[1]
 
