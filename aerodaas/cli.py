@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `remote`, `schema`, `doctor`, and what reads recordings."""
+"""The command line: `aerodaas run`, `remote`, `lab`, `schema`, `doctor`, and for recordings."""
 
 from __future__ import annotations
 
