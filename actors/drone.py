@@ -111,6 +111,7 @@ class DroneActor(StreamActor):
         }
 
     def _run(self) -> None:
+        self._heard = time.monotonic()
         for pilot in self._pilots.values():
             pilot.handle(Start(), self.clock.now())
         if self.session.lockstep:
