@@ -16,9 +16,11 @@ from typing import Any
 
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
-from aerodaas.actors.session import Session, is_due, next_due
+from aerodaas.actors._link import StreamLink
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
 from aerodaas.actors.streams import Inbox, Outlet
 from aerodaas.analytics.base import Analytics, ComputeKind
+from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.status import Message
@@ -26,7 +28,6 @@ from aerodaas.vehicle import VehicleState
 
 __all__ = ["AnalyticsActor", "NodeSpec", "TriggerSpec", "Wake"]
 
-_LOCKSTEP_DEPTH = 64
 _WAKE_DEPTH = 8
 
 
@@ -50,7 +51,10 @@ class NodeSpec:
 
     stream: str
     work: Analytics[Any]
-    inputs: tuple[str, ...]
+    inputs: dict[str, int]
+    """Streams that it reads, and how many messages of each may wait."""
+    robot: str
+    """The robot that its data belongs to, or that it commands."""
     state: str
     """Stream of the states of the vehicle that its data belongs to."""
     external: bool
@@ -139,11 +143,16 @@ class _Worker:
 
     def __init__(self, actor: AnalyticsActor, node: NodeSpec) -> None:
         self.node = node
-        depth = _LOCKSTEP_DEPTH if actor.session.lockstep else 1
+        states = MESSAGE_DEPTH if actor.session.lockstep else 1
         self.depths = {
-            **dict.fromkeys((node.state, *node.inputs), depth),
+            node.state: states,
+            **node.inputs,
             **dict.fromkeys(node.wakes, _WAKE_DEPTH),
         }
+        self._link: StreamLink | None = None
+        if isinstance(node.work, CommandingAnalytics):
+            self._link = StreamLink(actor, node.stream, node.robot)
+            self.depths.update(self._link.depths)
         self.busy = 0.0
         self.errors = 0
         self.last_error = ""
@@ -151,7 +160,7 @@ class _Worker:
         self._actor = actor
         self._woken: int | None = None if node.dormant else -1
         """Stamp of the measurement that woke it; None while it sleeps."""
-        self._states: deque[tuple[int, VehicleState]] = deque(maxlen=depth)
+        self._states: deque[tuple[int, VehicleState]] = deque(maxlen=states)
         self._now = 0
 
     def open(self) -> None:
@@ -164,15 +173,26 @@ class _Worker:
         self._acks: Outlet | None = None
         if session.lockstep and self.node.acknowledges:
             self._acks = self._actor.outlet(f"{ACKS}/{self.node.stream}")
+        if self._link is not None:
+            self._link.open()
         self.node.work.open()
         self.opened = True
 
     def run(self) -> None:
+        self._begin()
         turn = self._run_external if self.node.external else self._run_inputs
         if self.node.external and not self._actor.session.lockstep:
             turn = self._run_paced
         while not self._actor.stopping:
             turn()
+
+    def _begin(self) -> None:
+        if self._link is None or not isinstance(self.node.work, CommandingAnalytics):
+            return
+        try:
+            self.node.work.begin(self._link)
+        except Exception as error:  # noqa: BLE001 - a user's analysis may raise anything
+            self._complain(error)
 
     def _run_inputs(self) -> None:
         for message in self._receive(0.5):
@@ -213,7 +233,9 @@ class _Worker:
             # A state is published before what was measured in it, but may arrive in between.
             messages += self.inbox.receive(0.0)
         for message in messages:
-            if message.stream == self.node.state:
+            if self._link is not None:
+                self._link.note(message)
+            if message.stream == self.node.state and message.item is not None:
                 self._states.append((message.stamp, message.item))
             elif isinstance(message.item, Wake):
                 stamp = message.header.stamp
@@ -254,7 +276,7 @@ class _Worker:
         line = f"{self.node.stream}: {failure_line(error)}"
         if line != self.last_error:
             self.last_error = line
-            self._actor.alert("analysis_failed", line)
+            self._actor.tell("analysis_failed", line, self._now, {})
 
     def _fire(self, result: Any, origin: Message[Any]) -> None:  # noqa: ANN401
         for trigger in self.node.triggers:
@@ -297,4 +319,5 @@ class _Worker:
         return next(known, None)
 
     def alert(self, alert: Alert) -> None:
-        self._actor.alert(alert.kind, alert.text, **alert.values)
+        # In lockstep only the messages know the time, not the actor's clock.
+        self._actor.tell(alert.kind, alert.text, alert.header.stamp, alert.values)

@@ -144,6 +144,7 @@ class Flight:
         if time.monotonic() >= self._next_reports:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
+            self._record_vitals()
         robots: dict[str, RobotReport] = {}
         for name in set(self._drones.values()):
             robots.update(self._ask(self._members[name].handle.robots.remote(newest)))
@@ -267,6 +268,19 @@ class Flight:
                 member.report = ray.get(reference)
             except RayActorError:
                 self._lost(member)
+
+    def _record_vitals(self) -> None:
+        """Have the recorder note what each process takes; it alone could not ask other nodes."""
+        recorder = self._members.get("recorder")
+        if recorder is None or recorder.report.phase != "running":
+            return
+        recorder.handle.vitals.remote(
+            {
+                f"{member.name}@{member.info.node_id[:8]}": member.report.vitals
+                for member in self._members.values()
+                if member.info is not None and member.report.vitals is not None
+            }
+        )
 
     def _lost(self, member: _Member) -> None:
         """A dead actor is reported; Ray restarts analytics, the next report finds it new."""

@@ -6,13 +6,15 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors._barrier import ACKS, paths
+from aerodaas.actors._names import state_stream
 from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
 from aerodaas.actors.cluster import Place
 from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
 from aerodaas.actors.drone import Conduct
-from aerodaas.actors.pilot import Pilot, RobotSpec, state_stream
-from aerodaas.actors.session import Session
+from aerodaas.actors.pilot import Pilot, RobotSpec
+from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig, TaskConfig
 from aerodaas.data import Frame
 from aerodaas.errors import GraphError
@@ -80,8 +82,8 @@ class FlightPlan:
     analyses: tuple[Analyses, ...]
     dispatch: Dispatching | None
     conduct: Conduct
-    recorded: tuple[str, ...]
-    """Streams for the recorder; empty for no recording."""
+    recorded: dict[str, int]
+    """Streams for the recorder and how many messages of each may wait; empty for none."""
 
 
 class _Planner:
@@ -122,8 +124,11 @@ class _Planner:
     def analyses(self) -> list[Node]:
         return [node for node in self.graph.nodes.values() if node.kind != "sensor"]
 
+    def robot_of(self, node: Node) -> str:
+        return node.robot or self.robots[0].id
+
     def state_of(self, node: Node) -> str:
-        return state_stream(node.robot or self.robots[0].id)
+        return state_stream(self.robot_of(node))
 
     def reaches_a_drone(self, stream: str, asked: frozenset[str] = frozenset()) -> bool:
         """Tell whether what `stream` carries can change what a drone does.
@@ -208,7 +213,11 @@ class _Planner:
         return NodeSpec(
             stream=done_stream(node.id) if managed else node.id,
             work=node.work,
-            inputs=(task_stream(node.id),) if managed else tuple(node.inputs),
+            inputs={
+                name: self.depth(name) if self.session.lockstep else 1
+                for name in ([task_stream(node.id)] if managed else node.inputs)
+            },
+            robot=self.robot_of(node),
             state=self.state_of(node),
             external=node.kind == "external",
             dormant=node.dormant,
@@ -218,6 +227,12 @@ class _Planner:
             answers_always=managed,
             wakes=tuple(_trigger_stream(node.id, waker) for waker in wakers),
         )
+
+    def depth(self, stream: str) -> int:
+        """How many messages may wait for a reader of `stream` that wants them all."""
+        node = self.graph.nodes.get(stream.removesuffix(task_stream("")))
+        frames = stream.endswith(task_stream("")) or (node is not None and node.item is Frame)
+        return FRAME_DEPTH if frames else MESSAGE_DEPTH
 
     def place_of(self, node: Node) -> Place:
         if node.compute is None:
@@ -254,6 +269,11 @@ class _Planner:
             sensors=tuple(node.work for node in mine if node.work.type != "camera"),
             navigation=tuple(dict.fromkeys(n for edge in edges for n in _streams_of(edge))),
             commands=tuple(commanding),
+            requesters=tuple(
+                node.id
+                for node in self.analyses()
+                if isinstance(node.work, CommandingAnalytics) and self.robot_of(node) == robot.id
+            ),
             initial=tuple(initial_commands(edges)),
             scheduler=self.scheduler,
         )
@@ -317,6 +337,7 @@ def make_plan(
     names += [f"sensor/{camera.stream}" for camera in cameras]
     names += [actor.name for actor in analyses]
     names += ["dispatcher"] if dispatch is not None else []
+    streams += [f"alerts/{name}" for name in names]
     return FlightPlan(
         session=session,
         drones=drones,
@@ -324,7 +345,7 @@ def make_plan(
         analyses=analyses,
         dispatch=dispatch,
         conduct=planner.conduct(specs, cameras) if session.lockstep else Conduct(),
-        recorded=(*streams, *(f"alerts/{name}" for name in names)) if planner.recorded else (),
+        recorded={stream: planner.depth(stream) for stream in streams} if planner.recorded else {},
     )
 
 

@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `schema`, `doctor`."""
+"""The command line: `aerodaas run`, `remote`, `schema`, `doctor`, and what reads recordings."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from typing import Annotated
 
 import typer
 
+from aerodaas import cli_remote
+from aerodaas.commands.export import export
+from aerodaas.commands.report import compare, report
 from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.options import RunOptions, current_options
 from aerodaas.overrides import parse_setting
@@ -29,6 +32,7 @@ flies a simulated drone, PX4, ArduPilot or a Tello.
     aerodaas run apps/farm_survey.py --speed max
 """,
 )
+app.add_typer(cli_remote.app, name="remote")
 
 
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
@@ -112,6 +116,11 @@ def doctor(
     from aerodaas.doctor import examine  # noqa: PLC0415 - only here
 
     raise typer.Exit(0 if examine(address) else 1)
+
+
+app.command()(report)
+app.command()(compare)
+app.command()(export)
 
 
 def _speed(text: str | None) -> tuple[float | None, bool | None]:
