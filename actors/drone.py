@@ -117,6 +117,7 @@ class DroneActor(StreamActor):
         }
 
     def _run(self) -> None:
+        self._heard = time.monotonic()
         for pilot in self._pilots.values():
             pilot.start(self.clock)
         if self.session.lockstep:
