@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import os
 import threading
-import time
 import traceback
 from abc import abstractmethod
 from collections import deque
@@ -24,6 +23,7 @@ from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteR
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError
+from aerodaas.vitals import Vitals, read_vitals
 
 __all__ = [
     "ActorInfo",
@@ -75,7 +75,8 @@ class ActorReport:
     error: AeroDaaSError | None = None
     streams: dict[str, StreamCount] = field(default_factory=dict)
     sent: dict[str, SentCount] = field(default_factory=dict)
-    cpu_seconds: float = 0.0
+    vitals: Vitals | None = None
+    """What its process takes; None before it has said anything."""
     alerts: tuple[Alert, ...] = ()
     """The newest alerts, oldest first."""
     values: dict[str, Any] = field(default_factory=dict)
@@ -149,7 +150,7 @@ class StreamActor:
             error=self._error,
             streams=self.counts(),
             sent=self.sent(),
-            cpu_seconds=time.process_time(),
+            vitals=read_vitals(),
             alerts=tuple(self._newest_alerts),
             values=self._values(),
         )
@@ -181,8 +182,12 @@ class StreamActor:
 
     def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401
         """Tell the people who watch; any thread may."""
+        self.tell(kind, text, self.clock.now(), values)
+
+    def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
+        """Tell the people who watch about mission time `stamp`; any thread may."""
         with self._alerting:
-            header = Header(self.alerts.sent, self.clock.now(), self.name)
+            header = Header(self.alerts.sent, stamp, self.name)
             alert = Alert(header, kind, text, values)
             self._newest_alerts.append(alert)
             self.alerts.measure(alert, header, host_time_ns())

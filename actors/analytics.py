@@ -17,7 +17,7 @@ from typing import Any
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
 from aerodaas.actors._link import StreamLink
-from aerodaas.actors.session import Session, is_due, next_due
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
 from aerodaas.actors.streams import Inbox, Outlet
 from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.analytics.commanding import CommandingAnalytics
@@ -28,7 +28,6 @@ from aerodaas.vehicle import VehicleState
 
 __all__ = ["AnalyticsActor", "NodeSpec", "TriggerSpec", "Wake"]
 
-_LOCKSTEP_DEPTH = 64
 _WAKE_DEPTH = 8
 
 
@@ -52,7 +51,8 @@ class NodeSpec:
 
     stream: str
     work: Analytics[Any]
-    inputs: tuple[str, ...]
+    inputs: dict[str, int]
+    """Streams that it reads, and how many messages of each may wait."""
     robot: str
     """The robot that its data belongs to, or that it commands."""
     state: str
@@ -143,9 +143,10 @@ class _Worker:
 
     def __init__(self, actor: AnalyticsActor, node: NodeSpec) -> None:
         self.node = node
-        depth = _LOCKSTEP_DEPTH if actor.session.lockstep else 1
+        states = MESSAGE_DEPTH if actor.session.lockstep else 1
         self.depths = {
-            **dict.fromkeys((node.state, *node.inputs), depth),
+            node.state: states,
+            **node.inputs,
             **dict.fromkeys(node.wakes, _WAKE_DEPTH),
         }
         self._link: StreamLink | None = None
@@ -159,7 +160,7 @@ class _Worker:
         self._actor = actor
         self._woken: int | None = None if node.dormant else -1
         """Stamp of the measurement that woke it; None while it sleeps."""
-        self._states: deque[tuple[int, VehicleState]] = deque(maxlen=depth)
+        self._states: deque[tuple[int, VehicleState]] = deque(maxlen=states)
         self._now = 0
 
     def open(self) -> None:
@@ -275,7 +276,7 @@ class _Worker:
         line = f"{self.node.stream}: {failure_line(error)}"
         if line != self.last_error:
             self.last_error = line
-            self._actor.alert("analysis_failed", line)
+            self._actor.tell("analysis_failed", line, self._now, {})
 
     def _fire(self, result: Any, origin: Message[Any]) -> None:  # noqa: ANN401
         for trigger in self.node.triggers:
@@ -318,4 +319,5 @@ class _Worker:
         return next(known, None)
 
     def alert(self, alert: Alert) -> None:
-        self._actor.alert(alert.kind, alert.text, **alert.values)
+        # In lockstep only the messages know the time, not the actor's clock.
+        self._actor.tell(alert.kind, alert.text, alert.header.stamp, alert.values)

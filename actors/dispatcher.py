@@ -18,7 +18,7 @@ from typing import Any
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor, failure_line
 from aerodaas.actors._cloud import Cloud
-from aerodaas.actors.session import Session
+from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Header
 from aerodaas.schedulers.analytics.base import (
@@ -42,7 +42,6 @@ __all__ = ["DECISIONS", "DispatcherActor", "Managed", "done_stream", "task_strea
 
 DECISIONS = "decisions"
 """Stream of the scheduler's decisions and their outcomes."""
-_DEPTH = 64
 _EDGE_PATIENCE = 10
 """An execution on the edge that takes so many times its expected time has failed."""
 _SLOW_DECISION = 0.05
@@ -82,8 +81,8 @@ class DispatcherActor(StreamActor):
         resources: Resources,
     ) -> None:
         """Belong to `session`; without a cloud, `resources` has no slots there."""
-        inputs = dict.fromkeys((s for one in managed for s in one.inputs), _DEPTH)
-        answers = dict.fromkeys((done_stream(one.stream) for one in managed), _DEPTH)
+        inputs = dict.fromkeys((s for one in managed for s in one.inputs), FRAME_DEPTH)
+        answers = dict.fromkeys((done_stream(one.stream) for one in managed), MESSAGE_DEPTH)
         super().__init__(session, "dispatcher", {**inputs, **answers})
         self._managed = managed
         self._by_done = {done_stream(one.stream): one for one in managed}

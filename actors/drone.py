@@ -16,7 +16,7 @@ from aerodaas.actors._barrier import ACKS, Barrier
 from aerodaas.actors._base import StreamActor
 from aerodaas.actors._names import reply_stream, request_stream, state_stream
 from aerodaas.actors.pilot import Pilot, RobotSpec
-from aerodaas.actors.session import CONTROL_PERIOD_NS, Session, next_due
+from aerodaas.actors.session import CONTROL_PERIOD_NS, MESSAGE_DEPTH, Session, next_due
 from aerodaas.clock import NANOSECONDS, LockstepClock
 from aerodaas.errors import AeroDaaSError
 from aerodaas.navigation.commands import Answer, Command, ReturnHome, Start
@@ -27,7 +27,6 @@ from aerodaas.vehicle import VehicleState
 __all__ = ["Conduct", "DroneActor", "RobotReport"]
 
 _CONTROL_RATE = NANOSECONDS / CONTROL_PERIOD_NS
-_COMMAND_DEPTH = 64
 _APPLICATION_TIMEOUT = 5.0
 """Seconds without a word from the application's process after which the drone comes home."""
 
@@ -77,7 +76,7 @@ class DroneActor(StreamActor):
         """
         streams = [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
         streams += [request_stream(node) for robot in robots for node in robot.requesters]
-        depths = dict.fromkeys([*streams, *conduct.readers], _COMMAND_DEPTH)
+        depths = dict.fromkeys([*streams, *conduct.readers], MESSAGE_DEPTH)
         depths.update(dict.fromkeys((state_stream(other) for other in neighbours), 1))
         super().__init__(session, name, depths)
         self._conduct = conduct
@@ -118,6 +117,7 @@ class DroneActor(StreamActor):
         }
 
     def _run(self) -> None:
+        self._heard = time.monotonic()
         for pilot in self._pilots.values():
             pilot.handle(Start(), self.clock.now())
         if self.session.lockstep:

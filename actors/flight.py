@@ -64,6 +64,8 @@ class _Member:
     info: ActorInfo | None = None
     report: ActorReport = field(default_factory=lambda: ActorReport("new"))
     pending: ray.ObjectRef[ActorReport] | None = None
+    reviving: ray.ObjectRef[ActorInfo] | None = None
+    """Under way after a restart."""
 
 
 class Flight:
@@ -132,6 +134,7 @@ class Flight:
         # Those that only listen go first, so that nobody speaks to an empty room.
         for member in reversed(self._members.values()):
             member.handle.start.remote(self._origin)
+            member.report = ActorReport("running")
 
     def poll(self, newest: int = 200) -> FlightState:
         """Ask how everyone fares, with the `newest` latencies of each robot.
@@ -141,6 +144,7 @@ class Flight:
         if time.monotonic() >= self._next_reports:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
+            self._record_vitals()
         robots: dict[str, RobotReport] = {}
         for name in set(self._drones.values()):
             robots.update(self._ask(self._members[name].handle.robots.remote(newest)))
@@ -160,6 +164,11 @@ class Flight:
     def infos(self) -> dict[str, ActorInfo]:
         """Where each actor lives, once launched."""
         return {m.name: m.info for m in self._members.values() if m.info is not None}
+
+    @property
+    def streams(self) -> set[str]:
+        """Streams that the flight's actors publish, once launched."""
+        return {stream for info in self.infos().values() for stream in info.publishes}
 
     def stop(self) -> dict[str, ActorReport]:
         """Stop all actors, the recorder last, and return their last reports."""
@@ -248,6 +257,7 @@ class Flight:
 
     def _gather_reports(self) -> None:
         for member in self._members.values():
+            self._revive(member)
             if member.pending is None:
                 member.pending = member.handle.report.remote()
             ready, _ = ray.wait([member.pending], timeout=0.05)
@@ -258,8 +268,19 @@ class Flight:
                 member.report = ray.get(reference)
             except RayActorError:
                 self._lost(member)
-            else:
-                self._revive(member)
+
+    def _record_vitals(self) -> None:
+        """Have the recorder note what each process takes; it alone could not ask other nodes."""
+        recorder = self._members.get("recorder")
+        if recorder is None or recorder.report.phase != "running":
+            return
+        recorder.handle.vitals.remote(
+            {
+                f"{member.name}@{member.info.node_id[:8]}": member.report.vitals
+                for member in self._members.values()
+                if member.info is not None and member.report.vitals is not None
+            }
+        )
 
     def _lost(self, member: _Member) -> None:
         """A dead actor is reported; Ray restarts analytics, the next report finds it new."""
@@ -269,9 +290,17 @@ class Flight:
         member.report = ActorReport("failed", error)
 
     def _revive(self, member: _Member) -> None:
-        if member.report.phase == "new" and member.info is not None:
-            self._prepare([member], lambda _: None)
-            member.handle.start.remote(self._origin)
+        """Set an actor up that Ray has restarted, without waiting: the drones need our word."""
+        if member.reviving is None:
+            if member.report.phase == "new" and member.info is not None:
+                member.reviving = member.handle.prepare.remote(*member.setup)
+        elif ray.wait([member.reviving], timeout=0)[0]:
+            reference, member.reviving = member.reviving, None
+            with contextlib.suppress(AeroDaaSError):  # it died again, or its next report says why
+                member.info = self._ask(reference)
+                self._connect([member])
+                member.handle.start.remote(self._origin)
+                member.report = ActorReport("running")
 
     @staticmethod
     def _ask(reference: Any) -> Any:  # noqa: ANN401 - whatever the actor returns

@@ -12,13 +12,14 @@ from aerodaas.actors.cluster import Place
 from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
 from aerodaas.actors.drone import Conduct
 from aerodaas.actors.pilot import Pilot, RobotSpec
-from aerodaas.actors.session import Session
+from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig, TaskConfig
 from aerodaas.data import Frame
 from aerodaas.errors import GraphError
 from aerodaas.graph import Graph, NavigationEdge, Node
+from aerodaas.handles import SENSOR_ITEMS
 from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
@@ -81,8 +82,8 @@ class FlightPlan:
     analyses: tuple[Analyses, ...]
     dispatch: Dispatching | None
     conduct: Conduct
-    recorded: tuple[str, ...]
-    """Streams for the recorder; empty for no recording."""
+    recorded: dict[str, int]
+    """Streams for the recorder and how many messages of each may wait; empty for none."""
 
 
 class _Planner:
@@ -104,16 +105,18 @@ class _Planner:
         named = {edge.robot for edge in graph.navigation}
         self.robots = [r for r in session.environment.robots if r.id in named]
         self.recorded = session.environment.recording.enabled
-        self._add_cameras()
+        self._add_sensors()
         self.steering = {name for edge in graph.navigation for name in _streams_of(edge)}
 
-    def _add_cameras(self) -> None:
-        """Cameras that the application does not read run all the same: they are recorded."""
-        for robot in self.robots if self.recorded else ():
+    def _add_sensors(self) -> None:
+        """Sensors that the application does not read run all the same, cameras if recorded."""
+        for robot in self.robots:
             for sensor in robot.sensors:
                 stream = f"{robot.id}/{sensor.id}"
-                if sensor.type == "camera" and stream not in self.graph.nodes:
-                    self.graph.add(Node(stream, "sensor", Frame, sensor, robot.id))
+                wanted = self.recorded or sensor.type != "camera"
+                if wanted and stream not in self.graph.nodes:
+                    item = SENSOR_ITEMS[sensor.type]
+                    self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
 
     def sensors(self) -> list[Node]:
         return [node for node in self.graph.nodes.values() if node.kind == "sensor"]
@@ -210,7 +213,10 @@ class _Planner:
         return NodeSpec(
             stream=done_stream(node.id) if managed else node.id,
             work=node.work,
-            inputs=(task_stream(node.id),) if managed else tuple(node.inputs),
+            inputs={
+                name: self.depth(name) if self.session.lockstep else 1
+                for name in ([task_stream(node.id)] if managed else node.inputs)
+            },
             robot=self.robot_of(node),
             state=self.state_of(node),
             external=node.kind == "external",
@@ -221,6 +227,12 @@ class _Planner:
             answers_always=managed,
             wakes=tuple(_trigger_stream(node.id, waker) for waker in wakers),
         )
+
+    def depth(self, stream: str) -> int:
+        """How many messages may wait for a reader of `stream` that wants them all."""
+        node = self.graph.nodes.get(stream.removesuffix(task_stream("")))
+        frames = stream.endswith(task_stream("")) or (node is not None and node.item is Frame)
+        return FRAME_DEPTH if frames else MESSAGE_DEPTH
 
     def place_of(self, node: Node) -> Place:
         if node.compute is None:
@@ -325,6 +337,7 @@ def make_plan(
     names += [f"sensor/{camera.stream}" for camera in cameras]
     names += [actor.name for actor in analyses]
     names += ["dispatcher"] if dispatch is not None else []
+    streams += [f"alerts/{name}" for name in names]
     return FlightPlan(
         session=session,
         drones=drones,
@@ -332,7 +345,7 @@ def make_plan(
         analyses=analyses,
         dispatch=dispatch,
         conduct=planner.conduct(specs, cameras) if session.lockstep else Conduct(),
-        recorded=(*streams, *(f"alerts/{name}" for name in names)) if planner.recorded else (),
+        recorded={stream: planner.depth(stream) for stream in streams} if planner.recorded else {},
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from aerodaas.actors._base import StreamActor, StreamCount
-from aerodaas.actors.session import Session, is_due, next_due
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
 from aerodaas.cameras.base import Camera, Picture
 from aerodaas.clock import host_time_ns
 from aerodaas.config import SensorConfig
@@ -16,8 +16,6 @@ from aerodaas.status import Message
 from aerodaas.vehicle import VehicleState
 
 __all__ = ["SensorActor"]
-
-_LOCKSTEP_DEPTH = 64
 
 
 class SensorActor(StreamActor):
@@ -30,7 +28,7 @@ class SensorActor(StreamActor):
 
         With `ends`, the mission is over once the camera has no more pictures.
         """
-        depth = _LOCKSTEP_DEPTH if session.lockstep else 1
+        depth = MESSAGE_DEPTH if session.lockstep else 1
         super().__init__(session, f"sensor/{stream}", {state: depth})
         self._stream = stream
         self._sensor = sensor
@@ -91,7 +89,9 @@ class SensorActor(StreamActor):
             self._frames.measure(None, header, taken)
 
     def _frame(self, header: Header, picture: Picture) -> Frame:
-        odometry = self._vehicle.odometry if self._vehicle else None
+        odometry = picture.odometry
+        if odometry is None and self._vehicle is not None:
+            odometry = self._vehicle.odometry
         return Frame(header, picture.image, self._camera.model, odometry)
 
     def _close(self) -> None:

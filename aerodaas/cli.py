@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `remote`, `schema`, `doctor`."""
+"""The command line: `aerodaas run`, `remote`, `schema`, `doctor`, and what reads recordings."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from typing import Annotated
 import typer
 
 from aerodaas import cli_remote
+from aerodaas.commands.export import export
+from aerodaas.commands.report import compare, report
 from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.options import RunOptions, current_options
 from aerodaas.overrides import parse_setting
@@ -114,6 +116,11 @@ def doctor(
     from aerodaas.doctor import examine  # noqa: PLC0415 - only here
 
     raise typer.Exit(0 if examine(address) else 1)
+
+
+app.command()(report)
+app.command()(compare)
+app.command()(export)
 
 
 def _speed(text: str | None) -> tuple[float | None, bool | None]:

@@ -156,6 +156,8 @@ class CameraConfig(_Strict):
     """Degrees to the left."""
     path: str | None = None
     """Folder of pictures, video file or URL, for the drivers that read one."""
+    topic: str | None = None
+    """Channel of the recording at `path`; None where it holds one camera's pictures only."""
     loop: bool = False
 
 

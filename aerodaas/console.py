@@ -162,8 +162,7 @@ def show_results(options: RunOptions, recording: Path | None) -> None:
         return
     if options.view:
         console.print(str(report.summary), markup=False)
-    places = {"recording": recording, "summary": report.summary_text}
-    places |= {f"{path.stem} plot": path for path in report.plots}
+    places = {"recording": recording, "report": report.page, "summary": report.summary_text}
     width = max(map(len, places))
     for name, path in places.items():
         console.print(f"{name:>{width}}  {_shown(path)}", markup=False)

@@ -23,6 +23,8 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
         "recorded": "aerodaas.cameras.recorded:recorded_camera",
         "folder": "aerodaas.cameras.folder:FolderCamera",
         "video": "aerodaas.cameras.video:VideoCamera",
+        "mcap": "aerodaas.cameras.mcap:McapCamera",
+        "replayed": "aerodaas.cameras.mcap:ReplayedCamera",
     },
     "waypoint_schedulers": {
         "ordered": "aerodaas.schedulers.waypoint.ordered:OrderedScheduler",

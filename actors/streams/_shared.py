@@ -18,7 +18,7 @@ from aerodaas.status import Message
 __all__ = ["SharedPublisher", "SharedSubscriber", "SharedWaiter", "shared_memory_available"]
 
 MAX_READERS = 16
-MAX_DEPTH = 64
+MAX_DEPTH = 32
 """Messages that a reader may leave waiting."""
 MAX_BORROWED = 16
 """Messages that a reader may hold on to while it goes on receiving."""
