@@ -4,8 +4,6 @@ A scripted detector stands where a model would, and the printed distances are sh
 environments' fast drones, not by the code.
 """
 
-# ruff: noqa: E501, N816 - the paper's own lines
-
 from __future__ import annotations
 
 from itertools import groupby
