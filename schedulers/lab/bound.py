@@ -69,7 +69,7 @@ def clairvoyant_bound(
     blocks = _blocks(jobs)
     horizon = blocks[0].end + int(jobs.length.max()) + 1
     prices: _Floats = np.zeros(len(jobs.first))
-    best = np.inf
+    best = float(jobs.worth.sum())
     step = float(jobs.worth.mean()) / 2
     for _ in range(iterations):
         value, taken = _longest_path(jobs, blocks, jobs.worth - prices, horizon)
