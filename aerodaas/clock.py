@@ -1,8 +1,8 @@
 """The mission clock: wall time, scaled time, or lockstep, behind one protocol.
 
 Every stamp in this project is an integer of nanoseconds on the mission clock, which reads zero
-when the mission's actors start. Latencies are taken on `host_time_ns`, the machine's own
-monotonic clock, because simulated time may stand still while a frame is processed.
+when the mission's actors start. Latencies are taken on `host_time_ns`, because simulated time
+may stand still while a frame is processed.
 """
 
 from __future__ import annotations
@@ -28,9 +28,16 @@ NANOSECONDS = 1_000_000_000
 """Nanoseconds in a second."""
 
 
+_EPOCH_OFFSET = time.time_ns() - time.monotonic_ns()
+
+
 def host_time_ns() -> int:
-    """Nanoseconds of the host's monotonic clock, comparable between processes of one host."""
-    return time.monotonic_ns()
+    """Nanoseconds since the Unix epoch that never step backwards within a process.
+
+    Comparable between processes of one host to some microseconds, and between hosts as well as
+    their clocks are kept together.
+    """
+    return time.monotonic_ns() + _EPOCH_OFFSET
 
 
 def seconds(nanoseconds: int) -> float:

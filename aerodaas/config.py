@@ -11,7 +11,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, SecretStr, ValidationError, model_validator
 from typing_extensions import Self
 
 from aerodaas.errors import ConfigError
@@ -23,11 +23,15 @@ __all__ = [
     "GeofenceConfig",
     "HomeConfig",
     "LimitsConfig",
+    "MissionConfig",
     "RecordingConfig",
+    "RemoteConfig",
     "RobotConfig",
     "SchedulersConfig",
     "SensorConfig",
     "SimulationConfig",
+    "TaskConfig",
+    "validated",
 ]
 
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", max_length=64)]
@@ -57,11 +61,16 @@ class GeofenceConfig(_Strict):
     """Corners (east, north); empty for no polygon."""
     floor: Finite = 0.3
     ceiling: Finite = 120.0
+    margin: NotNegative = 0.5
+    """Metres that the drone keeps from the polygon's edge and from no-fly zones."""
+    no_fly: list[list[tuple[Finite, Finite]]] = Field(default_factory=list)
+    """Polygons (east, north) inside the fence where the drone may not be, at any height."""
 
     @model_validator(mode="after")
     def _closed(self) -> Self:
         corners = 3
-        if self.polygon and len(self.polygon) < corners:
+        outlines = [self.polygon, *self.no_fly] if self.polygon else self.no_fly
+        if any(len(outline) < corners for outline in outlines):
             message = "a geofence polygon needs at least three corners"
             raise ValueError(message)
         if self.ceiling <= self.floor:
@@ -79,15 +88,46 @@ class LimitsConfig(_Strict):
     max_yaw_rate: Positive = 90.0
     """Degrees per second."""
     max_acceleration: Positive = 3.0
+    max_range: Positive = 1000.0
+    """Metres from the place of take-off that the drone may go."""
+    reaction_time: Positive = 0.3
+    """Seconds from a setpoint to the vehicle's answer, kept free before every boundary."""
+    separation: NotNegative = 2.0
+    """Metres kept from the other drones of the environment; 0 for none."""
     takeoff_height: Positive = 1.5
+    takeoff_timeout: Positive = 30.0
+    """A take-off that takes longer ends in a landing."""
+    preflight_timeout: Positive = 5.0
+    """Time given to the vehicle's own objections to go away before take-off is refused."""
     arrival_radius: Positive = 0.3
     command_timeout: Positive = 1.0
     """Silence of the navigation after which the drone holds."""
     silence_return: Positive = 20.0
     """Further silence after which it returns home."""
+    link_timeout: Positive = 3.0
+    """Loss of the vehicle's word or of its position after which the flight is cut short."""
+    return_timeout: Positive = 300.0
+    """A return that takes longer ends in a landing on the spot."""
+    endurance: Positive = 900.0
+    """Seconds that a full battery hovers; the energy model's scale."""
     battery_return: Annotated[float, Field(ge=0, le=1)] = 0.25
+    """Charge at which the drone returns, earlier where the way home needs more."""
     battery_land: Annotated[float, Field(ge=0, le=1)] = 0.12
+    """Charge at which it lands where it is, and that a return keeps in reserve."""
     geofence: GeofenceConfig = GeofenceConfig()
+
+
+class MissionConfig(_Strict):
+    """How a mission behaves where the application does not say."""
+
+    on_complete: Literal["return", "land", "hold"] = "return"
+    """What follows the last waypoint when no live stream feeds navigation."""
+    resume_after: NotNegative = 2.0
+    """Silence of urgent velocity commands after which the interrupted plan resumes."""
+    plan_timeout: Positive = 5.0
+    """Wait for a scheduler's first plan before flying the order given."""
+    stall_timeout: Positive = 60.0
+    """A waypoint that comes no nearer for so long is given up."""
 
 
 class SensorConfig(_Strict):
@@ -95,7 +135,8 @@ class SensorConfig(_Strict):
 
     id: Identifier
     type: Literal["camera", "odometry", "gps", "battery", "status"] = "camera"
-    driver: str = "simulated"
+    driver: str | None = None
+    """None: a camera of its robot's own kind (see `EnvironmentConfig.camera_driver`)."""
     rate: Positive = 15.0
     """Items per second."""
     settings: dict[str, Any] = Field(default_factory=dict)
@@ -108,7 +149,7 @@ class CameraConfig(_Strict):
     height: Annotated[int, Field(ge=16, le=8192)] = 360
     horizontal_fov: Annotated[float, Field(gt=1, lt=179)] = 82.6
     """Degrees; the Tello's by default."""
-    mount: tuple[Finite, Finite, Finite] = (0.1, 0.0, 0.0)
+    mount: tuple[Finite, Finite, Finite] = (0.1, 0.0, 0.08)
     """Metres forward, left and up of the body's centre."""
     pitch: Annotated[float, Field(ge=-90, le=90)] = 0.0
     """Degrees downwards."""
@@ -116,6 +157,8 @@ class CameraConfig(_Strict):
     """Degrees to the left."""
     path: str | None = None
     """Folder of pictures, video file or URL, for the drivers that read one."""
+    topic: str | None = None
+    """Channel of the recording at `path`; None where it holds one camera's pictures only."""
     loop: bool = False
 
 
@@ -128,6 +171,7 @@ class RobotConfig(_Strict):
     """Settings of the driver, such as `url` for MAVLink."""
     sensors: list[SensorConfig] = Field(default_factory=list)
     limits: LimitsConfig = LimitsConfig()
+    mission: MissionConfig = MissionConfig()
     start: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
     """Where it stands before take-off, ENU metres."""
     start_yaw: Finite = 0.0
@@ -146,10 +190,29 @@ class ComputeConfig(_Strict):
     settings: dict[str, Any] = Field(default_factory=dict)
 
 
+class TaskConfig(_Strict):
+    """What a scheduler is told of one analysis, by its name; times in milliseconds.
+
+    Benefit and costs are in one unit of the user's choice.
+    """
+
+    benefit: Positive = 1.0
+    deadline: Positive = 1000.0
+    """From the frame's arrival at the dispatcher."""
+    edge_time: Positive = 100.0
+    """Expected execution on the edge."""
+    cloud_time: Positive = 300.0
+    """Expected time from sending a frame to the cloud until its result is back."""
+    edge_cost: NotNegative = 0.0
+    cloud_cost: NotNegative = 0.0
+
+
 class SchedulersConfig(_Strict):
     """Default plug-ins: a registered name or `module:Class`."""
 
     trajectory: str = "ordered"
+    tasks: dict[str, TaskConfig] = Field(default_factory=dict)
+    """What the analytics scheduler is told of each analysis, by the analysis' name."""
     analytics: str | None = None
     """None: each analysis runs where it is deployed, on the newest item, without a dispatcher."""
 
@@ -162,6 +225,17 @@ class RecordingConfig(_Strict):
     """None: a new folder under `runs/`."""
     images: Literal["jpeg", "none"] = "jpeg"
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
+
+
+class RemoteConfig(_Strict):
+    """Where `RemoteAnalytics` listens for a remote user, and who may command."""
+
+    host: str = "127.0.0.1"
+    """Address to listen on; beyond the loopback interface a token is compulsory."""
+    port: Annotated[int, Field(ge=1, le=65535)] = 8350
+    token: Annotated[SecretStr, Field(min_length=16)] | None = None
+    """Secret that every request must carry; the environment variable AERODAAS_REMOTE_TOKEN takes
+    its place. It is shown, logged and recorded nowhere."""
 
 
 class SimulationConfig(_Strict):
@@ -192,6 +266,7 @@ class EnvironmentConfig(_Strict):
     compute: list[ComputeConfig] | Literal["auto"] = "auto"
     schedulers: SchedulersConfig = SchedulersConfig()
     recording: RecordingConfig = RecordingConfig()
+    remote: RemoteConfig = RemoteConfig()
     simulation: SimulationConfig = SimulationConfig()
 
     @model_validator(mode="after")
@@ -208,6 +283,16 @@ class EnvironmentConfig(_Strict):
                 raise ValueError(message)
         return self
 
+    def camera_driver(self, sensor: SensorConfig) -> str:
+        """The driver of a camera: its own, else its robot's, else the simulated one.
+
+        So one word in the file, a robot's driver, takes its camera along.
+        """
+        if sensor.driver is not None:
+            return sensor.driver
+        carriers = [robot.driver for robot in self.robots if sensor in robot.sensors]
+        return carriers[0] if carriers else "simulated"
+
     @classmethod
     def load(cls, path: str | Path) -> EnvironmentConfig:
         """Read an environment file; raises ConfigError that names the file and the place."""
@@ -217,12 +302,19 @@ class EnvironmentConfig(_Strict):
             message = f"cannot read the environment file {path}: {error.strerror}"
             raise ConfigError(message) from None
         try:
-            return cls.model_validate(json.loads(text))
+            content = json.loads(text)
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
             message = f"{path} is not JSON: {error}"
             raise ConfigError(message) from None
-        except ValidationError as error:
-            raise ConfigError(f"{path}: {_explain(error)}") from None
+        return validated(content, str(path))
+
+
+def validated(content: object, place: str) -> EnvironmentConfig:
+    """Check the content of an environment file; raises ConfigError that names `place`."""
+    try:
+        return EnvironmentConfig.model_validate(content)
+    except ValidationError as error:
+        raise ConfigError(f"{place}: {_explain(error)}") from None
 
 
 def _explain(error: ValidationError) -> str:

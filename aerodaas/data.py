@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any, TypeVar, overload
+from typing import Any, NamedTuple, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from aerodaas.errors import SourceError
 from aerodaas.geometry import CameraModel, Vector
 from aerodaas.interfaces import IAeroData
 from aerodaas.names import PaperNames
+from aerodaas.records import travels
 
 __all__ = [
     "AeroData",
@@ -32,6 +33,7 @@ __all__ = [
     "Image",
     "Odom",
     "Odometry",
+    "Readings",
 ]
 
 E = TypeVar("E")
@@ -82,8 +84,7 @@ class AeroListData(AeroData[list[E]], Sequence[E]):
         return iter(self._data)
 
 
-@dataclass(frozen=True, slots=True)
-class Header:
+class Header(NamedTuple):
     """Who measured something, which measurement it was, and when.
 
     A result carries the header of the measurement it was made from, so that its age is known
@@ -98,6 +99,7 @@ class Header:
     """Identifier of the sensor, `robot/sensor`."""
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class Odometry:
     """Where the vehicle believes it is: ENU position and velocity, attitude and body rates."""
@@ -123,6 +125,7 @@ class Odometry:
         return float(self.position[2])
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class GpsFix:
     """A global position: WGS84 degrees, metres above the ellipsoid, and its accuracy."""
@@ -137,6 +140,7 @@ class GpsFix:
     satellites: int = 0
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class Battery:
     """State of the flight battery."""
@@ -149,6 +153,7 @@ class Battery:
     """Amperes drawn, zero where unknown."""
 
 
+@travels
 @dataclass(frozen=True, slots=True, eq=False)
 class Frame:
     """An immutable picture with what is needed to place it in the world."""
@@ -183,6 +188,7 @@ class Frame:
         return int(self.image.shape[0])
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class Detection:
     """One object found in a frame; the box is in the frame's own pixels."""
@@ -210,6 +216,7 @@ class Detection:
         return max(0.0, right - left) * max(0.0, bottom - top)
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class Detections(Sequence[Detection]):
     """Everything found in one frame, best first, with what is known of that frame."""
@@ -246,6 +253,7 @@ class Detections(Sequence[Detection]):
         return len(self.items)
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class Alert:
     """Something that a person should know: raised by monitoring, emergencies, the watchdogs."""
@@ -257,6 +265,19 @@ class Alert:
     """One sentence for a person."""
     values: dict[str, Any] = field(default_factory=dict)
     """Figures behind it, by name, in SI units."""
+
+
+@travels
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """What monitoring read, by name, in SI units; a compound reading is `gps.latitude` and so on.
+
+    `state` is the index of the mission's state in `MissionState`.
+    """
+
+    stamp: int
+    """Mission clock, nanoseconds."""
+    values: dict[str, float]
 
 
 Image = Frame

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import enum
 from dataclasses import dataclass, field
-from typing import Generic, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from aerodaas.data import Header
+from aerodaas.records import travels
 from aerodaas.vehicle import Setpoint
 from aerodaas.waypoints import Waypoint
 
@@ -42,6 +43,7 @@ class MissionState(str, enum.Enum):
     """Over without having been completed: refused, taken over or lost; the reason says which."""
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class MissionStatus:
     """The mission at one moment."""
@@ -71,6 +73,7 @@ class MissionStatus:
         return len(self.visited) / known if known else 0.0
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class SetpointRecord:
     """One turn of the setpoint loop: what the mission asked for and what the vehicle was sent."""
@@ -84,6 +87,7 @@ class SetpointRecord:
     """Measurement that the command behind this setpoint was made from, for latency."""
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class Decision:
     """One decision of an analytics scheduler, with its reason."""
@@ -98,9 +102,8 @@ class Decision:
     """Figures behind it: slack, expected times, utility; seconds or the table's own units."""
 
 
-@dataclass(frozen=True, slots=True)
-class Hop:
-    """One actor's share in a message's way, on the host's monotonic clock in nanoseconds."""
+class Hop(NamedTuple):
+    """One actor's share in a message's way, in nanoseconds of `clock.host_time_ns`."""
 
     node: str
     received: int
@@ -119,7 +122,7 @@ class Message(Generic[E]):
     header: Header
     """The measurement that this was made from."""
     captured: int
-    """Host monotonic clock at that measurement's capture, nanoseconds."""
+    """`clock.host_time_ns` at that measurement's capture."""
     hops: tuple[Hop, ...]
     item: E | None
     """None: processed, with nothing to say."""

@@ -10,11 +10,14 @@ import enum
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, runtime_checkable
 
+from aerodaas.clock import Clock
 from aerodaas.data import Battery, GpsFix, Odometry
 from aerodaas.geometry import Vector
+from aerodaas.records import travels
 
 __all__ = [
     "Capabilities",
+    "ClockedVehicle",
     "PositionSetpoint",
     "Setpoint",
     "SteppedVehicle",
@@ -43,6 +46,7 @@ class VehicleMode(str, enum.Enum):
     """No word from the vehicle within its link time-out."""
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class PositionSetpoint:
     """Fly to a place: ENU metres, yaw in radians (None keeps the present yaw), speed in m/s."""
@@ -52,6 +56,7 @@ class PositionSetpoint:
     speed: float | None = None
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class VelocitySetpoint:
     """Fly at a velocity: ENU m/s, yaw rate in rad/s counter-clockwise."""
@@ -79,6 +84,7 @@ class Capabilities:
     """m/s that the vehicle itself can do vertically."""
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class VehicleState:
     """The newest knowledge about a vehicle."""
@@ -150,4 +156,13 @@ class SteppedVehicle(Vehicle, Protocol):
 
     def advance_to(self, stamp: int) -> None:
         """Simulate up to mission time `stamp`, in nanoseconds."""
+        ...
+
+
+@runtime_checkable
+class ClockedVehicle(Vehicle, Protocol):
+    """A vehicle whose time is its own, and whose states are stamped by the mission's clock."""
+
+    def use_clock(self, clock: Clock) -> None:
+        """Stamp states by `clock` from now on; called when the mission starts."""
         ...

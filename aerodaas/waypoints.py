@@ -14,6 +14,7 @@ from aerodaas.data import AeroListData
 from aerodaas.errors import InvalidWaypointError
 from aerodaas.geometry import GeodeticOrigin, Vector
 from aerodaas.graph import AeroStreamData
+from aerodaas.records import travels
 
 __all__ = [
     "DEFAULT_PRIORITY",
@@ -66,6 +67,7 @@ def _require_finite(owner: str, **values: float | None) -> None:
             raise InvalidWaypointError(message)
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class Waypoint:
     """A place to fly to, and what to do there.
@@ -145,6 +147,7 @@ _NUMBERS = tuple(
 )
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class VelocityCommand:
     """A velocity asked for by analytics, in the level body frame (FLU).

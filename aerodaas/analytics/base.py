@@ -16,7 +16,7 @@ only what is cheap to send and checks only what the user could have got wrong.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar
 
 from typing_extensions import Self
 
@@ -28,8 +28,9 @@ from aerodaas.names import PaperNames, snake_case
 from aerodaas.vehicle import VehicleState
 from aerodaas.waypoints import AeroNavigation
 
-__all__ = ["Analytics", "Context", "NavigableAnalytics"]
+__all__ = ["Analytics", "ComputeKind", "Context", "NavigableAnalytics"]
 
+ComputeKind: TypeAlias = Literal["edge", "cloud"]
 O_co = TypeVar("O_co", covariant=True)
 
 
@@ -48,6 +49,11 @@ class Context(Protocol):
         """Tell the people who watch: shown, logged and recorded."""
         ...
 
+    @property
+    def kind(self) -> ComputeKind:
+        """Where this runs: on the edge node beside the vehicle, or in the cloud."""
+        ...
+
 
 class Analytics(PaperNames, IAnalyse[O_co]):
     """An analysis; subclasses say what they accept and produce, and implement `process`.
@@ -60,6 +66,12 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     """Item types that `analyse` takes."""
     produces: ClassVar[type] = object
     """Type of the results."""
+    isolated: bool = False
+    """True for an analysis that needs a process of its own, such as a neural network."""
+    scheduled: bool = False
+    """True for an analysis of frames whose every run the analytics scheduler decides on."""
+    rate: float = 1.0
+    """How often an external source (`instantiate`) is asked, in Hz."""
     name: str = ""
     """Name of the stream; by default the class's own in snake_case."""
 
@@ -99,7 +111,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
             )
             raise GraphError(message)
         robot = data.graph.nodes[data.name].robot
-        node = self.node_in(data.graph, robot)
+        node = self._node_in(data.graph, robot)
         data.graph.connect(data, node, self.accepts)
         return AeroStreamData(data.graph, node.id, self.produces)
 
@@ -111,7 +123,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         if self._graph is None:
             message = f"{type(self).__name__}: call deploy(compute) before instantiate()"
             raise GraphError(message)
-        node = self.node_in(self._graph, None)
+        node = self._node_in(self._graph, None)
         node.kind = "external"
         return AeroStreamData(self._graph, node.id, self.produces)
 
@@ -130,7 +142,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
                 message = f"{type(target).__name__}: call analyse() before it is a trigger's target"
                 raise GraphError(message)
             target.node.dormant = True
-            trigger = Trigger(target.node.id, when)
+            trigger = Trigger(target.node.id, when=when)
         else:
             robot = getattr(getattr(target, "__self__", None), "robot_id", None)
             command = getattr(target, "__name__", None)
@@ -140,7 +152,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
                     f"drone.end_mission, not {target!r}"
                 )
                 raise GraphError(message)
-            trigger = Trigger(f"{robot}.{command}", when)
+            trigger = Trigger(robot, command, when)
         self._triggers = (*self._triggers, trigger)
         if self.node is not None:
             self.node.triggers.append(trigger)

@@ -1,1 +1,1 @@
-"""Recording to MCAP, reading, plots."""
+"""Recording a flight to MCAP, reading it again, and reporting on it."""

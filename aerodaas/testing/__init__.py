@@ -1,1 +1,1 @@
-"""Kits that the author of a plug-in runs against their own class."""
+"""What an application's or a plug-in's author tests with."""

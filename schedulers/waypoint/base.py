@@ -13,15 +13,16 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from aerodaas.geometry import Vector
 from aerodaas.graph import AeroStreamData
 from aerodaas.interfaces import IAeroData, IEnvironment, INavigate
 from aerodaas.names import PaperNames
+from aerodaas.navigation.energy import EnergyModel
 from aerodaas.waypoints import AeroNavigation, NavigationType, SchedulingType, Waypoint
 
-__all__ = ["NavigationEntry", "Situation", "TrajectoryScheduler"]
+__all__ = ["NavigationEntry", "NavigationSink", "Situation", "TrajectoryScheduler"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +39,12 @@ class Situation:
     """Charge left, 0 to 1."""
     speed: float = 1.0
     """Cruise speed, m/s."""
+    ordered: tuple[tuple[str, ...], ...] = ()
+    """Ids that must be visited in this order, for each ordered group of two or more."""
+    energy: EnergyModel | None = None
+    """Charge that flying takes; None where nobody knows."""
+    reserve: float = 0.0
+    """Charge that must be left on arrival at home."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +58,22 @@ class NavigationEntry:
     """The queue is emptied when this navigation's stream first yields."""
 
 
-class TrajectoryScheduler(PaperNames, INavigate):
-    """Orders waypoints; subclasses implement `plan`, which must be pure and fast.
+@runtime_checkable
+class NavigationSink(Protocol):
+    """An environment whose mission may be running."""
 
-    `plan` is called in the drone's actor each time the queue changes and, if
-    `replans_on_arrival`, after each arrival.
+    def navigation_added(self, entry: NavigationEntry) -> bool:
+        """Take navigation in flight; False before the mission starts."""
+        ...
+
+
+class TrajectoryScheduler(PaperNames, INavigate):
+    """Orders waypoints; subclasses implement `plan`, which must be pure.
+
+    `plan` is called beside the setpoint loop each time the queue changes and, if
+    `replans_on_arrival`, after each arrival. It gets the waypoints of one priority at a time. The
+    queue keeps ordered groups in their order whatever the plan says, so that a scheduler may
+    ignore `situation.ordered`.
     """
 
     replans_on_arrival: bool = False
@@ -64,6 +82,7 @@ class TrajectoryScheduler(PaperNames, INavigate):
         """Belong to `environment`, whose graph records the navigation."""
         self._environment = environment
         self.entries: list[NavigationEntry] = []
+        self._cleared = False
 
     @abstractmethod
     def plan(self, pending: Sequence[Waypoint], situation: Situation) -> Sequence[Waypoint]:
@@ -99,16 +118,32 @@ class TrajectoryScheduler(PaperNames, INavigate):
                 navigation.scheduling_type,
                 priority=priority,
             )
-        self.entries.append(NavigationEntry(navigation, index, deadline))
+        clear_first = self._cleared and navigation.stream is not None
+        self._cleared = self._cleared and not clear_first
+        self._enter(NavigationEntry(navigation, index, deadline, clear_first))
 
     def clear_navigation(self, *, on: AeroStreamData[Any] | None = None) -> None:
-        """Empty the queue: now, or when the stream `on` first yields something."""
-        if on is None:
+        """Empty the queue: now, or when the stream `on` first yields something.
+
+        Before the mission, this is the paper's "on detection, reset the queue": what was added so
+        far is forgotten, and the first item of the stream that is added next empties the queue
+        of what `navigate()` was given, which is flown until then.
+        """
+        if on is not None:
+            navigation = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, on)
+            self._enter(NavigationEntry(navigation, clear_first=True))
+        elif not self._tell(NavigationEntry(AeroNavigation(), clear_first=True)):
             self.entries.clear()
-            return
-        navigation = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, on)
-        self.entries.append(NavigationEntry(navigation, clear_first=True))
+            self._cleared = True
+
+    def _enter(self, entry: NavigationEntry) -> None:
+        if not self._tell(entry):
+            self.entries.append(entry)
+
+    def _tell(self, entry: NavigationEntry) -> bool:
+        sink: object = self._environment
+        return isinstance(sink, NavigationSink) and sink.navigation_added(entry)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave the environment behind when sent to the drone's actor."""
-        return {**self.__dict__, "_environment": None}
+        """Leave the application's side behind when sent to the drone's actor."""
+        return {**self.__dict__, "_environment": None, "entries": []}

@@ -1,0 +1,252 @@
+"""What all actors share: a life in four steps, an inbox, outlets, and a report.
+
+The driver's process creates all actors at once, then calls on each `prepare` (open models and
+cameras, join the streams), `start` (run in a thread of the actor's own), any number of `report`,
+and `stop`. An actor that Ray has restarted begins again with `prepare`.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+import traceback
+from abc import abstractmethod
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import ray
+
+from aerodaas.actors.session import Session
+from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteReader
+from aerodaas.clock import host_time_ns
+from aerodaas.data import Alert, Header
+from aerodaas.errors import AeroDaaSError
+from aerodaas.vitals import Vitals, read_vitals
+
+__all__ = [
+    "ActorInfo",
+    "ActorReport",
+    "SentCount",
+    "StreamActor",
+    "StreamCount",
+    "failure_line",
+]
+
+_ALERTS_KEPT = 50
+Phase = Literal["new", "ready", "running", "done", "failed"]
+
+
+@dataclass(frozen=True)
+class ActorInfo:
+    """Where an actor lives."""
+
+    node_id: str
+    pid: int
+    shared_memory: bool
+    publishes: tuple[str, ...]
+    reads: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class StreamCount:
+    """What an actor has seen of one stream."""
+
+    received: int
+    dropped: int
+
+
+@dataclass(frozen=True)
+class SentCount:
+    """What an actor has published on one stream."""
+
+    count: int
+    median_ms: float | None
+    """From capture to publishing, of the newest messages; None before the first."""
+    p99_ms: float | None
+
+
+@dataclass(frozen=True)
+class ActorReport:
+    """How an actor fares."""
+
+    phase: Phase
+    error: AeroDaaSError | None = None
+    streams: dict[str, StreamCount] = field(default_factory=dict)
+    sent: dict[str, SentCount] = field(default_factory=dict)
+    vitals: Vitals | None = None
+    """What its process takes; None before it has said anything."""
+    alerts: tuple[Alert, ...] = ()
+    """The newest alerts, oldest first."""
+    values: dict[str, Any] = field(default_factory=dict)
+    """Figures of the actor's own."""
+
+
+def failure_line(error: BaseException) -> str:
+    """Where an exception was raised, by file and line, and what it says."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""  # noqa: PTH119
+    return f"{type(error).__name__}: {error}{place}"
+
+
+class StreamActor:
+    """Base of the actors; subclasses implement `_open`, `_run` and `_close`."""
+
+    def __init__(self, session: Session, name: str, reads: dict[str, int]) -> None:
+        """Belong to `session` as `name`, reading the streams `reads` with these depths."""
+        self.session = session
+        self.name = name
+        self.clock = session.clock()
+        self._reads = reads
+        self._phase: Phase = "new"
+        self._error: AeroDaaSError | None = None
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
+        self._alerting = threading.Lock()
+        self.inbox: Inbox | None = None
+        self.outlets: dict[str, Outlet] = {}
+
+    def prepare(self) -> ActorInfo:
+        """Open everything; raises the project's errors for what cannot be opened."""
+        logging.captureWarnings(capture=True)
+        self.inbox = Inbox(self.scope, self.name, self._reads)
+        self.alerts = self.outlet(f"alerts/{self.name}")
+        self._open()
+        self._phase = "ready"
+        return ActorInfo(
+            ray.get_runtime_context().get_node_id(),
+            os.getpid(),
+            self.inbox.shared,
+            tuple(self.outlets),
+            tuple(self.reads()),
+        )
+
+    def connect(self, readers: dict[str, list[Any]]) -> None:
+        """Learn which actors on other nodes read this actor's streams."""
+        # In lockstep nothing may be dropped; the barrier keeps the number under way small.
+        window = MAX_DEPTH if self.session.lockstep else UNDER_WAY
+        for stream, actors in readers.items():
+            self.outlets[stream].remote = [RemoteReader(actor, window) for actor in actors]
+
+    def start(self, origin_ns: int) -> None:
+        """Run in a thread; mission time is zero at host time `origin_ns`."""
+        self.session = self.session.starting_at(origin_ns)
+        self.clock = self.session.clock()
+        self._phase = "running"
+        self._thread = threading.Thread(target=self._guard, name=self.name, daemon=True)
+        self._thread.start()
+
+    def deliver(self, stream: str, data: bytes) -> None:
+        """Take a message from another node."""
+        if self.inbox is not None:
+            self.inbox.deliver(stream, data)
+
+    def report(self) -> ActorReport:
+        """How the actor fares."""
+        return ActorReport(
+            phase=self._phase,
+            error=self._error,
+            streams=self.counts(),
+            sent=self.sent(),
+            vitals=read_vitals(),
+            alerts=tuple(self._newest_alerts),
+            values=self._values(),
+        )
+
+    def stop(self) -> ActorReport:
+        """Finish what is under way, close everything, and report for the last time."""
+        self._stopping.set()
+        if self.inbox is not None:
+            self.inbox.wake()
+        if self._thread is not None:
+            self._thread.join(timeout=10.0)
+        self._close()
+        report = self.report()
+        for outlet in self.outlets.values():
+            outlet.close()
+        if self.inbox is not None:
+            self.inbox.close()
+        return report
+
+    @property
+    def scope(self) -> str:
+        """Prefix of the stream names of this run on this node."""
+        return self.session.scope(ray.get_runtime_context().get_node_id())
+
+    def outlet(self, stream: str) -> Outlet:
+        """Open a stream for writing."""
+        self.outlets[stream] = Outlet(self.scope, stream)
+        return self.outlets[stream]
+
+    def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401
+        """Tell the people who watch; any thread may."""
+        self.tell(kind, text, self.clock.now(), values)
+
+    def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
+        """Tell the people who watch about mission time `stamp`; any thread may."""
+        with self._alerting:
+            header = Header(self.alerts.sent, stamp, self.name)
+            alert = Alert(header, kind, text, values)
+            self._newest_alerts.append(alert)
+            self.alerts.measure(alert, header, host_time_ns())
+
+    def reads(self) -> list[str]:
+        """Streams that this actor reads."""
+        return list(self._reads)
+
+    def counts(self) -> dict[str, StreamCount]:
+        """What was received and dropped, by stream."""
+        if self.inbox is None:
+            return {}
+        return {
+            stream: StreamCount(received, self.inbox.dropped[stream])
+            for stream, received in self.inbox.received.items()
+        }
+
+    def sent(self) -> dict[str, SentCount]:
+        """What was published, by stream."""
+        return {stream: _sent(outlet) for stream, outlet in self.outlets.items()}
+
+    @property
+    def stopping(self) -> bool:
+        """True once `stop` was called."""
+        return self._stopping.is_set()
+
+    def _guard(self) -> None:
+        try:
+            self._run()
+        except AeroDaaSError as error:
+            self._fail(error)
+        except Exception as error:  # noqa: BLE001 - whatever a plug-in raises ends here
+            self._fail(AeroDaaSError(f"{self.name}: {failure_line(error)}"))
+        else:
+            self._phase = "done"
+
+    def _fail(self, error: AeroDaaSError) -> None:
+        self._error = error
+        self._phase = "failed"
+        self.alert("actor_failed", str(error))
+
+    @abstractmethod
+    def _open(self) -> None:
+        """Open models, cameras, outlets."""
+
+    @abstractmethod
+    def _run(self) -> None:
+        """Work until `stopping`."""
+
+    def _close(self) -> None:
+        """Release what `_open` took."""
+
+    def _values(self) -> dict[str, Any]:
+        return {}
+
+
+def _sent(outlet: Outlet) -> SentCount:
+    newest = sorted(outlet.latencies)
+    if not newest:
+        return SentCount(outlet.sent, None, None)
+    middle, high = newest[len(newest) // 2], newest[int(0.99 * (len(newest) - 1))]
+    return SentCount(outlet.sent, middle, high)

@@ -1,0 +1,323 @@
+"""The analytics' actor: runs one or several analyses, each in a thread with an inbox of its own.
+
+Light analyses share an actor, for an actor costs 70 MB; one that is `isolated`, such as a
+neural network, has its own.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from aerodaas.actors._barrier import ACKS
+from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
+from aerodaas.actors._link import StreamLink
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
+from aerodaas.actors.streams import Inbox, Outlet
+from aerodaas.analytics.base import Analytics, ComputeKind
+from aerodaas.analytics.commanding import CommandingAnalytics
+from aerodaas.clock import host_time_ns
+from aerodaas.data import Alert, Header
+from aerodaas.status import Message
+from aerodaas.vehicle import VehicleState
+
+__all__ = ["AnalyticsActor", "NodeSpec", "TriggerSpec", "Wake"]
+
+_WAKE_DEPTH = 8
+
+
+@dataclass(frozen=True)
+class Wake:
+    """Tells a dormant analysis to work from now on."""
+
+
+@dataclass(frozen=True)
+class TriggerSpec:
+    """Publishes `command` on `stream` when a result satisfies `when`."""
+
+    stream: str
+    command: Any
+    when: Callable[[Any], bool] | None
+
+
+@dataclass(frozen=True)
+class NodeSpec:
+    """One analysis as its actor gets it."""
+
+    stream: str
+    work: Analytics[Any]
+    inputs: dict[str, int]
+    """Streams that it reads, and how many messages of each may wait."""
+    robot: str
+    """The robot that its data belongs to, or that it commands."""
+    state: str
+    """Stream of the states of the vehicle that its data belongs to."""
+    external: bool
+    dormant: bool
+    triggers: tuple[TriggerSpec, ...]
+    acknowledges: bool
+    """True in lockstep for an analysis whose results nobody reads."""
+    kind: ComputeKind
+    """Where its actor stands."""
+    answers_always: bool
+    """True under a dispatcher, which waits for an answer to each task."""
+    wakes: tuple[str, ...]
+    """Streams on which a dormant analysis is woken."""
+
+
+class AnalyticsActor(StreamActor):
+    """Runs the analyses that `prepare` is given."""
+
+    def __init__(self, session: Session, name: str) -> None:
+        """Belong to `session` as `name`."""
+        super().__init__(session, name, {})
+        self._workers: list[_Worker] = []
+
+    def prepare(self, *nodes: NodeSpec) -> ActorInfo:
+        """Open the analyses `nodes`; raises what their `open` raises."""
+        # Not in the constructor: Ray would keep the models in its object store for restarts.
+        self._workers = [_Worker(self, node) for node in nodes]
+        return super().prepare()
+
+    def _open(self) -> None:
+        for worker in self._workers:
+            worker.open()
+
+    def _run(self) -> None:
+        threads = [
+            threading.Thread(target=worker.run, name=worker.node.stream, daemon=True)
+            for worker in self._workers
+        ]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+
+    def _close(self) -> None:
+        for worker in self._workers:
+            worker.close()
+
+    def deliver(self, stream: str, data: bytes) -> None:
+        """Take a message from another node for every analysis that reads it."""
+        for worker in self._workers:
+            if stream in worker.inbox.received:
+                worker.inbox.deliver(stream, data)
+
+    def stop(self) -> Any:  # noqa: ANN401 - the base's report
+        """Finish what is under way, close everything, and report for the last time."""
+        self._stopping.set()
+        for worker in self._workers:
+            worker.wake()
+        return super().stop()
+
+    def reads(self) -> list[str]:
+        """Streams that this actor's analyses read."""
+        return sorted({stream for worker in self._workers for stream in worker.depths})
+
+    def counts(self) -> dict[str, StreamCount]:
+        """What each analysis received and dropped of its inputs, as `stream>analysis`."""
+        return {
+            f"{stream}>{worker.node.stream}": StreamCount(
+                worker.inbox.received[stream], worker.inbox.dropped[stream]
+            )
+            for worker in self._workers
+            if worker.opened
+            for stream in worker.node.inputs
+        }
+
+    def _values(self) -> dict[str, Any]:
+        return {
+            "busy_seconds": {worker.node.stream: worker.busy for worker in self._workers},
+            "errors": {w.node.stream: w.errors for w in self._workers if w.errors},
+            "last_errors": [w.last_error for w in self._workers if w.last_error],
+        }
+
+
+class _Worker:
+    """One analysis: takes the newest item, works, publishes; is its own `Context`."""
+
+    def __init__(self, actor: AnalyticsActor, node: NodeSpec) -> None:
+        self.node = node
+        states = MESSAGE_DEPTH if actor.session.lockstep else 1
+        self.depths = {
+            node.state: states,
+            **node.inputs,
+            **dict.fromkeys(node.wakes, _WAKE_DEPTH),
+        }
+        self._link: StreamLink | None = None
+        if isinstance(node.work, CommandingAnalytics):
+            self._link = StreamLink(actor, node.stream, node.robot)
+            self.depths.update(self._link.depths)
+        self.busy = 0.0
+        self.errors = 0
+        self.last_error = ""
+        self.opened = False
+        self._actor = actor
+        self._woken: int | None = None if node.dormant else -1
+        """Stamp of the measurement that woke it; None while it sleeps."""
+        self._states: deque[tuple[int, VehicleState]] = deque(maxlen=states)
+        self._now = 0
+
+    def open(self) -> None:
+        session = self._actor.session
+        self.inbox = Inbox(self._actor.scope, f"analytics/{self.node.stream}", self.depths)
+        self._results = self._actor.outlet(self.node.stream)
+        self._commands = {
+            trigger.stream: self._actor.outlet(trigger.stream) for trigger in self.node.triggers
+        }
+        self._acks: Outlet | None = None
+        if session.lockstep and self.node.acknowledges:
+            self._acks = self._actor.outlet(f"{ACKS}/{self.node.stream}")
+        if self._link is not None:
+            self._link.open()
+        self.node.work.open()
+        self.opened = True
+
+    def run(self) -> None:
+        self._begin()
+        turn = self._run_external if self.node.external else self._run_inputs
+        if self.node.external and not self._actor.session.lockstep:
+            turn = self._run_paced
+        while not self._actor.stopping:
+            turn()
+
+    def _begin(self) -> None:
+        if self._link is None or not isinstance(self.node.work, CommandingAnalytics):
+            return
+        try:
+            self.node.work.begin(self._link)
+        except Exception as error:  # noqa: BLE001 - a user's analysis may raise anything
+            self._complain(error)
+
+    def _run_inputs(self) -> None:
+        for message in self._receive(0.5):
+            if message.stream in self.node.inputs:
+                self._work(message)
+
+    def _run_external(self) -> None:
+        """In lockstep an external source ticks with the drone's states."""
+        for message in self._receive(0.5):
+            if message.stream == self.node.state and is_due(self._rate, message.stamp):
+                self._produce(message.stamp)
+
+    def _run_paced(self) -> None:
+        clock = self._actor.clock
+        due = next_due(self._rate, clock.now())
+        clock.sleep_until(due)
+        self._receive(0.0)
+        self._produce(due)
+
+    @property
+    def _rate(self) -> float:
+        return self.node.work.rate
+
+    def _produce(self, stamp: int) -> None:
+        header = Header(self._results.sent, stamp, self.node.stream)
+        captured = host_time_ns()
+        item = self._process(None, stamp) if self._awake(stamp) else None
+        if item is not None:
+            origin = Message(self.node.stream, header.id, stamp, header, captured, (), item)
+            self._fire(item, origin)
+        if item is not None or self._actor.session.lockstep:
+            self._acknowledge(self._results.measure(item, header, captured))
+
+    def _receive(self, timeout: float) -> list[Message[Any]]:
+        """Take note of what has arrived, and return it."""
+        messages = self.inbox.receive(timeout)
+        if messages and self._actor.session.lockstep:
+            # A state is published before what was measured in it, but may arrive in between.
+            messages += self.inbox.receive(0.0)
+        for message in messages:
+            if self._link is not None:
+                self._link.note(message)
+            if message.stream == self.node.state and message.item is not None:
+                self._states.append((message.stamp, message.item))
+            elif isinstance(message.item, Wake):
+                stamp = message.header.stamp
+                self._woken = stamp if self._woken is None else min(self._woken, stamp)
+        return messages
+
+    def _awake(self, stamp: int) -> bool:
+        """Tell whether to work on what was measured at `stamp`: later than what woke us."""
+        return self._woken is not None and stamp > self._woken
+
+    def _work(self, message: Message[Any]) -> None:
+        received = host_time_ns()
+        result = None
+        if message.item is not None and self._awake(message.header.stamp):
+            result = self._process(message.item, message.header.stamp)
+        if result is not None:
+            self._fire(result, message)
+        if result is not None or self._actor.session.lockstep or self.node.answers_always:
+            self._results.derive(result, message, received, self._stamp(message))
+        self._acknowledge(message)
+
+    def _stamp(self, message: Message[Any]) -> int:
+        return message.stamp if self._actor.session.lockstep else self._actor.clock.now()
+
+    def _process(self, item: Any, now: int) -> Any:  # noqa: ANN401
+        self._now = now
+        began = time.perf_counter()
+        try:
+            return self.node.work.process(item, self)
+        except Exception as error:  # noqa: BLE001 - a user's analysis may raise anything
+            self._complain(error)
+            return None
+        finally:
+            self.busy += time.perf_counter() - began
+
+    def _complain(self, error: Exception) -> None:
+        self.errors += 1
+        line = f"{self.node.stream}: {failure_line(error)}"
+        if line != self.last_error:
+            self.last_error = line
+            self._actor.tell("analysis_failed", line, self._now, {})
+
+    def _fire(self, result: Any, origin: Message[Any]) -> None:  # noqa: ANN401
+        for trigger in self.node.triggers:
+            try:
+                wanted = result is not None and (trigger.when is None or trigger.when(result))
+            except Exception as error:  # noqa: BLE001 - a user's condition may raise anything
+                self._complain(error)
+                continue
+            if wanted:
+                self._commands[trigger.stream].derive(
+                    trigger.command, origin, host_time_ns(), self._stamp(origin)
+                )
+
+    def _acknowledge(self, message: Message[Any]) -> None:
+        if self._acks is not None:
+            done = ((message.header.source, message.header.stamp),)
+            self._acks.derive(done, message, host_time_ns(), message.stamp)
+
+    def wake(self) -> None:
+        if self.opened:
+            self.inbox.wake()
+
+    def close(self) -> None:
+        if self.opened:
+            with contextlib.suppress(Exception):
+                self.node.work.close()
+            self.inbox.close()
+
+    @property
+    def kind(self) -> ComputeKind:
+        return self.node.kind
+
+    def now(self) -> int:
+        return self._now
+
+    def vehicle(self) -> VehicleState | None:
+        """In lockstep the state at the item's own time, however far the drone has flown since."""
+        lockstep = self._actor.session.lockstep
+        known = (s for at, s in reversed(self._states) if at <= self._now or not lockstep)
+        return next(known, None)
+
+    def alert(self, alert: Alert) -> None:
+        # In lockstep only the messages know the time, not the actor's clock.
+        self._actor.tell(alert.kind, alert.text, alert.header.stamp, alert.values)

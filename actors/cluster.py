@@ -1,0 +1,111 @@
+"""Ray itself: start it here, or join a cluster, and find places for actors."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import os
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import ray
+
+from aerodaas.config import ComputeConfig
+from aerodaas.errors import AeroDaaSError, ConfigError
+
+__all__ = ["Place", "connect", "disconnect", "discover", "options_for"]
+
+_KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
+_SHARE = 0.001
+"""Share of a node's `edge` or `cloud` resource that an actor takes: it says where, not how much."""
+_STORE_BYTES = 128 * 2**20
+"""Object store of a one-machine run; its streams travel in shared memory of their own."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an actor belongs."""
+
+    kind: Literal["edge", "cloud"] = "edge"
+    node: str | None = None
+    """IP address of one node, where the kind alone does not say."""
+
+
+def connect(address: str | None) -> None:
+    """Start Ray on this machine, or join the cluster at `address` (or `RAY_ADDRESS`).
+
+    Raises AeroDaaSError if the cluster cannot be reached, ConfigError if it offers no edge node.
+    """
+    if ray.is_initialized():
+        return
+    address = address or os.environ.get("RAY_ADDRESS")
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    common: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
+    if address:
+        try:
+            ray.init(address=address, **common)
+        except (ConnectionError, RuntimeError, ValueError) as error:
+            reason = str(error).strip().splitlines()[0]
+            raise AeroDaaSError(
+                f"cannot join the Ray cluster at {address}: {reason}; "
+                "check the address and that the head runs the same Ray and Python versions"
+            ) from None
+        _require_edge(address)
+        return
+    ray.init(
+        num_cpus=os.cpu_count(),
+        include_dashboard=False,
+        object_store_memory=_STORE_BYTES,
+        resources={"edge": 1, "cloud": 1},
+        **common,
+    )
+    _trim()
+
+
+def _trim() -> None:
+    """Stop what a one-machine run of ours has no use for: 150 MB of autoscaler, log and web.
+
+    Ray offers no switch for it, so a Ray that hides these processes elsewhere keeps them.
+    """
+    node = getattr(ray._private.worker, "_global_node", None)  # noqa: SLF001
+    for name in ("kill_monitor", "kill_log_monitor", "kill_dashboard"):
+        with contextlib.suppress(Exception):
+            getattr(node, name)(check_alive=False)
+
+
+def _require_edge(address: str) -> None:
+    if not any("edge" in node["Resources"] for node in ray.nodes() if node["Alive"]):
+        ray.shutdown()
+        raise ConfigError(
+            f"the Ray cluster at {address} has no edge node; start the one beside the drone "
+            """with `ray start --address … --resources '{"edge": 1}'`"""
+        )
+
+
+def disconnect() -> None:
+    """Leave the cluster; a Ray that `connect` started ends with all its processes."""
+    ray.shutdown()
+
+
+def discover() -> list[ComputeConfig]:
+    """The compute resources that the connected cluster offers: one for each kind of node."""
+    found: dict[str, ComputeConfig] = {}
+    for node in ray.nodes():
+        for kind in _KINDS:
+            if node["Alive"] and kind in node["Resources"]:
+                found[kind] = ComputeConfig(id=kind, kind=kind)
+    return list(found.values())
+
+
+def options_for(place: Place, *, restarts: int) -> dict[str, Any]:
+    """Ray's options for an actor at `place`.
+
+    Raises ConfigError if no node of the cluster fits.
+    """
+    resource = f"node:{place.node}" if place.node else place.kind
+    if resource not in ray.cluster_resources():
+        offered = ", ".join(sorted({"edge", "cloud"} & set(ray.cluster_resources()))) or "neither"
+        raise ConfigError(
+            f"no node of the cluster offers {resource!r}; of edge and cloud it has: {offered}"
+        )
+    return {"num_cpus": 0, "resources": {resource: _SHARE}, "max_restarts": restarts}

@@ -1,0 +1,249 @@
+"""The drone's actor: the 20 Hz setpoint loop beside the vehicle, whatever the rest does.
+
+In real time each robot has an actor of its own. In lockstep one actor flies all the simulated
+robots of a run and conducts mission time: it moves to the next due moment, publishes what is
+measured there, and goes on once everyone whose work can reach a drone is done.
+"""
+
+from __future__ import annotations
+
+import threading
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+from aerodaas.actors._barrier import ACKS, Barrier
+from aerodaas.actors._base import StreamActor
+from aerodaas.actors._names import reply_stream, request_stream, state_stream
+from aerodaas.actors.pilot import Pilot, RobotSpec
+from aerodaas.actors.session import CONTROL_PERIOD_NS, MESSAGE_DEPTH, Session, next_due
+from aerodaas.clock import NANOSECONDS, LockstepClock
+from aerodaas.errors import AeroDaaSError
+from aerodaas.navigation.commands import Answer, Command, ReturnHome
+from aerodaas.navigation.safety import Neighbour
+from aerodaas.status import Message, MissionStatus
+from aerodaas.vehicle import VehicleState
+
+__all__ = ["Conduct", "DroneActor", "RobotReport"]
+
+_CONTROL_RATE = NANOSECONDS / CONTROL_PERIOD_NS
+_APPLICATION_TIMEOUT = 5.0
+"""Seconds without a word from the application's process after which the drone comes home."""
+
+
+@dataclass(frozen=True)
+class Conduct:
+    """What the conductor of a lockstep run must know about it."""
+
+    rates: dict[str, float] = field(default_factory=dict)
+    """Sources that others publish (cameras, external analyses), and their rates in Hz."""
+    acknowledgements: dict[str, int] = field(default_factory=dict)
+    """How many acknowledgements one measurement of each source leads to."""
+    windows: dict[str, int] = field(default_factory=dict)
+    """How many measurements of each source may be under way while time goes on."""
+    readers: tuple[str, ...] = ()
+    """Streams of acknowledgements."""
+    patience: float = 20.0
+    """Wall seconds to wait for an acknowledgement before its reader is given up."""
+
+
+@dataclass(frozen=True)
+class RobotReport:
+    """One robot at one moment."""
+
+    status: MissionStatus
+    state: VehicleState | None
+    latencies: tuple[float, ...]
+    """Milliseconds from capture to command, newest last."""
+    loop_late: int
+    """Turns of the setpoint loop that came more than half a period late."""
+
+
+class DroneActor(StreamActor):
+    """Flies `robots`."""
+
+    def __init__(
+        self,
+        session: Session,
+        name: str,
+        robots: tuple[RobotSpec, ...],
+        conduct: Conduct,
+        neighbours: tuple[str, ...] = (),
+    ) -> None:
+        """Belong to `session` as `name`; `conduct` matters in lockstep only.
+
+        `neighbours` are the robots that other actors fly, to be kept away from.
+        """
+        streams = [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
+        streams += [request_stream(node) for robot in robots for node in robot.requesters]
+        depths = dict.fromkeys([*streams, *conduct.readers], MESSAGE_DEPTH)
+        depths.update(dict.fromkeys((state_stream(other) for other in neighbours), 1))
+        super().__init__(session, name, depths)
+        self._conduct = conduct
+        self._whereabouts: dict[str, Neighbour] = {}
+        self._neighbours = {state_stream(other): other for other in neighbours}
+        self._steering = {stream for robot in robots for stream in robot.navigation}
+        self._specs = robots
+        self._pilots: dict[str, Pilot] = {}
+        self._obeying = threading.Lock()
+        """A mission is used by one thread at a time: the loop's, or one that brings a command."""
+        self._late = 0
+        self._heard = time.monotonic()
+        self._orphaned = False
+
+    def _open(self) -> None:
+        for spec in self._specs:
+            pilot = Pilot(spec, self.session)
+            streams = (*Pilot.streams(spec), *map(reply_stream, spec.requesters))
+            pilot.open({stream: self.outlet(stream) for stream in streams})
+            self._pilots[pilot.id] = pilot
+
+    def command(self, robot: str, command: Command) -> Answer:
+        """Tell one robot's mission something; called by the application's process."""
+        with self._obeying:
+            return self._pilots[robot].handle(command, self.clock.now())
+
+    def robots(self, newest: int = 200) -> dict[str, RobotReport]:
+        """How each robot fares; also the sign that the application's process is alive."""
+        self._heard = time.monotonic()
+        return {
+            name: RobotReport(
+                pilot.mission.status,
+                pilot.vehicle.read() if self._phase != "new" else None,
+                tuple(pilot.latencies)[-newest:],
+                self._late,
+            )
+            for name, pilot in self._pilots.items()
+        }
+
+    def _run(self) -> None:
+        self._heard = time.monotonic()
+        for pilot in self._pilots.values():
+            pilot.start(self.clock)
+        if self.session.lockstep:
+            self._run_lockstep()
+        else:
+            self._run_real_time()
+
+    def _run_real_time(self) -> None:
+        assert self.inbox is not None  # noqa: S101 - prepare came first
+        due = self.clock.now()
+        while not self._over():
+            wait = self.session.host_seconds(max(0, due - self.clock.now()))
+            for message in self.inbox.receive(wait):
+                self._take(message, self.clock.now())
+            now = self.clock.now()
+            if now < due:
+                continue
+            self._late += now - due > CONTROL_PERIOD_NS // 2
+            self._turn(now)
+            for pilot in self._pilots.values():
+                pilot.observe(now)
+            self._watch_application()
+            due = next_due(_CONTROL_RATE, now)
+
+    def _run_lockstep(self) -> None:
+        assert isinstance(self.clock, LockstepClock)  # noqa: S101 - the session says so
+        self._barrier = Barrier(self._conduct.windows)
+        due = {source: next_due(rate, -1) for source, rate in self._conduct.rates.items()}
+        control = 0
+        while not self._over():
+            readings = [pilot.next_reading for pilot in self._pilots.values()]
+            now = min([control, *due.values(), *(stamp for stamp in readings if stamp is not None)])
+            self.clock.advance_to(now)
+            for pilot in self._pilots.values():
+                pilot.advance_to(now)
+            if now == control:
+                self._turn(now)
+                control = next_due(_CONTROL_RATE, now)
+            self._measure(now, due)
+            self._await(drain=False)
+        self._await(drain=True)
+
+    def _measure(self, now: int, due: dict[str, int]) -> None:
+        """Publish what is known now, and expect what the sensors that are due make of it."""
+        counts = self._conduct.acknowledgements
+        for source, stamp in due.items():
+            if stamp == now:
+                self._barrier.expect(source, now, counts.get(source, 0))
+                due[source] = next_due(self._conduct.rates[source], now)
+        for pilot in self._pilots.values():
+            for stream, stamp in pilot.observe(now):
+                self._barrier.expect(stream, stamp, counts.get(stream, 0))
+
+    def _await(self, *, drain: bool) -> None:
+        assert self.inbox is not None  # noqa: S101 - prepare came first
+        given_up = time.monotonic() + self._conduct.patience
+        arrived: list[Message[Any]] = []
+        while not self.stopping:
+            clear = self._barrier.clear(drain=drain)
+            messages = self.inbox.receive(0.0 if clear else 0.5)
+            for message in messages:
+                self._acknowledge(message)
+                if not message.stream.startswith(ACKS):
+                    arrived.append(message)
+            if clear:
+                break
+            if messages:
+                given_up = time.monotonic() + self._conduct.patience
+            elif time.monotonic() > given_up:
+                sources = ", ".join(self._barrier.waiting_for())
+                self.alert("reader_lost", f"nobody answers for {sources}; flying on without")
+                self._barrier.forget()
+        now = self.clock.now()
+        # Arrival depends on the host's scheduler; the order in which they count must not.
+        for message in sorted(arrived, key=lambda one: (one.stream, one.seq)):
+            self._take(message, now)
+
+    def _acknowledge(self, message: Message[Any]) -> None:
+        if message.stream.startswith(ACKS):
+            for source, stamp in message.item or ():
+                self._barrier.acknowledge(source, stamp)
+        elif message.stream in self._steering:
+            self._barrier.acknowledge(message.header.source, message.header.stamp)
+
+    def _turn(self, now: int) -> None:
+        for pilot in self._pilots.values():
+            if not self.session.lockstep:
+                pilot.advance_to(now)
+            others = [where for name, where in self._whereabouts.items() if name != pilot.id]
+            with self._obeying:
+                pilot.turn(now, others)
+            state = pilot.loop.state
+            if state is not None:
+                self._whereabouts[pilot.id] = _neighbour(state)
+            for alert in pilot.new_alerts():
+                self.alert(alert.kind, alert.text, **alert.values)
+
+    def _take(self, message: Message[Any], now: int) -> None:
+        if message.stream in self._neighbours and isinstance(message.item, VehicleState):
+            self._whereabouts[self._neighbours[message.stream]] = _neighbour(message.item)
+            return
+        for pilot in self._pilots.values():
+            with self._obeying:
+                pilot.take(message, now)
+
+    def _over(self) -> bool:
+        return self.stopping or all(pilot.over for pilot in self._pilots.values())
+
+    def _watch_application(self) -> None:
+        silent = time.monotonic() - self._heard > _APPLICATION_TIMEOUT
+        if silent and not self._orphaned:
+            reason = "the application's process is gone"
+            for pilot in self._pilots.values():
+                pilot.handle(ReturnHome(reason), self.clock.now())
+            self.alert("application_lost", reason)
+        self._orphaned = silent
+
+    def _fail(self, error: AeroDaaSError) -> None:
+        for pilot in self._pilots.values():
+            pilot.abandon()
+        super()._fail(error)
+
+    def _close(self) -> None:
+        for pilot in self._pilots.values():
+            pilot.vehicle.close()
+
+
+def _neighbour(state: VehicleState) -> Neighbour:
+    return Neighbour(state.odometry.position, state.odometry.velocity)

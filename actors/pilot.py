@@ -1,0 +1,187 @@
+"""One drone inside its actor: vehicle, mission and setpoint loop, and the streams they feed."""
+
+from __future__ import annotations
+
+import contextlib
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from aerodaas.actors._names import reply_stream, request_stream, state_stream, status_stream
+from aerodaas.actors.session import Session, next_due
+from aerodaas.actors.streams import Outlet
+from aerodaas.clock import Clock, host_time_ns
+from aerodaas.config import RobotConfig, SensorConfig
+from aerodaas.data import Alert, Header
+from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.geometry import GeodeticOrigin
+from aerodaas.navigation.commands import Answer, Command, Reply, Request, Start, StreamItem
+from aerodaas.navigation.loop import SetpointLoop
+from aerodaas.navigation.mission import Mission
+from aerodaas.navigation.planner import BackgroundPlanner, InlinePlanner
+from aerodaas.navigation.safety import Neighbour
+from aerodaas.plugins import load_plugin
+from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
+from aerodaas.status import Message, MissionStatus, SetpointRecord
+from aerodaas.vehicle import ClockedVehicle, SteppedVehicle, Vehicle, VehicleState
+
+__all__ = ["Pilot", "RobotSpec", "sensor_item"]
+
+_LATENCIES_KEPT = 100_000
+
+
+def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
+    """What a sensor that reads the vehicle itself yields; None where the vehicle cannot tell."""
+    readings: dict[str, object] = {
+        "odometry": state.odometry,
+        "gps": state.gps,
+        "battery": state.battery,
+        "status": status,
+    }
+    return readings[sensor.type]
+
+
+@dataclass(frozen=True)
+class RobotSpec:
+    """One robot as its actor gets it."""
+
+    robot: RobotConfig
+    sensors: tuple[SensorConfig, ...]
+    """The vehicle's own sensors (no cameras) that somebody reads."""
+    navigation: tuple[str, ...]
+    """Streams that feed its mission."""
+    commands: tuple[str, ...]
+    """Streams that carry commands from triggers and cameras."""
+    requesters: tuple[str, ...]
+    """Analyses that command its mission and wait for an answer."""
+    initial: tuple[Command, ...]
+    """Navigation known before take-off."""
+    scheduler: TrajectoryScheduler
+
+
+class Pilot:
+    """Flies one robot; driven by the drone's actor."""
+
+    def __init__(self, spec: RobotSpec, session: Session) -> None:
+        """Build the vehicle and the mission; nothing is connected yet."""
+        self.spec = spec
+        self.id = spec.robot.id
+        self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
+        """Milliseconds from capture to the arrival of the command made from it."""
+        self._session = session
+        self._told = 0
+        self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
+        self._due = {sensor.id: next_due(sensor.rate, -1) for sensor in spec.sensors}
+        plugin = load_plugin("drivers", spec.robot.driver)
+        self.vehicle: Vehicle = plugin(spec.robot, session.environment)
+
+    def open(self, outlets: dict[str, Outlet]) -> None:
+        """Connect the vehicle, build its mission; publish through `outlets`, by stream."""
+        self._outlets = outlets
+        self.vehicle.connect()
+        robot, environment = self.spec.robot, self._session.environment
+        takeoff = self.vehicle.read().odometry.position
+        home = environment.home
+        # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
+        plan_with = InlinePlanner if self._session.lockstep else BackgroundPlanner
+        self.mission = Mission(
+            robot,
+            plan_with(self.spec.scheduler),
+            takeoff=takeoff,
+            origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
+            wind=np.array(environment.simulation.wind, dtype=np.float64),
+        )
+        self.loop = SetpointLoop(self.vehicle, self.mission)
+        for command in self.spec.initial:
+            answer = self.handle(command, 0)
+            if not answer.accepted or answer.refused:
+                reasons = [answer.text, *(f"{name}: {why}" for name, why in answer.refused.items())]
+                raise MissionError(f"{self.id}: {'; '.join(text for text in reasons if text)}")
+
+    @staticmethod
+    def streams(spec: RobotSpec) -> list[str]:
+        """Streams that a pilot of this robot publishes for all, the replies aside."""
+        own = [state_stream(spec.robot.id), status_stream(spec.robot.id)]
+        return [
+            *own,
+            f"{spec.robot.id}/setpoints",
+            *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
+        ]
+
+    def start(self, clock: Clock) -> None:
+        """Start the mission, whose time is that of `clock`."""
+        if isinstance(self.vehicle, ClockedVehicle):
+            self.vehicle.use_clock(clock)
+        self.handle(Start(), clock.now())
+
+    def advance_to(self, stamp: int) -> None:
+        """Move a simulated vehicle's time on."""
+        if isinstance(self.vehicle, SteppedVehicle):
+            self.vehicle.advance_to(stamp)
+
+    def handle(self, command: Command, now: int) -> Answer:
+        """Pass a command on to the mission."""
+        return self.mission.handle(command, now)
+
+    def take(self, message: Message[Any], now: int) -> None:
+        """Pass on what came by stream: navigation, or a command of a trigger."""
+        if message.item is None:
+            return
+        if message.stream in self.spec.navigation:
+            self.latencies.append((host_time_ns() - message.captured) / 1e6)
+            self.handle(StreamItem(message.stream, message.item, message.header), now)
+        elif message.stream in self.spec.commands:
+            self.handle(message.item, now)
+        elif message.stream in self._replies and isinstance(message.item, Request):
+            reply = Reply(message.item.number, self.handle(message.item.command, now))
+            self._publish(self._replies[message.stream], reply, now)
+
+    def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
+        """One turn of the setpoint loop; publishes what was decided."""
+        record = self.loop.turn(now, neighbours)
+        self._publish(f"{self.id}/setpoints", record, now)
+        self._publish(status_stream(self.id), self.mission.status, now)
+        return record
+
+    def observe(self, now: int) -> list[tuple[str, int]]:
+        """Publish the vehicle's state and the readings of the sensors that are due by now.
+
+        Returns (stream, stamp) of each.
+        """
+        state = self.vehicle.read()
+        published = [self._publish(state_stream(self.id), state, now)]
+        for sensor in self.spec.sensors:
+            if self._due[sensor.id] <= now:
+                self._due[sensor.id] = next_due(sensor.rate, now)
+                item = sensor_item(sensor, state, self.mission.status)
+                published.append(self._publish(f"{self.id}/{sensor.id}", item, now))
+        return published
+
+    @property
+    def next_reading(self) -> int | None:
+        """When the next sensor is due; None without sensors."""
+        return min(self._due.values(), default=None)
+
+    @property
+    def over(self) -> bool:
+        """True once the mission has ended, on the ground or out of our hands."""
+        return self.mission.finished
+
+    def new_alerts(self) -> list[Alert]:
+        """What the mission has had to say since the last call."""
+        alerts = list(self.mission.alerts[self._told :])
+        self._told += len(alerts)
+        return alerts
+
+    def abandon(self) -> None:
+        """Our own code has failed: have the vehicle land by itself."""
+        with contextlib.suppress(AeroDaaSError):
+            self.vehicle.land()
+
+    def _publish(self, stream: str, item: object, now: int) -> tuple[str, int]:
+        outlet = self._outlets[stream]
+        outlet.measure(item, Header(outlet.sent, now, stream), host_time_ns())
+        return stream, now

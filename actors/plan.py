@@ -1,0 +1,358 @@
+"""From an application's graph to the actors that will run it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from aerodaas.actors._barrier import ACKS, paths
+from aerodaas.actors._names import state_stream
+from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
+from aerodaas.actors.cluster import Place
+from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
+from aerodaas.actors.drone import Conduct
+from aerodaas.actors.pilot import Pilot, RobotSpec
+from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
+from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.commanding import CommandingAnalytics
+from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig, TaskConfig
+from aerodaas.data import Frame
+from aerodaas.errors import GraphError
+from aerodaas.graph import Graph, NavigationEdge, Node
+from aerodaas.handles import SENSOR_ITEMS
+from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    AnalyticsScheduler,
+    Profile,
+    Resources,
+)
+from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
+
+__all__ = ["Analyses", "Cameras", "Dispatching", "FlightPlan", "make_plan"]
+
+_CAMERA_WINDOW = 4
+_STATE_WINDOW = 16
+_COMMANDS: dict[str, Command] = {
+    "end_mission": End("an analysis asked to land"),
+    "pause_mission": Pause(),
+    "resume_mission": Resume(),
+}
+
+
+@dataclass(frozen=True)
+class Cameras:
+    """One camera's actor."""
+
+    stream: str
+    sensor: SensorConfig
+    state: str
+    ends: bool
+
+
+@dataclass(frozen=True)
+class Analyses:
+    """One analytics actor."""
+
+    name: str
+    place: Place
+    nodes: tuple[NodeSpec, ...]
+
+
+@dataclass(frozen=True)
+class Dispatching:
+    """The dispatcher's actor, and the cloud's executor if there is one."""
+
+    scheduler: AnalyticsScheduler
+    managed: tuple[Managed, ...]
+    resources: Resources
+    cloud: Place | None
+    works: dict[str, Analytics[Any]]
+    """The managed analyses, by stream, for the cloud."""
+
+
+@dataclass(frozen=True)
+class FlightPlan:
+    """All actors of a run, before they are placed."""
+
+    session: Session
+    drones: tuple[tuple[RobotSpec, ...], ...]
+    """One actor for each group."""
+    cameras: tuple[Cameras, ...]
+    analyses: tuple[Analyses, ...]
+    dispatch: Dispatching | None
+    conduct: Conduct
+    recorded: dict[str, int]
+    """Streams for the recorder and how many messages of each may wait; empty for none."""
+
+
+class _Planner:
+    """Reads one graph; each method answers one question about it."""
+
+    def __init__(
+        self,
+        session: Session,
+        graph: Graph,
+        compute: list[ComputeConfig],
+        scheduler: TrajectoryScheduler,
+        dispatch_with: AnalyticsScheduler | None,
+    ) -> None:
+        self.session = session
+        self.graph = graph
+        self.scheduler = scheduler
+        self.dispatch_with = dispatch_with
+        self.compute = {resource.id: resource for resource in compute}
+        named = {edge.robot for edge in graph.navigation}
+        self.robots = [r for r in session.environment.robots if r.id in named]
+        self.recorded = session.environment.recording.enabled
+        self._add_sensors()
+        self.steering = {name for edge in graph.navigation for name in _streams_of(edge)}
+
+    def _add_sensors(self) -> None:
+        """Sensors that the application does not read run all the same, cameras if recorded."""
+        for robot in self.robots:
+            for sensor in robot.sensors:
+                stream = f"{robot.id}/{sensor.id}"
+                wanted = self.recorded or sensor.type != "camera"
+                if wanted and stream not in self.graph.nodes:
+                    item = SENSOR_ITEMS[sensor.type]
+                    self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
+
+    def sensors(self) -> list[Node]:
+        return [node for node in self.graph.nodes.values() if node.kind == "sensor"]
+
+    def analyses(self) -> list[Node]:
+        return [node for node in self.graph.nodes.values() if node.kind != "sensor"]
+
+    def robot_of(self, node: Node) -> str:
+        return node.robot or self.robots[0].id
+
+    def state_of(self, node: Node) -> str:
+        return state_stream(self.robot_of(node))
+
+    def reaches_a_drone(self, stream: str, asked: frozenset[str] = frozenset()) -> bool:
+        """Tell whether what `stream` carries can change what a drone does.
+
+        By navigation, by a trigger's command, or by waking an analysis that can; `asked` are the
+        streams that the question came through.
+        """
+        if stream in self.steering:
+            return True
+        node = self.graph.nodes.get(stream)
+        triggers = node.triggers if node is not None else []
+        further = {trigger.target for trigger in triggers if trigger.method is None}
+        further |= {reader.id for reader in self.graph.downstream(stream)}
+        return any(trigger.method is not None for trigger in triggers) or any(
+            self.reaches_a_drone(one, asked | {stream}) for one in further - asked
+        )
+
+    def acknowledgements(self, stream: str) -> int:
+        return paths(self.graph, stream, self.steering, recorded=self.recorded)
+
+    def cameras(self) -> tuple[Cameras, ...]:
+        return tuple(
+            Cameras(node.id, node.work, self.state_of(node), self.reaches_a_drone(node.id))
+            for node in self.sensors()
+            if node.work.type == "camera"
+        )
+
+    def is_managed(self, node: Node) -> bool:
+        """The dispatcher manages the analyses of frames that want to be scheduled."""
+        if self.dispatch_with is None or not node.work.scheduled or not node.inputs:
+            return False
+        return all(self.graph.nodes[name].item is Frame for name in node.inputs)
+
+    def managed(self) -> list[Node]:
+        return [node for node in self.analyses() if self.is_managed(node)]
+
+    def dispatching(self) -> Dispatching | None:
+        nodes = self.managed()
+        if self.dispatch_with is None or not nodes:
+            return None
+        clouds = [resource for resource in self.compute.values() if resource.kind == "cloud"]
+        slots = sum(resource.executors for resource in clouds)
+        if self.session.lockstep:
+            # Simulated time stands still while an analysis runs, so there is nothing to offload.
+            clouds, slots = [], 0
+        return Dispatching(
+            scheduler=self.dispatch_with,
+            managed=tuple(
+                Managed(n.id, tuple(n.inputs), self.profile(n), self.acknowledgements(n.id) == 0)
+                for n in nodes
+            ),
+            resources=Resources(cloud_slots=slots),
+            cloud=Place(clouds[0].kind, clouds[0].node) if clouds else None,
+            works={node.id: node.work for node in nodes},
+        )
+
+    def profile(self, node: Node) -> Profile:
+        """The analysis' figures from the environment file, by its name without the robot."""
+        known = self.session.environment.schedulers.tasks
+        told = known.get(node.id.rpartition("/")[2], TaskConfig())
+        return Profile(
+            model=node.id,
+            benefit=told.benefit,
+            deadline=int(told.deadline * MILLISECOND),
+            edge_time=int(told.edge_time * MILLISECOND),
+            cloud_time=int(told.cloud_time * MILLISECOND),
+            edge_cost=told.edge_cost,
+            cloud_cost=told.cloud_cost,
+        )
+
+    def node_spec(self, node: Node) -> NodeSpec:
+        triggers = tuple(
+            TriggerSpec(
+                _trigger_stream(trigger.target, node),
+                _COMMANDS[trigger.method] if trigger.method else Wake(),
+                trigger.when,
+            )
+            for trigger in node.triggers
+        )
+        managed = self.is_managed(node)
+        wakers = [n for n in self.analyses() if any(t.target == node.id for t in n.triggers)]
+        return NodeSpec(
+            stream=done_stream(node.id) if managed else node.id,
+            work=node.work,
+            inputs={
+                name: self.depth(name) if self.session.lockstep else 1
+                for name in ([task_stream(node.id)] if managed else node.inputs)
+            },
+            robot=self.robot_of(node),
+            state=self.state_of(node),
+            external=node.kind == "external",
+            dormant=node.dormant,
+            triggers=triggers,
+            kind=self.place_of(node).kind,
+            acknowledges=self.acknowledgements(node.id) == 0 and not managed,
+            answers_always=managed,
+            wakes=tuple(_trigger_stream(node.id, waker) for waker in wakers),
+        )
+
+    def depth(self, stream: str) -> int:
+        """How many messages may wait for a reader of `stream` that wants them all."""
+        node = self.graph.nodes.get(stream.removesuffix(task_stream("")))
+        frames = stream.endswith(task_stream("")) or (node is not None and node.item is Frame)
+        return FRAME_DEPTH if frames else MESSAGE_DEPTH
+
+    def place_of(self, node: Node) -> Place:
+        if node.compute is None:
+            return Place()
+        resource = self.compute[node.compute]
+        # Under a dispatcher, an analysis has an executor on the edge wherever it is deployed.
+        return Place() if self.is_managed(node) else Place(resource.kind, resource.node)
+
+    def analyses_by_actor(self) -> tuple[Analyses, ...]:
+        shared: dict[Place, list[NodeSpec]] = {}
+        actors = []
+        for node in self.analyses():
+            if node.work.isolated:
+                name = f"analytics/{node.id}"
+                actors.append(Analyses(name, self.place_of(node), (self.node_spec(node),)))
+            else:
+                shared.setdefault(self.place_of(node), []).append(self.node_spec(node))
+        for place, nodes in shared.items():
+            name = f"analytics/{place.node or place.kind}"
+            actors.append(Analyses(name, place, tuple(nodes)))
+        return tuple(actors)
+
+    def robot_spec(self, robot: RobotConfig) -> RobotSpec:
+        edges = [edge for edge in self.graph.navigation if edge.robot == robot.id]
+        mine = [node for node in self.sensors() if node.robot == robot.id]
+        commanding = [f"{camera.stream}/commands" for camera in self.cameras() if camera.ends]
+        commanding += [
+            _trigger_stream(robot.id, node)
+            for node in self.analyses()
+            if any(trigger.target == robot.id for trigger in node.triggers)
+        ]
+        return RobotSpec(
+            robot=robot,
+            sensors=tuple(node.work for node in mine if node.work.type != "camera"),
+            navigation=tuple(dict.fromkeys(n for edge in edges for n in _streams_of(edge))),
+            commands=tuple(commanding),
+            requesters=tuple(
+                node.id
+                for node in self.analyses()
+                if isinstance(node.work, CommandingAnalytics) and self.robot_of(node) == robot.id
+            ),
+            initial=tuple(initial_commands(edges)),
+            scheduler=self.scheduler,
+        )
+
+    def conduct(self, specs: tuple[RobotSpec, ...], cameras: tuple[Cameras, ...]) -> Conduct:
+        rates = {camera.stream: camera.sensor.rate for camera in cameras}
+        for node in self.analyses():
+            if node.kind == "external":
+                rates[node.id] = node.work.rate
+        own = [
+            stream
+            for spec in specs
+            for stream in (
+                state_stream(spec.robot.id),
+                *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
+            )
+        ]
+        windows = {
+            source: 0 if self.reaches_a_drone(source) else size
+            for size, sources in ((_CAMERA_WINDOW, list(rates)), (_STATE_WINDOW, own))
+            for source in sources
+        }
+        readers = [
+            f"{ACKS}/{node.id}" for node in self.analyses() if not self.acknowledgements(node.id)
+        ]
+        if self.recorded:
+            readers.append(f"{ACKS}/recorder")
+        return Conduct(
+            rates=rates,
+            acknowledgements={source: self.acknowledgements(source) for source in windows},
+            windows=windows,
+            readers=tuple(readers),
+        )
+
+
+def make_plan(
+    session: Session,
+    graph: Graph,
+    compute: list[ComputeConfig],
+    scheduler: TrajectoryScheduler,
+    dispatch_with: AnalyticsScheduler | None = None,
+) -> FlightPlan:
+    """Decide which actors a graph becomes; raises GraphError if nothing flies.
+
+    With an analytics scheduler to `dispatch_with`, heavy analyses run when and where it says.
+    """
+    planner = _Planner(session, graph, compute, scheduler, dispatch_with)
+    if not planner.robots:
+        raise GraphError("no robot navigates: call drone.navigate(…) before start_mission()")
+    specs = tuple(planner.robot_spec(robot) for robot in planner.robots)
+    cameras = planner.cameras()
+    analyses = planner.analyses_by_actor()
+    streams = [stream for spec in specs for stream in Pilot.streams(spec)]
+    streams += [camera.stream for camera in cameras]
+    streams += [node.id for node in planner.analyses()]
+    dispatch = planner.dispatching()
+    if dispatch is not None:
+        streams.append(DECISIONS)
+    drones = (specs,) if session.lockstep else tuple((spec,) for spec in specs)
+    names = [f"drone/{'+'.join(spec.robot.id for spec in group)}" for group in drones]
+    names += [f"sensor/{camera.stream}" for camera in cameras]
+    names += [actor.name for actor in analyses]
+    names += ["dispatcher"] if dispatch is not None else []
+    streams += [f"alerts/{name}" for name in names]
+    return FlightPlan(
+        session=session,
+        drones=drones,
+        cameras=cameras,
+        analyses=analyses,
+        dispatch=dispatch,
+        conduct=planner.conduct(specs, cameras) if session.lockstep else Conduct(),
+        recorded={stream: planner.depth(stream) for stream in streams} if planner.recorded else {},
+    )
+
+
+def _streams_of(edge: NavigationEdge) -> list[str]:
+    names = [edge.navigation.stream.name] if edge.navigation.stream is not None else []
+    return [*names, edge.clear_on] if edge.clear_on else names
+
+
+def _trigger_stream(target: str, source: Node) -> str:
+    return f"{target}/commands/{source.id}"

@@ -1,0 +1,104 @@
+"""The sensor's actor: a camera becomes a stream of frames."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from aerodaas.actors._base import StreamActor, StreamCount
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
+from aerodaas.cameras.base import Camera, Picture
+from aerodaas.clock import host_time_ns
+from aerodaas.config import SensorConfig
+from aerodaas.data import Frame, Header
+from aerodaas.navigation.commands import End
+from aerodaas.plugins import load_plugin
+from aerodaas.status import Message
+from aerodaas.vehicle import VehicleState
+
+__all__ = ["SensorActor"]
+
+
+class SensorActor(StreamActor):
+    """Asks a camera for its newest picture at the sensor's rate and publishes it as a Frame."""
+
+    def __init__(
+        self, session: Session, stream: str, sensor: SensorConfig, state: str, *, ends: bool
+    ) -> None:
+        """Publish `stream` from `sensor`, placed by the vehicle states of the stream `state`.
+
+        With `ends`, the mission is over once the camera has no more pictures.
+        """
+        depth = MESSAGE_DEPTH if session.lockstep else 1
+        super().__init__(session, f"sensor/{stream}", {state: depth})
+        self._stream = stream
+        self._sensor = sensor
+        self._ends = ends
+        self._ended = False
+        self._vehicle: VehicleState | None = None
+
+    def _open(self) -> None:
+        environment = self.session.environment
+        plugin = load_plugin("cameras", environment.camera_driver(self._sensor))
+        self._camera: Camera = plugin(self._sensor, environment)
+        self._camera.open()
+        self._frames = self.outlet(self._stream)
+        self._commands = self.outlet(f"{self._stream}/commands")
+
+    def _run(self) -> None:
+        assert self.inbox is not None  # noqa: S101 - prepare came first
+        if self.session.lockstep:
+            while not self.stopping:
+                for message in self.inbox.receive(0.5):
+                    self._take(message)
+                    if is_due(self._sensor.rate, message.stamp):
+                        self._capture(message.stamp, lockstep=True)
+            return
+        due = next_due(self._sensor.rate, self.clock.now())
+        while not self.stopping:
+            self.clock.sleep_until(due)
+            for message in self.inbox.receive(0.0):
+                self._take(message)
+            now = self.clock.now()
+            self._capture(now, lockstep=False)
+            due = next_due(self._sensor.rate, now)
+
+    def counts(self) -> dict[str, StreamCount]:
+        """Nothing: of the vehicle's states only the newest matters here, by intention."""
+        return {}
+
+    def _take(self, message: Message[Any]) -> None:
+        if isinstance(message.item, VehicleState):
+            self._vehicle = message.item
+
+    def _capture(self, stamp: int, *, lockstep: bool) -> None:
+        vehicle = self._vehicle
+        picture = self._camera.capture(stamp, vehicle.truth if vehicle else None)
+        taken = host_time_ns()
+        # Before the frame: in lockstep time may go on as soon as the frame has been worked through.
+        if self._camera.finished and self._ends and not self._ended:
+            self._ended = True
+            header = Header(0, stamp, self._stream)
+            self._commands.measure(End(f"{self._stream} has no more pictures"), header, taken)
+        if picture is not None:
+            # A live camera hands out a picture that is some milliseconds old already.
+            age = 0 if lockstep else max(0, stamp - picture.stamp)
+            header = Header(self._frames.sent, picture.stamp, self._stream)
+            frame = self._frame(header, picture)
+            self._frames.measure(frame, header, taken - int(self.session.host_seconds(age) * 1e9))
+        elif lockstep:
+            header = Header(self._frames.sent, stamp, self._stream)
+            self._frames.measure(None, header, taken)
+
+    def _frame(self, header: Header, picture: Picture) -> Frame:
+        odometry = picture.odometry
+        if odometry is None and self._vehicle is not None:
+            odometry = self._vehicle.odometry
+        return Frame(header, picture.image, self._camera.model, odometry)
+
+    def _close(self) -> None:
+        self._camera.close()
+
+    def _values(self) -> dict[str, Any]:
+        if self._phase == "new":
+            return {}
+        return {"skipped": self._camera.skipped, "finished": self._camera.finished}

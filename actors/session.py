@@ -1,0 +1,80 @@
+"""What every actor of one run knows."""
+
+from __future__ import annotations
+
+import uuid
+from dataclasses import dataclass, field, replace
+
+from aerodaas.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
+from aerodaas.config import EnvironmentConfig
+
+__all__ = [
+    "CONTROL_PERIOD_NS",
+    "FRAME_DEPTH",
+    "MESSAGE_DEPTH",
+    "Session",
+    "is_due",
+    "next_due",
+]
+
+FRAME_DEPTH = 8
+"""Frames that may wait for a reader that wants them all; each is megabytes of shared memory."""
+MESSAGE_DEPTH = 32
+"""Other messages that may wait for a reader that wants them all."""
+CONTROL_PERIOD_NS = NANOSECONDS // 20
+"""Period of the setpoint loop: 20 Hz, ten times what PX4 asks for in offboard mode."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """One run, sent by value to each of its actors."""
+
+    environment: EnvironmentConfig
+    speed: float | None = 1.0
+    """Mission seconds per wall second; None for lockstep."""
+    id: str = field(default_factory=lambda: f"aerodaas/{uuid.uuid4().hex[:12]}")
+    """Prefix of the run's stream names; unique on a host."""
+    origin_ns: int = field(default_factory=host_time_ns)
+    """Host time at which mission time is zero."""
+
+    def scope(self, node_id: str) -> str:
+        """Prefix of the run's stream names on one Ray node; two nodes may share a host."""
+        return f"{self.id}/{node_id[:12]}"
+
+    def starting_at(self, origin_ns: int) -> Session:
+        """The same run with mission time zero at this host time."""
+        return replace(self, origin_ns=origin_ns)
+
+    @property
+    def lockstep(self) -> bool:
+        """True where time moves only as fast as everyone follows."""
+        return self.speed is None
+
+    def clock(self) -> Clock:
+        """The mission clock of a process of this run."""
+        if self.speed is None:
+            return LockstepClock()
+        return ScaledClock(self.speed, self.origin_ns)
+
+    def host_seconds(self, mission_ns: int) -> float:
+        """How long this stretch of mission time takes on the wall."""
+        return mission_ns / NANOSECONDS / (self.speed or 1.0)
+
+
+def next_due(rate: float, after: int) -> int:
+    """The first stamp later than `after` at which something with `rate` Hz is due."""
+    index = int(after * rate / NANOSECONDS) + 1
+    while _stamp(rate, index - 1) > after:
+        index -= 1
+    while _stamp(rate, index) <= after:
+        index += 1
+    return _stamp(rate, index)
+
+
+def is_due(rate: float, stamp: int) -> bool:
+    """Tell whether `stamp` lies on the grid of something with `rate` Hz."""
+    return next_due(rate, stamp - 1) == stamp
+
+
+def _stamp(rate: float, index: int) -> int:
+    return int(index * NANOSECONDS / rate)

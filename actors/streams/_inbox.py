@@ -1,0 +1,119 @@
+"""The reading end: one inbox for all the streams that an actor reads."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Mapping
+from typing import Any
+
+from aerodaas.actors.streams._codec import decode
+from aerodaas.actors.streams._shared import (
+    MAX_DEPTH,
+    SharedSubscriber,
+    SharedWaiter,
+    shared_memory_available,
+)
+from aerodaas.status import Message
+
+__all__ = ["Inbox"]
+
+
+class Inbox:
+    """Reads several streams from one thread; another thread may `deliver` and `wake`.
+
+    Each stream keeps its newest `depth` messages. What was overwritten unread shows as a gap in
+    the messages' `seq` and is counted in `dropped`.
+    """
+
+    def __init__(self, scope: str, name: str, depths: Mapping[str, int]) -> None:
+        """Read the streams named in `depths`; `scope` is the prefix of their names on this node.
+
+        `name` is the reader's own, unique within the scope.
+        """
+        self.received: dict[str, int] = dict.fromkeys(depths, 0)
+        self.dropped: dict[str, int] = dict.fromkeys(depths, 0)
+        self._next: dict[str, int] = {}
+        self._delivered = {
+            stream: deque[Message[Any]](maxlen=depth) for stream, depth in depths.items()
+        }
+        self._called = threading.Condition()
+        self._calls = 0
+        self._subscribers: dict[str, SharedSubscriber] = {}
+        self._waiter: SharedWaiter | None = None
+        if shared_memory_available():
+            self._waiter = SharedWaiter(f"{scope}/inbox/{name}")
+            for stream, depth in depths.items():
+                subscriber = SharedSubscriber(f"{scope}/{stream}", min(depth, MAX_DEPTH))
+                self._waiter.attach(subscriber)
+                self._subscribers[stream] = subscriber
+
+    @property
+    def shared(self) -> bool:
+        """True where this inbox reads shared memory."""
+        return self._waiter is not None
+
+    def receive(self, timeout: float) -> list[Message[Any]]:
+        """Return what has arrived, in order within each stream; wait up to `timeout` seconds.
+
+        Returns early, perhaps empty-handed, when woken. Streams come in the order in which they
+        were named, whatever the order of arrival.
+        """
+        messages = self._collect()
+        if not messages and timeout > 0:
+            self._wait(timeout)
+            messages = self._collect()
+        return messages
+
+    def deliver(self, stream: str, data: bytes) -> None:
+        """Take a message that came from another node."""
+        message = decode(memoryview(data))
+        with self._called:
+            self._delivered[stream].append(message)
+        self.wake()
+
+    def wake(self) -> None:
+        """Let a waiting `receive` return."""
+        with self._called:
+            self._calls += 1
+            self._called.notify_all()
+        if self._waiter is not None:
+            self._waiter.wake()
+
+    def close(self) -> None:
+        """Leave all streams."""
+        for subscriber in self._subscribers.values():
+            subscriber.close()
+        if self._waiter is not None:
+            self._waiter.close()
+
+    def _wait(self, timeout: float) -> None:
+        if self._waiter is not None:
+            self._waiter.wait(timeout)
+            return
+        with self._called:
+            calls = self._calls
+            self._called.wait_for(
+                lambda: self._calls != calls or any(self._delivered.values()), timeout
+            )
+
+    def _collect(self) -> list[Message[Any]]:
+        messages: list[Message[Any]] = []
+        for stream, delivered in self._delivered.items():
+            start = len(messages)
+            subscriber = self._subscribers.get(stream)
+            if subscriber is not None:
+                while (message := subscriber.receive()) is not None:
+                    messages.append(message)
+            while delivered:
+                messages.append(delivered.popleft())
+            for message in messages[start:]:
+                self._count(message)
+        return messages
+
+    def _count(self, message: Message[Any]) -> None:
+        stream = message.stream
+        missing = message.seq - self._next.get(stream, message.seq)
+        self.dropped[stream] += max(0, missing)
+        self.received[stream] += 1
+        self._next[stream] = message.seq + 1

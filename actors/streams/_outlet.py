@@ -1,0 +1,70 @@
+"""The writing end of a stream."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import Any
+
+from aerodaas.actors.streams._codec import Encoded
+from aerodaas.actors.streams._remote import RemoteReader, send_to
+from aerodaas.actors.streams._shared import SharedPublisher, shared_memory_available
+from aerodaas.clock import host_time_ns
+from aerodaas.data import Header
+from aerodaas.status import Hop, Message
+
+__all__ = ["Outlet", "RemoteReader"]
+
+_LATENCIES_KEPT = 256
+
+
+class Outlet:
+    """Publishes one stream: in shared memory on this node, by reference to other nodes."""
+
+    def __init__(self, scope: str, stream: str) -> None:
+        """Open `stream` for writing; `scope` is the prefix of its name on this node."""
+        self.scope = scope
+        self.stream = stream
+        self.sent = 0
+        self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
+        """Milliseconds from capture to publishing, newest last."""
+        self.remote: list[RemoteReader] = []
+        self._shared = SharedPublisher(f"{scope}/{stream}") if shared_memory_available() else None
+
+    def measure(self, item: Any, header: Header, captured: int) -> Message[Any]:  # noqa: ANN401
+        """Publish a measurement: the first message of its way. `captured` is host time in ns."""
+        hop = Hop(self.stream, captured, host_time_ns())
+        return self._send(header.stamp, header, captured, (hop,), item)
+
+    def derive(
+        self,
+        item: Any,  # noqa: ANN401
+        origin: Message[Any],
+        received: int,
+        stamp: int,
+    ) -> Message[Any]:
+        """Publish what was made from `origin`, which arrived at host time `received`."""
+        hops = (*origin.hops, Hop(self.stream, received, host_time_ns()))
+        return self._send(stamp, origin.header, origin.captured, hops, item)
+
+    def _send(
+        self,
+        stamp: int,
+        header: Header,
+        captured: int,
+        hops: tuple[Hop, ...],
+        item: Any,  # noqa: ANN401
+    ) -> Message[Any]:
+        self.latencies.append((hops[-1].published - captured) / 1e6)
+        message = Message(self.stream, self.sent, stamp, header, captured, hops, item)
+        self.sent += 1
+        encoded = Encoded(message)
+        if self._shared is not None:
+            self._shared.send(encoded)
+        if self.remote:
+            send_to(self.remote, self.stream, encoded)
+        return message
+
+    def close(self) -> None:
+        """Leave the stream."""
+        if self._shared is not None:
+            self._shared.close()

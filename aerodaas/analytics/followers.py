@@ -1,0 +1,85 @@
+"""Followers of what the applications follow, with the sizes and distances that suit it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.follow import FollowAnalytics
+from aerodaas.data import Detections
+from aerodaas.interfaces import IEnvironment
+from aerodaas.waypoints import DEFAULT_PRIORITY
+
+__all__ = ["CarFollowAnalytics", "PersonFollowAnalytics", "VipFollowAnalytics"]
+
+
+class PersonFollowAnalytics(FollowAnalytics):
+    """Follows a whole person, 1.7 m tall."""
+
+
+class VipFollowAnalytics(FollowAnalytics):
+    """Follows a person by the hazard vest, from 2 m at a height of 1.5 m as in the paper.
+
+    A vest is about 0.65 m tall and 0.45 m wide, and is all in the picture at that distance.
+    """
+
+    def __init__(
+        self,
+        environment: IEnvironment | None = None,
+        *,
+        distance: float = 2.0,
+        height: float = 1.5,
+        labels: Sequence[str] = ("vest", "hazard vest"),
+        target_height: float = 0.65,
+        target_width: float = 0.45,
+        priority: int = DEFAULT_PRIORITY,
+        detector: Analytics[Detections] | None = None,
+    ) -> None:
+        """Follow from `distance`, flying at `height`, in metres.
+
+        The paper's listings pass the environment; the analysed stream knows its own.
+        """
+        del environment
+        super().__init__(
+            labels,
+            distance,
+            height,
+            target_height=target_height,
+            target_width=target_width,
+            priority=priority,
+            detector=detector,
+        )
+
+
+class CarFollowAnalytics(FollowAnalytics):
+    """Follows a car, 1.5 m tall, from 6 m at a height of 2.5 m, which has it all in the picture.
+
+    Its width is that of the rear: seen from the side a car then seems nearer, never farther.
+    """
+
+    def __init__(
+        self,
+        environment: IEnvironment | None = None,
+        *,
+        distance: float = 6.0,
+        height: float = 2.5,
+        labels: Sequence[str] = ("car",),
+        target_height: float = 1.5,
+        target_width: float = 1.8,
+        priority: int = DEFAULT_PRIORITY,
+        detector: Analytics[Detections] | None = None,
+    ) -> None:
+        """Follow from `distance`, flying at `height`, in metres.
+
+        The paper's listings pass the environment; the analysed stream knows its own.
+        """
+        del environment
+        super().__init__(
+            labels,
+            distance,
+            height,
+            target_height=target_height,
+            target_width=target_width,
+            priority=priority,
+            detector=detector,
+        )

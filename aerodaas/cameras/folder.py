@@ -1,0 +1,142 @@
+"""FolderCamera: a folder of pictures, played as if a camera took them."""
+
+from __future__ import annotations
+
+import logging
+import re
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.cameras.base import Picture
+from aerodaas.cameras.settings import camera_model, camera_settings, required_path
+from aerodaas.clock import seconds
+from aerodaas.config import EnvironmentConfig, SensorConfig
+from aerodaas.data import Odometry
+from aerodaas.errors import SourceError
+from aerodaas.geometry import CameraModel
+
+__all__ = ["FolderCamera"]
+
+_log = logging.getLogger(__name__)
+_KINDS = {".jpg", ".jpeg", ".png", ".bmp", ".webp"}
+
+
+class FolderCamera:
+    """Plays the pictures of a folder at the sensor's rate, in the order a person would count.
+
+    Settings: `path` of the folder, `loop`, and the lens and mount of `CameraConfig`. Which
+    picture is shown depends on the mission's stamps only. Grey, 16-bit and transparent pictures
+    become 8-bit BGR; their sizes may differ.
+    """
+
+    def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
+        """Check the settings of `sensor`; raises ConfigError."""
+        del environment
+        self._settings = camera_settings(sensor)
+        self._folder = Path(required_path(sensor, self._settings, "folder of pictures"))
+        self._rate = sensor.rate
+        self._files: list[Path] = []
+        self._broken: set[Path] = set()
+        self._model: CameraModel | None = None
+        self._start: int | None = None
+        self._played = -1
+
+    @property
+    def model(self) -> CameraModel | None:
+        """Calibration for the size of the newest picture; None before `open`."""
+        return self._model
+
+    @property
+    def finished(self) -> bool:
+        """True once the last picture was given; never for a folder that loops."""
+        return not self._settings.loop and self._played >= len(self._files) - 1
+
+    @property
+    def skipped(self) -> int:
+        """Files that hold no readable picture."""
+        return len(self._broken)
+
+    def open(self) -> None:
+        """List the pictures; raises SourceError if there is none that can be read."""
+        try:
+            files = [path for path in self._folder.iterdir() if path.suffix.lower() in _KINDS]
+        except OSError as error:
+            message = (
+                f"cannot read the folder of pictures {self._folder}: {error.strerror}; "
+                "give an existing folder as the sensor's path"
+            )
+            raise SourceError(message) from None
+        self._files = sorted(files, key=_natural)
+        if not self._files:
+            kinds = ", ".join(sorted(_KINDS))
+            message = f"the folder {self._folder} holds no pictures; put {kinds} files there"
+            raise SourceError(message)
+        pictures = (self._read(path) for path in self._files)
+        first = next((image for image in pictures if image is not None), None)
+        if first is None:
+            message = (
+                f"none of the {len(self._files)} pictures in {self._folder} can be read; "
+                "copy them again"
+            )
+            raise SourceError(message)
+        self._model = camera_model(self._settings, first.shape[1], first.shape[0])
+
+    def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
+        """Return the picture whose turn it is at `stamp`; None if it was given or is broken."""
+        del pose
+        if self._start is None:
+            self._start = stamp
+        # The nearest, so that a sensor whose clock jitters neither repeats nor leaves one out.
+        turn = round(seconds(stamp - self._start) * self._rate)
+        if turn <= self._played or self.finished:
+            return None
+        last = len(self._files) - 1
+        self._played = turn if self._settings.loop else min(turn, last)
+        path = self._files[self._played % len(self._files)]
+        image = self._read(path)
+        if image is None:
+            return None
+        self._model = camera_model(self._settings, image.shape[1], image.shape[0])
+        return Picture(image, stamp, path.name)
+
+    def close(self) -> None:
+        """Nothing is held open."""
+
+    def _read(self, path: Path) -> NDArray[np.uint8] | None:
+        image = _decode(path)
+        if image is None and path not in self._broken:
+            self._broken.add(path)
+            _log.warning("skipped %s: it is no readable picture", path)
+        return image
+
+
+def _natural(path: Path) -> list[tuple[int, str]]:
+    """Sort key under which frame_2 comes before frame_10."""
+    parts = re.split(r"(\d+)", path.name.lower())
+    return [(int(part), "") if part.isdigit() else (0, part) for part in parts]
+
+
+def _decode(path: Path) -> NDArray[np.uint8] | None:
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    if not content or _is_cut_short(content):
+        return None
+    try:
+        image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
+    except cv2.error:
+        return None
+    return None if image is None else np.asarray(image, np.uint8)
+
+
+def _is_cut_short(content: bytes) -> bool:
+    """Whether a JPEG lacks its end marker: OpenCV fills what is missing with grey, silently.
+
+    Only the second half counts, because a thumbnail ahead of the picture has a marker too.
+    """
+    is_jpeg = content.startswith(b"\xff\xd8")
+    return is_jpeg and content.rfind(b"\xff\xd9") < len(content) // 2

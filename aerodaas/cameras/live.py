@@ -1,0 +1,121 @@
+"""Frames of a live source: decoded in a thread of their own, only the newest is kept.
+
+A reader that asks less often than frames arrive would otherwise see frames that grow staler in
+the decoder's queue: seconds of it, as users of Wi-Fi drones report.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import threading
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.clock import host_time_ns
+from aerodaas.errors import SourceError
+
+__all__ = ["LiveSource"]
+
+_log = logging.getLogger(__name__)
+_FIRST_FRAME_TIMEOUT = 10.0
+_READ_TIMEOUT_MS = 3000
+_SHORTEST_WAIT = 0.5
+_LONGEST_WAIT = 8.0
+# FFmpeg otherwise gathers frames before it gives out the first.
+_LOW_LATENCY = "rtsp_transport;tcp|fflags;nobuffer|flags;low_delay"
+
+
+class LiveSource:
+    """The newest frame of a URL (rtsp, udp, http, …) or device (/dev/video0)."""
+
+    def __init__(self, address: str, *, timeout: float = _FIRST_FRAME_TIMEOUT) -> None:
+        """Watch `address`; `open` waits up to `timeout` seconds for the first frame."""
+        self._address = address
+        self._timeout = timeout
+        self._lock = threading.Lock()
+        self._arrived = threading.Event()
+        self._closing = threading.Event()
+        self._frame: tuple[NDArray[np.uint8], int] | None = None
+        self._thread: threading.Thread | None = None
+        self.finished = False
+        """Never true: a source that is silent is connected to again."""
+        self.skipped = 0
+        self.reconnections = 0
+
+    def open(self) -> NDArray[np.uint8]:
+        """Start decoding and return the first frame; raises SourceError if none comes."""
+        os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", _LOW_LATENCY)
+        self._thread = threading.Thread(target=self._decode, name="live-source", daemon=True)
+        self._thread.start()
+        if not self._arrived.wait(self._timeout):
+            self.close()
+            message = (
+                f"no picture from {self._address} within {self._timeout:g} s; check that it is "
+                "switched on and reachable, and that `ffplay` can show it"
+            )
+            raise SourceError(message)
+        with self._lock:
+            if self._frame is None:
+                message = f"{self._address} ended before its first picture"
+                raise SourceError(message)
+            return self._frame[0]
+
+    def newest(self, stamp: int) -> tuple[NDArray[np.uint8], int] | None:
+        """Return the newest frame not yet given and its stamp: `stamp` less the frame's age."""
+        with self._lock:
+            frame, self._frame = self._frame, None
+        if frame is None:
+            return None
+        image, grabbed = frame
+        return image, max(0, stamp - (host_time_ns() - grabbed))
+
+    def close(self) -> None:
+        """Stop decoding."""
+        self._closing.set()
+        if self._thread is not None:
+            self._thread.join(timeout=_READ_TIMEOUT_MS / 1000)
+
+    def _decode(self) -> None:
+        wait = _SHORTEST_WAIT
+        while not self._closing.is_set():
+            capture = _connect(self._address)
+            if self._drain(capture):
+                wait = _SHORTEST_WAIT
+            capture.release()
+            if self._closing.wait(wait):
+                return
+            self.reconnections += 1
+            _log.warning("%s is silent; connecting again", self._address)
+            wait = min(2 * wait, _LONGEST_WAIT)
+
+    def _drain(self, capture: cv2.VideoCapture) -> bool:
+        """Read frames until the source falls silent; tell whether there was any."""
+        any_frame = False
+        while not self._closing.is_set() and capture.grab():
+            grabbed = host_time_ns()
+            readable, image = capture.retrieve()
+            if not readable:
+                self.skipped += 1
+                continue
+            any_frame = True
+            with self._lock:
+                self._frame = (np.asarray(image, np.uint8), grabbed)
+            self._arrived.set()
+        return any_frame
+
+
+def _connect(address: str) -> cv2.VideoCapture:
+    device = address.removeprefix("/dev/video")
+    if device != address and device.isdigit():
+        return cv2.VideoCapture(int(device), cv2.CAP_V4L2)
+    timeouts: Sequence[int] = [
+        cv2.CAP_PROP_OPEN_TIMEOUT_MSEC,
+        _READ_TIMEOUT_MS,
+        cv2.CAP_PROP_READ_TIMEOUT_MSEC,
+        _READ_TIMEOUT_MS,
+    ]
+    return cv2.VideoCapture(address, cv2.CAP_FFMPEG, timeouts)

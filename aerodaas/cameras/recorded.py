@@ -1,0 +1,20 @@
+"""A camera that plays whatever was recorded: a folder of pictures, or a video file or URL."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from aerodaas.cameras.base import Camera
+from aerodaas.cameras.folder import FolderCamera
+from aerodaas.cameras.settings import camera_settings
+from aerodaas.cameras.video import VideoCamera
+from aerodaas.config import EnvironmentConfig, SensorConfig
+
+__all__ = ["recorded_camera"]
+
+
+def recorded_camera(sensor: SensorConfig, environment: EnvironmentConfig) -> Camera:
+    """Make the camera that fits the setting `path`; raises ConfigError for bad settings."""
+    path = camera_settings(sensor).path
+    kind = FolderCamera if path is None or Path(path).is_dir() else VideoCamera
+    return kind(sensor, environment)

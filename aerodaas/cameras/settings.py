@@ -1,0 +1,45 @@
+"""The settings that a camera's driver reads from its sensor's entry."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import ValidationError
+
+from aerodaas.config import CameraConfig, SensorConfig
+from aerodaas.errors import ConfigError
+from aerodaas.geometry import CameraModel
+
+__all__ = ["camera_model", "camera_settings", "required_path"]
+
+
+def camera_settings(sensor: SensorConfig) -> CameraConfig:
+    """Check the settings of `sensor`; raises ConfigError that names the sensor and the setting."""
+    try:
+        return CameraConfig.model_validate(sensor.settings)
+    except ValidationError as error:
+        problems = "; ".join(
+            f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}"
+            for problem in error.errors()
+        )
+        raise ConfigError(f"sensor {sensor.id}: settings: {problems}") from None
+
+
+def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> str:
+    """Return the path among the settings; raises ConfigError where it is missing."""
+    if not settings.path:
+        message = f'sensor {sensor.id}: settings: give the {what} as "path"'
+        raise ConfigError(message)
+    return settings.path
+
+
+def camera_model(settings: CameraConfig, width: int, height: int) -> CameraModel:
+    """Make the pinhole model of pictures of `width` x `height` pixels, with the mount's pose."""
+    return CameraModel.from_fov(
+        width,
+        height,
+        math.radians(settings.horizontal_fov),
+        mount=settings.mount,
+        pitch=math.radians(settings.pitch),
+        yaw=math.radians(settings.yaw),
+    )

@@ -1,0 +1,96 @@
+"""The simulated camera: looks at the simulated world from the vehicle's true pose."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from pydantic import ValidationError
+
+from aerodaas.cameras.base import Picture
+from aerodaas.clock import seconds
+from aerodaas.config import CameraConfig, EnvironmentConfig, SensorConfig
+from aerodaas.data import Odometry
+from aerodaas.errors import ConfigError, SourceError
+from aerodaas.geometry import CameraModel
+from aerodaas.simulation.world import World
+
+if TYPE_CHECKING:
+    from aerodaas.simulation.renderer import Renderer
+
+__all__ = ["SimulatedCamera"]
+
+
+class SimulatedCamera:
+    """A pinhole camera in the simulated world; implements `aerodaas.cameras.base.Camera`.
+
+    Raises ConfigError if the sensor's settings are not those of a `CameraConfig`, or if the
+    environment's world is broken.
+    """
+
+    def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
+        """Check the settings and load the world; the renderer starts in `open`."""
+        try:
+            config = CameraConfig.model_validate(sensor.settings)
+        except ValidationError as error:
+            raise ConfigError(_explain(sensor.id, error)) from None
+        self._name = sensor.id
+        self._world = World.load(environment.simulation)
+        self._model = CameraModel.from_fov(
+            config.width,
+            config.height,
+            math.radians(config.horizontal_fov),
+            mount=config.mount,
+            pitch=math.radians(config.pitch),
+            yaw=math.radians(config.yaw),
+        )
+        self._renderer: Renderer | None = None
+
+    @property
+    def model(self) -> CameraModel:
+        """Calibration and mount."""
+        return self._model
+
+    @property
+    def finished(self) -> bool:
+        """Never: a simulated camera goes on as long as it is asked."""
+        return False
+
+    @property
+    def skipped(self) -> int:
+        """None: every picture is good."""
+        return 0
+
+    def open(self) -> None:
+        """Start the renderer; raise SourceError if it cannot be had."""
+        if self._renderer is None:
+            # panda3d takes 0.2 s to import, which only a camera that is used should pay.
+            from aerodaas.simulation.renderer import Renderer  # noqa: PLC0415
+
+            self._renderer = Renderer(self._world, self._model)
+
+    def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
+        """Picture at mission time `stamp` (ns) from the true `pose`; None while that is unknown.
+
+        Raises SourceError if the camera is not open.
+        """
+        if self._renderer is None:
+            raise SourceError(f"{self._name} is not open; call open first")
+        if pose is None:
+            return None
+        return Picture(self._renderer.render(seconds(stamp), pose), stamp)
+
+    def close(self) -> None:
+        """Free the renderer."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+def _explain(name: str, error: ValidationError) -> str:
+    problems = "; ".join(
+        f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}"
+        for problem in error.errors()
+    )
+    known = ", ".join(sorted(CameraConfig.model_fields))
+    return f"settings of camera {name}: {problems} (a camera knows {known})"

@@ -1,0 +1,71 @@
+"""VideoCamera: a video file, a network stream or a camera plugged into this machine."""
+
+from __future__ import annotations
+
+import re
+
+from aerodaas.cameras.base import Picture
+from aerodaas.cameras.live import LiveSource
+from aerodaas.cameras.settings import camera_model, camera_settings, required_path
+from aerodaas.cameras.video_file import VideoFile
+from aerodaas.config import EnvironmentConfig, SensorConfig
+from aerodaas.data import Odometry
+from aerodaas.geometry import CameraModel
+
+__all__ = ["VideoCamera"]
+
+_LIVE = re.compile(r"^([a-z][a-z0-9+.\-]*://|/dev/video\d+$)", re.IGNORECASE)
+
+
+class VideoCamera:
+    """Plays a video file by the mission's stamps, or shows the newest frame of a live source.
+
+    Settings: `path` (a file, a URL such as `rtsp://…` or `udp://…`, or `/dev/video0`), `loop`
+    for files, and the lens and mount of `CameraConfig`.
+    """
+
+    def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
+        """Check the settings of `sensor`; raises ConfigError."""
+        del environment
+        self._settings = camera_settings(sensor)
+        self._address = required_path(sensor, self._settings, "video file, URL or device")
+        self._source: VideoFile | LiveSource = (
+            LiveSource(self._address)
+            if _LIVE.match(self._address)
+            else VideoFile(self._address, sensor.rate, loop=self._settings.loop)
+        )
+        self._model: CameraModel | None = None
+
+    @property
+    def model(self) -> CameraModel | None:
+        """Calibration for the size of the newest frame; None before `open`."""
+        return self._model
+
+    @property
+    def finished(self) -> bool:
+        """True at the end of a file that does not loop; never for a live source."""
+        return self._source.finished
+
+    @property
+    def skipped(self) -> int:
+        """Frames that could not be decoded."""
+        return self._source.skipped
+
+    def open(self) -> None:
+        """Open the source; raises SourceError if no frame can be had from it."""
+        first = self._source.open()
+        self._model = camera_model(self._settings, first.shape[1], first.shape[0])
+
+    def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
+        """Return the frame of mission time `stamp`; None if there is no new one."""
+        del pose
+        found = self._source.newest(stamp)
+        if found is None:
+            return None
+        image, taken = found
+        self._model = camera_model(self._settings, image.shape[1], image.shape[0])
+        return Picture(image, taken, self._address)
+
+    def close(self) -> None:
+        """Release the source."""
+        self._source.close()

@@ -1,0 +1,161 @@
+"""The command line: `aerodaas run`, `remote`, `lab`, `schema`, `doctor`, and for recordings."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+import traceback
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aerodaas import cli_remote
+from aerodaas.commands.export import export
+from aerodaas.commands.report import compare, report
+from aerodaas.errors import AeroDaaSError, ConfigError
+from aerodaas.options import RunOptions, current_options
+from aerodaas.overrides import parse_setting
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    help="""Program drones as a service.
+
+An application of some 20 lines becomes a dataflow of sensing, analytics and navigation, and
+flies a simulated drone, PX4, ArduPilot or a Tello.
+
+    aerodaas run apps/farm_survey.py --speed max
+""",
+)
+app.add_typer(cli_remote.app, name="remote")
+
+
+@app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+def run(
+    context: typer.Context,
+    application: Annotated[Path, typer.Argument(help="The application: a Python file.")],
+    env: Annotated[
+        Path | None, typer.Option(help="Environment file instead of the application's own.")
+    ] = None,
+    speed: Annotated[
+        str | None,
+        typer.Option(
+            help="Mission seconds per wall second, or `max`: as fast as the machine goes, "
+            "repeatable to the last digit. Default: `max` if every robot is simulated, else 1."
+        ),
+    ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(help="Where recording, plots and summary go. Default: a folder in runs/."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the simulation.")] = None,
+    address: Annotated[
+        str | None, typer.Option(help="Ray cluster to join. Default: RAY_ADDRESS, or none.")
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
+    ] = None,
+    view: Annotated[bool, typer.Option(help="Show the live view.")] = True,  # noqa: FBT002
+) -> None:
+    """Fly an application.
+
+    Words after `--` are the application's own.
+
+        aerodaas run apps/farm_survey.py
+        aerodaas run apps/farm_survey.py --speed 5 --seed 7 --record /tmp/farm
+        aerodaas run apps/farm_survey.py --set quadrotor_base.limits.cruise_speed=1
+        aerodaas run apps/watch_frames.py -- pictures/ yolov8n.onnx --rate 5
+    """
+    if not application.is_file():
+        raise ConfigError(f"there is no application {application}")
+    factor, lockstep = _speed(speed)
+    options = RunOptions(
+        environment=env,
+        speed=factor,
+        lockstep=lockstep,
+        seed=seed,
+        record=record,
+        address=address,
+        overrides=dict(parse_setting(text) for text in setting or ()),
+        view=view,
+        application=application.resolve(),
+    )
+    current_options.set(options)
+    sys.argv = [str(application), *context.args]
+    sys.path.insert(0, str(application.resolve().parent))
+    runpy.run_path(str(application), run_name="__main__")
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of environment files.
+
+    aerodaas schema > environment.schema.json
+    """
+    import json  # noqa: PLC0415 - only here
+
+    from aerodaas.config import EnvironmentConfig  # noqa: PLC0415
+
+    typer.echo(json.dumps(EnvironmentConfig.model_json_schema(by_alias=True), indent=2))
+
+
+@app.command()
+def doctor(
+    address: Annotated[str | None, typer.Option(help="Ray cluster to check, too.")] = None,
+) -> None:
+    """Say what this machine can do.
+
+    aerodaas doctor
+    """
+    from aerodaas.doctor import examine  # noqa: PLC0415 - only here
+
+    raise typer.Exit(0 if examine(address) else 1)
+
+
+app.command()(report)
+app.command()(compare)
+app.command()(export)
+
+
+def _speed(text: str | None) -> tuple[float | None, bool | None]:
+    if text is None:
+        return None, None
+    if text == "max":
+        return None, True
+    try:
+        factor = float(text)
+    except ValueError:
+        factor = 0.0
+    if not 0.0 < factor < float("inf"):
+        raise ConfigError(f'--speed takes a positive number or "max", not {text!r}')
+    return factor, False
+
+
+def main() -> None:
+    """Run the command line; errors become one message and an exit code."""
+    try:
+        app(standalone_mode=True)
+    except AeroDaaSError as error:
+        _say(str(error))
+        sys.exit(error.exit_code)
+    except KeyboardInterrupt:
+        _say("interrupted")
+        sys.exit(130)
+    except Exception as error:  # noqa: BLE001 - the application may raise anything
+        frames = [f for f in traceback.extract_tb(error.__traceback__) if "aerodaas" not in f.name]
+        place = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
+        _say(f"{place}{type(error).__name__}: {error}")
+        sys.exit(1)
+
+
+def _say(text: str) -> None:
+    from rich.console import Console  # noqa: PLC0415 - only when there is something to say
+    from rich.text import Text  # noqa: PLC0415
+
+    Console(stderr=True).print(Text("error: ", style="bold red") + Text(text), soft_wrap=True)

@@ -1,0 +1,233 @@
+"""The simulated drone behind the same protocol as the real ones.
+
+Its settings in the environment file are those of `aerodaas.simulation.airframe.Airframe`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import ValidationError
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.drivers.setpoints import require_finite
+from aerodaas.errors import ClockError, ConfigError, InvalidWaypointError, VehicleError
+from aerodaas.geometry import GeodeticOrigin
+from aerodaas.simulation.airframe import Airframe
+from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
+from aerodaas.simulation.dynamics import STEP, STEP_NS, Multirotor
+from aerodaas.simulation.noise import SensorNoise
+from aerodaas.simulation.wind import Wind
+from aerodaas.vehicle import (
+    Capabilities,
+    PositionSetpoint,
+    Setpoint,
+    VehicleMode,
+    VehicleState,
+    VelocitySetpoint,
+)
+
+__all__ = ["SimulatedVehicle"]
+
+
+class SimulatedVehicle:
+    """A quadrotor in the embedded simulator; implements `aerodaas.vehicle.SteppedVehicle`.
+
+    Time moves only in `advance_to`, on a fixed grid, so that the trajectory depends on the seed
+    and the commands alone, not on how the caller slices time. One thread at a time may use it.
+    Raises ConfigError if the robot's settings are not those of an `Airframe`.
+    """
+
+    def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
+        """Make the drone of `robot`, standing at its start."""
+        try:
+            airframe = Airframe.model_validate(robot.settings)
+        except ValidationError as error:
+            raise ConfigError(_explain(robot.id, error)) from None
+        limits, simulation, home = robot.limits, environment.simulation, environment.home
+        self._name = robot.id
+        self._airframe = airframe
+        self._origin = home and GeodeticOrigin(home.latitude, home.longitude, home.altitude)
+        self._limits = FlightLimits(
+            min(limits.max_speed, airframe.max_speed),
+            min(limits.max_climb, airframe.max_climb),
+            limits.max_acceleration,
+            min(limits.cruise_speed, limits.max_speed, airframe.max_speed),
+        )
+        self._max_yaw_rate = math.radians(limits.max_yaw_rate)
+        wind = Wind(simulation.wind, simulation.gust, f"{simulation.seed}/{robot.id}/wind", STEP)
+        self._rotor = Multirotor(
+            airframe,
+            wind,
+            max_acceleration=limits.max_acceleration,
+            max_yaw_rate=self._max_yaw_rate,
+            start=robot.start,
+            yaw=math.remainder(math.radians(robot.start_yaw), math.tau),
+        )
+        self._noise = SensorNoise(simulation.sensor_noise, f"{simulation.seed}/{robot.id}/noise")
+        self._autopilot = Autopilot(airframe, self._rotor, self._noise, self._limits)
+        self._now = 0
+        self._steps = 0
+        self._connected = False
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this driver offers."""
+        return Capabilities(
+            "simulated",
+            global_position=self._origin is not None,
+            max_speed=self._airframe.max_speed,
+            max_climb=self._airframe.max_climb,
+        )
+
+    def connect(self, timeout: float = 10.0) -> None:  # noqa: ARG002 - it is always there
+        """Connect, which always succeeds."""
+        self._connected = True
+
+    def close(self) -> None:
+        """Let go; a drone in the air lands by itself as time goes on."""
+        if self._connected and self._autopilot.flying:
+            self._autopilot.land()
+        self._connected = False
+
+    def advance_to(self, stamp: int) -> None:
+        """Simulate up to mission time `stamp` in ns; raise ClockError if that is in the past."""
+        if stamp < self._now:
+            raise ClockError(
+                f"{self._name}: simulated time cannot run backwards, "
+                f"from {self._now} to {stamp} ns; advance to later stamps only"
+            )
+        self._now = stamp
+        step = self._autopilot.step
+        for _ in range(stamp // STEP_NS - self._steps):
+            step()
+        self._steps = stamp // STEP_NS
+
+    def read(self) -> VehicleState:
+        """Return the state at the time last advanced to."""
+        self._require_connection()
+        motion = self._rotor.motion((self._now - self._steps * STEP_NS) / NANOSECONDS)
+        exact = SensorNoise(0.0, "").odometry(motion)
+        return VehicleState(
+            self._now,
+            self._noise.odometry(motion),
+            self._autopilot.battery.state,
+            self._autopilot.mode,
+            self._autopilot.armed,
+            self._noise.gps(motion, self._origin) if self._origin else None,
+            exact,
+            tuple(self._faults()),
+        )
+
+    def _faults(self) -> list[str]:
+        faults = []
+        if self._autopilot.crashed:
+            faults.append(f"crashed: hit the ground at {self._rotor.impact:.1f} m/s")
+        left, airframe = self._autopilot.battery.fraction, self._airframe
+        if left <= 0.0:
+            faults.append("the battery is empty")
+        elif left <= airframe.battery_failsafe:
+            faults.append(f"the battery is down to {left:.0%}; landing by itself")
+        elif left < airframe.battery_minimum:
+            faults.append(f"the battery is low: {left:.0%}")
+        return faults
+
+    def preflight(self) -> list[str]:
+        """Reasons for which a take-off would be refused now; empty when ready."""
+        reasons = []
+        if not self._connected:
+            reasons.append("not connected")
+        if self._autopilot.flying:
+            reasons.append(f"already {self._autopilot.mode.value.replace('_', ' ')}")
+        if self._autopilot.crashed:
+            reasons.append("crashed")
+        left, needed = self._autopilot.battery.fraction, self._airframe.battery_minimum
+        if left < needed:
+            reasons.append(f"the battery holds {left:.0%}, take-off needs {needed:.0%}")
+        return reasons
+
+    def take_off(self, height: float) -> None:
+        """Arm and climb to `height` metres; raise VehicleError if preflight has objections."""
+        if not (math.isfinite(height) and height > 0.0):
+            raise InvalidWaypointError(
+                f"{self._name}: the take-off height must be a positive number of metres, "
+                f"not {height!r}"
+            )
+        if reasons := self.preflight():
+            raise VehicleError(f"{self._name} refuses to take off: {'; '.join(reasons)}")
+        self._autopilot.take_off(height)
+
+    def send(self, setpoint: Setpoint) -> Setpoint:
+        """Send one setpoint and return it after clipping to the limits of the drone.
+
+        Raises InvalidWaypointError for numbers that are not finite, and VehicleError on the
+        ground, during take-off and when the drone's own protection has taken over.
+        """
+        require_finite(self._name, setpoint)
+        self._require_flight("follow a setpoint")
+        if self._autopilot.mode is VehicleMode.TAKING_OFF:
+            raise VehicleError(
+                f"{self._name} is still taking off; wait for {VehicleMode.HOLDING.value} "
+                "before sending setpoints"
+            )
+        if isinstance(setpoint, VelocitySetpoint):
+            return self._send_velocity(setpoint)
+        return self._send_position(setpoint)
+
+    def _send_velocity(self, setpoint: VelocitySetpoint) -> VelocitySetpoint:
+        x, y, z = (float(axis) for axis in setpoint.velocity)
+        across = math.hypot(x, y)
+        if across > self._limits.speed:
+            x, y = x * self._limits.speed / across, y * self._limits.speed / across
+        z = min(max(z, -self._limits.climb), self._limits.climb)
+        rate = min(max(float(setpoint.yaw_rate), -self._max_yaw_rate), self._max_yaw_rate)
+        self._autopilot.guide(Steer((x, y, z), rate))
+        return VelocitySetpoint(np.array([x, y, z]), rate)
+
+    def _send_position(self, setpoint: PositionSetpoint) -> PositionSetpoint:
+        x, y, z = (float(axis) for axis in setpoint.position)
+        z = max(z, self._rotor.ground)
+        wanted = self._limits.cruise if setpoint.speed is None else float(setpoint.speed)
+        speed = min(wanted, self._limits.speed)
+        yaw = setpoint.yaw
+        facing = self._rotor.yaw + self._noise.yaw_drift if yaw is None else float(yaw)
+        self._autopilot.guide(Goto((x, y, z), facing, speed))
+        return PositionSetpoint(np.array([x, y, z]), yaw, speed)
+
+    def hold(self) -> None:
+        """Stop and stay; raise VehicleError on the ground."""
+        self._require_flight("hold")
+        self._autopilot.hold()
+
+    def return_home(self) -> None:
+        """Return to the place of take-off and land there; raise VehicleError on the ground."""
+        self._require_flight("return home")
+        self._autopilot.return_home()
+
+    def land(self) -> None:
+        """Land here; does nothing on the ground."""
+        self._require_connection()
+        if self._autopilot.flying and self._autopilot.mode is not VehicleMode.FAILSAFE:
+            self._autopilot.land()
+
+    def _require_connection(self) -> None:
+        if not self._connected:
+            raise VehicleError(f"{self._name} is not connected; call connect first")
+
+    def _require_flight(self, deed: str) -> None:
+        self._require_connection()
+        if not self._autopilot.flying:
+            raise VehicleError(f"{self._name} cannot {deed} on the ground; take off first")
+        if self._autopilot.mode is VehicleMode.FAILSAFE:
+            raise VehicleError(f"{self._name} cannot {deed}: it is landing on its last charge")
+
+
+def _explain(name: str, error: ValidationError) -> str:
+    problems = "; ".join(
+        f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}"
+        for problem in error.errors()
+    )
+    known = ", ".join(sorted(Airframe.model_fields))
+    return f"settings of robot {name}: {problems} (the simulated drone knows {known})"

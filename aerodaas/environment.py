@@ -1,0 +1,282 @@
+"""Environment and Robot: the handles by which an application builds its graph and flies it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from aerodaas.config import ComputeConfig, EnvironmentConfig, RobotConfig
+from aerodaas.errors import ConfigError, GraphError, MissionError, UnknownIdError
+from aerodaas.graph import Graph, NavigationEdge
+from aerodaas.handles import Compute, Sensor
+from aerodaas.interfaces import IAeroData, IEnvironment, INavigate, IRobot, ISensor
+from aerodaas.names import PaperNames
+from aerodaas.navigation.commands import AddNavigation, Command, End, Pause, Resume
+from aerodaas.options import current_options
+from aerodaas.overrides import overridden
+from aerodaas.plugins import load_plugin
+from aerodaas.run import Run
+from aerodaas.schedulers.analytics.base import AnalyticsScheduler
+from aerodaas.schedulers.analytics.registry import load_scheduler
+from aerodaas.schedulers.waypoint.base import NavigationEntry, TrajectoryScheduler
+from aerodaas.waypoints import AeroNavigation
+
+__all__ = ["Environment", "Robot"]
+
+
+class Environment(PaperNames, IEnvironment):
+    """Robots, sensors and compute resources of an environment file, and one application's graph.
+
+    A relative path is looked up beside the application's file, then in the working directory.
+    `overrides` lays settings over the file, by `id.setting`: `{"camera.rate": 5}`.
+    Raises ConfigError for a file that is missing or malformed.
+    """
+
+    def __init__(
+        self,
+        path: str | Path = "environment.json",
+        overrides: Mapping[str, Any] | None = None,
+    ) -> None:
+        options = current_options.get()
+        self.path = _find(options.environment or Path(path), options.application)
+        settings = {**(overrides or {}), **options.overrides}
+        if options.seed is not None:
+            settings["simulation.seed"] = options.seed
+        self.config: EnvironmentConfig = overridden(EnvironmentConfig.load(self.path), settings)
+        self.env_data = self.config.model_dump(by_alias=True)
+        """The environment file's content, for analyses that want it."""
+        self.graph = Graph()
+        self.run: Run | None = None
+        self._robots = {robot.id: Robot(self, robot) for robot in self.config.robots}
+        self._trajectory: TrajectoryScheduler | None = None
+        self._dispatch_with: AnalyticsScheduler | None = None
+        self._compute: list[ComputeConfig] | None = None
+
+    def has_env_sensors(self) -> bool:
+        """Return True if the environment has sensors."""
+        return bool(self.config.sensors)
+
+    def get_env_sensors(self) -> list[ISensor[Any]]:
+        """Return the sensors in the environment."""
+        return [Sensor(self.graph, sensor, None) for sensor in self.config.sensors]
+
+    def get_env_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
+        """Return the requested sensor; raises UnknownIdError."""
+        for sensor in self.config.sensors:
+            if sensor.id == sensor_id:
+                return Sensor(self.graph, sensor, None)
+        known = [sensor.id for sensor in self.config.sensors]
+        raise UnknownIdError("environment sensor", sensor_id, known)
+
+    def get_env_robots(self) -> list[IRobot]:
+        """Return all the robots available in the environment."""
+        return list(self._robots.values())
+
+    def get_robot_by_id(self, robot_id: str) -> Robot:
+        """Return the requested robot; raises UnknownIdError."""
+        if robot_id not in self._robots:
+            raise UnknownIdError("robot", robot_id, list(self._robots))
+        return self._robots[robot_id]
+
+    def is_robot_sensor_available(self, sensor_id: str) -> bool:
+        """Return True if a robot has the required onboard sensor."""
+        return any(s.id == sensor_id for robot in self.config.robots for s in robot.sensors)
+
+    def get_robot_sensors(self) -> list[ISensor[Any]]:
+        """Return the sensors of all robots in the environment."""
+        return [sensor for robot in self._robots.values() for sensor in robot.get_sensors()]
+
+    def get_compute_resources(self) -> list[Any]:
+        """Return all the compute resources available: of the file, or of the cluster if "auto"."""
+        return [Compute(self.graph, resource) for resource in self.compute()]
+
+    def get_compute_resource_by_id(self, compute_id: str) -> Compute:
+        """Return the requested compute resource; raises UnknownIdError."""
+        for resource in self.compute():
+            if resource.id == compute_id:
+                return Compute(self.graph, resource)
+        raise UnknownIdError("compute resource", compute_id, [one.id for one in self.compute()])
+
+    def set_trajectory_scheduler(self, scheduler: INavigate) -> None:
+        """Plug in the trajectory scheduler; raises ConfigError if it is none."""
+        if not isinstance(scheduler, TrajectoryScheduler):
+            kind = type(scheduler).__name__
+            raise ConfigError(f"a trajectory scheduler is a TrajectoryScheduler, not {kind}")
+        self._trajectory = scheduler
+
+    def set_analytics_scheduler(self, scheduler: Any) -> None:  # noqa: ANN401 - as the interface
+        """Plug in the analytics scheduler: a name, `module:Class`, or an instance.
+
+        Raises UnknownIdError or SchedulerError if it cannot be used.
+        """
+        self._dispatch_with = load_scheduler(scheduler)
+
+    def compute(self) -> list[ComputeConfig]:
+        """The compute resources; asks the cluster where the file says "auto"."""
+        if self._compute is None:
+            if self.config.compute == "auto":
+                from aerodaas.actors import cluster  # noqa: PLC0415 - ray only where it is needed
+
+                cluster.connect(current_options.get().address)
+                self._compute = cluster.discover()
+            else:
+                self._compute = list(self.config.compute)
+        return self._compute
+
+    def trajectory_scheduler(self) -> TrajectoryScheduler:
+        """The scheduler plugged in, or the one that the environment file names."""
+        if self._trajectory is None:
+            name = self.config.schedulers.trajectory
+            self.set_trajectory_scheduler(load_plugin("waypoint_schedulers", name)(self))
+        assert self._trajectory is not None  # noqa: S101 - set just now
+        return self._trajectory
+
+    def analytics_scheduler(self) -> AnalyticsScheduler | None:
+        """The scheduler plugged in, or the one that the environment file names, if any."""
+        if self._dispatch_with is None and self.config.schedulers.analytics is not None:
+            self._dispatch_with = load_scheduler(self.config.schedulers.analytics)
+        return self._dispatch_with
+
+    def navigation_added(self, entry: NavigationEntry) -> bool:
+        """Take navigation that a scheduler was given; False before the mission starts."""
+        if self.run is None:
+            return False
+        navigation = AddNavigation(
+            entry.navigation, entry.index, entry.deadline, clear_first=entry.clear_first
+        )
+        for robot in {edge.robot for edge in self.graph.navigation}:
+            self.command(robot, navigation)
+        return True
+
+    def command(self, robot: str, command: Command) -> None:
+        """Tell a flying robot something; raises MissionError if it does not fly or refuses."""
+        if self.run is None:
+            raise MissionError(f"{robot} is not flying: call start_mission(wait=False) first")
+        answer = self.run.command(robot, command)
+        if not answer.accepted:
+            raise MissionError(f"{robot}: {answer.text}")
+
+    def launch(self) -> Run:
+        """Start the mission of every robot that navigates; once."""
+        if self.run is None:
+            self._place_entries()
+            self.run = Run(self)
+            self.run.start()
+        return self.run
+
+    def _place_entries(self) -> None:
+        """Hand what was added to the scheduler to the robot that navigates."""
+        robots = list(dict.fromkeys(edge.robot for edge in self.graph.navigation))
+        for entry in self.trajectory_scheduler().entries:
+            stream = entry.navigation.stream
+            clear_on = stream.name if entry.clear_first and stream is not None else None
+            self.graph.navigation.extend(
+                NavigationEdge(robot, entry.navigation, entry.index, entry.deadline, clear_on)
+                for robot in robots
+            )
+
+
+class Robot(PaperNames, IRobot):
+    """One drone of an environment."""
+
+    def __init__(self, environment: Environment, config: RobotConfig) -> None:
+        self._environment = environment
+        self.config = config
+        self.robot_id = config.id
+        self._start_hooks: list[Callable[[], None]] = []
+        self._end_hooks: list[Callable[[], None]] = []
+
+    def has_sensors(self) -> bool:
+        """Return True if the robot has any onboard sensors."""
+        return bool(self.config.sensors)
+
+    def get_sensors(self) -> list[ISensor[Any]]:
+        """Return all the sensors on board."""
+        graph = self._environment.graph
+        return [Sensor(graph, sensor, self.robot_id) for sensor in self.config.sensors]
+
+    def get_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
+        """Return the requested sensor; raises UnknownIdError."""
+        for sensor in self.config.sensors:
+            if sensor.id == sensor_id:
+                return Sensor(self._environment.graph, sensor, self.robot_id)
+        known = [sensor.id for sensor in self.config.sensors]
+        raise UnknownIdError(f"sensor of {self.robot_id}", sensor_id, known)
+
+    def is_navigable(self) -> bool:
+        """Return True if the robot is navigable: its driver takes setpoints."""
+        capabilities = load_plugin("drivers", self.config.driver)(
+            self.config, self._environment.config
+        ).capabilities
+        return bool(capabilities.position_setpoints or capabilities.velocity_setpoints)
+
+    def navigate(self, data: IAeroData[Any]) -> None:
+        """Fly by this navigation: waypoints, or a stream of navigation.
+
+        Raises GraphError if `data` is neither.
+        """
+        navigation = data
+        if not isinstance(navigation, AeroNavigation):
+            navigation = self._environment.trajectory_scheduler().generate_navigation(data)
+        stream = navigation.stream
+        if stream is not None and not issubclass(stream.item, AeroNavigation):
+            raise GraphError(
+                f"{self.robot_id} cannot navigate by {stream.name}, which carries "
+                f"{stream.item.__name__}; put a follow analysis between"
+            )
+        if stream is not None and stream.graph is not self._environment.graph:
+            raise GraphError(f"{stream.name} belongs to another Environment than {self.robot_id}")
+        self._environment.graph.navigation.append(NavigationEdge(self.robot_id, navigation))
+
+    def start_mission(self, hook: Callable[[], None] | None = None, *, wait: bool = True) -> None:
+        """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
+
+        With `wait=False`, return as soon as it flies. Raises the project's errors; whatever
+        happens, the drone is landed and the recording closed first.
+        """
+        for each in [*self._start_hooks, *([hook] if hook else [])]:
+            each()
+        run = self._environment.launch()
+        run.on_end.extend(self._end_hooks)
+        if wait:
+            run.wait()
+
+    def end_mission(self) -> None:
+        """End the mission: land here; the hooks of `on_end` run once it is over."""
+        self._environment.command(self.robot_id, End())
+
+    def pause_mission(self) -> None:
+        """Pause the ongoing mission by putting the drone in hover mode."""
+        self._environment.command(self.robot_id, Pause())
+
+    def resume_mission(self) -> None:
+        """Resume the ongoing mission."""
+        self._environment.command(self.robot_id, Resume())
+
+    def wait(self) -> None:
+        """Return when the mission has ended; raises what it ended with."""
+        self._environment.launch().wait()
+
+    def on_start(self, hook: Callable[[], None]) -> Callable[[], None]:
+        """Register a hook to run before take-off; usable as a decorator."""
+        self._start_hooks.append(hook)
+        return hook
+
+    def on_end(self, hook: Callable[[], None]) -> Callable[[], None]:
+        """Register a hook to run after the mission has ended; usable as a decorator."""
+        self._end_hooks.append(hook)
+        return hook
+
+
+def _find(path: Path, application: Path | None) -> Path:
+    if path.is_absolute():
+        return path
+    main = getattr(sys.modules.get("__main__"), "__file__", None)
+    beside = application or (Path(main) if main else None)
+    candidates = [beside.parent / path] if beside is not None else []
+    for candidate in [*candidates, path]:
+        if candidate.exists():
+            return candidate
+    return path

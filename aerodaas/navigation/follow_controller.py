@@ -1,0 +1,229 @@
+"""From sightings of a target to velocity commands: pure, on the mission's stamps alone.
+
+The drone turns to face the target and moves along the line of sight to keep its distance, by
+PID. Where odometry is known, the target's own velocity is fed forward, so that a walking person
+is followed without lag: along the line of sight to the speed, across it to the turn. The drone
+so flies where its camera looks and comes to stand behind the target, as in pure pursuit. A
+target out of sight is followed where it should be for a moment; then the drone slows down,
+holds, turns in search, and gives up.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from simple_pid import PID
+
+from aerodaas.clock import seconds
+from aerodaas.data import Odometry
+from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
+from aerodaas.navigation.sighting import Sighting
+from aerodaas.navigation.target_motion import TargetMotion
+from aerodaas.waypoints import DEFAULT_PRIORITY, VelocityCommand
+
+__all__ = ["FollowController", "FollowPhase", "Observation"]
+
+_LONGEST_STEP = 0.5
+"""Seconds; after a longer silence the integrals would grow by what nobody saw."""
+_FIRST_STEP = 0.1
+_FARTHEST = 1000.0
+"""Metres; no camera tells a person from farther away."""
+_FARTHEST_FROM_HOME = 1e5
+_INTEGRAL_REACH = 1.2
+"""Metres; a person who walks at 1 m/s is followed so far behind by the proportional part alone."""
+
+
+class FollowPhase(str, enum.Enum):
+    """What the controller is doing about its target."""
+
+    WAITING = "waiting"
+    """No target was ever seen, or it was given up: there is nothing to command."""
+    FOLLOWING = "following"
+    SLOWING = "slowing"
+    HOLDING = "holding"
+    SEARCHING = "searching"
+
+
+@dataclass(frozen=True, slots=True)
+class Observation:
+    """What one frame tells: the target or None, and the drone then and now."""
+
+    stamp: int
+    """Nanoseconds of mission time at capture."""
+    sighting: Sighting | None
+    at_capture: Odometry | None = None
+    now: Odometry | None = None
+    now_stamp: int | None = None
+
+
+class FollowController:
+    """Keeps `distance` metres from the target and, where odometry is known, `height` metres up."""
+
+    def __init__(
+        self,
+        distance: float,
+        height: float,
+        *,
+        gains: FollowGains | None = None,
+        limits: FollowLimits | None = None,
+        lost: LostPolicy | None = None,
+        priority: int = DEFAULT_PRIORITY,
+    ) -> None:
+        """Wait for a first sighting. Distances in metres, both above zero."""
+        self.distance = distance
+        self.height = height
+        self.gains = gains or FollowGains()
+        self.limits = limits or FollowLimits()
+        self.lost = lost or LostPolicy()
+        self.priority = priority
+        self.phase = FollowPhase.WAITING
+        self.motion = TargetMotion()
+        limits = self.limits
+        self._distance_pid = _pid(self.gains.distance, -limits.backward, limits.forward)
+        self._yaw_pid = _pid(self.gains.yaw, -limits.yaw_rate, limits.yaw_rate)
+        self._velocity: NDArray[np.float64] = np.zeros(3)
+        self._yaw_rate = 0.0
+        self._stamp: int | None = None
+        self._seen: int | None = None
+        self._last: Sighting | None = None
+
+    def step(self, seen: Observation) -> VelocityCommand | None:
+        """Command for one frame; None while there is no target and for stamps that run back."""
+        if self._stamp is not None and seen.stamp <= self._stamp:
+            return None
+        dt = _FIRST_STEP if self._stamp is None else seconds(seen.stamp - self._stamp)
+        self._stamp = seen.stamp
+        seen = _without_nonsense(seen)
+        if seen.sighting is not None:
+            self._take_in(seen.sighting, seen)
+        self.phase = self._next_phase(seen.stamp)
+        if self.phase is FollowPhase.WAITING:
+            self._forget()
+            return None
+        velocity, yaw_rate = self._wanted(seen, min(dt, _LONGEST_STEP))
+        return self._command(velocity, yaw_rate, seen, min(dt, _LONGEST_STEP))
+
+    def _take_in(self, sighting: Sighting, seen: Observation) -> None:
+        self._seen, self._last = seen.stamp, sighting
+        if seen.at_capture is not None and not sighting.bound:
+            self.motion.observe(sighting, seen.at_capture, seen.stamp)
+
+    def _next_phase(self, stamp: int) -> FollowPhase:
+        if self._seen is None:
+            return FollowPhase.WAITING
+        unseen = seconds(stamp - self._seen)
+        phases = (
+            (self.lost.coast, FollowPhase.FOLLOWING),
+            (self.lost.slow, FollowPhase.SLOWING),
+            (self.lost.hold, FollowPhase.HOLDING),
+            (self.lost.search, FollowPhase.SEARCHING),
+        )
+        return next((phase for until, phase in phases if unseen <= until), FollowPhase.WAITING)
+
+    def _forget(self) -> None:
+        self._seen = self._last = None
+        self._velocity, self._yaw_rate = np.zeros(3), 0.0
+        self._reset()
+
+    def _reset(self) -> None:
+        self.motion.reset()
+        self._distance_pid.reset()
+        self._yaw_pid.reset()
+
+    def _wanted(self, seen: Observation, dt: float) -> tuple[NDArray[np.float64], float]:
+        """Velocity (forward, left) in m/s and yaw rate in rad/s that the phase asks for."""
+        if self.phase is FollowPhase.FOLLOWING:
+            return self._follow(seen, dt)
+        if self.phase is FollowPhase.SLOWING:
+            unseen = seconds(seen.stamp - (self._seen or 0))
+            left = (self.lost.slow - unseen) / (self.lost.slow - self.lost.coast)
+            velocity, yaw_rate = self._follow(seen, dt)
+            return velocity * left, yaw_rate * left
+        self._reset()
+        if self.phase is FollowPhase.SEARCHING and self._last is not None:
+            return np.zeros(2), math.copysign(self.lost.search_rate, self._last.bearing)
+        return np.zeros(2), 0.0
+
+    def _follow(self, seen: Observation, dt: float) -> tuple[NDArray[np.float64], float]:
+        target, away, left = self._target(seen)
+        distance = max(target.distance, self.limits.nearest * self.distance)
+        yaw_rate = float(self._yaw_pid(-target.bearing, dt=dt) or 0.0) + left / distance
+        error = target.distance - self.distance
+        # Far away the integral would only wind up and carry the drone past its place.
+        self._distance_pid.Ki = self.gains.distance[1] if abs(error) < _INTEGRAL_REACH else 0.0
+        speed = float(self._distance_pid(-error, dt=dt) or 0.0) + away
+        too_near = target.bound or target.distance < self.limits.nearest * self.distance
+        if too_near and speed > 0:
+            self._distance_pid.reset()
+            speed = 0.0
+        return speed * np.array([math.cos(target.bearing), math.sin(target.bearing)]), yaw_rate
+
+    def _target(self, seen: Observation) -> tuple[Sighting, float, float]:
+        """The target as it should be now, and how fast it moves away and to the left."""
+        last = self._last or Sighting(0.0, self.distance)
+        now = seen.now or seen.at_capture
+        stamp = max(seen.stamp, seen.now_stamp or 0) if seen.now else seen.stamp
+        predicted = None
+        if now is not None and not last.bound:
+            predicted = self.motion.relative_to(now, stamp)
+        return predicted or (last, 0.0, 0.0)
+
+    def _command(
+        self, velocity: NDArray[np.float64], yaw_rate: float, seen: Observation, dt: float
+    ) -> VelocityCommand:
+        """Clip to the limits of speed, then to those of acceleration."""
+        limits = self.limits
+        odometry = seen.now or seen.at_capture
+        climb = 0.0
+        if odometry is not None:
+            climb = self.gains.height * (self.height - odometry.height)
+        speed = float(np.hypot(*velocity))
+        fastest = limits.forward if velocity[0] >= 0 else limits.backward
+        if speed > fastest:
+            velocity = velocity * fastest / speed
+        wanted = np.array([*velocity, _clip(climb, limits.climb)])
+        change = wanted - self._velocity
+        largest = limits.acceleration * dt
+        if (size := float(np.linalg.norm(change))) > largest:
+            change = change * largest / size
+        turn = _clip(yaw_rate, limits.yaw_rate) - self._yaw_rate
+        self._velocity = self._velocity + change
+        self._yaw_rate += _clip(turn, limits.yaw_acceleration * dt)
+        if not np.isfinite([*self._velocity, self._yaw_rate]).all():
+            self._velocity, self._yaw_rate = np.zeros(3), 0.0
+            self._reset()
+        forward, left, up = self._velocity.tolist()
+        return VelocityCommand(forward, left, up, self._yaw_rate, priority=self.priority)
+
+
+def _pid(gains: tuple[float, float, float], low: float, high: float) -> PID:
+    """A PID that stops integrating at the limits of its output (clamping anti-windup)."""
+    return PID(*gains, setpoint=0.0, sample_time=None, output_limits=(low, high))
+
+
+def _without_nonsense(seen: Observation) -> Observation:
+    """Leave out what holds a number that cannot be: it counts as not observed."""
+    sighting = seen.sighting
+    if sighting is not None and not (
+        abs(sighting.bearing) <= math.pi and 0.0 <= sighting.distance <= _FARTHEST
+    ):
+        sighting = None
+    at_capture = seen.at_capture if _is_sane(seen.at_capture) else None
+    now = seen.now if _is_sane(seen.now) else None
+    return replace(seen, sighting=sighting, at_capture=at_capture, now=now)
+
+
+def _is_sane(odometry: Odometry | None) -> bool:
+    return (
+        odometry is not None
+        and bool((np.abs(odometry.position) <= _FARTHEST_FROM_HOME).all())
+        and math.isfinite(odometry.yaw)
+    )
+
+
+def _clip(value: float, limit: float) -> float:
+    return min(max(value, -limit), limit)

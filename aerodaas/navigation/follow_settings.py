@@ -1,0 +1,59 @@
+"""What can be tuned about following, with the reason for each default."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+__all__ = ["FollowGains", "FollowLimits", "LostPolicy"]
+
+
+@dataclass(frozen=True, slots=True)
+class FollowGains:
+    """Proportional, integral and derivative gains.
+
+    With a frame every 0.2 s and 0.2 s from capture to command, gains above about 2 per second
+    start to swing.
+    """
+
+    distance: tuple[float, float, float] = (0.9, 0.15, 0.0)
+    """m/s for each metre, metre second and m/s."""
+    yaw: tuple[float, float, float] = (1.5, 0.1, 0.0)
+    """rad/s for each radian, radian second and rad/s."""
+    height: float = 1.0
+    """m/s for each metre."""
+
+
+@dataclass(frozen=True, slots=True)
+class FollowLimits:
+    """What a command never exceeds, near people."""
+
+    forward: float = 1.5
+    """m/s towards the target."""
+    backward: float = 1.0
+    """m/s away from it: nothing looks where the drone goes then."""
+    climb: float = 0.5
+    """m/s up or down."""
+    yaw_rate: float = 1.2
+    """rad/s."""
+    acceleration: float = 1.5
+    """m/s^2 of the commanded velocity."""
+    yaw_acceleration: float = 4.0
+    """rad/s^2 of the commanded yaw rate."""
+    nearest: float = 0.6
+    """Part of the wanted distance within which the drone never moves towards the target."""
+
+
+@dataclass(frozen=True, slots=True)
+class LostPolicy:
+    """What happens after the target went out of sight; each time in seconds from then."""
+
+    coast: float = 0.4
+    """Until here it is followed where it should be: a detector misses now and then."""
+    slow: float = 1.4
+    """Until here the drone slows down to a stop."""
+    hold: float = 3.0
+    """Until here it waits for the same target; from here on, another may take its place."""
+    search: float = 18.0
+    """Until here it turns in search, at 0.5 rad/s more than once around; then it gives up."""
+    search_rate: float = 0.5
+    """rad/s."""

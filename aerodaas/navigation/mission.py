@@ -1,0 +1,472 @@
+"""The mission of one drone: commands and vehicle states in, one action per turn out.
+
+A mission is pure: it reads no clock, never sleeps and starts no thread, so that it can be flown by
+the drone's actor, in a test or in a study with the same result. What it cannot do at once, plans,
+it asks of a `Planner`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from aerodaas.clock import seconds
+from aerodaas.config import RobotConfig
+from aerodaas.data import Alert
+from aerodaas.geometry import GeodeticOrigin, Vector, body_to_enu
+from aerodaas.navigation.actions import Action, Fly, Hold, Land, Return, TakeOff, Wait
+from aerodaas.navigation.commands import (
+    AddNavigation,
+    Answer,
+    ClearNavigation,
+    CloseStream,
+    Command,
+    End,
+    OpenStream,
+    Pause,
+    Resume,
+    ReturnHome,
+    Start,
+    StreamItem,
+)
+from aerodaas.navigation.control import stopping_point
+from aerodaas.navigation.detour import Detour
+from aerodaas.navigation.energy import EnergyMeter, EnergyModel
+from aerodaas.navigation.geofence import Geofence
+from aerodaas.navigation.intake import DONE, Intake
+from aerodaas.navigation.leg import Leg, LegPhase, setpoint_towards
+from aerodaas.navigation.log import MissionLog
+from aerodaas.navigation.navigator import LiveCommand, Navigator
+from aerodaas.navigation.planner import Planner
+from aerodaas.navigation.queue import Stop
+from aerodaas.navigation.state_machine import TERMINAL, MissionStateMachine
+from aerodaas.navigation.supervisor import CALM, Demand, Supervisor, has_position
+from aerodaas.schedulers.waypoint.base import Situation
+from aerodaas.status import MissionState, MissionStatus
+from aerodaas.vehicle import VehicleMode, VehicleState, VelocitySetpoint
+
+__all__ = ["Mission"]
+
+_ON_GROUND = frozenset({MissionState.IDLE, MissionState.PREFLIGHT})
+_LEAVING = frozenset({MissionState.RETURNING, MissionState.LANDING})
+_SETTLED = frozenset({VehicleMode.HOLDING, VehicleMode.GUIDED})
+
+
+class Mission:
+    """One flight, from the ground to the ground.
+
+    The drone's actor turns the crank 20 times a second::
+
+        action = mission.update(vehicle.read(), clock.now())
+
+    and carries the action out (`aerodaas.navigation.loop.SetpointLoop` does both). Commands may be
+    handled between turns, by the same thread.
+    """
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        planner: Planner,
+        *,
+        takeoff: Vector,
+        origin: GeodeticOrigin | None = None,
+        wind: Vector | None = None,
+    ) -> None:
+        """Plan with `planner` for a drone that stands at `takeoff`, ENU metres.
+
+        `origin` pins global waypoints; `wind` (ENU m/s) is for the energy model. Raises ConfigError
+        for a geofence that is none.
+        """
+        self.limits = limits = robot.limits
+        self.fence = Geofence(limits.geofence)
+        self.home = takeoff.astype(np.float64)
+        self._options = robot.mission
+        self._machine = MissionStateMachine()
+        self._log = MissionLog(f"{robot.id}/mission")
+        self._meter = EnergyMeter(
+            EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
+        )
+        self._supervisor = Supervisor(limits, self.home, self.fence, self._meter)
+        self._navigator = Navigator(
+            planner,
+            self.fence,
+            home=self.home,
+            max_range=limits.max_range,
+            origin=origin,
+            command_timeout=limits.command_timeout,
+            resume_after=robot.mission.resume_after,
+        )
+        self._detour = Detour(self.fence, limits.arrival_radius)
+        self._intake = Intake(self._navigator, self._log)
+        self._assessment = CALM
+        self._plan_fault = ""
+        self._paused = False
+        self._last: VehicleState | None = None
+        self._now = 0
+        self._turned_at = 0
+        self._elapsed = 0.0
+        self._leg: Leg | None = None
+        self._anchor: Vector | None = None
+        """Where the drone holds."""
+        self._return_height: float | None = None
+
+    @property
+    def state(self) -> MissionState:
+        """The present state."""
+        return self._machine.state
+
+    @property
+    def finished(self) -> bool:
+        """Whether the mission is over, completed or not."""
+        return self.state in TERMINAL
+
+    @property
+    def alerts(self) -> Sequence[Alert]:
+        """Everything that people should be told, oldest first; it only grows."""
+        return self._log.alerts
+
+    @property
+    def status(self) -> MissionStatus:
+        """Everything that the mission says about itself."""
+        stops = list(self._navigator.queue)
+        served = bool(stops) and self._leg is not None and self._leg.stop is stops[0]
+        waypoints = tuple(stop.waypoint for stop in stops)
+        texts = [finding.text for finding in self._assessment.findings]
+        return MissionStatus(
+            self._now,
+            self.state,
+            self._machine.reason,
+            waypoints[0] if served else None,
+            waypoints[1:] if served else waypoints,
+            tuple(self._log.visited),
+            tuple(self._log.given_up),
+            self._log.distance,
+            tuple(text for text in (*texts, self._navigator.fault, self._plan_fault) if text),
+        )
+
+    def handle(self, command: Command, now: int) -> Answer:
+        """Obey `command` at `now` (mission clock, nanoseconds), or say why not; raises nothing."""
+        self._now = max(self._now, now)
+        if self.finished:
+            return Answer(accepted=False, text=f"the mission is over: {self.state.value}")
+        match command:
+            case AddNavigation() | StreamItem() if self.state in _LEAVING:
+                return Answer(accepted=False, text=f"the drone is {self.state.value} by now")
+            case AddNavigation() | StreamItem() | OpenStream() | CloseStream() | ClearNavigation():
+                return self._intake.handle(command, self._now)
+            case _:
+                return self._control(command)
+
+    def _control(self, command: Start | Pause | Resume | ReturnHome | End) -> Answer:
+        match command:
+            case Start():
+                return self._start()
+            case Pause():
+                return self._pause()
+            case Resume():
+                return self._resume()
+            case ReturnHome():
+                return self._leave(MissionState.RETURNING, command.reason)
+            case End():
+                return self._leave(MissionState.LANDING, command.reason)
+
+    def _start(self) -> Answer:
+        if self.state is not MissionState.IDLE:
+            return Answer(accepted=False, text="the mission has already been started")
+        self._to(MissionState.PREFLIGHT)
+        return DONE
+
+    def _pause(self) -> Answer:
+        if self.state in _LEAVING:
+            return Answer(accepted=False, text=f"a drone that is {self.state.value} goes on")
+        self._paused = True
+        return DONE
+
+    def _resume(self) -> Answer:
+        if not self._paused:
+            return Answer(accepted=False, text="the mission is not paused")
+        self._paused = False
+        self._intake.last_word = self._now
+        if self.state is MissionState.PAUSED:
+            self._to(MissionState.HOLDING, "resumed")
+        return DONE
+
+    def _leave(self, state: MissionState, reason: str) -> Answer:
+        if self.state in _ON_GROUND:
+            self._to(MissionState.ABORTED, f"{reason} before take-off")
+        elif self.state is MissionState.LANDING and state is MissionState.RETURNING:
+            return Answer(accepted=False, text="the drone is already landing")
+        else:
+            self._to(state, reason)
+        return DONE
+
+    def update(self, state: VehicleState, now: int, objections: Sequence[str] = ()) -> Action:
+        """Take one turn of the loop and return what to do.
+
+        `objections` are the vehicle's own reasons against a take-off (`Vehicle.preflight`); they
+        matter in the PREFLIGHT state only.
+        """
+        self._observe(state, now)
+        if self.state is MissionState.IDLE or self.finished:
+            return Wait()
+        if self.state is MissionState.PREFLIGHT:
+            return self._preflight(state, objections)
+        self._protect(state)
+        turns = {
+            MissionState.TAKING_OFF: self._take_off,
+            MissionState.PAUSED: self._hover,
+            MissionState.RETURNING: self._return,
+            MissionState.LANDING: self._land,
+            MissionState.ABORTED: self._release,
+        }
+        return turns.get(self.state, self._fly)(state)
+
+    def vehicle_refused(self, text: str) -> None:
+        """Take note that the vehicle did not carry out an action, in its own words."""
+        if self.state is MissionState.TAKING_OFF:
+            self._to(MissionState.ABORTED, f"the vehicle refused to take off: {text}")
+        self._log.alert(self._now, "refused", text)
+
+    def _observe(self, state: VehicleState, now: int) -> None:
+        self._elapsed = seconds(now - self._turned_at) if self._last is not None else 0.0
+        self._now = self._turned_at = now
+        last, self._last = self._last, state
+        on_ground = state.mode is VehicleMode.GROUNDED or not has_position(state)
+        if last is None or on_ground or not has_position(last):
+            return
+        self._log.fly(state.odometry.position)
+        self._meter.observe(
+            state.battery.fraction, state.odometry.velocity, seconds(state.stamp - last.stamp)
+        )
+
+    def _preflight(self, state: VehicleState, objections: Sequence[str]) -> Action:
+        self._plan(state)
+        reasons = self._supervisor.objections(state)
+        waits = self._intake.is_fed or self._options.on_complete == "hold"
+        if not (waits or len(self._navigator.queue)):
+            refused = "; ".join(self._log.given_up.values())
+            reasons.append(f"there is nothing to fly{': ' if refused else ''}{refused}")
+        waited = seconds(self._now - self._machine.since)
+        if not reasons and objections and waited >= self.limits.preflight_timeout:
+            reasons = list(objections)
+        if reasons:
+            self._to(MissionState.ABORTED, f"take-off refused: {'; '.join(reasons)}")
+            self._log.alert(self._now, "takeoff_refused", self._machine.reason)
+        elif objections:
+            self._to(MissionState.PREFLIGHT, f"not ready: {'; '.join(objections)}")
+        else:
+            self._to(MissionState.TAKING_OFF)
+            return TakeOff(self.limits.takeoff_height)
+        return Wait()
+
+    def _protect(self, state: VehicleState) -> None:
+        before = {finding.kind for finding in self._assessment.findings}
+        self._assessment = self._supervisor.assess(state, self._now)
+        for finding in self._assessment.findings:
+            if finding.kind not in before:
+                self._log.alert(self._now, finding.kind, finding.text)
+        demand, reason = self._assessment.demand, self._assessment.gravest.text
+        if demand is Demand.RELEASE:
+            self._to(MissionState.ABORTED, reason)
+        elif demand is Demand.LAND and self.state is not MissionState.LANDING:
+            self._to(MissionState.LANDING, reason)
+        elif demand is Demand.RETURN and self.state not in _LEAVING:
+            self._to(MissionState.RETURNING, reason)
+
+    def _take_off(self, state: VehicleState) -> Action:
+        self._plan(state)
+        tolerance = max(self.limits.arrival_radius, 0.1 * self.limits.takeoff_height)
+        height = state.odometry.height - float(self.home[2])
+        if state.mode in _SETTLED and height >= self.limits.takeoff_height - tolerance:
+            self._to(MissionState.HOLDING)
+            self._intake.last_word = self._now
+            return self._fly(state)
+        if seconds(self._now - self._machine.since) > self.limits.takeoff_timeout:
+            self._to(MissionState.LANDING, "the take-off took too long")
+            return Land()
+        return TakeOff(self.limits.takeoff_height)
+
+    def _fly(self, state: VehicleState) -> Action:
+        if self._paused:
+            self._to(MissionState.PAUSED)
+            return self._hover(state)
+        if self._assessment.demand is Demand.HOLD:
+            self._to(MissionState.HOLDING, self._assessment.gravest.text)
+            return self._hover(state)
+        self._plan(state)
+        served = self._navigator.served(self._now)
+        if isinstance(served, Stop):
+            return self._serve(served, state)
+        self._leg = None
+        if served is not None:
+            return self._follow(served, state)
+        return self._idle(state)
+
+    def _serve(self, stop: Stop, state: VehicleState) -> Action:
+        if self._awaits_plan(stop):
+            self._to(MissionState.HOLDING, "waiting for a plan")
+            return self._hover(state)
+        diverted = MissionState.DIVERTED if self._navigator.queue.interrupted else None
+        if self._leg is None or self._leg.stop is not stop:
+            self._navigator.queue.leave_place()
+            self._leg = Leg(
+                stop, self._now, self.limits.arrival_radius, self._options.stall_timeout
+            )
+            self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
+        position = state.odometry.position
+        phase = self._leg.advance(state.odometry, self._now, self._elapsed)
+        place = self._detour.towards(stop.waypoint.position, position)
+        if place is None or phase in {LegPhase.DONE, LegPhase.STALLED}:
+            self._finish(stop, phase)
+            return self._fly(state)
+        if phase is LegPhase.HOVERING:
+            self._to(diverted or MissionState.LOITERING, f"at {stop.id}")
+        else:
+            self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
+        self._anchor = None
+        return Fly(self._leg.setpoint(place, position, self.limits.cruise_speed), stop.cause)
+
+    def _awaits_plan(self, stop: Stop) -> bool:
+        """Whether to hold for the plan that is being made, rather than set out for `stop`."""
+        if not self._navigator.waits_for_plan or stop.under_way:
+            return False
+        waited = seconds(self._now - self._machine.since)
+        return self.state is not MissionState.HOLDING or waited < self._options.plan_timeout
+
+    def _finish(self, stop: Stop, phase: LegPhase) -> None:
+        if phase is LegPhase.DONE:
+            self._log.visited.append(stop.id)
+        else:
+            stalled = phase is LegPhase.STALLED
+            why = (
+                "the drone comes no nearer" if stalled else "no way inside the geofence leads there"
+            )
+            reason = f"{stop.id} cannot be reached: {why}"
+            self._log.give_up(self._now, stop.id, reason)
+        self._navigator.finish(stop)
+
+    def _follow(self, live: LiveCommand, state: VehicleState) -> Action:
+        waiting = len(self._navigator.queue) > 0
+        if self._now >= live.expires:
+            self._to(MissionState.DIVERTED if waiting else MissionState.HOLDING, "no fresh command")
+            return self._hover(state)
+        self._to(MissionState.DIVERTED if waiting else MissionState.FOLLOWING, "following commands")
+        self._anchor = None
+        command = live.command
+        velocity = body_to_enu(command.velocity, state.odometry.yaw)
+        return Fly(VelocitySetpoint(velocity, command.yaw_rate), live.cause)
+
+    def _idle(self, state: VehicleState) -> Action:
+        options, limits = self._options, self.limits
+        if self._intake.is_fed:
+            quiet = seconds(self._now - self._intake.last_word)
+            if quiet <= limits.command_timeout + limits.silence_return:
+                self._to(MissionState.HOLDING, "waiting for navigation")
+                return self._hover(state)
+            self._to(MissionState.RETURNING, f"navigation has been silent for {quiet:.0f} s")
+            return self._return(state)
+        if options.on_complete == "hold":
+            self._to(MissionState.HOLDING, "all waypoints are visited")
+            return self._hover(state)
+        if options.on_complete == "land":
+            self._to(MissionState.LANDING, "all waypoints are visited")
+            return Land()
+        self._to(MissionState.RETURNING, "all waypoints are visited")
+        return self._return(state)
+
+    def _hover(self, state: VehicleState) -> Action:
+        self._leg = None
+        if not has_position(state):
+            return Hold(None)
+        if self._anchor is None:
+            odometry = state.odometry
+            self._anchor = stopping_point(
+                odometry.position, odometry.velocity, self.limits.max_acceleration
+            )
+        return Hold(self._anchor)
+
+    def _return(self, state: VehicleState) -> Action:
+        self._leg = None
+        if self._assessment.demand in {Demand.HOLD, Demand.RETURN} and (
+            state.mode is VehicleMode.LOST or not has_position(state)
+        ):
+            return Return()
+        if state.mode is VehicleMode.GROUNDED:
+            self._to(MissionState.LANDED, self._machine.reason)
+            return Wait()
+        position = state.odometry.position
+        if self._return_height is None:
+            lowest = float(self.home[2]) + self.limits.takeoff_height
+            self._return_height = max(float(position[2]), lowest)
+        above = np.array([self.home[0], self.home[1], self._return_height])
+        way = above - position
+        late = seconds(self._now - self._machine.since) > self.limits.return_timeout
+        if late or math.hypot(way[0], way[1]) <= self.limits.arrival_radius:
+            reason = self._machine.reason
+            self._to(
+                MissionState.LANDING, f"the return took too long; {reason}" if late else reason
+            )
+            return Land()
+        place = self._detour.towards(above, position)
+        if place is None:
+            self._to(MissionState.LANDING, "no way inside the geofence leads home")
+            return Land()
+        return Fly(setpoint_towards(place, position, None, self.limits.cruise_speed))
+
+    def _land(self, state: VehicleState) -> Action:
+        self._leg = None
+        if state.mode is VehicleMode.GROUNDED and not state.armed:
+            self._to(MissionState.LANDED, self._machine.reason)
+            return Wait()
+        waited = seconds(self._now - self._machine.since)
+        if state.mode is VehicleMode.LOST and waited > self.limits.return_timeout:
+            self._to(MissionState.ABORTED, "the vehicle is lost")
+            return Wait()
+        return Land()
+
+    @staticmethod
+    def _release(_: VehicleState) -> Action:
+        return Wait()
+
+    def _plan(self, state: VehicleState) -> None:
+        if not has_position(state):
+            return
+        limits = self.limits
+        situation = Situation(
+            seconds(self._now),
+            state.odometry.position,
+            self.home,
+            state.battery.fraction,
+            limits.cruise_speed,
+            energy=self._meter.model,
+            reserve=limits.battery_land,
+        )
+        fault = self._navigator.fault
+        plan = self._navigator.plan(situation)
+        if plan is None:
+            return
+        for waypoint_id in plan:
+            self._log.give_up(
+                self._now, waypoint_id, f"the scheduler left {waypoint_id} out of its plan"
+            )
+        if self._navigator.fault and self._navigator.fault != fault:
+            self._log.alert(self._now, "scheduler", self._navigator.fault)
+        self._check_energy(situation)
+
+    def _check_energy(self, situation: Situation) -> None:
+        route = [stop.waypoint for stop in self._navigator.queue]
+        needed = self._meter.route(situation.position, route, self.home, situation.speed)
+        available = situation.battery - situation.reserve
+        before, self._plan_fault = self._plan_fault, ""
+        if route and needed > available:
+            self._plan_fault = (
+                f"the plan and the way home need {needed:.0%} of a battery, and {available:.0%} "
+                "is there to spend: the drone will return before the plan is done"
+            )
+            if not before:
+                self._log.alert(self._now, "unreachable_plan", self._plan_fault)
+
+    def _to(self, state: MissionState, reason: str = "") -> None:
+        self._machine.to(state, self._now, reason)

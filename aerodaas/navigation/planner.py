@@ -1,0 +1,164 @@
+"""Planning beside the setpoint loop: a plan may take its time, a setpoint may not.
+
+The mission submits requests and polls for plans. `InlinePlanner` answers at once, so that runs in
+lockstep are deterministic; `BackgroundPlanner` plans on an executor while the drone flies on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Protocol
+
+from aerodaas.schedulers.waypoint.base import Situation, TrajectoryScheduler
+from aerodaas.waypoints import Waypoint
+
+__all__ = ["BackgroundPlanner", "InlinePlanner", "Plan", "PlanRequest", "Planner", "solve"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PlanRequest:
+    """The waypoints of one priority that may be reordered, and what is known."""
+
+    epoch: int
+    """Of the queue; a plan made before the queue was emptied is void."""
+    level: int
+    """The priority."""
+    pending: tuple[Waypoint, ...]
+    situation: Situation
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Plan:
+    """An answer to a request."""
+
+    request: PlanRequest
+    order: tuple[Waypoint, ...]
+    fault: str = ""
+    """Why the scheduler was of no use and the order given was kept."""
+
+
+class Planner(Protocol):
+    """Where a mission has its plans made."""
+
+    @property
+    def replans_on_arrival(self) -> bool:
+        """Whether the scheduler wants to be asked again after each arrival."""
+        ...
+
+    def submit(self, request: PlanRequest) -> None:
+        """Have a plan made; a newer request replaces one that waits."""
+        ...
+
+    def poll(self) -> Plan | None:
+        """Return a plan that is ready and was not returned yet; never blocks."""
+        ...
+
+
+def solve(scheduler: TrajectoryScheduler, request: PlanRequest) -> Plan:
+    """Ask the scheduler; whatever it does wrong becomes a fault, never an exception.
+
+    A scheduler is a plug-in that runs in flight: one that fails must not take the drone with it.
+    """
+    try:
+        answer = scheduler.plan(request.pending, request.situation)
+        order, fault = tuple(answer), _objection(request.pending, answer)
+    except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
+        order, fault = request.pending, f"{type(error).__name__}: {error}"
+    if fault:
+        return Plan(request, request.pending, f"{type(scheduler).__name__} failed: {fault}")
+    return Plan(request, order)
+
+
+def _objection(pending: Sequence[Waypoint], order: Sequence[Waypoint]) -> str:
+    known = {waypoint.id for waypoint in pending}
+    answered = [waypoint.id for waypoint in order]
+    if len(set(answered)) < len(answered):
+        return "its plan visits a waypoint twice"
+    unknown = sorted(set(answered) - known)
+    return f"its plan visits {', '.join(unknown)}, which nobody asked for" if unknown else ""
+
+
+class InlinePlanner:
+    """Plans while `submit` is called."""
+
+    def __init__(self, scheduler: TrajectoryScheduler) -> None:
+        """Plan with `scheduler`."""
+        self._scheduler = scheduler
+        self._plan: Plan | None = None
+
+    @property
+    def replans_on_arrival(self) -> bool:
+        """Whether the scheduler wants to be asked again after each arrival."""
+        return self._scheduler.replans_on_arrival
+
+    def submit(self, request: PlanRequest) -> None:
+        """Plan now."""
+        self._plan = solve(self._scheduler, request)
+
+    def poll(self) -> Plan | None:
+        """Return the plan made last, once."""
+        plan, self._plan = self._plan, None
+        return plan
+
+
+class BackgroundPlanner:
+    """Plans on an executor, one request at a time; of those that wait, the newest is kept.
+
+    A process keeps the setpoint loop free of the interpreter lock that long plans hold; the
+    scheduler is sent there with each request and so must pickle. Without an executor, a thread is
+    used, which suits schedulers that answer within milliseconds.
+    """
+
+    def __init__(self, scheduler: TrajectoryScheduler, executor: Executor | None = None) -> None:
+        """Plan with `scheduler` on `executor`, which stays the caller's to shut down."""
+        self._scheduler = scheduler
+        self._own = ThreadPoolExecutor(1, "planner") if executor is None else None
+        self._executor = executor or self._own
+        self._running: Future[Plan] | None = None
+        self._request: PlanRequest | None = None
+        self._waiting: PlanRequest | None = None
+
+    @property
+    def replans_on_arrival(self) -> bool:
+        """Whether the scheduler wants to be asked again after each arrival."""
+        return self._scheduler.replans_on_arrival
+
+    def submit(self, request: PlanRequest) -> None:
+        """Plan as soon as the plan being made is done."""
+        self._waiting = request
+        if self._running is None:
+            self._start()
+
+    def poll(self) -> Plan | None:
+        """Return the plan that is ready, and start on the request that waits."""
+        running, request = self._running, self._request
+        if running is None or request is None or not running.done():
+            return None
+        self._running = None
+        error = running.exception()
+        plan = (
+            running.result()
+            if error is None
+            else Plan(request, request.pending, f"planning failed: {error}")
+        )
+        if self._waiting is not None:
+            self._start()
+        return plan
+
+    def close(self) -> None:
+        """Let go of the planner's own thread; a plan being made is not waited for."""
+        if self._own is not None:
+            self._own.shutdown(wait=False, cancel_futures=True)
+
+    def _start(self) -> None:
+        request, self._waiting = self._waiting, None
+        if request is None or self._executor is None:
+            return
+        self._request = request
+        try:
+            self._running = self._executor.submit(solve, self._scheduler, request)
+        except RuntimeError as error:  # the executor is shut down or its process has died
+            self._running = Future()
+            self._running.set_exception(error)

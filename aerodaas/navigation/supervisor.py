@@ -1,0 +1,176 @@
+"""What the drone's condition demands, whatever the application wants."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerodaas.clock import seconds
+from aerodaas.config import LimitsConfig
+from aerodaas.geometry import Vector
+from aerodaas.navigation.energy import EnergyMeter
+from aerodaas.navigation.geofence import Geofence
+from aerodaas.vehicle import VehicleMode, VehicleState
+
+__all__ = ["CALM", "Assessment", "Demand", "Finding", "Supervisor", "has_position"]
+
+
+class Demand(enum.IntEnum):
+    """What must be done now, the gravest last."""
+
+    NOTHING = 0
+    HOLD = 1
+    """Stand still: the drone is out of touch, perhaps for a moment only."""
+    RETURN = 2
+    LAND = 3
+    RELEASE = 4
+    """Send nothing any more: a pilot or the vehicle's own protection flies."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing to complain about."""
+
+    demand: Demand
+    kind: str
+    """Short machine-readable name, such as `battery_low`."""
+    text: str
+    """One sentence for a person."""
+
+
+@dataclass(frozen=True, slots=True)
+class Assessment:
+    """What must be done, and everything there is to complain about."""
+
+    gravest: Finding
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def demand(self) -> Demand:
+        """What must be done now."""
+        return self.gravest.demand
+
+
+CALM = Assessment(Finding(Demand.NOTHING, "", ""))
+"""Nothing to complain about."""
+
+
+class Supervisor:
+    """Watches battery, link, position and mode of one vehicle in flight."""
+
+    _STALE = 1.0
+    """Age in seconds at which a vehicle's state no longer tells where it is."""
+
+    def __init__(
+        self, limits: LimitsConfig, home: Vector, fence: Geofence, meter: EnergyMeter
+    ) -> None:
+        """Watch a vehicle that took off at `home` (ENU metres)."""
+        self._limits = limits
+        self._home = home
+        self._fence = fence
+        self._meter = meter
+        self._out_of_touch_since: int | None = None
+
+    def assess(self, state: VehicleState, now: int) -> Assessment:
+        """Judge `state`, read at `now` (mission clock, nanoseconds)."""
+        checks = (
+            self._mode(state),
+            self._touch(state, now),
+            self._battery(state),
+            self._place(state),
+        )
+        findings = [finding for finding in checks if finding is not None]
+        findings += [Finding(Demand.NOTHING, "vehicle", text) for text in state.faults]
+        if not findings:
+            return CALM
+        return Assessment(max(findings, key=lambda finding: finding.demand), tuple(findings))
+
+    def objections(self, state: VehicleState) -> list[str]:
+        """Reasons against taking off now that will not go away by waiting."""
+        limits, fence = self._limits, self._fence
+        reasons: list[str] = []
+        if state.mode is not VehicleMode.GROUNDED:
+            reasons.append(f"the vehicle is {state.mode.value}, not on the ground")
+        charge = state.battery.fraction
+        if math.isfinite(charge) and charge <= limits.battery_return:
+            reasons.append(
+                f"the battery is at {charge:.0%}, and the drone returns at "
+                f"{limits.battery_return:.0%}: charge it"
+            )
+        if not has_position(state):
+            return [*reasons, "the vehicle does not know its position"]
+        position = state.odometry.position
+        if not fence.inside(position):
+            reasons.append(f"the drone stands outside its geofence, at {_place(position)}")
+        height = float(position[2]) + limits.takeoff_height
+        if not fence.floor <= height <= fence.ceiling:
+            reasons.append(
+                f"taking off to {height:g} m leaves the geofence's heights of "
+                f"{fence.floor:g} to {fence.ceiling:g} m"
+            )
+        return reasons
+
+    def _mode(self, state: VehicleState) -> Finding | None:
+        if state.mode is VehicleMode.MANUAL:
+            return Finding(Demand.RELEASE, "pilot", "a pilot has taken over")
+        if state.mode is VehicleMode.FAILSAFE:
+            text = "the vehicle's own protection has taken over"
+            return Finding(Demand.RELEASE, "failsafe", text)
+        return None
+
+    def _touch(self, state: VehicleState, now: int) -> Finding | None:
+        lost = state.mode is VehicleMode.LOST or seconds(now - state.stamp) > self._STALE
+        if not lost and has_position(state):
+            self._out_of_touch_since = None
+            return None
+        if self._out_of_touch_since is None:
+            self._out_of_touch_since = now
+        duration = seconds(now - self._out_of_touch_since)
+        kind = "link_lost" if lost else "no_position"
+        what = "no word from the vehicle" if lost else "the vehicle does not know its position"
+        if duration < self._limits.link_timeout:
+            return Finding(Demand.HOLD, kind, what)
+        grave = Demand.RETURN if lost else Demand.LAND
+        return Finding(grave, kind, f"{what} for {duration:.0f} s")
+
+    def _battery(self, state: VehicleState) -> Finding | None:
+        limits, charge = self._limits, state.battery.fraction
+        if not math.isfinite(charge):
+            return Finding(Demand.NOTHING, "battery_unknown", "the battery's charge is not known")
+        if charge <= limits.battery_land:
+            text = f"the battery is critical at {charge:.0%}"
+            return Finding(Demand.LAND, "battery_critical", text)
+        if charge <= limits.battery_return:
+            return Finding(Demand.RETURN, "battery_low", f"the battery is low at {charge:.0%}")
+        if not has_position(state):
+            return None
+        position = state.odometry.position
+        needed = self._meter.way_home(position, self._home, limits.cruise_speed)
+        if charge <= needed + limits.battery_land:
+            text = f"the way home needs {needed:.0%} of the battery's {charge:.0%}"
+            return Finding(Demand.RETURN, "battery_low", text)
+        return None
+
+    def _place(self, state: VehicleState) -> Finding | None:
+        position = state.odometry.position
+        if has_position(state) and not self._fence.inside(position):
+            text = f"the drone is outside its geofence, at {_place(position)}"
+            return Finding(Demand.NOTHING, "geofence", text)
+        return None
+
+
+def has_position(state: VehicleState) -> bool:
+    """Tell whether the vehicle knows where it is and how it moves."""
+    odometry = state.odometry
+    return bool(
+        np.isfinite(odometry.position).all()
+        and np.isfinite(odometry.velocity).all()
+        and math.isfinite(odometry.yaw)
+    )
+
+
+def _place(position: Vector) -> str:
+    return f"({position[0]:.1f}, {position[1]:.1f}, {position[2]:.1f}) m"

@@ -1,0 +1,93 @@
+"""Where the target is on the ground and how it moves: a Kalman filter at constant velocity.
+
+It works in the local ENU frame, so that the drone's own motion does not pass for the target's,
+and bridges the time between a frame's capture and the command that it leads to.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.clock import seconds
+from aerodaas.data import Odometry
+from aerodaas.navigation.sighting import Sighting
+
+__all__ = ["TargetMotion"]
+
+_RANGE_NOISE, _SIDE_NOISE = 0.06, 0.02
+"""Standard deviations along and across the line of sight, in parts of the distance."""
+_LEAST_NOISE = 0.03
+_ACCELERATION = 0.7
+"""Standard deviation of a walking person's acceleration, m/s^2."""
+_NEAREST = 0.1
+_FIRST_SPEED = 0.7
+"""Standard deviation of a velocity not yet observed, m/s."""
+
+
+class TargetMotion:
+    """Position and velocity of the target, east and north."""
+
+    def __init__(self) -> None:
+        """Know nothing."""
+        self._state: NDArray[np.float64] | None = None
+        self._covariance: NDArray[np.float64] = np.zeros((4, 4))
+        self._stamp = 0
+
+    @property
+    def known(self) -> bool:
+        """Whether the target was ever observed since the last reset."""
+        return self._state is not None
+
+    def reset(self) -> None:
+        """Forget the target."""
+        self._state = None
+
+    def observe(self, sighting: Sighting, odometry: Odometry, stamp: int) -> None:
+        """Take in a sighting made at `stamp` from a drone at `odometry`."""
+        heading = odometry.yaw + sighting.bearing
+        along = np.array([math.cos(heading), math.sin(heading)])
+        across = np.array([-along[1], along[0]])
+        place = odometry.position[:2] + sighting.distance * along
+        range_sigma = max(_LEAST_NOISE, _RANGE_NOISE * sighting.distance)
+        side_sigma = max(_LEAST_NOISE, _SIDE_NOISE * sighting.distance)
+        noise = range_sigma**2 * np.outer(along, along) + side_sigma**2 * np.outer(across, across)
+        if self._state is None:
+            self._state = np.array([*place, 0.0, 0.0])
+            self._covariance = np.zeros((4, 4))
+            self._covariance[:2, :2] = noise
+            self._covariance[2:, 2:] = _FIRST_SPEED**2 * np.eye(2)
+        else:
+            self._advance(seconds(stamp - self._stamp))
+            gain = self._covariance[:, :2] @ np.linalg.inv(self._covariance[:2, :2] + noise)
+            self._state = self._state + gain @ (place - self._state[:2])
+            self._covariance = self._covariance - gain @ self._covariance[:2]
+        self._stamp = stamp
+
+    def relative_to(self, odometry: Odometry, stamp: int) -> tuple[Sighting, float, float] | None:
+        """Predict for `stamp` how the target is seen from `odometry`.
+
+        Returns the sighting and the target's velocity in m/s, away from the drone along the line
+        of sight and to the left across it. None before the first observation.
+        """
+        if self._state is None:
+            return None
+        velocity = self._state[2:]
+        place = self._state[:2] + velocity * seconds(stamp - self._stamp) - odometry.position[:2]
+        bearing = math.remainder(math.atan2(place[1], place[0]) - odometry.yaw, math.tau)
+        distance = float(np.hypot(*place))
+        along = place / max(distance, _NEAREST)
+        away = float(velocity @ along)
+        left = float(along[0] * velocity[1] - along[1] * velocity[0])
+        return Sighting(bearing, distance), away, left
+
+    def _advance(self, dt: float) -> None:
+        if self._state is None:
+            return
+        step = np.eye(4)
+        step[0, 2] = step[1, 3] = dt
+        push = np.vstack([np.eye(2) * dt**2 / 2, np.eye(2) * dt])
+        self._state = step @ self._state
+        self._covariance = step @ self._covariance @ step.T + _ACCELERATION**2 * push @ push.T

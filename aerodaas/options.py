@@ -1,0 +1,38 @@
+"""How a run was asked for: what `aerodaas run` lays over an application's own words."""
+
+from __future__ import annotations
+
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+__all__ = ["RunOptions", "current_options"]
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of one run; None leaves a thing as the application or its environment file says."""
+
+    environment: Path | None = None
+    """Environment file instead of the application's own."""
+    speed: float | None = None
+    """Mission seconds per wall second."""
+    lockstep: bool | None = None
+    """Simulated time as fast as the machine goes; None: where all robots are simulated."""
+    seed: int | None = None
+    record: Path | None = None
+    """Folder for the recording, the plots and the summary."""
+    address: str | None = None
+    """Ray cluster to join."""
+    overrides: dict[str, Any] = field(default_factory=dict)
+    """Settings by `id.setting`, such as `camera.rate`."""
+    view: bool = True
+    """Show the live terminal view."""
+    application: Path | None = None
+    """The application's file, for relative paths and the recording's provenance."""
+
+
+_CURRENT: ContextVar[RunOptions] = ContextVar("run_options", default=RunOptions())  # noqa: B039 - frozen
+current_options = _CURRENT
+"""Options of the run under way; the command line sets them, `Environment` reads them."""

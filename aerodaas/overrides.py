@@ -1,0 +1,61 @@
+"""Settings laid over an environment file: `camera.rate=5`, `simulation.seed=3`."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Mapping
+from typing import Any
+
+from aerodaas.config import EnvironmentConfig, SensorConfig, validated
+from aerodaas.errors import ConfigError
+
+__all__ = ["overridden", "parse_setting"]
+
+
+def parse_setting(text: str) -> tuple[str, Any]:
+    """Split `id.setting=value`; the value is JSON, or else a string. Raises ConfigError."""
+    name, equals, value = text.partition("=")
+    if not equals or "." not in name:
+        raise ConfigError(f"a setting is written id.setting=value, not {text!r}")
+    try:
+        return name, json.loads(value)
+    except json.JSONDecodeError:
+        return name, value
+
+
+def overridden(config: EnvironmentConfig, settings: Mapping[str, Any]) -> EnvironmentConfig:
+    """Return `config` with `settings` laid over it.
+
+    The part before the first dot is the id of a robot, a sensor or a compute resource, or a
+    section of the file such as `simulation`. Raises ConfigError for an unknown id or setting.
+    """
+    if not settings:
+        return config
+    content = config.model_dump(by_alias=True)
+    for name, value in settings.items():
+        owner, _, path = name.partition(".")
+        _assign(_find(content, owner), path.split("."), copy.deepcopy(value))
+    return validated(content, "environment with overrides")
+
+
+def _find(content: dict[str, Any], owner: str) -> dict[str, Any]:
+    places: list[dict[str, Any]] = [*content["robots"], *content["sensors"]]
+    places += [sensor for robot in content["robots"] for sensor in robot["sensors"]]
+    places += [] if content["compute"] == "auto" else content["compute"]
+    for place in places:
+        if place["id"] == owner:
+            return place
+    section = content.get(owner)
+    if isinstance(section, dict):
+        return section
+    known = ", ".join(sorted(place["id"] for place in places))
+    raise ConfigError(f"no robot, sensor, compute resource or section is called {owner!r}: {known}")
+
+
+def _assign(place: dict[str, Any], path: list[str], value: Any) -> None:  # noqa: ANN401
+    for key in path[:-1]:
+        place = place.setdefault(key, {})
+    if path[-1] not in place and "settings" in place and path[-1] not in SensorConfig.model_fields:
+        place = place["settings"]
+    place[path[-1]] = value

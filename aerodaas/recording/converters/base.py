@@ -1,0 +1,78 @@
+"""The dispatch on an item's type, what converters share, and the fallback for unknown types."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import singledispatch
+from typing import Any
+
+from foxglove.messages import Quaternion, Timestamp, Vector3
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.config import RecordingConfig
+from aerodaas.geometry import GeodeticOrigin, Vector
+from aerodaas.recording.encoding import Entry, json_bytes, json_schema, plain, topic
+from aerodaas.recording.rotation import Rotation
+from aerodaas.status import Message
+
+__all__ = ["MAP_FRAME", "Session", "convert", "quaternion", "vector", "xyz"]
+
+MAP_FRAME = "map"
+"""Name of the local ENU frame."""
+
+VALUE = json_schema("Value", stamp="integer", source="string", type="string", value={})
+
+
+@dataclass(slots=True)
+class Session:
+    """What converters know about the recording that they write for."""
+
+    config: RecordingConfig
+    epoch_ns: int
+    """Unix time at mission time zero."""
+    home: GeodeticOrigin | None = None
+    """Pins the local frame on the globe, for maps."""
+    last: dict[tuple[str, str], Any] = field(default_factory=dict)
+    """What a converter wrote last, by its own name and the stream's, to write changes only."""
+
+    def time(self, stamp: int) -> Timestamp:
+        """Foxglove's timestamp of a mission time."""
+        return Timestamp(*divmod(self.epoch_ns + stamp, NANOSECONDS))
+
+    def changed(self, kind: str, stream: str, value: object) -> bool:
+        """Whether `value` differs from that of the last call for this kind and stream."""
+        key = (kind, stream)
+        if key in self.last and self.last[key] == value:
+            return False
+        self.last[key] = value
+        return True
+
+
+@singledispatch
+def convert(item: object, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Yield what `item` becomes; of a type that nobody registered, generic JSON."""
+    del session
+    value = {
+        "stamp": message.header.stamp,
+        "source": message.header.source,
+        "type": type(item).__name__,
+        "value": plain(item),
+    }
+    yield Entry(topic(message.stream, "value"), VALUE, json_bytes(value))
+
+
+def xyz(vector: Vector) -> dict[str, float]:
+    """A vector for JSON."""
+    return {"x": float(vector[0]), "y": float(vector[1]), "z": float(vector[2])}
+
+
+def vector(values: Vector | Sequence[float]) -> Vector3:
+    """A vector for Foxglove."""
+    return Vector3(x=float(values[0]), y=float(values[1]), z=float(values[2]))
+
+
+def quaternion(rotation: Rotation) -> Quaternion:
+    """A rotation for Foxglove."""
+    x, y, z, w = rotation
+    return Quaternion(x=x, y=y, z=z, w=w)

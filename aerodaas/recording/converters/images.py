@@ -1,0 +1,177 @@
+"""Frames and what was found in them: JPEG, calibration, mount, boxes and keypoints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import cv2
+from foxglove.messages import (
+    CameraCalibration,
+    Color,
+    CompressedImage,
+    FrameTransform,
+    ImageAnnotations,
+    Point2,
+    PointsAnnotation,
+    PointsAnnotationType,
+    TextAnnotation,
+)
+
+from aerodaas.data import Detection, Detections, Frame
+from aerodaas.geometry import CameraModel
+from aerodaas.recording.converters.base import Session, convert, quaternion, vector
+from aerodaas.recording.converters.vehicle import body_frame, odometry_json
+from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
+from aerodaas.recording.palette import label_colour, rgb
+from aerodaas.recording.rotation import OPTICAL, compose, from_rpy
+from aerodaas.status import Message
+
+__all__: list[str] = []
+
+IMAGE = CompressedImage.get_schema()
+CALIBRATION = CameraCalibration.get_schema()
+TRANSFORM = FrameTransform.get_schema()
+ANNOTATIONS = ImageAnnotations.get_schema()
+FRAME = json_schema(
+    "Frame", id="integer", stamp="integer", source="string", width="integer", height="integer"
+)
+DETECTIONS = json_schema(
+    "Detections",
+    id="integer",
+    stamp="integer",
+    source="string",
+    width="integer",
+    height="integer",
+    items={"type": "array", "items": {"type": "object"}},
+)
+
+_VISIBLE = 0.3
+"""Keypoints of less confidence are recorded, but not drawn."""
+_BLACK = Color(r=0.0, g=0.0, b=0.0, a=0.7)
+
+
+@convert.register
+def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write a picture, and its camera when that has changed."""
+    header, stream = item.header, message.stream
+    if item.camera is not None and session.changed("camera", stream, item.camera):
+        yield from _camera(item.camera, header.source, stream, header.stamp, session)
+    value: dict[str, Any] = {
+        "id": header.id,
+        "stamp": header.stamp,
+        "source": header.source,
+        "width": item.width,
+        "height": item.height,
+    }
+    if item.odometry is not None:
+        value["odometry"] = odometry_json(item.odometry)
+    yield Entry(topic(stream, "frame"), FRAME, json_bytes(value), header.stamp)
+    if session.config.images == "none":
+        return
+    quality = [cv2.IMWRITE_JPEG_QUALITY, session.config.jpeg_quality]
+    _, jpeg = cv2.imencode(".jpg", item.image, quality)
+    image = CompressedImage(
+        timestamp=session.time(header.stamp),
+        frame_id=header.source,
+        data=jpeg.tobytes(),
+        format="jpeg",
+    )
+    yield Entry(topic(stream, "image"), IMAGE, image.encode(), header.stamp)
+
+
+@convert.register
+def detections(item: Detections, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write boxes and keypoints to be drawn over the picture, and the same as exact JSON."""
+    header, stream = item.header, message.stream
+    annotations = ImageAnnotations(
+        # Foxglove pairs annotations with the picture of exactly this time.
+        timestamp=session.time(header.stamp),
+        points=[shape for found in item.items for shape in _shapes(found)],
+        texts=[_label(found) for found in item.items],
+    )
+    yield Entry(topic(stream, "boxes"), ANNOTATIONS, annotations.encode(), header.stamp)
+    value = {
+        "id": header.id,
+        "stamp": header.stamp,
+        "source": header.source,
+        "width": item.width,
+        "height": item.height,
+        "items": [_detection_json(found) for found in item.items],
+    }
+    yield Entry(topic(stream, "detections"), DETECTIONS, json_bytes(value), header.stamp)
+
+
+def _camera(
+    camera: CameraModel, source: str, stream: str, stamp: int, session: Session
+) -> Iterator[Entry]:
+    time = session.time(stamp)
+    fx, fy, cx, cy = camera.fx, camera.fy, camera.cx, camera.cy
+    calibration = CameraCalibration(
+        timestamp=time,
+        frame_id=source,
+        width=camera.width,
+        height=camera.height,
+        K=[fx, 0, cx, 0, fy, cy, 0, 0, 1],
+        R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
+        P=[fx, 0, cx, 0, 0, fy, cy, 0, 0, 0, 1, 0],
+    )
+    yield Entry(topic(stream, "calibration"), CALIBRATION, calibration.encode(), stamp)
+    mount = FrameTransform(
+        timestamp=time,
+        parent_frame_id=body_frame(source),
+        child_frame_id=source,
+        translation=vector(camera.mount),
+        rotation=quaternion(compose(from_rpy(0.0, camera.pitch, camera.yaw), OPTICAL)),
+    )
+    yield Entry(topic(stream, "mount"), TRANSFORM, mount.encode(), stamp)
+
+
+def _colour(label: str) -> Color:
+    red, green, blue = rgb(label_colour(label))
+    return Color(r=red, g=green, b=blue, a=1.0)
+
+
+def _shapes(found: Detection) -> Iterator[PointsAnnotation]:
+    left, top, right, bottom = found.box
+    colour = _colour(found.label)
+    corners = ((left, top), (right, top), (right, bottom), (left, bottom))
+    yield PointsAnnotation(
+        type=PointsAnnotationType.LineLoop,
+        points=[Point2(x=float(u), y=float(v)) for u, v in corners],
+        outline_color=colour,
+        thickness=2.0,
+    )
+    if found.keypoints is not None:
+        yield PointsAnnotation(
+            type=PointsAnnotationType.Points,
+            points=[Point2(x=u, y=v) for u, v, c in found.keypoints.tolist() if c >= _VISIBLE],
+            outline_color=colour,
+            fill_color=colour,
+            thickness=5.0,
+        )
+
+
+def _label(found: Detection) -> TextAnnotation:
+    track = f" #{found.track_id}" if found.track_id is not None else ""
+    left, top, _, _ = found.box
+    return TextAnnotation(
+        position=Point2(x=float(left), y=float(top)),
+        text=f"{found.label}{track} {found.score:.2f}",
+        font_size=12.0,
+        text_color=_colour(found.label),
+        background_color=_BLACK,
+    )
+
+
+def _detection_json(found: Detection) -> dict[str, Any]:
+    value: dict[str, Any] = {
+        "label": found.label,
+        "score": float(found.score),
+        "box": [float(edge) for edge in found.box],
+    }
+    if found.track_id is not None:
+        value["track_id"] = found.track_id
+    if found.keypoints is not None:
+        value["keypoints"] = found.keypoints.tolist()
+    return value

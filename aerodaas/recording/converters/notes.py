@@ -1,0 +1,81 @@
+"""What is told to people: alerts and log lines."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from typing import Any
+
+from foxglove.messages import Log, LogLevel
+
+from aerodaas.data import Alert
+from aerodaas.recording.converters.base import Session, convert
+from aerodaas.recording.encoding import Entry, json_bytes, json_schema
+from aerodaas.status import Message
+
+__all__ = ["log_entry"]
+
+LOG = Log.get_schema()
+ALERT = json_schema(
+    "Alert",
+    stamp="integer",
+    source="string",
+    stream="string",
+    kind="string",
+    text="string",
+    values="object",
+)
+
+
+def log_entry(session: Session, stamp: int, level: LogLevel, name: str, text: str) -> Entry:
+    """One line of the recording's log, by `name`."""
+    line = Log(timestamp=session.time(stamp), level=level, message=text, name=name)
+    return Entry("/log", LOG, line.encode(), stamp)
+
+
+@convert.register
+def alert(item: Alert, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write an alert to the log and, with its figures, as JSON."""
+    stamp = item.header.stamp
+    yield log_entry(session, stamp, LogLevel.Warning, message.stream, f"{item.kind}: {item.text}")
+    value = {
+        "stamp": stamp,
+        "source": item.header.source,
+        "stream": message.stream,
+        "kind": item.kind,
+        "text": item.text,
+        "values": item.values,
+    }
+    yield Entry("/alerts", ALERT, json_bytes(value), stamp)
+
+
+@convert.register
+def text(item: str, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write a plain text as a line of the log."""
+    yield log_entry(session, message.stamp, LogLevel.Info, message.stream, item)
+
+
+@convert.register
+def log_record(item: logging.LogRecord, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write a record of Python's logging, with its level and place."""
+    line = Log(
+        timestamp=session.time(message.stamp),
+        level=_level(item.levelno),
+        message=item.getMessage(),
+        name=item.name,
+        file=item.filename,
+        line=item.lineno,
+    )
+    yield Entry("/log", LOG, line.encode())
+
+
+def _level(number: int) -> LogLevel:
+    for least, level in (
+        (logging.CRITICAL, LogLevel.Fatal),
+        (logging.ERROR, LogLevel.Error),
+        (logging.WARNING, LogLevel.Warning),
+        (logging.INFO, LogLevel.Info),
+    ):
+        if number >= least:
+            return level
+    return LogLevel.Debug

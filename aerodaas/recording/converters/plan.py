@@ -1,0 +1,157 @@
+"""Plans and fences as people see them: in the 3D scene, as poses, and on the map."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from foxglove.messages import (
+    Color,
+    GeoJson,
+    LinePrimitive,
+    LinePrimitiveLineType,
+    Point3,
+    Pose,
+    PosesInFrame,
+    SceneEntity,
+    SceneUpdate,
+    SpherePrimitive,
+    TextPrimitive,
+    Vector3,
+)
+
+from aerodaas.config import GeofenceConfig
+from aerodaas.geometry import GeodeticOrigin
+from aerodaas.recording.converters.base import MAP_FRAME, Session, quaternion, vector
+from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
+from aerodaas.recording.palette import OKABE_ITO, rgb
+from aerodaas.recording.rotation import from_rpy
+from aerodaas.waypoints import Waypoint
+
+__all__ = ["fence_entries", "plan_entries"]
+
+SCENE = SceneUpdate.get_schema()
+POSES = PosesInFrame.get_schema()
+MAP = GeoJson.get_schema()
+PLAN = json_schema("Plan", stamp="integer", robot="string", waypoints="array")
+FENCE = json_schema("Geofence", robot="string", polygon="array", floor="number", ceiling="number")
+
+_BALL = 0.25
+"""Diameter in metres of a waypoint in the scene."""
+
+
+def plan_entries(
+    waypoints: Sequence[Waypoint], robot: str, stream: str, stamp: int, session: Session
+) -> Iterator[Entry]:
+    """Write the local waypoints of a plan as JSON, scene, poses and, with a home, GeoJSON."""
+    value = {"stamp": stamp, "robot": robot, "waypoints": waypoints}
+    yield Entry(topic(stream, "plan"), PLAN, json_bytes(value), stamp)
+    time = session.time(stamp)
+    colour = _colour("blue")
+    entity = SceneEntity(
+        timestamp=time,
+        frame_id=MAP_FRAME,
+        id=f"{robot}/plan",
+        lines=[
+            LinePrimitive(
+                type=LinePrimitiveLineType.LineStrip,
+                thickness=2.0,
+                scale_invariant=True,
+                points=[Point3(x=at.x, y=at.y, z=at.z) for at in waypoints],
+                color=colour,
+            )
+        ],
+        spheres=[
+            SpherePrimitive(
+                pose=_pose(at), size=Vector3(x=_BALL, y=_BALL, z=_BALL), color=_colour("orange")
+            )
+            for at in waypoints
+        ],
+        texts=[
+            TextPrimitive(
+                pose=_pose(at),
+                billboard=True,
+                font_size=14.0,
+                scale_invariant=True,
+                color=colour,
+                text=at.id,
+            )
+            for at in waypoints
+        ],
+    )
+    yield Entry(topic(stream, "scene"), SCENE, SceneUpdate(entities=[entity]).encode(), stamp)
+    poses = PosesInFrame(timestamp=time, frame_id=MAP_FRAME, poses=[_pose(at) for at in waypoints])
+    yield Entry(topic(stream, "path"), POSES, poses.encode(), stamp)
+    if session.home is not None:
+        home = session.home
+        places = [_place((at.x, at.y, at.z), home) for at in waypoints]
+        features = [_feature("LineString", places, f"{robot} plan")] if len(places) > 1 else []
+        features += [
+            _feature("Point", place, at.id) for place, at in zip(places, waypoints, strict=True)
+        ]
+        yield Entry(topic(stream, "map"), MAP, _geojson(features), stamp)
+
+
+def fence_entries(fence: GeofenceConfig, robot: str, session: Session) -> Iterator[Entry]:
+    """Write a robot's geofence as JSON, scene and, with a home, GeoJSON."""
+    value = {
+        "robot": robot,
+        "polygon": fence.polygon,
+        "floor": fence.floor,
+        "ceiling": fence.ceiling,
+    }
+    yield Entry(topic(robot, "fence"), FENCE, json_bytes(value), 0)
+    if not fence.polygon:
+        return
+    colour = _colour("vermilion")
+    entity = SceneEntity(
+        timestamp=session.time(0),
+        frame_id=MAP_FRAME,
+        id=f"{robot}/fence",
+        lines=[
+            LinePrimitive(
+                type=LinePrimitiveLineType.LineLoop,
+                thickness=2.0,
+                scale_invariant=True,
+                points=[Point3(x=x, y=y, z=height) for x, y in fence.polygon],
+                color=colour,
+            )
+            for height in (fence.floor, fence.ceiling)
+        ],
+    )
+    scene = SceneUpdate(entities=[entity])
+    yield Entry(topic(f"{robot}/fence", "scene"), SCENE, scene.encode(), 0)
+    if session.home is not None:
+        ring = [_place((x, y, 0.0), session.home) for x, y in fence.polygon]
+        feature = _feature("Polygon", [[*ring, ring[0]]], f"{robot} geofence")
+        yield Entry(topic(f"{robot}/fence", "map"), MAP, _geojson([feature]), 0)
+
+
+def _colour(name: str) -> Color:
+    red, green, blue = rgb(OKABE_ITO[name])
+    return Color(r=red, g=green, b=blue, a=1.0)
+
+
+def _pose(at: Waypoint) -> Pose:
+    attitude = quaternion(from_rpy(0.0, 0.0, at.yaw or 0.0))
+    return Pose(position=vector(at.position), orientation=attitude)
+
+
+def _place(point: tuple[float, float, float], home: GeodeticOrigin) -> list[float]:
+    latitude, longitude, altitude = home.to_geodetic(np.array(point))
+    return [longitude, latitude, altitude]
+
+
+def _feature(kind: str, coordinates: list[Any], name: str) -> dict[str, Any]:
+    return {
+        "type": "Feature",
+        "properties": {"name": name},
+        "geometry": {"type": kind, "coordinates": coordinates},
+    }
+
+
+def _geojson(features: list[dict[str, Any]]) -> bytes:
+    collection = {"type": "FeatureCollection", "features": features}
+    return GeoJson(geojson=json.dumps(collection)).encode()

@@ -1,0 +1,204 @@
+"""Vehicle states and setpoints: odometry, transform, GPS, and everything else as JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from foxglove.messages import (
+    FrameTransform,
+    LocationFix,
+    LocationFixPositionCovarianceType,
+    Pose,
+)
+from foxglove.messages import Odometry as FoxgloveOdometry
+
+from aerodaas.data import Battery, GpsFix, Odometry
+from aerodaas.geometry import enu_to_body
+from aerodaas.recording.converters.base import (
+    MAP_FRAME,
+    Session,
+    convert,
+    quaternion,
+    vector,
+    xyz,
+)
+from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
+from aerodaas.recording.rotation import from_rpy
+from aerodaas.status import Message, SetpointRecord
+from aerodaas.vehicle import PositionSetpoint, Setpoint, VehicleState
+
+__all__ = ["body_frame", "odometry_json"]
+
+ODOMETRY = FoxgloveOdometry.get_schema()
+TRANSFORM = FrameTransform.get_schema()
+LOCATION = LocationFix.get_schema()
+STATE = json_schema(
+    "VehicleState",
+    stamp="integer",
+    robot="string",
+    mode="string",
+    armed="boolean",
+    battery="object",
+    odometry="object",
+    faults="array",
+    extra="object",
+)
+BATTERY = json_schema(
+    "Battery",
+    stamp="integer",
+    source="string",
+    fraction="number",
+    voltage="number",
+    current="number",
+)
+SETPOINT = json_schema(
+    "Setpoint", stamp="integer", robot="string", asked={}, sent={}, clipped_by="array"
+)
+
+
+def body_frame(source: str) -> str:
+    """Name of the body frame of the robot that a source belongs to; the map for no robot."""
+    robot, slash, _ = source.partition("/")
+    return f"{robot}/base_link" if slash else MAP_FRAME
+
+
+def odometry_json(odometry: Odometry) -> dict[str, Any]:
+    """An odometry for JSON, exact to the last digit."""
+    return {
+        "position": xyz(odometry.position),
+        "velocity": xyz(odometry.velocity),
+        "yaw": float(odometry.yaw),
+        "roll": float(odometry.roll),
+        "pitch": float(odometry.pitch),
+        "yaw_rate": float(odometry.yaw_rate),
+        "position_sigma": float(odometry.position_sigma),
+    }
+
+
+@convert.register
+def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write a state as odometry, transform, location and JSON."""
+    stream = message.stream
+    robot = (message.header.source or stream).partition("/")[0]
+    yield from _pose(item.odometry, f"{robot}/base_link", stream, item.stamp, session)
+    if item.gps is not None:
+        yield _location(item.gps, f"{robot}/base_link", stream, item.stamp, session)
+    state = {
+        "stamp": item.stamp,
+        "robot": robot,
+        "mode": item.mode.value,
+        "armed": item.armed,
+        "battery": _battery_json(item.battery),
+        "odometry": odometry_json(item.odometry),
+        "faults": item.faults,
+        "extra": item.extra,
+    }
+    if item.gps is not None:
+        state["gps"] = item.gps
+    if item.truth is not None:
+        state["truth"] = odometry_json(item.truth)
+    yield Entry(topic(stream, "state"), STATE, json_bytes(state), item.stamp)
+
+
+@convert.register
+def odometry(item: Odometry, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write the reading of an odometry sensor."""
+    header = message.header
+    yield from _pose(item, body_frame(header.source), message.stream, header.stamp, session)
+
+
+@convert.register
+def gps(item: GpsFix, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write the reading of a GPS sensor."""
+    header = message.header
+    yield _location(item, body_frame(header.source), message.stream, header.stamp, session)
+
+
+@convert.register
+def battery(item: Battery, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write the reading of a battery sensor."""
+    del session
+    header = message.header
+    value = {"stamp": header.stamp, "source": header.source, **_battery_json(item)}
+    yield Entry(topic(message.stream, "battery"), BATTERY, json_bytes(value))
+
+
+@convert.register
+def setpoint(item: SetpointRecord, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write what was asked for, what was sent, and what changed it in between."""
+    del session
+    value = {
+        "stamp": item.stamp,
+        "robot": (message.header.source or message.stream).partition("/")[0],
+        "asked": _setpoint_json(item.asked),
+        "sent": _setpoint_json(item.sent),
+        "clipped_by": item.clipped_by,
+        "cause": item.cause._asdict() if item.cause else None,
+    }
+    yield Entry(topic(message.stream, "setpoint"), SETPOINT, json_bytes(value), item.stamp)
+
+
+def _pose(item: Odometry, frame: str, stream: str, stamp: int, session: Session) -> Iterator[Entry]:
+    time = session.time(stamp)
+    position = vector(item.position)
+    attitude = quaternion(from_rpy(item.roll, item.pitch, item.yaw))
+    # Foxglove, as ROS, wants velocities in the body's frame.
+    velocity = vector(enu_to_body(item.velocity, item.yaw))
+    pose = FoxgloveOdometry(
+        timestamp=time,
+        frame_id=MAP_FRAME,
+        body_frame_id=frame,
+        pose=Pose(position=position, orientation=attitude),
+        linear_velocity=velocity,
+        angular_velocity=vector((0.0, 0.0, item.yaw_rate)),
+    )
+    yield Entry(topic(stream, "odometry"), ODOMETRY, pose.encode(), stamp)
+    transform = FrameTransform(
+        timestamp=time,
+        parent_frame_id=MAP_FRAME,
+        child_frame_id=frame,
+        translation=position,
+        rotation=attitude,
+    )
+    yield Entry(topic(stream, "transform"), TRANSFORM, transform.encode(), stamp)
+
+
+def _location(fix: GpsFix, frame: str, stream: str, stamp: int, session: Session) -> Entry:
+    horizontal, vertical = fix.horizontal_sigma**2, fix.vertical_sigma**2
+    kinds = LocationFixPositionCovarianceType
+    location = LocationFix(
+        timestamp=session.time(stamp),
+        frame_id=frame,
+        latitude=fix.latitude,
+        longitude=fix.longitude,
+        altitude=fix.altitude,
+        position_covariance=[horizontal, 0, 0, 0, horizontal, 0, 0, 0, vertical],
+        position_covariance_type=kinds.DiagonalKnown if horizontal else kinds.Unknown,
+    )
+    return Entry(topic(stream, "location"), LOCATION, location.encode(), stamp)
+
+
+def _battery_json(battery: Battery) -> dict[str, float]:
+    return {
+        "fraction": battery.fraction,
+        "voltage": battery.voltage,
+        "current": battery.current,
+    }
+
+
+def _setpoint_json(setpoint: Setpoint | None) -> dict[str, Any] | None:
+    if setpoint is None:
+        return None
+    if isinstance(setpoint, PositionSetpoint):
+        return {
+            "kind": "position",
+            "position": xyz(setpoint.position),
+            "yaw": setpoint.yaw,
+            "speed": setpoint.speed,
+        }
+    return {
+        "kind": "velocity",
+        "velocity": xyz(setpoint.velocity),
+        "yaw_rate": setpoint.yaw_rate,
+    }

@@ -1,0 +1,100 @@
+"""Messages as bytes: our JSON channels, and what a converter hands to the recorder."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import math
+import re
+from collections.abc import Mapping
+from collections.abc import Set as AbstractSet
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from foxglove import Schema
+
+__all__ = ["Entry", "json_bytes", "json_schema", "plain", "topic"]
+
+_DEEPEST = 12
+_LONGEST_ARRAY = 4096
+_FORBIDDEN = re.compile(r"[^A-Za-z0-9_/\-]+")
+
+
+class Entry(NamedTuple):
+    """One message for one channel, encoded."""
+
+    topic: str
+    schema: Schema
+    """Of the channel; its encoding is `protobuf` or `jsonschema`."""
+    data: bytes
+    stamp: int | None = None
+    """Mission clock of what is described, where it isn't the message's own measurement."""
+
+
+@lru_cache(maxsize=4096)
+def topic(stream: str, kind: str) -> str:
+    """Topic of one kind of data of a stream: `/robot/camera/image`.
+
+    Dots and blanks become `_`; a stream that is already named after the kind does not repeat it.
+    """
+    name = "/" + _FORBIDDEN.sub("_", stream).strip("/")
+    return name if name.rsplit("/", 1)[-1] == kind else f"{name}/{kind}"
+
+
+def json_schema(name: str, **properties: str | dict[str, Any]) -> Schema:
+    """Schema of a JSON channel; a property given by a word is of that JSON type."""
+    body = {
+        "type": "object",
+        "properties": {
+            key: {"type": kind} if isinstance(kind, str) else kind
+            for key, kind in properties.items()
+        },
+    }
+    return Schema(
+        name=f"aerodaas.{name}", encoding="jsonschema", data=json.dumps(body).encode("utf-8")
+    )
+
+
+def json_bytes(value: dict[str, Any]) -> bytes:
+    """Encode anything as strict JSON: what JSON does not know becomes what `plain` makes of it."""
+    try:
+        return json.dumps(value, default=plain, allow_nan=False, separators=(",", ":")).encode()
+    except (ValueError, TypeError, RecursionError):
+        # NaN, infinity, keys that are no strings, cycles, lone surrogates: rare, so paid for here.
+        return json.dumps(plain(value), separators=(",", ":")).encode()
+
+
+def plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - any JSON value
+    """Reduce any object to JSON's types; never raises for lack of a rule.
+
+    Numbers that are not finite become None, large arrays their shape and type, objects that are
+    no dataclass their class's name.
+    """
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    if isinstance(value, float | np.floating):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, np.integer | np.bool_):
+        return value.item()
+    if depth >= _DEEPEST:
+        return f"<{type(value).__name__}>"
+    return _plain_container(value, depth + 1)
+
+
+def _plain_container(value: object, depth: int) -> Any:  # noqa: ANN401 - any JSON value
+    if isinstance(value, np.ndarray):
+        whole = value.size <= _LONGEST_ARRAY and value.dtype.kind in "biuf"
+        shape = {"shape": list(value.shape), "dtype": str(value.dtype)}
+        return plain(value.tolist(), depth) if whole else shape
+    if isinstance(value, Mapping):
+        return {str(key): plain(item, depth) for key, item in value.items()}
+    if isinstance(value, list | tuple | AbstractSet):
+        return [plain(item, depth) for item in value]
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        names = [field.name for field in dataclasses.fields(value)]
+        return {name: plain(getattr(value, name, None), depth) for name in names}
+    dump = getattr(value, "model_dump", None) or getattr(value, "get_data", None)
+    if callable(dump) and not isinstance(value, type):
+        return plain(dump(), depth)
+    return f"<{type(value).__name__}>"

@@ -1,0 +1,66 @@
+"""The file that a recording is written to: never overwrites, always ends at a whole record."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from aerodaas.errors import RecordingError
+
+__all__ = ["Output"]
+
+
+class Output:
+    """A new file for MCAP's writer, which hands over whole records one `write` at a time.
+
+    Unbuffered, so that what `write` has returned from survives the death of this process. A
+    write that fails half-way (disk full) is taken back, and the file stays readable.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Create `path` and its folders; RecordingError if it exists or cannot be made."""
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open("xb", buffering=0)
+        except FileExistsError as error:
+            if path.exists():
+                raise RecordingError(
+                    f"{path} already exists and is not overwritten; "
+                    "give --record another path or move the file away"
+                ) from None
+            raise RecordingError(
+                f"cannot create {path}: {error.filename} is not a folder; choose another path"
+            ) from None
+        except OSError as error:
+            raise RecordingError(
+                f"cannot create {path}: {error.strerror}; "
+                "choose a folder that you may write to with --record"
+            ) from None
+        self._size = 0
+
+    def write(self, data: bytes) -> int:
+        """Append all of `data` or none of it; raises OSError."""
+        remaining = memoryview(data)
+        try:
+            while remaining:
+                remaining = remaining[self._file.write(remaining) or 0 :]
+        except OSError:
+            self._file.truncate(self._size)
+            raise
+        self._size += len(data)
+        return len(data)
+
+    def tell(self) -> int:
+        """Bytes written so far."""
+        return self._size
+
+    def flush(self) -> None:
+        """Do nothing: every write has reached the operating system when it returns."""
+
+    def sync(self) -> None:
+        """Return when the operating system has put everything on the disk; raises OSError."""
+        os.fsync(self._file.fileno())
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()

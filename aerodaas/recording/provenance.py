@@ -1,0 +1,109 @@
+"""Where a recording comes from: what is needed to fly it again."""
+
+from __future__ import annotations
+
+import platform
+import re
+import subprocess
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from typing_extensions import Self
+
+from aerodaas.config import EnvironmentConfig
+
+__all__ = ["Provenance"]
+
+_PACKAGES = ("aerodaas", "ray", "numpy", "opencv-python-headless", "onnxruntime", "panda3d")
+_PASSWORD = re.compile(r"(?<=://)[^/@\s\"']+@")
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """Versions, configuration, application and seed of a run."""
+
+    started_ns: int = field(default_factory=time.time_ns)
+    """Wall time (Unix, nanoseconds) at which the mission clock read zero."""
+    name: str = ""
+    """What was flown, for a title."""
+    seed: int | None = None
+    speed: str = ""
+    """`--speed` as given."""
+    config: str = ""
+    """The environment, JSON."""
+    app: str = ""
+    """File name of the application."""
+    app_source: str = ""
+    revision: str = ""
+    """Git commit of the application's repository, `+` appended if it had changes; or empty."""
+    versions: Mapping[str, str] = field(default_factory=dict)
+    """Versions of Python, the platform and the packages that matter, by name."""
+
+    @classmethod
+    def collect(
+        cls,
+        *,
+        app: Path | None = None,
+        config: EnvironmentConfig | None = None,
+        seed: int | None = None,
+        speed: str = "",
+    ) -> Self:
+        """Look everything up for a run of the application in the file `app`.
+
+        Passwords in URLs of the configuration are left out.
+        """
+        return cls(
+            name=app.stem if app else "",
+            seed=seed if seed is not None or config is None else config.simulation.seed,
+            speed=speed,
+            config=_PASSWORD.sub("***@", config.model_dump_json(indent=2)) if config else "",
+            app=app.name if app else "",
+            app_source=app.read_text(encoding="utf-8", errors="replace") if app else "",
+            revision=_revision(app.parent if app else Path.cwd()),
+            versions=_versions(),
+        )
+
+    def as_metadata(self) -> dict[str, str]:
+        """Everything that fits a table of short texts, by name."""
+        figures = {
+            "epoch_ns": str(self.started_ns),
+            "name": self.name,
+            "seed": "" if self.seed is None else str(self.seed),
+            "speed": self.speed,
+            "app": self.app,
+            "revision": self.revision,
+        }
+        return figures | dict(self.versions)
+
+
+def _versions() -> dict[str, str]:
+    found = {"python": platform.python_version(), "platform": platform.platform()}
+    return found | {name: number for name in _PACKAGES if (number := _version(name))}
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def _revision(folder: Path) -> str:
+    def git(*arguments: str) -> str:
+        return subprocess.run(  # noqa: S603 - fixed arguments
+            ["git", *arguments],  # noqa: S607 - whichever git the user has
+            cwd=folder,
+            capture_output=True,
+            text=True,
+            timeout=5,
+            check=True,
+        ).stdout.strip()
+
+    try:
+        changed = git("status", "--porcelain", "--untracked-files=no")
+        return git("rev-parse", "HEAD") + ("+" if changed else "")
+    except (OSError, subprocess.SubprocessError):
+        return ""

@@ -1,0 +1,240 @@
+"""Reading a recording, whole or cut off, ours or another's MCAP."""
+
+from __future__ import annotations
+
+import heapq
+import json
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from types import TracebackType
+from typing import Any, BinaryIO
+
+from mcap.data_stream import ReadDataStream
+from mcap.records import Attachment, Channel, Message
+from mcap_protobuf.decoder import DecoderFactory
+from mcap_ros2.decoder import DecoderFactory as RosDecoderFactory
+from typing_extensions import Self
+
+from aerodaas.clock import seconds
+from aerodaas.errors import RecordingError
+from aerodaas.recording.index import BROKEN, Block, FileIndex, load, read_index
+
+__all__ = ["Record", "Recording", "Topic"]
+
+_RECORD_HEAD = 9
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One channel of a recording."""
+
+    name: str
+    schema: str
+    """Name of the schema, such as `foxglove.CompressedImage`; empty for none."""
+    encoding: str
+    """`json`, `protobuf`, `cdr`, …"""
+    count: int
+    """Messages in the file."""
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One message of a recording."""
+
+    topic: str
+    schema: str
+    stamp: int
+    """Mission clock when it was recorded, nanoseconds."""
+    captured: int
+    """Mission clock of what it describes, nanoseconds."""
+    sequence: int
+    value: Any
+    """A dictionary for JSON, an object with fields for protobuf and ROS 2, or else bytes."""
+
+
+class Recording:
+    """An open MCAP file. What a cut-off or damaged file still holds is read; the rest counted."""
+
+    def __init__(self, path: Path, file: BinaryIO, index: FileIndex) -> None:
+        """Wrap an open file; use `Recording.open`."""
+        self.path = path
+        self._file = file
+        self._index = index
+        self._protobuf = DecoderFactory()
+        self._ros = RosDecoderFactory()
+        self._decoders: dict[int, Callable[[bytes], Any]] = {}
+        starts = [block.start for block in index.blocks]
+        self.metadata: dict[str, dict[str, str]] = {
+            record.name: record.metadata for record in index.metadata
+        }
+        """Every metadata record by name; `aerodaas` holds our provenance."""
+        try:
+            self.epoch_ns = int(self.provenance["epoch_ns"])
+        except (KeyError, ValueError):
+            self.epoch_ns = min(starts, default=0)
+
+    @classmethod
+    def open(cls, path: str | Path) -> Self:
+        """Open the recording `path`; raises RecordingError if it isn't one or cannot be read."""
+        path = Path(path)
+        try:
+            size = path.stat().st_size
+            file = path.open("rb")
+        except OSError as error:
+            raise RecordingError(f"cannot open the recording {path}: {error.strerror}") from None
+        try:
+            return cls(path, file, read_index(file, size))
+        except (*BROKEN, OSError) as error:
+            file.close()
+            if size == 0:
+                raise RecordingError(f"{path} is empty: nothing was recorded") from None
+            if isinstance(error, OSError):
+                raise RecordingError(f"cannot read {path}: {error.strerror}") from None
+            raise RecordingError(
+                f"{path} is not an MCAP recording; give the .mcap file that a run has written"
+            ) from None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the file was closed properly."""
+        return self._index.complete
+
+    @property
+    def damaged(self) -> int:
+        """Chunks that could not be read so far."""
+        return self._index.damaged
+
+    @property
+    def provenance(self) -> Mapping[str, str]:
+        """Versions, seed and application, as `Provenance.as_metadata`; empty if not ours."""
+        return self.metadata.get("aerodaas", {})
+
+    @property
+    def topics(self) -> dict[str, Topic]:
+        """The channels by topic."""
+        index = self._index
+        return {
+            channel.topic: Topic(
+                channel.topic,
+                self._schema_name(channel),
+                channel.message_encoding,
+                index.counts[number],
+            )
+            for number, channel in index.channels.items()
+        }
+
+    @property
+    def duration(self) -> float:
+        """Seconds between the first message and the last."""
+        blocks = self._index.blocks
+        if not blocks:
+            return 0.0
+        return seconds(max(block.end for block in blocks) - min(block.start for block in blocks))
+
+    @property
+    def attachments(self) -> list[str]:
+        """Names of the attachments."""
+        return list(self._index.attachments)
+
+    def attachment(self, name: str) -> bytes:
+        """Contents of an attachment; RecordingError if there is none of this name."""
+        if name not in self._index.attachments:
+            known = ", ".join(self._index.attachments) or "none"
+            raise RecordingError(f"{self.path} has no attachment {name!r}; it has: {known}")
+        offset, length = self._index.attachments[name]
+        self._file.seek(offset + _RECORD_HEAD)
+        body = BytesIO(self._file.read(length - _RECORD_HEAD))
+        try:
+            data: bytes = Attachment.read(ReadDataStream(body)).data
+        except BROKEN:
+            raise RecordingError(f"the attachment {name!r} of {self.path} is damaged") from None
+        return data
+
+    def records(
+        self,
+        *,
+        schemas: Collection[str] | None = None,
+        topics: Collection[str] | None = None,
+    ) -> Iterator[Record]:
+        """Messages of these schemas and topics (None: of all) in the order of log times.
+
+        A damaged chunk or message is skipped and counted in `damaged`.
+        """
+        wanted = {
+            number
+            for number, channel in self._index.channels.items()
+            if (topics is None or channel.topic in topics)
+            and (schemas is None or self._schema_name(channel) in schemas)
+        }
+        for message in self._messages(wanted):
+            channel = self._index.channels[message.channel_id]
+            try:
+                value = self._decode(channel, message.data)
+            except BROKEN:
+                self._index.damaged += 1
+                continue
+            yield Record(
+                channel.topic,
+                self._schema_name(channel),
+                message.log_time - self.epoch_ns,
+                message.publish_time - self.epoch_ns,
+                message.sequence,
+                value,
+            )
+
+    def close(self) -> None:
+        """Close the file."""
+        self._file.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _schema_name(self, channel: Channel) -> str:
+        schema = self._index.schemas.get(channel.schema_id)
+        return schema.name if schema else ""
+
+    def _messages(self, wanted: set[int]) -> Iterator[Message]:
+        blocks = sorted(
+            (b for b in self._index.blocks if not b.channels or b.channels & wanted),
+            key=lambda block: block.start,
+        )
+        # Chunks may overlap in time: hold messages back until no later chunk can precede them.
+        held: list[tuple[int, int, Message]] = []
+        order = 0
+        for position, block in enumerate(blocks):
+            for message in self._load(block):
+                if message.channel_id in wanted:
+                    heapq.heappush(held, (message.log_time, order, message))
+                    order += 1
+            following = blocks[position + 1].start if position + 1 < len(blocks) else None
+            while held and (following is None or held[0][0] < following):
+                yield heapq.heappop(held)[2]
+
+    def _load(self, block: Block) -> Iterator[Message]:
+        try:
+            records = load(self._file, block)
+        except BROKEN:
+            self._index.damaged += 1
+            return
+        yield from (record for record in records if isinstance(record, Message))
+
+    def _decode(self, channel: Channel, data: bytes) -> Any:  # noqa: ANN401 - by the channel
+        decoder = self._decoders.get(channel.id)
+        if decoder is None:
+            schema = self._index.schemas.get(channel.schema_id)
+            decoder = self._protobuf.decoder_for(channel.message_encoding, schema)
+            decoder = decoder or self._ros.decoder_for(channel.message_encoding, schema)
+            if decoder is None:
+                decoder = json.loads if channel.message_encoding == "json" else bytes
+            self._decoders[channel.id] = decoder
+        return decoder(data)

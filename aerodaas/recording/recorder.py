@@ -1,0 +1,283 @@
+"""The flight recorder: messages in, an MCAP file out that survives a crash.
+
+Foxglove's SDK encodes the messages, the mcap library writes the file: the SDK's own writer has
+no publish time, and says nothing when the disk is full.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import cv2
+from foxglove import Schema
+from foxglove.messages import LogLevel
+from mcap.writer import Writer
+from typing_extensions import Self
+
+from aerodaas.clock import seconds
+from aerodaas.config import GeofenceConfig, RecordingConfig
+from aerodaas.errors import RecordingError
+from aerodaas.geometry import GeodeticOrigin
+from aerodaas.recording.converters import Session, convert
+from aerodaas.recording.converters.notes import log_entry
+from aerodaas.recording.converters.plan import fence_entries
+from aerodaas.recording.encoding import Entry, json_bytes, json_schema
+from aerodaas.recording.outcome import RecordingSummary
+from aerodaas.recording.output import Output
+from aerodaas.recording.provenance import Provenance
+from aerodaas.status import Message
+
+__all__ = ["FLUSH_SECONDS", "FlightRecorder"]
+
+FLUSH_SECONDS = 0.5
+"""What a killed process loses at most, in seconds of the host."""
+_CHUNK = 1 << 20
+_MILLISECOND = 1_000_000
+
+DROPS = json_schema("Drops", stream="string", dropped="integer", total="integer")
+LATENCY = json_schema(
+    "Latency",
+    stream="string",
+    seq="integer",
+    id="integer",
+    source="string",
+    total_ms="number",
+    hops={"type": "array", "items": {"type": "object"}},
+)
+
+
+class FlightRecorder:
+    """Writes what streams carry to a new MCAP file. Any thread may call it.
+
+    Messages are logged at their mission time of publishing and published at the time of the
+    measurement, both counted from `provenance.started_ns`. Whatever was written half a second
+    ago outlives a kill of this process, and soon after a loss of power.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        *,
+        config: RecordingConfig,
+        provenance: Provenance,
+        home: GeodeticOrigin | None = None,
+        fences: Mapping[str, GeofenceConfig] | None = None,
+    ) -> None:
+        """Create the file `path`; `fences` are by robot.
+
+        Raises RecordingError if the file exists already or cannot be written.
+        """
+        self.path = Path(path)
+        self._session = Session(config, provenance.started_ns, home)
+        self._output = Output(self.path)
+        self._writer = Writer(self._output, chunk_size=_CHUNK)  # type: ignore[arg-type]
+        self._schemas: dict[str, int] = {}
+        self._channels: dict[str, int] = {}
+        self._counts: Counter[str] = Counter()
+        self._drops: Counter[str] = Counter()
+        self._first: int | None = None
+        self._last = 0
+        self._failure = ""
+        self._told = False
+        self._summary: RecordingSummary | None = None
+        self._lock = threading.Lock()
+        self._closing = threading.Event()
+        try:
+            self._begin(provenance, fences or {})
+        except OSError as error:
+            self._output.close()
+            raise RecordingError(f"cannot write {self.path}: {error.strerror}") from None
+        self._flusher = threading.Thread(target=self._flush_regularly, daemon=True)
+        self._flusher.start()
+
+    def write(self, message: Message[Any]) -> None:
+        """Record a message: its item by type, and its way here.
+
+        Raises RecordingError once if recording had to stop (disk full); from then on it only
+        counts what is lost.
+        """
+        entries = self._entries(message)
+        with self._lock:
+            if self._failure or self._summary is not None:
+                self._lose(message.stream)
+                return
+            try:
+                for entry in entries:
+                    self._add(entry, message)
+            except OSError as error:
+                self._fail(error)
+                self._lose(message.stream)
+
+    def drops(self, stream: str, count: int = 1) -> None:
+        """Count messages of `stream` that were dropped on their way here."""
+        with self._lock:
+            self._drops[stream] += count
+            value = {"stream": stream, "dropped": count, "total": self._drops[stream]}
+            entry = Entry("/drops", DROPS, json_bytes(value), self._last)
+            if self._failure or self._summary is not None:
+                return
+            try:
+                self._put(entry, self._last, self._last, self._counts["/drops"])
+            except OSError as error:
+                self._fail(error)
+
+    def flush(self) -> None:
+        """Hand everything written so far to the operating system."""
+        with self._lock:
+            if self._failure or self._summary is not None:
+                return
+            try:
+                self._writer.flush()
+            except OSError as error:
+                self._fail(error)
+
+    def close(self) -> RecordingSummary:
+        """Finish the file and say what it holds. May be called again; never raises."""
+        self._closing.set()
+        self._flusher.join()
+        with self._lock:
+            if self._summary is None:
+                if not self._failure:
+                    try:
+                        self._finish()
+                    except OSError as error:
+                        self._fail(error)
+                with suppress(OSError):
+                    self._output.close()
+                self._summary = RecordingSummary(
+                    path=self.path,
+                    channels=dict(self._counts),
+                    drops=dict(self._drops),
+                    duration=seconds(self._last - (self._first or 0)),
+                    size=self._output.tell(),
+                    stopped=self._failure,
+                )
+            return self._summary
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _entries(self, message: Message[Any]) -> list[Entry]:
+        entries = []
+        if message.item is not None:
+            try:
+                entries = list(convert(message.item, message, self._session))
+            except (TypeError, ValueError, OverflowError, AttributeError, cv2.error) as error:
+                # An item that contradicts its own type must cost neither the flight nor the rest.
+                self.drops(message.stream)
+                text = f"cannot record a {type(message.item).__name__}: {error}"
+                entries = [
+                    log_entry(self._session, message.stamp, LogLevel.Error, message.stream, text)
+                ]
+        if len(message.hops) > 1:
+            entries.append(_latency(message))
+        return entries
+
+    def _begin(self, provenance: Provenance, fences: Mapping[str, GeofenceConfig]) -> None:
+        self._writer.start(library=f"aerodaas {provenance.versions.get('aerodaas', '')}".strip())
+        epoch = provenance.started_ns
+        self._writer.add_metadata("aerodaas", provenance.as_metadata())
+        for name, media_type, text in (
+            ("environment.json", "application/json", provenance.config),
+            (provenance.app or "app.py", "text/x-python", provenance.app_source),
+        ):
+            if text:
+                self._writer.add_attachment(epoch, epoch, name, media_type, text.encode())
+        for robot, fence in fences.items():
+            for entry in fence_entries(fence, robot, self._session):
+                self._put(entry, 0, 0, 0)
+        self._writer.flush()
+
+    def _add(self, entry: Entry, message: Message[Any]) -> None:
+        if self._first is None:
+            self._first = self._last = message.stamp
+        self._last = max(self._last, message.stamp)
+        captured = message.header.stamp if entry.stamp is None else entry.stamp
+        self._put(entry, message.stamp, captured, message.seq)
+
+    def _put(self, entry: Entry, recorded: int, captured: int, sequence: int) -> None:
+        channel = self._channels.get(entry.topic) or self._register(entry.topic, entry.schema)
+        epoch = self._session.epoch_ns
+        self._writer.add_message(
+            channel,
+            log_time=epoch + recorded,
+            publish_time=epoch + captured,
+            data=entry.data,
+            sequence=sequence,
+        )
+        self._counts[entry.topic] += 1
+
+    def _register(self, topic: str, schema: Schema) -> int:
+        name = schema.name
+        if name not in self._schemas:
+            self._schemas[name] = self._writer.register_schema(name, schema.encoding, schema.data)
+        encoding = "json" if schema.encoding == "jsonschema" else schema.encoding
+        self._channels[topic] = self._writer.register_channel(topic, encoding, self._schemas[name])
+        return self._channels[topic]
+
+    def _finish(self) -> None:
+        if self._drops:
+            figures = {stream: str(count) for stream, count in self._drops.items()}
+            self._writer.add_metadata("aerodaas.drops", figures)
+        self._writer.finish()
+        self._output.sync()
+
+    def _fail(self, error: OSError) -> None:
+        self._failure = (
+            f"{self.path} could not be written any further ({error.strerror}); what it holds so "
+            "far can be read; free space on the disk before the next flight"
+        )
+
+    def _lose(self, stream: str) -> None:
+        self._drops[stream] += 1
+        if self._failure and not self._told:
+            self._told = True
+            raise RecordingError(self._failure)
+
+    def _flush_regularly(self) -> None:
+        while not self._closing.wait(FLUSH_SECONDS):
+            self.flush()
+            try:
+                # Not under the lock: a slow card must not hold up `write`.
+                self._output.sync()
+            except OSError as error:
+                with self._lock:
+                    self._fail(error)
+                return
+
+
+def _latency(message: Message[Any]) -> Entry:
+    hops = []
+    before = message.captured
+    for hop in message.hops:
+        hops.append(
+            {
+                "node": hop.node,
+                "wait_ms": (hop.received - before) / _MILLISECOND,
+                "work_ms": (hop.published - hop.received) / _MILLISECOND,
+            }
+        )
+        before = hop.published
+    value = {
+        "stream": message.stream,
+        "seq": message.seq,
+        "id": message.header.id,
+        "source": message.header.source,
+        "total_ms": message.latency_ns / _MILLISECOND,
+        "hops": hops,
+    }
+    return Entry("/latency", LATENCY, json_bytes(value))

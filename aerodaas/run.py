@@ -1,0 +1,227 @@
+"""One run of an application: from its graph to a landed drone and a closed recording."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import threading
+import time
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from aerodaas.clock import seconds
+from aerodaas.config import EnvironmentConfig
+from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, MissionError
+from aerodaas.navigation.commands import Answer, Command, End
+from aerodaas.options import RunOptions, current_options
+from aerodaas.status import MissionState
+
+if TYPE_CHECKING:
+    from aerodaas.actors.flight import Flight, FlightState
+    from aerodaas.actors.plan import FlightPlan
+    from aerodaas.environment import Environment
+
+__all__ = ["Run"]
+
+_POLL_SECONDS = 0.1
+_BEAT_SECONDS = 1.0
+_LANDING_SECONDS = 60.0
+"""Wall time that an interrupted run gives its drones to land."""
+_RECORDING = "flight.mcap"
+
+
+class Run:
+    """The flight of one environment's robots; made by `Environment.launch`."""
+
+    def __init__(self, environment: Environment) -> None:
+        self.options = current_options.get()
+        self.config = environment.config
+        self.graph = environment.graph
+        self.on_end: list[Callable[[], None]] = []
+        self.recording = _recording_path(self.options, self.config)
+        self.state: FlightState | None = None
+        self._environment = environment
+        self._flight: Flight | None = None
+        self._over = False
+        self._finished = threading.Event()
+        self._polling = threading.Lock()
+        self._began = time.monotonic()
+        self._launched = self._began
+
+    @property
+    def lockstep(self) -> bool:
+        """True where mission time moves as fast as the machine goes."""
+        simulated = all(robot.driver == "simulated" for robot in self.config.robots)
+        wanted = self.options.lockstep
+        if wanted and not simulated:
+            raise ConfigError('--speed max needs every robot to be simulated; use "--speed 1"')
+        return simulated and self.options.speed is None if wanted is None else wanted
+
+    def start(self) -> None:
+        """Start all actors; raises the project's errors, with nothing left running."""
+        from aerodaas.actors import cluster  # noqa: PLC0415 - ray only where it is needed
+        from aerodaas.actors.flight import Flight  # noqa: PLC0415
+        from aerodaas.actors.live import LiveReader  # noqa: PLC0415
+        from aerodaas.console import Starting  # noqa: PLC0415
+        from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
+
+        with Starting(self.options) as starting:
+            starting.step("starting Ray")
+            cluster.connect(self.options.address)
+            plan = self._plan()
+            provenance = Provenance.collect(
+                app=self.options.application, config=self.config, speed=self._speed_text()
+            )
+            flight = Flight(plan, self.recording, provenance)
+            try:
+                flight.launch(starting.step)
+            except BaseException:
+                flight.stop()
+                raise
+        self._flight = flight
+        self._launched = time.monotonic()
+        session = plan.session
+
+        def read(stream: str) -> LiveReader:
+            if stream not in flight.streams:
+                raise GraphError(
+                    f"{stream} does not run: call get_data_stream() before start_mission()"
+                )
+            return LiveReader(session, stream, lambda: self._over)
+
+        self.graph.reader = read
+        for callback in self.graph.on_launch:
+            callback()
+        threading.Thread(target=self._keep_alive, name="heartbeat", daemon=True).start()
+        atexit.register(self.abandon)
+
+    def command(self, robot: str, command: Command) -> Answer:
+        """Tell a robot's mission something; raises MissionError once the run is over."""
+        if self._flight is None or self._finished.is_set():
+            raise MissionError(f"{robot} is no longer flying")
+        return self._flight.command(robot, command)
+
+    def look(self, newest: int = 200) -> FlightState:
+        """Return the present state, with the `newest` latencies of each robot."""
+        assert self._flight is not None  # noqa: S101 - launched
+        with self._polling:
+            self.state = self._flight.poll(newest)
+        self._over = self.state.over
+        return self.state
+
+    def _keep_alive(self) -> None:
+        """Tell the drones that the application lives, whatever it is busy with."""
+        while not self._finished.wait(_BEAT_SECONDS):
+            # Whoever waits for the run meets the same error and deals with it.
+            with contextlib.suppress(AeroDaaSError):
+                self.look()
+
+    def wait(self) -> None:
+        """Watch until every mission has ended; raises what they ended with.
+
+        Ctrl-C lands the drones first; a second one stops at once.
+        """
+        if self._finished.is_set():
+            return
+        assert self._flight is not None  # noqa: S101 - launched
+        try:
+            self._watch(float("inf"))
+        except KeyboardInterrupt:
+            self._land("interrupted from the keyboard")
+            raise
+        except AeroDaaSError:
+            self._land("the run failed")
+            raise
+        finally:
+            self._finish()
+        self._raise_problems()
+
+    def _plan(self) -> FlightPlan:
+        from aerodaas.actors.plan import make_plan  # noqa: PLC0415
+        from aerodaas.actors.session import Session  # noqa: PLC0415
+
+        speed = None if self.lockstep else (self.options.speed or 1.0)
+        session = Session(self.config, speed)
+        scheduler = self._environment.trajectory_scheduler()
+        dispatch_with = self._environment.analytics_scheduler()
+        compute = self._environment.compute()
+        return make_plan(session, self.graph, compute, scheduler, dispatch_with)
+
+    def _speed_text(self) -> str:
+        return "max" if self.lockstep else f"{self.options.speed or 1.0:g}"
+
+    def _watch(self, until: float) -> None:
+        from aerodaas.console import Watching  # noqa: PLC0415
+
+        assert self._flight is not None  # noqa: S101 - launched
+        with Watching(self.options, self.config) as watching:
+            while time.monotonic() < until:
+                state = self.look()
+                watching.update(state)
+                if state.over:
+                    return
+                time.sleep(_POLL_SECONDS)
+
+    def _land(self, reason: str) -> None:
+        """Have every drone land, and give it the time to do so."""
+        assert self._flight is not None  # noqa: S101 - launched
+        try:
+            for robot in dict.fromkeys(edge.robot for edge in self.graph.navigation):
+                self._flight.command(robot, End(reason))
+            self._watch(time.monotonic() + _LANDING_SECONDS)
+        except AeroDaaSError:
+            return
+
+    def _finish(self) -> None:
+        from aerodaas.console import show_results, show_speed  # noqa: PLC0415
+
+        assert self._flight is not None  # noqa: S101 - launched
+        self._finished.set()
+        self._over = True
+        atexit.unregister(self.abandon)
+        flown = time.monotonic() - self._launched
+        with self._polling:
+            self._flight.stop()
+        for hook in self.on_end:
+            hook()
+        stamps = [robot.status.stamp for robot in self.state.robots.values()] if self.state else []
+        show_speed(
+            self.options, seconds(max(stamps, default=0)), flown, self._launched - self._began
+        )
+        show_results(self.options, self._flight.recording)
+
+    def abandon(self) -> None:
+        """Land and stop: the application has ended without waiting."""
+        if not self._finished.is_set():
+            self._land("the application ended")
+            self._finish()
+
+    def _raise_problems(self) -> None:
+        assert self._flight is not None  # noqa: S101 - launched
+        problems = [str(report.error) for report in self._flight.reports().values() if report.error]
+        problems += [
+            line
+            for report in self._flight.reports().values()
+            for line in report.values.get("last_errors", ())
+        ]
+        robots = self.state.robots if self.state else {}
+        problems += [
+            f"{name}: mission aborted: {robot.status.reason}"
+            for name, robot in robots.items()
+            if robot.status.state is MissionState.ABORTED
+        ]
+        if problems:
+            raise MissionError("; ".join(dict.fromkeys(problems)))
+
+
+def _recording_path(options: RunOptions, config: EnvironmentConfig) -> Path | None:
+    if not config.recording.enabled:
+        return None
+    wanted = options.record or (Path(config.recording.path) if config.recording.path else None)
+    if wanted is None:
+        name = options.application.stem if options.application else config.name
+        now = datetime.now().astimezone()
+        wanted = Path("runs") / f"{name}-{now:%Y%m%d-%H%M%S}"
+    return wanted if wanted.suffix == ".mcap" else wanted / _RECORDING

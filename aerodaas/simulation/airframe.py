@@ -1,0 +1,69 @@
+"""What a simulated drone is made of: the settings of the simulated driver.
+
+The defaults describe a 2 kg quadrotor with 10-inch rotors and a 4-cell 5 Ah battery, about
+20 minutes of hover: the class of the Holybro X500 that PX4 ships as its own simulated default.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+__all__ = ["AIR_DENSITY", "GRAVITY", "Airframe"]
+
+GRAVITY = 9.80665
+"""Standard gravity, m/s^2."""
+
+AIR_DENSITY = 1.225
+"""Sea level, International Standard Atmosphere, kg/m^3."""
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Fraction = Annotated[float, Field(ge=0, le=1)]
+
+
+class Airframe(BaseModel):
+    """Mass, rotors, drag, battery and own limits of a simulated multirotor."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    mass: Positive = 2.0
+    """Kilograms, battery included."""
+    rotors: Annotated[int, Field(ge=3, le=16)] = 4
+    rotor_radius: Positive = 0.127
+    """Metres."""
+    efficiency: Annotated[float, Field(gt=0, le=1)] = 0.6
+    """Ideal power over electrical power: rotors, motors and controllers together."""
+    avionics_power: NotNegative = 10.0
+    """Watts drawn whether flying or not."""
+    rotor_drag: NotNegative = 0.15
+    """Linear drag of the rotors, (m/s^2) per m/s of airspeed."""
+    body_drag: NotNegative = 0.02
+    """Quadratic drag of the body, (m/s^2) per (m/s)^2 of airspeed."""
+    thrust_to_weight: Annotated[float, Field(ge=1.2, le=6)] = 2.0
+    max_tilt: Annotated[float, Field(ge=5, le=60)] = 30.0
+    """Degrees."""
+    max_speed: Positive = 12.0
+    """m/s that it can do horizontally, whatever the mission's limits allow."""
+    max_climb: Positive = 3.0
+    """m/s that it can do vertically."""
+    landing_speed: Annotated[float, Field(gt=0, le=2)] = 0.4
+    """m/s downwards close to the ground."""
+    cells: Annotated[int, Field(ge=1, le=24)] = 4
+    capacity: Positive = 5.0
+    """Ampere-hours."""
+    cell_resistance: NotNegative = 0.006
+    """Ohms per cell."""
+    battery: Fraction = 1.0
+    """Charge at the start, 0 to 1."""
+    battery_minimum: Fraction = 0.15
+    """Charge below which it refuses to take off."""
+    battery_failsafe: Fraction = 0.05
+    """Charge below which it lands by itself, whatever it is told."""
+
+    @property
+    def disc_area(self) -> float:
+        """Area swept by all rotors, m^2."""
+        return self.rotors * math.pi * self.rotor_radius**2

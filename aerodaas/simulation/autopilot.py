@@ -1,0 +1,229 @@
+"""The autopilot of the simulated drone: its modes, from the ground and back to it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from aerodaas.simulation.airframe import Airframe
+from aerodaas.simulation.battery import FlightBattery, flight_power
+from aerodaas.simulation.dynamics import STEP, Multirotor, Triple
+from aerodaas.simulation.guidance import velocity_towards, yaw_rate_towards
+from aerodaas.simulation.noise import SensorNoise
+from aerodaas.vehicle import VehicleMode
+
+__all__ = ["Autopilot", "FlightLimits", "Goto", "Steer"]
+
+_SPOOL_UP = 0.8
+"""Seconds from arming until the rotors lift."""
+
+_DISARM_AFTER = 0.5
+"""Seconds on the ground after a landing until the motors stop."""
+
+_DISARM_GUIDED_AFTER = 2.0
+"""The same when setpoints led to the ground, as PX4's COM_DISARM_LAND."""
+
+_POWER_PERIOD = 10
+"""Steps between two looks at the power drawn; it changes slowly."""
+
+_ARRIVED = 0.1
+"""Metres and m/s within which a take-off height or home counts as reached."""
+
+_STANDING = 0.15
+"""m/s below which a hold latches its place."""
+
+_FLARE_SPEED_PER_METRE = 0.5
+"""1/s: how a descent slows down towards the ground."""
+
+_CRASH_SPEED = 2.0
+"""m/s downwards at touchdown from which it is reported as a crash."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlightLimits:
+    """What the vehicle keeps to: m/s, m/s^2."""
+
+    speed: float
+    climb: float
+    acceleration: float
+    cruise: float
+    """Horizontal m/s where nobody states another."""
+
+
+@dataclass(frozen=True, slots=True)
+class Goto:
+    """Fly to a believed position (ENU metres) at most at `speed` m/s, facing `yaw` radians."""
+
+    position: Triple
+    yaw: float
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Steer:
+    """Fly at a velocity (ENU m/s) and turn at `yaw_rate` rad/s."""
+
+    velocity: Triple
+    yaw_rate: float
+
+
+class Autopilot:
+    """Flies a `Multirotor` by what it believes of its position, one step at a time.
+
+    The public methods set a mode and a target; they trust their caller to have checked both.
+    """
+
+    def __init__(
+        self,
+        airframe: Airframe,
+        rotor: Multirotor,
+        noise: SensorNoise,
+        limits: FlightLimits,
+    ) -> None:
+        """Stand on the ground, disarmed."""
+        self.mode = VehicleMode.GROUNDED
+        self.armed = False
+        self.crashed = False
+        self.battery = FlightBattery(airframe)
+        self._airframe = airframe
+        self._rotor = rotor
+        self._noise = noise
+        self._limits = limits
+        self._home = rotor.position
+        self._target: Goto | Steer | None = None
+        self._steps = 0
+        self._spooling = 0.0
+        self._grounded_for = 0.0
+
+    @property
+    def flying(self) -> bool:
+        """True in every mode in which the rotors carry it."""
+        return self.mode is not VehicleMode.GROUNDED
+
+    def take_off(self, height: float) -> None:
+        """Arm and climb to `height` metres above the ground."""
+        x, y, z = self._home = self._believed()
+        self.armed = True
+        self.mode = VehicleMode.TAKING_OFF
+        self._spooling = _SPOOL_UP
+        self._grounded_for = 0.0
+        self._target = Goto((x, y, z + height), self._believed_yaw(), self._limits.cruise)
+
+    def guide(self, target: Goto | Steer) -> None:
+        """Follow a setpoint."""
+        self.mode = VehicleMode.GUIDED
+        self._target = target
+
+    def hold(self) -> None:
+        """Brake and stay; does nothing while already holding."""
+        if self.mode is not VehicleMode.HOLDING:
+            self.mode = VehicleMode.HOLDING
+            self._target = None
+
+    def return_home(self) -> None:
+        """Fly level to the place of take-off and land there."""
+        self.mode = VehicleMode.RETURNING
+        x, y, _ = self._home
+        height = self._believed()[2]
+        self._target = Goto((x, y, height), self._believed_yaw(), self._limits.cruise)
+
+    def land(self, mode: VehicleMode = VehicleMode.LANDING) -> None:
+        """Descend here; `mode` may be FAILSAFE, which nobody can override."""
+        self.mode = mode
+        x, y, z = self._believed()
+        self._target = Goto((x, y, z), self._believed_yaw(), self._limits.cruise)
+
+    def step(self) -> None:
+        """Advance by one step of the flight dynamics."""
+        rotor = self._rotor
+        if self.armed and self.battery.fraction > 0.0:
+            demand, yaw_rate = self._demand()
+            rotor.step(demand, yaw_rate)
+        else:
+            rotor.step(None, 0.0)
+        self._steps += 1
+        if self._steps % SensorNoise.PERIOD == 0:
+            self._noise.update()
+        if self._steps % _POWER_PERIOD == 0:
+            power = flight_power(self._airframe, rotor.thrust, rotor.airspeed)
+            self.battery.drain(power, STEP * _POWER_PERIOD)
+        if self.armed:
+            self._change_mode()
+
+    def _believed(self) -> Triple:
+        (x, y, z), (dx, dy, dz) = self._rotor.position, self._noise.drift
+        return x + dx, y + dy, z + dz
+
+    def _believed_yaw(self) -> float:
+        return self._rotor.yaw + self._noise.yaw_drift
+
+    def _demand(self) -> tuple[Triple | None, float]:
+        """Velocity and yaw rate for the next step."""
+        if self._spooling > 0.0:
+            self._spooling -= STEP
+            return None, 0.0
+        target = self._target
+        if isinstance(target, Steer):
+            return target.velocity, target.yaw_rate
+        if target is None:
+            return (0.0, 0.0, 0.0), 0.0
+        velocity = velocity_towards(
+            self._believed(),
+            target.position,
+            speed=target.speed,
+            climb=self._limits.climb,
+            max_acceleration=self._limits.acceleration,
+        )
+        if self.mode in {VehicleMode.LANDING, VehicleMode.FAILSAFE}:
+            velocity = (velocity[0], velocity[1], -self._descent())
+        return velocity, yaw_rate_towards(self._believed_yaw(), target.yaw)
+
+    def _descent(self) -> float:
+        """Speed of a landing in m/s: fast above, gentle close to the ground."""
+        height = self._rotor.position[2] - self._rotor.ground
+        slow = self._airframe.landing_speed
+        return min(self._limits.climb, max(slow, _FLARE_SPEED_PER_METRE * height))
+
+    def _change_mode(self) -> None:
+        mode = self.mode
+        if self._rotor.on_ground:
+            self._change_mode_on_ground()
+            mode = self.mode
+        else:
+            self._grounded_for = 0.0
+        if mode is VehicleMode.TAKING_OFF and self._arrived():
+            self.hold()
+        elif mode is VehicleMode.RETURNING and self._arrived():
+            self.land()
+        elif mode is VehicleMode.HOLDING and self._target is None and self._standing():
+            self._target = Goto(self._believed(), self._believed_yaw(), self._limits.cruise)
+        if (
+            mode is not VehicleMode.FAILSAFE
+            and self.armed
+            and self.battery.fraction <= self._airframe.battery_failsafe
+        ):
+            self.land(VehicleMode.FAILSAFE)
+
+    def _standing(self) -> bool:
+        return math.hypot(*self._rotor.velocity) < _STANDING
+
+    def _arrived(self) -> bool:
+        target = self._target
+        return (
+            isinstance(target, Goto)
+            and math.dist(self._believed(), target.position) < _ARRIVED
+            and math.hypot(*self._rotor.velocity) < _ARRIVED
+        )
+
+    def _change_mode_on_ground(self) -> None:
+        if self.mode is VehicleMode.TAKING_OFF:
+            return
+        self._grounded_for += STEP
+        landing = self.mode in {VehicleMode.LANDING, VehicleMode.FAILSAFE}
+        if self._rotor.impact > _CRASH_SPEED:
+            self.crashed = True
+        patience = _DISARM_AFTER if landing else _DISARM_GUIDED_AFTER
+        if self.crashed or self._grounded_for >= patience:
+            self.armed = False
+            self.mode = VehicleMode.GROUNDED
+            self._target = None

@@ -1,0 +1,244 @@
+"""Flight dynamics of a multirotor under its own velocity controller.
+
+The model is a point mass under the thrust of its rotors, gravity and drag, with a first-order lag
+from commanded to actual thrust vector that stands for the attitude loop (Mellinger and Kumar,
+"Minimum snap trajectory generation and control for quadrotors", ICRA 2011, separate the two in
+the same way). The controller turns a velocity demand into an acceleration and cancels what drag
+and wind do by feeding back the measured difference between acceleration and thrust (Smeur, de
+Croon, Chu, "Cascaded incremental nonlinear dynamic inversion for MAV disturbance rejection",
+Control Engineering Practice 73, 2018).
+
+All of it is scalar arithmetic: for vectors of three, Python's floats are several times faster
+than numpy.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from aerodaas.simulation.airframe import GRAVITY, Airframe
+from aerodaas.simulation.wind import Wind
+
+__all__ = ["STEP", "STEP_NS", "Motion", "Multirotor", "Triple"]
+
+Triple: TypeAlias = tuple[float, float, float]
+
+STEP_NS = 10_000_000
+"""The fixed step in nanoseconds; steps lie on the grid of its multiples."""
+
+STEP = STEP_NS / 1e9
+"""The same in seconds."""
+
+_VELOCITY_GAIN = 2.5
+"""1/s. With the lag below, the velocity loop is overdamped: it does not overshoot."""
+
+_THRUST_LAG = 0.08
+"""Seconds from a commanded to an actual thrust vector; attitude loops reach 0.05 to 0.15."""
+
+_DISTURBANCE_LAG = 0.25
+"""Seconds in which the controller learns what drag and wind do."""
+
+_YAW_RATE_LAG = 0.12
+"""Seconds."""
+
+_MIN_THRUST_SHARE = 0.3
+"""Share of the weight that the controller always keeps as upward thrust, to stay steerable."""
+
+
+def _share(lag: float) -> float:
+    return 1.0 - math.exp(-STEP / lag)
+
+
+_THRUST_SHARE = _share(_THRUST_LAG)
+_DISTURBANCE_SHARE = _share(_DISTURBANCE_LAG)
+_YAW_RATE_SHARE = _share(_YAW_RATE_LAG)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Exact state of motion at one moment; ENU metres, m/s, radians, rad/s."""
+
+    position: Triple
+    velocity: Triple
+    roll: float
+    pitch: float
+    yaw: float
+    yaw_rate: float
+
+
+class Multirotor:
+    """The vehicle and its velocity controller, advanced by steps of `STEP` seconds.
+
+    `max_acceleration` in m/s^2 bounds what the controller asks for, `max_yaw_rate` is rad/s,
+    `start` ENU metres, `yaw` radians. The ground is flat, at the height of `start`.
+    """
+
+    __slots__ = (
+        "_body_drag",
+        "_disturbance",
+        "_max_acceleration",
+        "_max_thrust",
+        "_max_yaw_rate",
+        "_rotor_drag",
+        "_tilt_slope",
+        "_wind",
+        "acceleration",
+        "ground",
+        "impact",
+        "on_ground",
+        "position",
+        "thrust",
+        "velocity",
+        "yaw",
+        "yaw_rate",
+    )
+
+    def __init__(
+        self,
+        airframe: Airframe,
+        wind: Wind,
+        *,
+        max_acceleration: float,
+        max_yaw_rate: float,
+        start: Triple,
+        yaw: float,
+    ) -> None:
+        """Stand at `start` with the motors off."""
+        self._rotor_drag = airframe.rotor_drag
+        self._body_drag = airframe.body_drag
+        self._tilt_slope = math.tan(math.radians(airframe.max_tilt))
+        self._max_thrust = airframe.thrust_to_weight * GRAVITY
+        self._max_acceleration = max_acceleration
+        self._max_yaw_rate = max_yaw_rate
+        self._wind = wind
+        self._disturbance: Triple = (0.0, 0.0, 0.0)
+        self.position = start
+        self.velocity: Triple = (0.0, 0.0, 0.0)
+        self.acceleration: Triple = (0.0, 0.0, 0.0)
+        self.thrust: Triple = (0.0, 0.0, 0.0)
+        """Thrust over mass, ENU m/s^2."""
+        self.yaw = yaw
+        self.yaw_rate = 0.0
+        self.ground = start[2]
+        self.on_ground = True
+        self.impact = 0.0
+        """m/s downwards at the latest touchdown."""
+
+    @property
+    def airspeed(self) -> Triple:
+        """Velocity relative to the air, ENU m/s."""
+        v, w = self.velocity, self._wind.velocity
+        return v[0] - w[0], v[1] - w[1], v[2] - w[2]
+
+    def step(self, demand: Triple | None, yaw_rate: float) -> None:
+        """Advance by one step with a velocity `demand` (ENU m/s), or None with the motors off."""
+        self._wind.step()
+        if demand is None:
+            if self.on_ground:
+                self._rest()
+                return
+            command = (0.0, 0.0, 0.0)
+        else:
+            command = self._command(demand)
+        keep = 1.0 - _THRUST_SHARE
+        thrust = self.thrust
+        self.thrust = fx, fy, fz = (
+            keep * thrust[0] + _THRUST_SHARE * command[0],
+            keep * thrust[1] + _THRUST_SHARE * command[1],
+            keep * thrust[2] + _THRUST_SHARE * command[2],
+        )
+        ux, uy, uz = self.airspeed
+        drag = self._rotor_drag + self._body_drag * math.sqrt(ux * ux + uy * uy + uz * uz)
+        dx, dy, dz = -drag * ux, -drag * uy, -drag * uz
+        lx, ly, lz = self._disturbance
+        self._disturbance = (
+            lx + _DISTURBANCE_SHARE * (dx - lx),
+            ly + _DISTURBANCE_SHARE * (dy - ly),
+            lz + _DISTURBANCE_SHARE * (dz - lz),
+        )
+        self._move((fx + dx, fy + dy, fz - GRAVITY + dz), yaw_rate)
+
+    def _rest(self) -> None:
+        self.velocity = self.acceleration = self.thrust = (0.0, 0.0, 0.0)
+        self._disturbance = (0.0, 0.0, 0.0)
+        self.yaw_rate = 0.0
+
+    def _command(self, demand: Triple) -> Triple:
+        """Thrust over mass that the controller asks for, within tilt and acceleration limits."""
+        vx, vy, vz = self.velocity
+        ax = _VELOCITY_GAIN * (demand[0] - vx)
+        ay = _VELOCITY_GAIN * (demand[1] - vy)
+        az = _VELOCITY_GAIN * (demand[2] - vz)
+        size = math.sqrt(ax * ax + ay * ay + az * az)
+        if size > self._max_acceleration:
+            scale = self._max_acceleration / size
+            ax, ay, az = ax * scale, ay * scale, az * scale
+        lx, ly, lz = self._disturbance
+        fx, fy, fz = ax - lx, ay - ly, az - lz + GRAVITY
+        fz = min(max(fz, _MIN_THRUST_SHARE * GRAVITY), self._max_thrust)
+        sideways = math.hypot(fx, fy)
+        widest = self._tilt_slope * fz
+        if sideways > widest:
+            scale = widest / sideways
+            fx, fy = fx * scale, fy * scale
+        return fx, fy, fz
+
+    def _move(self, acceleration: Triple, yaw_rate: float) -> None:
+        ax, ay, az = acceleration
+        if self.on_ground:
+            if az <= 0.0:
+                self.velocity = self.acceleration = (0.0, 0.0, 0.0)
+                self.yaw_rate = 0.0
+                return
+            self.on_ground = False
+        x, y, z = self.position
+        vx, vy, vz = self.velocity
+        half = 0.5 * STEP * STEP
+        z += vz * STEP + az * half
+        self.position = (x + vx * STEP + ax * half, y + vy * STEP + ay * half, z)
+        self.velocity = (vx + ax * STEP, vy + ay * STEP, vz + az * STEP)
+        self.acceleration = acceleration
+        wanted = min(max(yaw_rate, -self._max_yaw_rate), self._max_yaw_rate)
+        self.yaw_rate += _YAW_RATE_SHARE * (wanted - self.yaw_rate)
+        self.yaw = math.remainder(self.yaw + self.yaw_rate * STEP, math.tau)
+        if z <= self.ground and self.velocity[2] < 0.0:
+            self.impact = -self.velocity[2]
+            self.position = (self.position[0], self.position[1], self.ground)
+            self.velocity = self.acceleration = (0.0, 0.0, 0.0)
+            self.yaw_rate = 0.0
+            self.on_ground = True
+
+    def motion(self, ahead: float = 0.0) -> Motion:
+        """State of motion, carried on by `ahead` seconds (less than a step) for reading.
+
+        Reading between two steps of the grid does not change the simulation.
+        """
+        x, y, z = self.position
+        vx, vy, vz = self.velocity
+        ax, ay, az = self.acceleration
+        half = 0.5 * ahead * ahead
+        roll, pitch = self._tilt()
+        return Motion(
+            (
+                x + vx * ahead + ax * half,
+                y + vy * ahead + ay * half,
+                max(self.ground, z + vz * ahead + az * half),
+            ),
+            (vx + ax * ahead, vy + ay * ahead, vz + az * ahead),
+            roll,
+            pitch,
+            math.remainder(self.yaw + self.yaw_rate * ahead, math.tau),
+            self.yaw_rate,
+        )
+
+    def _tilt(self) -> tuple[float, float]:
+        """Roll and pitch that point the body's up axis along the thrust."""
+        fx, fy, fz = self.thrust
+        size = math.sqrt(fx * fx + fy * fy + fz * fz)
+        if self.on_ground or size < _MIN_THRUST_SHARE:
+            return 0.0, 0.0
+        c, s = math.cos(self.yaw), math.sin(self.yaw)
+        forward, left = c * fx + s * fy, c * fy - s * fx
+        return math.asin(-left / size), math.atan2(forward, fz)

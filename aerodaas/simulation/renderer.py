@@ -1,0 +1,127 @@
+"""Pictures of a simulated world, by panda3d's software renderer.
+
+It needs no GPU, no display and no system library. panda3d's axes agree with ENU (x right/east,
+y ahead/north, z up), and its cameras look along their own y.
+"""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from panda3d.core import (
+    Camera,
+    FrameBufferProperties,
+    GraphicsEngine,
+    GraphicsOutput,
+    GraphicsPipe,
+    GraphicsPipeSelection,
+    LMatrix4f,
+    PerspectiveLens,
+    Texture,
+    WindowProperties,
+    load_prc_file_data,
+)
+
+from aerodaas.data import Odometry
+from aerodaas.errors import SourceError
+from aerodaas.geometry import CameraModel, rotation_from_rpy
+from aerodaas.simulation.scene.light import HAZE
+from aerodaas.simulation.scene.scene import Scene
+from aerodaas.simulation.world import World
+
+__all__ = ["Renderer"]
+
+# A moving camera fills panda3d's cache of transforms by some 36 a frame, for good.
+_SETTINGS = """
+transform-cache false
+load-display p3tinydisplay
+window-type offscreen
+audio-library-name null
+notify-level warning
+"""
+
+_NEAR, _FAR = 0.1, 1200.0
+"""Metres."""
+
+_LOWEST = 0.12
+"""Metres above the ground at which the landing gear holds the camera, at least."""
+
+
+class Renderer:
+    """Renders one camera's view of a world; it belongs to the thread that made it.
+
+    Raises SourceError if the software renderer cannot be had.
+    """
+
+    def __init__(self, world: World, camera: CameraModel) -> None:
+        """Build the scene and an offscreen buffer of the camera's size."""
+        load_prc_file_data("aerodaas", _SETTINGS)
+        self._camera = camera
+        self._optical = camera.body_from_optical
+        pipe = GraphicsPipeSelection.get_global_ptr().make_pipe(
+            "TinyOffscreenGraphicsPipe", "p3tinydisplay"
+        )
+        if pipe is None:
+            raise SourceError(
+                "panda3d came without its software renderer (p3tinydisplay); "
+                "reinstall it with `pip install --force-reinstall panda3d`"
+            )
+        # An engine of its own: rendering one camera must not render all others of the process.
+        self._engine = GraphicsEngine(pipe)
+        self._scene = Scene(world)
+        self._eye = self._scene.root.attach_new_node(Camera("eye", _lens(camera)))
+        self._buffer, self._pixels = self._open(pipe)
+
+    def _open(self, pipe: GraphicsPipe) -> tuple[GraphicsOutput, Texture]:
+        camera = self._camera
+        properties = FrameBufferProperties()
+        properties.set_rgb_color(True)
+        properties.set_depth_bits(24)
+        buffer = self._engine.make_output(
+            pipe,
+            "camera",
+            0,
+            properties,
+            WindowProperties.size(camera.width, camera.height),
+            GraphicsPipe.BF_refuse_window,
+        )
+        if buffer is None:
+            raise SourceError(
+                f"cannot render {camera.width} x {camera.height} pixels; ask for fewer"
+            )
+        buffer.set_clear_color((*HAZE, 1.0))
+        pixels = Texture("pixels")
+        buffer.add_render_texture(pixels, GraphicsOutput.RTM_copy_ram)
+        buffer.make_display_region().set_camera(self._eye)
+        return buffer, pixels
+
+    def render(self, time: float, pose: Odometry) -> NDArray[np.uint8]:
+        """Picture (height, width, 3) in BGR at `time` seconds from a vehicle at `pose`."""
+        body = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
+        right, down, ahead = (body @ self._optical).T
+        x, y, z = np.asarray(pose.position) + body @ np.array(self._camera.mount)
+        z = max(z, _LOWEST)
+        self._eye.set_mat(LMatrix4f(*right, 0, *ahead, 0, *(-down), 0, x, y, z, 1))
+        self._scene.update(time, (float(x), float(y), float(z)))
+        self._engine.render_frame()
+        shape = (self._camera.height, self._camera.width, 4)
+        upside_down = np.frombuffer(self._pixels.get_ram_image(), np.uint8).reshape(shape)
+        picture = cv2.flip(cv2.cvtColor(upside_down, cv2.COLOR_BGRA2BGR), 0)
+        return picture.astype(np.uint8, copy=False)
+
+    def close(self) -> None:
+        """Free the buffer and the scene."""
+        self._engine.remove_all_windows()
+        self._scene.root.remove_node()
+
+
+def _lens(camera: CameraModel) -> PerspectiveLens:
+    """Pinhole lens of these intrinsics: the film is measured in horizontal pixels."""
+    lens = PerspectiveLens()
+    stretch = camera.fx / camera.fy
+    lens.set_film_size(camera.width, camera.height * stretch)
+    lens.set_focal_length(camera.fx)
+    lens.set_film_offset(camera.width / 2 - camera.cx, (camera.cy - camera.height / 2) * stretch)
+    lens.set_near_far(_NEAR, _FAR)
+    return lens

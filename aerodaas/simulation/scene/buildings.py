@@ -1,0 +1,239 @@
+"""Buildings, fences and lattice towers."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from panda3d.core import NodePath
+
+from aerodaas.simulation.scenario import Building, Fence, Tower
+from aerodaas.simulation.scene.layers import attach
+from aerodaas.simulation.scene.light import Light
+from aerodaas.simulation.scene.mesh import Mesh, box, merged, sheet, tube
+from aerodaas.simulation.scene.plants import rng_of
+from aerodaas.simulation.scene.textures import Palette
+from aerodaas.simulation.world import ROOF_RISE, Thing
+
+__all__ = ["add_building", "add_fence", "add_tower", "beam"]
+
+_EAVES = 0.45
+"""Metres by which a roof reaches over the walls."""
+
+_BAY = 3.0
+"""Metres of a plastered wall per window."""
+
+_PROUD = 0.03
+"""Metres by which windows and doors stand out from their wall."""
+
+_BARN_LENGTH = 12.0
+"""Metres from which a wooden building is a barn, with a gate."""
+
+_BESIDE_DOOR = 0.9
+"""Metres between a door and the middle of the next window, at least."""
+
+_FRAME = (0.90, 0.89, 0.86)
+_TILED_SHARE = 0.6
+"""Share of roofs in clay; the others are of slate."""
+
+_WOODS = ((1.0, 0.95, 0.9), (0.75, 0.42, 0.36), (0.8, 0.85, 0.85))
+_PLASTERS = ((1.0, 0.97, 0.90), (0.98, 0.90, 0.74), (0.86, 0.90, 0.92), (0.95, 0.82, 0.76))
+
+
+def add_building(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
+    """Attach a building with its roof, windows and a door."""
+    spec = thing.spec
+    if not isinstance(spec, Building):
+        raise TypeError(f"{thing.id} is no building")
+    rng = rng_of(thing)
+    walls = spec.walls or str(rng.choice(["brick", "plaster", "wood"]))
+    length, width, height = spec.size
+    home = parent.attach_new_node(spec.id)
+    home.set_pos(thing.x, thing.y, 0.0)
+    home.set_h(math.degrees(thing.yaw))
+    sun = _turned(light.sun, -thing.yaw)
+    tint: ArrayLike = 1.0
+    if walls == "plaster":
+        tint = _PLASTERS[rng.integers(len(_PLASTERS))]
+        body = _facade(spec)
+    else:
+        tint = _WOODS[rng.integers(len(_WOODS))] if walls == "wood" else 1.0
+        body = box(spec.size, texel=1.6)
+    parts = [body]
+    if spec.roof == "gable":
+        parts.append(_gables(length, width, height))
+    texture = palette["facade" if walls == "plaster" else walls]
+    attach(home, "walls", merged(parts).painted(tint).lit(sun), texture)
+    roof = _gable_roof(length, width, height) if spec.roof == "gable" else _flat_roof(spec)
+    slate = (1.0, 1.0, 1.0) if rng.random() < _TILED_SHARE else (0.55, 0.62, 0.72)
+    cover = palette["tiles" if spec.roof == "gable" else "gravel"]
+    attach(home, "roof", roof.painted(slate).lit(sun), cover, both_sides=True)
+    attach(home, "openings", _openings(spec, walls).lit(sun), palette["plain"])
+    home.flatten_light()
+
+
+def _turned(vector: NDArray[np.float64], yaw: float) -> NDArray[np.float64]:
+    c, s = math.cos(yaw), math.sin(yaw)
+    x, y, z = vector
+    return np.array([c * x - s * y, s * x + c * y, z])
+
+
+def _facade(spec: Building) -> Mesh:
+    """Walls whose texture repeats once per bay and storey."""
+    length, width, height = spec.size
+    body = box(spec.size)
+    storeys = max(1, round(height / _BAY))
+    scale = np.ones_like(body.uv)
+    bays = [max(1, round(extent / _BAY)) / extent for extent in (length, width, length, width)]
+    for side, share in enumerate(bays):
+        scale[4 * side : 4 * side + 4] = (share, storeys / height)
+    scale[16:] = 0.0
+    return Mesh(body.points, body.uv * scale, body.normals, body.colours, body.triangles)
+
+
+def _gables(length: float, width: float, height: float) -> Mesh:
+    rise = ROOF_RISE * width / 2
+    x, y = length / 2, width / 2
+    parts = []
+    for side in (-1.0, 1.0):
+        points = np.array(
+            [
+                (side * x, -side * y, height),
+                (side * x, side * y, height),
+                (side * x, 0, height + rise),
+            ]
+        )
+        normal = np.tile([side, 0.0, 0.0], (3, 1))
+        uv = points[:, 1:] / 1.6 * (1.0, 0.02)
+        parts.append(Mesh(points, uv, normal, np.ones((3, 3)), np.array([[0, 1, 2]])))
+    return merged(parts)
+
+
+def _gable_roof(length: float, width: float, height: float) -> Mesh:
+    slope = ROOF_RISE
+    x, y = length / 2 + _EAVES, width / 2 + _EAVES
+    ridge, eaves = height + slope * width / 2 + 0.04, height - slope * _EAVES + 0.04
+    run = math.hypot(y, ridge - eaves)
+    uv = np.array([(0, 0), (2 * x, 0), (2 * x, run), (0, run)]) / 2.2
+    south = sheet([(-x, -y, eaves), (x, -y, eaves), (x, 0, ridge), (-x, 0, ridge)], uv)
+    north = sheet([(x, y, eaves), (-x, y, eaves), (-x, 0, ridge), (x, 0, ridge)], uv)
+    return merged([south, north])
+
+
+def _flat_roof(spec: Building) -> Mesh:
+    length, width, height = spec.size
+    return box((length + 0.3, width + 0.3, 0.35), texel=2.0, bottom=True).moved(
+        (0, 0, height - 0.3)
+    )
+
+
+def _openings(spec: Building, walls: str) -> Mesh:
+    """A door on the south side and, but for plaster that has them drawn, windows around."""
+    length, width, height = spec.size
+    barn = walls == "wood" and length > _BARN_LENGTH
+    door_width, tall = (3.2, 3.2) if barn else (1.1, 2.1)
+    door = _Opening(0.0, door_width, 0.0, min(tall, 0.82 * height), (0.38, 0.27, 0.19))
+    parts = list(_framed(door, -width / 2, 0.0))
+    if walls == "plaster":
+        return merged(parts)
+    sides = ((length, width), (width, length), (length, width), (width, length))
+    for side, (extent, reach) in enumerate(sides):
+        count = int(extent // _BAY)
+        for k in range(count):
+            along = (k + 0.5 - count / 2) * _BAY
+            if side > 0 or abs(along) > door_width / 2 + _BESIDE_DOOR:
+                low = 0.38 * height
+                high = low + min(1.3, 0.4 * height)
+                window = _Opening(along, 1.1, low, high, (0.24, 0.31, 0.38))
+                parts += _framed(window, -reach / 2, side * math.pi / 2)
+    return merged(parts)
+
+
+@dataclass(frozen=True)
+class _Opening:
+    """A door or window: where along its wall, how wide, from where to where up, its colour."""
+
+    along: float
+    width: float
+    low: float
+    high: float
+    colour: tuple[float, float, float]
+
+
+def _framed(opening: _Opening, wall: float, turn: float) -> list[Mesh]:
+    """A pane in its frame on the south `wall`, turned about the building's centre."""
+    half, rim = opening.width / 2, 0.09
+    result = []
+    for out, margin, colour in ((_PROUD, rim, _FRAME), (2.5 * _PROUD, 0.0, opening.colour)):
+        west, east = opening.along - half - margin, opening.along + half + margin
+        low, high, y = max(0.0, opening.low - margin), opening.high + margin, wall - out
+        corners = [(west, y, low), (east, y, low), (east, y, high), (west, y, high)]
+        result.append(sheet(corners).painted(colour).moved((0, 0, 0), turn))
+    return result
+
+
+def beam(start: ArrayLike, end: ArrayLike, radius: float, sides: int = 4) -> Mesh:
+    """A bar from one point to another."""
+    a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+    length = float(np.linalg.norm(b - a))
+    up = (b - a) / length
+    side = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+    side /= np.linalg.norm(side)
+    basis = np.stack([side, np.cross(up, side), up])
+    bar = tube([radius, radius], [0.0, length], sides=sides)
+    return Mesh(bar.points @ basis + a, bar.uv, bar.normals @ basis, bar.colours, bar.triangles)
+
+
+def add_fence(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
+    """Attach a fence of posts and two rails."""
+    spec = thing.spec
+    if not isinstance(spec, Fence):
+        raise TypeError(f"{thing.id} is no fence")
+    parts = []
+    line = [np.array([*point, 0.0]) for point in spec.points]
+    for here, there in itertools.pairwise(line):
+        count = max(1, round(float(np.linalg.norm(there - here)) / 2.5))
+        for k in range(count + 1):
+            foot = here + (there - here) * k / count
+            parts.append(beam(foot, foot + np.array([0.0, 0.0, spec.height]), 0.06))
+        for share in (0.5, 0.88):
+            level = np.array([0.0, 0.0, share * spec.height])
+            parts.append(beam(here + level, there + level, 0.035))
+    attach(parent, spec.id, merged(parts).painted((1.2, 1.15, 1.1)).lit(light.sun), palette["wood"])
+
+
+def add_tower(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
+    """Attach a lattice tower in red and white bands, with aerials at its top."""
+    spec = thing.spec
+    if not isinstance(spec, Tower):
+        raise TypeError(f"{thing.id} is no tower")
+    sections = max(4, round(spec.height / 2.4))
+    levels = np.linspace(0.0, spec.height - 2.0, sections + 1)
+    half = spec.width / 2 * np.linspace(1.0, 0.22, sections + 1)
+    corner = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
+    parts = []
+    for k in range(sections):
+        band = (0.86, 0.16, 0.12) if k * 7 // sections % 2 == 0 else (0.95, 0.95, 0.95)
+        low = np.c_[corner * half[k], np.full(4, levels[k])]
+        high = np.c_[corner * half[k + 1], np.full(4, levels[k + 1])]
+        for i in range(4):
+            j = (i + 1) % 4
+            bars = [(low[i], high[i], 0.07), (low[i], high[j], 0.035), (low[j], high[i], 0.035)]
+            bars.append((high[i], high[j], 0.035))
+            parts += [beam(a, b, radius, 3).painted(band) for a, b, radius in bars]
+    top = levels[-1]
+    parts.append(beam((0, 0, top), (0, 0, spec.height), 0.05).painted((0.9, 0.9, 0.9)))
+    for k in range(3):
+        angle = math.tau * k / 3
+        out = np.array([math.cos(angle), math.sin(angle), 0.0]) * (half[-1] + 0.35)
+        panel = box((0.14, 0.32, 1.6), bottom=True).moved((0, 0, 0), angle)
+        parts.append(panel.moved(out + np.array([0.0, 0.0, top - 1.9])).painted((0.88, 0.89, 0.9)))
+    dish = tube([0.05, 0.5, 0.62], [0.0, 0.12, 0.3], sides=12)
+    swap = [2, 1, 0]
+    dish = replace(dish, points=dish.points[:, swap], normals=dish.normals[:, swap])
+    parts.append(dish.moved((half[-2], 0, 0.72 * spec.height)).painted((0.93, 0.93, 0.93)))
+    tower = merged(parts).moved((thing.x, thing.y, 0.0), thing.yaw)
+    attach(parent, spec.id, tower.lit(light.sun), palette["plain"], both_sides=True)

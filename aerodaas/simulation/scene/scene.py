@@ -1,0 +1,75 @@
+"""A world as a panda3d scene."""
+
+from __future__ import annotations
+
+from panda3d.core import NodePath
+
+from aerodaas.simulation.scenario import Building, Car, CropRows, Fence, Person, Road, Tower, Tree
+from aerodaas.simulation.scene.buildings import add_building, add_fence, add_tower
+from aerodaas.simulation.scene.cars import CarFigure
+from aerodaas.simulation.scene.ground import add_field, add_ground, add_road, add_shadow
+from aerodaas.simulation.scene.light import Light, sky_dome
+from aerodaas.simulation.scene.people import PersonFigure
+from aerodaas.simulation.scene.plants import add_crops, add_tree
+from aerodaas.simulation.scene.textures import Palette
+from aerodaas.simulation.world import Thing, World
+
+__all__ = ["Scene"]
+
+
+class Scene:
+    """The nodes of a world; `update` moves what moves."""
+
+    def __init__(self, world: World) -> None:
+        """Build everything that stands, and the figures of what moves."""
+        self.root = NodePath("world")
+        self._palette = Palette()
+        self._light = Light.draw(world.scenario.sky, world.seed)
+        self._sky = sky_dome(self.root, self._light)
+        add_ground(self.root, world.scenario.ground.surface, self._palette, self._light)
+        self._people: list[tuple[Thing, PersonFigure, NodePath]] = []
+        self._cars: list[tuple[Thing, CarFigure]] = []
+        for thing in world.things:
+            self._add(thing)
+
+    def _add(self, thing: Thing) -> None:
+        root, palette, light, spec = self.root, self._palette, self._light, thing.spec
+        if isinstance(spec, Road):
+            add_road(root, spec, palette, light)
+        elif isinstance(spec, CropRows):
+            add_field(root, spec, palette, light)
+            add_crops(root, thing, palette, light)
+        elif isinstance(spec, Fence):
+            add_fence(root, thing, palette, light)
+        elif isinstance(spec, Tree):
+            add_shadow(root, thing, palette, light)
+            add_tree(root, thing, palette, light)
+        elif isinstance(spec, Building):
+            add_shadow(root, thing, palette, light)
+            add_building(root, thing, palette, light)
+        elif isinstance(spec, Tower):
+            add_shadow(root, thing, palette, light)
+            add_tower(root, thing, palette, light)
+        elif isinstance(spec, Car):
+            car = CarFigure(root, thing, palette)
+            add_shadow(car.node, thing, palette, light)
+            self._cars.append((thing, car))
+        elif isinstance(spec, Person):
+            feet = root.attach_new_node("feet")
+            add_shadow(feet, thing, palette, light)
+            self._people.append((thing, PersonFigure(root, thing, palette), feet))
+
+    def update(self, time: float, eye: tuple[float, float, float]) -> None:
+        """Show the world as it is at `time` seconds, seen from `eye` (ENU metres)."""
+        self._sky.set_pos(*eye)
+        for thing, figure, feet in self._people:
+            state = thing.state(time)
+            figure.show(present=state.present)
+            if state.present:
+                figure.pose(thing.joints(time), state.yaw)
+                feet.set_pos(state.x, state.y, 0.0)
+                feet.show()
+            else:
+                feet.hide()
+        for thing, car in self._cars:
+            car.pose(thing.state(time))

@@ -1,0 +1,120 @@
+"""Where something that moves along a path is at a time: a pure function of both."""
+
+from __future__ import annotations
+
+import bisect
+import itertools
+import math
+import random
+from dataclasses import dataclass
+
+from aerodaas.simulation.scenario import Motion
+
+__all__ = ["Track", "TrackPoint"]
+
+_CORNER_PIECES = 6
+_SPEED_PERIOD = 17.0
+"""Seconds of one swing of the speed."""
+
+_LOOK = 0.15
+"""Metres before and after a place between which its direction is taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class TrackPoint:
+    """A place on a track."""
+
+    x: float
+    y: float
+    yaw: float
+    """Radians counter-clockwise from east."""
+    travelled: float
+    """Metres since the start."""
+    speed: float
+    """m/s."""
+    present: bool
+    """False once a thing that vanishes at the end is gone."""
+
+
+class Track:
+    """A `Motion` with its corners rounded and its swing of speed drawn from `seed`."""
+
+    def __init__(self, motion: Motion, seed: str) -> None:
+        """Prepare the path."""
+        self._motion = motion
+        self._phase = random.Random(seed).uniform(0.0, math.tau)
+        points = [*motion.points, motion.points[0]] if motion.end == "loop" else motion.points
+        self._points = _rounded(points, motion.corner, closed=motion.end == "loop")
+        self._lengths = [0.0]
+        for here, there in itertools.pairwise(self._points):
+            self._lengths.append(self._lengths[-1] + math.dist(here, there))
+
+    @property
+    def length(self) -> float:
+        """Metres from the first to the last point."""
+        return self._lengths[-1]
+
+    def at(self, time: float) -> TrackPoint:
+        """Place at `time` seconds of the mission clock."""
+        motion = self._motion
+        moving = max(0.0, time - motion.start)
+        turn = math.tau / _SPEED_PERIOD
+        swing = math.sin(turn * moving + self._phase) - math.sin(self._phase)
+        travelled = motion.speed * (moving + motion.variation * swing / turn)
+        speed = 0.0
+        if time > motion.start:
+            speed = motion.speed * (1.0 + motion.variation * math.cos(turn * moving + self._phase))
+        ended = motion.end != "loop" and travelled >= self.length
+        if ended:
+            travelled, speed = self.length, 0.0
+        x, y = self._place(travelled)
+        before, after = self._place(travelled - _LOOK), self._place(travelled + _LOOK)
+        yaw = math.atan2(after[1] - before[1], after[0] - before[0])
+        return TrackPoint(x, y, yaw, travelled, speed, not (ended and motion.end == "vanish"))
+
+    def _place(self, travelled: float) -> tuple[float, float]:
+        if self._motion.end == "loop":
+            travelled %= self.length
+        index = bisect.bisect_right(self._lengths, travelled) - 1
+        index = min(max(index, 0), len(self._points) - 2)
+        (x0, y0), (x1, y1) = self._points[index], self._points[index + 1]
+        piece = self._lengths[index + 1] - self._lengths[index]
+        share = min(max((travelled - self._lengths[index]) / piece, 0.0), 1.0)
+        return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+
+
+def _rounded(
+    points: list[tuple[float, float]], corner: float, *, closed: bool
+) -> list[tuple[float, float]]:
+    """Replace each corner by a quadratic Bezier curve that starts `corner` metres before it."""
+    if corner <= 0.0:
+        return list(points)
+    count = len(points)
+    inner = range(count - 1) if closed else range(1, count - 1)
+    result = [] if closed else [points[0]]
+    for index in inner:
+        here = points[index]
+        before = points[index - 1] if index > 0 else points[count - 2]
+        start = _towards(here, before, corner)
+        end = _towards(here, points[index + 1], corner)
+        for piece in range(_CORNER_PIECES + 1):
+            t = piece / _CORNER_PIECES
+            a, b, c = (1 - t) ** 2, 2 * t * (1 - t), t * t
+            place = (
+                a * start[0] + b * here[0] + c * end[0],
+                a * start[1] + b * here[1] + c * end[1],
+            )
+            if not result or math.dist(result[-1], place) > 0.0:
+                result.append(place)
+    last = result[0] if closed else points[-1]
+    if math.dist(result[-1], last) > 0.0:
+        result.append(last)
+    return result
+
+
+def _towards(
+    here: tuple[float, float], there: tuple[float, float], metres: float
+) -> tuple[float, float]:
+    """Place at most `metres` from `here` towards `there`, never past the middle."""
+    share = min(metres / math.dist(here, there), 0.5)
+    return here[0] + share * (there[0] - here[0]), here[1] + share * (there[1] - here[1])

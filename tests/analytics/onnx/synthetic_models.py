@@ -1,0 +1,72 @@
+"""ONNX files made for a test: their outputs are known, whatever the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+import onnx
+from numpy.typing import NDArray
+from onnx import TensorProto, helper, numpy_helper
+
+
+def constant_model(
+    path: Path,
+    outputs: Sequence[NDArray[np.generic]],
+    *,
+    shape: Sequence[int | str] = (1, 3, 64, 64),
+    element: int = TensorProto.FLOAT,
+    metadata: Mapping[str, str] | None = None,
+    declared: Sequence[Sequence[int | str]] | None = None,
+) -> Path:
+    """Write a model that gives `outputs` for any picture; `declared` are the shapes it states."""
+    shapes = declared or [output.shape for output in outputs]
+    nodes, initializers, infos = [], [], []
+    for index, output in enumerate(outputs):
+        initializers.append(numpy_helper.from_array(output, f"constant{index}"))
+        nodes.append(helper.make_node("Identity", [f"constant{index}"], [f"output{index}"]))
+        kind = helper.np_dtype_to_tensor_dtype(output.dtype)
+        infos.append(helper.make_tensor_value_info(f"output{index}", kind, shapes[index]))
+    picture = helper.make_tensor_value_info("images", element, shape)
+    graph = helper.make_graph(nodes, "constant", [picture], infos, initializers)
+    return _save(path, graph, metadata)
+
+
+def patchwork_model(
+    path: Path, *, classes: int = 80, shape: Sequence[int | str] = ("b", 3, "h", "w")
+) -> Path:
+    """Write an Ultralytics-shaped model of any input size and batch.
+
+    Every row of the output holds 40 times the cell's mean colour, 0 to 1: a white cell gives a
+    box of 40 pixels about (40, 40).
+    """
+    nodes, flat = [], []
+    for stride in (8, 16, 32):
+        window = [stride, stride]
+        nodes.append(
+            helper.make_node(
+                "AveragePool", ["images"], [f"pool{stride}"], kernel_shape=window, strides=window
+            )
+        )
+        nodes.append(helper.make_node("Reshape", [f"pool{stride}", "flat"], [f"flat{stride}"]))
+        flat.append(f"flat{stride}")
+    nodes.append(helper.make_node("Concat", flat, ["cells"], axis=2))
+    nodes.append(helper.make_node("Mul", ["cells", "forty"], ["values"]))
+    nodes.append(helper.make_node("Tile", ["values", "repeats"], ["output0"]))
+    initializers = [
+        numpy_helper.from_array(np.array(40, np.float32), "forty"),
+        numpy_helper.from_array(np.array([0, 3, -1], np.int64), "flat"),
+        numpy_helper.from_array(np.array([1, (4 + classes) // 3, 1], np.int64), "repeats"),
+    ]
+    info = helper.make_tensor_value_info("output0", TensorProto.FLOAT, ["b", 4 + classes, "n"])
+    picture = helper.make_tensor_value_info("images", TensorProto.FLOAT, shape)
+    graph = helper.make_graph(nodes, "patchwork", [picture], [info], initializers)
+    return _save(path, graph, None)
+
+
+def _save(path: Path, graph: onnx.GraphProto, metadata: Mapping[str, str] | None) -> Path:
+    model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
+    helper.set_model_props(model, dict(metadata or {}))
+    onnx.save(model, str(path))
+    return path

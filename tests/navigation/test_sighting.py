@@ -1,0 +1,164 @@
+"""Distance and bearing from a box are right, and never too far where the box is cut."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from aerodaas.data import Detection, Detections, Header, Odometry
+from aerodaas.geometry import CameraModel, rotation_from_rpy
+from aerodaas.navigation.sighting import TargetSize, sight
+
+PERSON = TargetSize(1.7, 0.5)
+WIDE, TALL = 1280, 720
+Box = tuple[float, float, float, float]
+
+
+def camera(pitch: float = 0.0) -> CameraModel:
+    """A Tello-like camera at the body's centre."""
+    return CameraModel.from_fov(WIDE, TALL, math.radians(82.6), pitch=pitch)
+
+
+def project(
+    model: CameraModel, distance: float, bearing: float, *, eye: float = 1.5, tilt: float = 0.0
+) -> Box | None:
+    """Box of an upright plate PERSON's size that faces the drone; None if it is behind."""
+    towards = np.array([math.cos(bearing), math.sin(bearing), 0.0])
+    across = np.array([-towards[1], towards[0], 0.0])
+    body_from_level = rotation_from_rpy(0.0, tilt, 0.0).T
+    corners = [
+        body_from_level @ (distance * towards + side * across * 0.25 + np.array([0, 0, up - eye]))
+        for side in (-1, 1)
+        for up in (0.0, 1.7)
+    ]
+    pixels = [model.project(corner) for corner in corners]
+    if any(depth <= 0.05 for _, _, depth in pixels):
+        return None
+    us, vs = [u for u, _, _ in pixels], [v for _, v, _ in pixels]
+    return min(us), min(vs), max(us), max(vs)
+
+
+def found(box: Box, model: CameraModel | None, tilt: float = 0.0) -> Detections:
+    """The frame in which `box` was found."""
+    odometry = Odometry(np.zeros(3), np.zeros(3), 0.0, pitch=tilt)
+    item = Detection(box, "person", 0.9)
+    return Detections(Header(0, 0, "cam"), (item,), WIDE, TALL, model, odometry)
+
+
+@given(
+    distance=st.floats(4, 20),
+    bearing=st.floats(-0.6, 0.6),
+    pitch=st.floats(-0.1, 0.2),
+    tilt=st.floats(-0.1, 0.1),
+)
+@settings(max_examples=100, deadline=None)
+def test_a_whole_object_is_located(
+    distance: float, bearing: float, pitch: float, tilt: float
+) -> None:
+    """Whatever the camera's pitch and the drone's tilt, to 5 % and 2 degrees ahead.
+
+    Towards the picture's sides a tilted camera sees an upright object lean. Its box is then too
+    wide, and the object may seem nearer than it is, never farther.
+    """
+    model = camera(pitch)
+    box = project(model, distance, bearing, tilt=tilt)
+    assert box is not None
+    assume(box[0] > 40 and box[1] > 22 and box[2] < WIDE - 40 and box[3] < TALL - 22)
+    detections = found(box, model, tilt)
+    seen = sight(detections[0], detections, PERSON)
+    assert seen is not None
+    assert seen.bearing == pytest.approx(bearing, abs=0.035)
+    assert not seen.bound
+    ahead = 0.2
+    if abs(bearing) < ahead:
+        assert seen.distance == pytest.approx(distance, rel=0.05)
+        assert seen.width == pytest.approx(0.5, rel=0.15)
+    assert 0.6 * distance < seen.distance < 1.05 * distance
+
+
+@given(distance=st.floats(0.6, 6), bearing=st.floats(-0.7, 0.7), eye=st.floats(0.5, 3))
+@settings(max_examples=200, deadline=None)
+def test_a_cut_object_never_seems_farther_than_it_is(
+    distance: float, bearing: float, eye: float
+) -> None:
+    """Or the sighting says that its distance is no more than an upper bound."""
+    model = camera()
+    whole = project(model, distance, bearing, eye=eye)
+    assume(whole is not None)
+    assert whole is not None
+    box = (max(0, whole[0]), max(0, whole[1]), min(WIDE, whole[2]), min(TALL, whole[3]))
+    assume(box[2] - box[0] > 5 and box[3] - box[1] > 5)
+    detections = found(box, model)
+    seen = sight(detections[0], detections, PERSON)
+    assume(seen is not None)
+    assert seen is not None
+    if not seen.bound:
+        assert seen.distance < 1.35 * distance
+    assert seen.distance > 0.6 * distance
+
+
+def test_feet_out_of_the_picture_do_not_draw_the_drone_in() -> None:
+    """At 2 m a level camera loses the feet: by its height alone the person would seem at 2.9 m."""
+    model = camera()
+    whole = project(model, 2.0, 0.0)
+    assert whole is not None
+    assert whole[3] > TALL
+    detections = found((*whole[:3], TALL - 12.0), model)
+    seen = sight(detections[0], detections, PERSON)
+    assert seen is not None
+    assert seen.distance == pytest.approx(2.0, rel=0.05)
+    assert seen.width is None
+
+
+def test_half_hidden_by_a_wall_it_seems_no_farther() -> None:
+    """The lower half of the box is missing, nowhere near the picture's edge."""
+    model = camera()
+    whole = project(model, 5.0, 0.0)
+    assert whole is not None
+    half = (*whole[:3], (whole[1] + whole[3]) / 2)
+    detections = found(half, model)
+    seen = sight(detections[0], detections, PERSON)
+    assert seen is not None
+    assert seen.distance == pytest.approx(5.0, rel=0.05)
+
+
+def test_left_of_the_picture_is_left_of_the_drone() -> None:
+    """FLU: left is positive."""
+    left = found((200, 200, 260, 400), camera())
+    right = found((1020, 200, 1080, 400), camera())
+    seen = [sight(item[0], item, PERSON) for item in (left, right)]
+    assert seen[0] is not None
+    assert seen[1] is not None
+    assert seen[0].bearing > 0.3
+    assert seen[1].bearing == pytest.approx(-seen[0].bearing)
+    assert seen[0].offset[1] > 0
+
+
+def test_a_picture_resized_on_the_way_gives_the_same() -> None:
+    """The calibration's size counts, not that of the picture in which the box was found."""
+    box = (500.0, 100.0, 560.0, 300.0)
+    full = found(box, camera())
+    half = replace(
+        full,
+        width=WIDE // 2,
+        height=TALL // 2,
+        items=(replace(full[0], box=(250.0, 50.0, 280.0, 150.0)),),
+    )
+    assert sight(half[0], half, PERSON) == sight(full[0], full, PERSON)
+
+
+@pytest.mark.parametrize(
+    "box",
+    [(math.nan, 0, 10, 10), (0, 0, math.inf, 10), (5, 5, 5, 5), (10, 10, 0, 0), (3, 9, 30, 9)],
+)
+def test_a_box_that_says_nothing_gives_no_sighting(box: Box) -> None:
+    """Nor does a camera without calibration."""
+    detections = found(box, camera())
+    assert sight(detections[0], detections, PERSON) is None
+    uncalibrated = found((500, 100, 560, 300), None)
+    assert sight(uncalibrated[0], uncalibrated, PERSON) is None

@@ -1,0 +1,119 @@
+"""Figures and pictures of a flight."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from synthetic_flight import PROVENANCE, SyntheticFlight, record
+
+from aerodaas.config import EnvironmentConfig, RecordingConfig
+from aerodaas.errors import RecordingError
+from aerodaas.recording.flight import Flight
+from aerodaas.recording.provenance import Provenance
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.recording.report import write_report
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A whole flight with a few frames."""
+    path = tmp_path_factory.mktemp("report") / "flight.mcap"
+    record(path, SyntheticFlight(frames=1), drops=4)
+    return path
+
+
+def test_summary_tells_the_flight(recorded: Path, tmp_path: Path) -> None:
+    """Distance, times, waypoints, battery and drops are those that were flown."""
+    files = write_report(recorded, tmp_path / "out")
+    written = json.loads(files.summary_json.read_text())
+    robot = written["robots"]["tello"]
+    assert robot["outcome"] == "landed: mission complete"
+    assert robot["distance_m"] == pytest.approx(43.0, abs=0.1)
+    assert robot["duration_s"] == pytest.approx(105.0, abs=0.2)
+    assert (robot["waypoints_planned"], robot["waypoints_visited"]) == (4, 4)
+    assert robot["max_height_m"] == pytest.approx(1.5, abs=0.15)
+    assert robot["battery_used"] == pytest.approx(0.004 * 106, abs=0.01)
+    assert written["frames"] == {"tello/camera": 106}
+    assert written["drops"] == {"tello/camera": 4}
+    assert written["decisions"] == {"edge": 106}
+    assert written["provenance"]["seed"] == "7"
+    detector = written["latencies"]["tello/detector"]
+    assert 15 < detector["median_ms"] < detector["p99_ms"] < 60
+    assert 0.1 < detector["overhead_ms"] < detector["median_ms"]
+    text = files.summary_text.read_text()
+    assert "tello: landed: mission complete; 4 of 4 waypoints, 43.0 m in 105.0 s" in text
+    assert "dropped 4 of tello/camera" in text
+
+
+def test_pictures_show_something(recorded: Path, tmp_path: Path) -> None:
+    """Each PNG opens, is not blank, and holds many colours."""
+    files = write_report(recorded, tmp_path)
+    assert [path.stem for path in files.plots] == [
+        "trajectory",
+        "profile",
+        "timeline",
+        "latency",
+        "outcomes",
+    ]
+    for path in (*files.plots, tmp_path / "moments.png"):
+        image = cv2.imread(str(path))
+        assert image is not None
+        assert min(image.shape[:2]) > 300
+        assert len(np.unique(image[::9, ::9].reshape(-1, 3), axis=0)) > 10
+
+
+def test_states_cover_the_flight(recorded: Path) -> None:
+    """Bands follow one another without gaps, and every moment has its state."""
+    with Recording.open(recorded) as recording:
+        robot = Flight.read(recording).robots["tello"]
+    assert all(a.end == b.start for a, b in zip(robot.bands, robot.bands[1:], strict=False))
+    assert [band.state for band in robot.bands[:3]] == ["preflight", "taking_off", "enroute"]
+    middle = np.array([(band.start + band.end) / 2 for band in robot.bands])
+    assert robot.state_at(middle) == [band.state for band in robot.bands]
+
+
+def test_two_robots_and_a_cut_off_file(tmp_path: Path) -> None:
+    """Each robot has its figures; a file that was not closed says so."""
+    path = tmp_path / "two.mcap"
+    record(path, SyntheticFlight(rate=5), SyntheticFlight("second", offset=(2, 2), rate=5, hover=1))
+    path.write_bytes(path.read_bytes()[:-100])
+    summary = write_report(path, tmp_path / "out").summary
+    assert set(summary.robots) == {"tello", "second"}
+    assert not summary.complete
+    assert "cut off" in str(summary)
+
+
+def test_recording_without_a_flight(tmp_path: Path) -> None:
+    """Nothing to show is said, not drawn."""
+    path = tmp_path / "nothing.mcap"
+    FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE).close()
+    with pytest.raises(RecordingError, match="holds no flight"):
+        write_report(path, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_folder_that_cannot_be_written(recorded: Path, tmp_path: Path) -> None:
+    """The folder is named."""
+    (tmp_path / "file").touch()
+    with pytest.raises(RecordingError, match="cannot write the report to"):
+        write_report(recorded, tmp_path / "file" / "out")
+
+
+def test_provenance_is_collected_without_passwords(tmp_path: Path) -> None:
+    """The application's source is kept, the password of its camera is not."""
+    app = tmp_path / "watch.py"
+    app.write_text("print('hello')\n")
+    camera = {"id": "cam", "driver": "video", "settings": {"path": "rtsp://me:secret@cam/live"}}
+    config = EnvironmentConfig.model_validate({"robots": [{"id": "tello", "sensors": [camera]}]})
+    found = Provenance.collect(app=app, config=config, seed=9)
+    assert found.app_source == app.read_text()
+    assert (found.name, found.seed) == ("watch", 9)
+    assert "secret" not in found.config
+    assert "rtsp://***@cam/live" in found.config
+    assert found.revision == ""
+    assert "python" in found.as_metadata()
