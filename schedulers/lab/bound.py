@@ -56,7 +56,7 @@ class _Block:
 
 
 def clairvoyant_bound(
-    path: SamplePath, *, grid: int = MILLISECOND, iterations: int = 60, decay: float = 0.94
+    path: SamplePath, *, grid: int = MILLISECOND, iterations: int = 40, decay: float = 0.9
 ) -> float:
     """Upper bound on the QoS utility of any scheduler on this path.
 

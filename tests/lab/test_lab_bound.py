@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
-from aerodaas.schedulers.analytics.registry import REGISTERED, load_scheduler
+from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 from aerodaas.schedulers.lab.bound import clairvoyant_bound
 from aerodaas.schedulers.lab.metrics import score
 from aerodaas.schedulers.lab.network import Network
@@ -82,7 +82,7 @@ def test_no_scheduler_exceeds_it(times: str, network: str, name: str) -> None:
     )
     bound = clairvoyant_bound(path, iterations=10)
     assert clairvoyant_bound(path, iterations=1) >= bound
-    for scheduler in REGISTERED:
+    for scheduler in scheduler_names():
         assert score(path.tasks, simulate(path, load_scheduler(scheduler))).qos <= bound + 1e-6
 
 

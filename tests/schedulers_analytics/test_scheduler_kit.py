@@ -19,7 +19,7 @@ from aerodaas.schedulers.analytics.base import (
     WakeAt,
 )
 from aerodaas.schedulers.analytics.edge_only import Fifo
-from aerodaas.schedulers.analytics.registry import REGISTERED
+from aerodaas.schedulers.analytics.registry import scheduler_names
 from aerodaas.testing.scheduler_kit import check_scheduler
 
 
@@ -117,7 +117,7 @@ def test_each_fault_is_found_and_named(broken: type[AnalyticsScheduler], words: 
         check_scheduler(broken, seconds=5)
 
 
-@pytest.mark.parametrize("name", [*REGISTERED, "dems_published", "gems_published"])
+@pytest.mark.parametrize("name", [*scheduler_names(), "dems_published", "gems_published"])
 def test_every_registered_scheduler_passes(name: str) -> None:
     """Ours keep the rules that we ask of others."""
     check_scheduler(name, seconds=8)

@@ -11,10 +11,10 @@ from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Profile, Resources
 from aerodaas.schedulers.analytics.dems import Dems
 from aerodaas.schedulers.analytics.profiles import ACTIVE, PASSIVE, PUBLISHED
-from aerodaas.schedulers.analytics.registry import REGISTERED, load_scheduler
+from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 
 
-@pytest.mark.parametrize("name", list(REGISTERED))
+@pytest.mark.parametrize("name", scheduler_names())
 def test_every_registered_name_loads(name: str) -> None:
     """Each call makes an instance of its own, which can be sent to an actor."""
     first, second = load_scheduler(name), load_scheduler(name.upper().replace("_", "-"))
@@ -55,7 +55,7 @@ def test_a_file_a_module_a_class_and_an_instance_load(tmp_path: Path) -> None:
         ("nope", UnknownIdError, "known: .*dems"),
         ("nope.py:Mine", SchedulerError, "cannot import"),
         ("no.such.module:Mine", SchedulerError, "cannot import"),
-        ("aerodaas.schedulers.analytics.dems:Nope", SchedulerError, "holds no class 'Nope'"),
+        ("aerodaas.schedulers.analytics.dems:Nope", SchedulerError, "cannot import .*Nope"),
         ("aerodaas.schedulers.analytics.base:Task", SchedulerError, "no analytics scheduler"),
     ],
 )
