@@ -17,9 +17,13 @@ __all__ = ["PluginKind", "load_plugin", "plugin_names"]
 PluginKind = Literal["drivers", "cameras", "waypoint_schedulers"]
 
 _BUILT_IN: dict[PluginKind, dict[str, str]] = {
-    "drivers": {"simulated": "aerodaas.drivers.simulated:SimulatedVehicle"},
+    "drivers": {
+        "simulated": "aerodaas.drivers.simulated:SimulatedVehicle",
+        "tello": "aerodaas.drivers.tello.vehicle:TelloVehicle",
+    },
     "cameras": {
         "simulated": "aerodaas.cameras.simulated:SimulatedCamera",
+        "tello": "aerodaas.cameras.tello:TelloCamera",
         "recorded": "aerodaas.cameras.recorded:recorded_camera",
         "folder": "aerodaas.cameras.folder:FolderCamera",
         "video": "aerodaas.cameras.video:VideoCamera",

@@ -68,7 +68,7 @@ def clairvoyant_bound(
         return elsewhere
     blocks = _blocks(jobs)
     horizon = blocks[0].end + int(jobs.length.max()) + 1
-    prices = np.zeros(len(jobs.first))
+    prices: _Floats = np.zeros(len(jobs.first))
     best = np.inf
     step = float(jobs.worth.mean()) / 2
     for _ in range(iterations):
