@@ -145,9 +145,6 @@ def main() -> None:
     except AeroDaaSError as error:
         _say(str(error))
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        _say("interrupted")
-        sys.exit(130)
     except Exception as error:  # noqa: BLE001 - the application may raise anything
         frames = [f for f in traceback.extract_tb(error.__traceback__) if "aerodaas" not in f.name]
         place = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
