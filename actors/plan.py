@@ -112,7 +112,9 @@ class _Planner:
         for robot in self.robots if self.recorded else ():
             for sensor in robot.sensors:
                 stream = f"{robot.id}/{sensor.id}"
-                if sensor.type == "camera" and stream not in self.graph.nodes:
+                if sensor.driver == "replayed" or sensor.type != "camera":
+                    continue
+                if stream not in self.graph.nodes:
                     self.graph.add(Node(stream, "sensor", Frame, sensor, robot.id))
 
     def sensors(self) -> list[Node]:

@@ -17,7 +17,10 @@ __all__ = ["PluginKind", "load_plugin", "plugin_names"]
 PluginKind = Literal["drivers", "cameras", "waypoint_schedulers"]
 
 _BUILT_IN: dict[PluginKind, dict[str, str]] = {
-    "drivers": {"simulated": "aerodaas.drivers.simulated:SimulatedVehicle"},
+    "drivers": {
+        "simulated": "aerodaas.drivers.simulated:SimulatedVehicle",
+        "replayed": "aerodaas.drivers.replayed:ReplayedVehicle",
+    },
     "cameras": {
         "simulated": "aerodaas.cameras.simulated:SimulatedCamera",
         "recorded": "aerodaas.cameras.recorded:recorded_camera",

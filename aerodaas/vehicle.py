@@ -16,6 +16,7 @@ from aerodaas.records import travels
 
 __all__ = [
     "Capabilities",
+    "PlayedVehicle",
     "PositionSetpoint",
     "Setpoint",
     "SteppedVehicle",
@@ -154,4 +155,14 @@ class SteppedVehicle(Vehicle, Protocol):
 
     def advance_to(self, stamp: int) -> None:
         """Simulate up to mission time `stamp`, in nanoseconds."""
+        ...
+
+
+@runtime_checkable
+class PlayedVehicle(SteppedVehicle, Protocol):
+    """A recorded vehicle, which comes to an end."""
+
+    @property
+    def finished(self) -> bool:
+        """True once there is nothing more to show."""
         ...
