@@ -5,9 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from typer.testing import CliRunner
-
 from aerodaas.lab_cli import app
+from typer.testing import CliRunner
 
 _MINE = """
 from aerodaas.schedulers.analytics import AnalyticsScheduler, Drop
