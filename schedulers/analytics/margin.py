@@ -6,7 +6,7 @@ difference: the gain over the cloud, with the chance of being late priced in.
 
 1. Execution times are distributions that are learned online (`estimates`); a cloud task is worth
    benefit x chance(in time) - cost, so a placement that is likely to fail is never paid for.
-2. The edge follows a plan over the next 1.5 s (`planner`): beam search over sequences of waiting
+2. The edge follows a plan over the next second (`planner`): beam search over sequences of waiting
    and of forecast tasks (`forecast`: video is periodic), by gain over the cloud less the price of
    edge time. The plan stands until reality departs from it.
 3. A task waits for the edge only while waiting can still pay (`outlook.patience`, a marginal
@@ -53,12 +53,12 @@ from aerodaas.schedulers.analytics.quality import QualityWatch
 
 __all__ = ["Margin"]
 
-HORIZON = 1_500 * MILLISECOND
-REPLAN = 600 * MILLISECOND
+HORIZON = 1_000 * MILLISECOND
+REPLAN = 500 * MILLISECOND
 """A plan that reaches less far ahead is made anew."""
 GAP = 250 * MILLISECOND
 """Longest time that the edge stays idle for a better task to come."""
-WIDTH = 6
+WIDTH = 4
 SURPRISE = 3 * MILLISECOND
 """Departure from the expected end of an execution that calls for a new plan."""
 RETRY = 20 * MILLISECOND
@@ -277,7 +277,8 @@ class Margin(AnalyticsScheduler):
         jobs: list[Job] = []
         for task, kept in model.waiting.items():
             if task.deadline > soonest:
-                elsewhere = 0.0 if kept else self._cloud_value(model, task, now)
+                room = task.deadline - now
+                elsewhere = 0.0 if kept else self.cloud.value(profile, room, bonus)
                 cost = profile.edge_cost + elsewhere
                 jobs.append(Job(task, begin, task.deadline, benefit, cost))
                 if len(jobs) == _LOOK:
