@@ -64,7 +64,7 @@ SURPRISE = 3 * MILLISECOND
 RETRY = 20 * MILLISECOND
 """Between two looks for a free slot in a crowded cloud."""
 _MEMORY = 5 * NANOSECONDS
-_LOOK = 8
+_LOOK = 5
 """Tasks of one model that the planner considers."""
 
 
