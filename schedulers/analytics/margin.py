@@ -83,7 +83,7 @@ class _Model:
 
 
 class Margin(AnalyticsScheduler):
-    """See the module: plans the edge ahead by expected gain over the cloud."""
+    """Plans the edge a second ahead by expected gain over the cloud, with the risk priced in."""
 
     def __init__(self) -> None:
         self.cloud = CloudOutlook()
@@ -106,7 +106,7 @@ class Margin(AnalyticsScheduler):
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
         """Let the task wait for as long as that can pay, or send it as a probe."""
-        model = self._models.get(task.profile.model) or self._new_model(task.profile)
+        model = self._model(task.profile)
         model.quality.arrival(task.arrival)
         model.rate = model.rate * exp((model.seen - now) / _MEMORY) + 1 / _MEMORY
         model.seen = now
@@ -179,7 +179,7 @@ class Margin(AnalyticsScheduler):
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
         """Learn from the result."""
         task = result.task
-        model = self._models[task.profile.model]
+        model = self._model(task.profile)
         model.quality.ended(task.arrival, in_time=result.outcome is Outcome.DONE)
         if result.place is Place.EDGE:
             self._stale |= abs(self._free_at - now) > SURPRISE
@@ -199,9 +199,11 @@ class Margin(AnalyticsScheduler):
             "cloud silent": float(self.cloud.silent_since is not None),
         }
 
-    def _new_model(self, profile: Profile) -> _Model:
-        model = _Model(profile, QualityWatch(profile.qoe or QoeGoal(0.0)))
-        self._models[profile.model] = model
+    def _model(self, profile: Profile) -> _Model:
+        model = self._models.get(profile.model)
+        if model is None:
+            model = _Model(profile, QualityWatch(profile.qoe or QoeGoal(0.0)))
+            self._models[profile.model] = model
         return model
 
     def _is_cheapest(self, model: _Model) -> bool:
