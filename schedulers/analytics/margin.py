@@ -16,8 +16,8 @@ difference: the gain over the cloud, with the chance of being late priced in.
 
 Sources: average-reward planning (Howard, 1960); the price of edge time is the dual of the
 fractional knapsack over the models' loads (Dantzig, 1957); deferral and stealing are those of
-DEMS (Raj et al., 2025). Cost: a plan takes width x lanes x steps evaluations, about 0.3 ms in
-Python, once a second or when surprised; every other event takes O(log n) in the tasks waiting.
+DEMS (Raj et al., 2025). Cost: a plan takes width x lanes x steps evaluations, about 0.1 ms in
+Python, twice a second or when surprised; every other event takes O(log n) in the tasks waiting.
 """
 
 from __future__ import annotations

@@ -189,13 +189,15 @@ def test_another_scheduler_takes_over_what_is_undecided() -> None:
 @pytest.mark.parametrize("name", scheduler_names())
 def test_every_scheduler_can_take_over_in_flight(name: str) -> None:
     """It is told the ends of tasks that it never saw start."""
-    dispatch, host = _dispatch_of(_Scripted(lambda t, _: SendToCloud(t), idle=True), slots=4)
+    scheduler = _Scripted(lambda t, _: SendToCloud(t), lambda t, _: RunOnEdge(t))
+    dispatch, host = _dispatch_of(scheduler, slots=4)
     tasks = [_task(number) for number in range(3)]
     for one in tasks:
         dispatch.arrived(one, 0)
     dispatch.replace(load_scheduler(name), 1)
-    for one in tasks:
-        dispatch.finished(one, 2, Outcome.FAILED if one.id else None)
-    again = Task(7, MODEL, 3, 3 + MODEL.deadline)
-    dispatch.arrived(again, 3)
-    assert [result.task.id for result in host.results[:3]] == [0, 1, 2]
+    dispatch.finished(tasks[0], 2)
+    dispatch.finished(tasks[1], 3, Outcome.FAILED)
+    dispatch.arrived(_task(7, 4), 4)
+    ends = {result.task.id: result.outcome for result in host.results}
+    assert (ends[0], ends[1]) == (Outcome.DONE, Outcome.FAILED)
+    assert dispatch.running is not tasks[1]
