@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import os
 import threading
-import time
 import traceback
 from abc import abstractmethod
 from collections import deque
@@ -20,10 +19,11 @@ from typing import Any, Literal
 import ray
 
 from aerodaas.actors.session import Session
-from aerodaas.actors.streams import Inbox, Outlet, RemoteReader
+from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteReader
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError
+from aerodaas.vitals import Vitals, read_vitals
 
 __all__ = [
     "ActorInfo",
@@ -75,7 +75,8 @@ class ActorReport:
     error: AeroDaaSError | None = None
     streams: dict[str, StreamCount] = field(default_factory=dict)
     sent: dict[str, SentCount] = field(default_factory=dict)
-    cpu_seconds: float = 0.0
+    vitals: Vitals | None = None
+    """What its process takes; None before it has said anything."""
     alerts: tuple[Alert, ...] = ()
     """The newest alerts, oldest first."""
     values: dict[str, Any] = field(default_factory=dict)
@@ -103,6 +104,7 @@ class StreamActor:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
+        self._alerting = threading.Lock()
         self.inbox: Inbox | None = None
         self.outlets: dict[str, Outlet] = {}
 
@@ -123,8 +125,10 @@ class StreamActor:
 
     def connect(self, readers: dict[str, list[Any]]) -> None:
         """Learn which actors on other nodes read this actor's streams."""
+        # In lockstep nothing may be dropped; the barrier keeps the number under way small.
+        window = MAX_DEPTH if self.session.lockstep else UNDER_WAY
         for stream, actors in readers.items():
-            self.outlets[stream].remote = [RemoteReader(actor) for actor in actors]
+            self.outlets[stream].remote = [RemoteReader(actor, window) for actor in actors]
 
     def start(self, origin_ns: int) -> None:
         """Run in a thread; mission time is zero at host time `origin_ns`."""
@@ -146,7 +150,7 @@ class StreamActor:
             error=self._error,
             streams=self.counts(),
             sent=self.sent(),
-            cpu_seconds=time.process_time(),
+            vitals=read_vitals(),
             alerts=tuple(self._newest_alerts),
             values=self._values(),
         )
@@ -177,11 +181,16 @@ class StreamActor:
         return self.outlets[stream]
 
     def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401
-        """Tell the people who watch."""
-        header = Header(self.alerts.sent, self.clock.now(), self.name)
-        alert = Alert(header, kind, text, values)
-        self._newest_alerts.append(alert)
-        self.alerts.measure(alert, header, host_time_ns())
+        """Tell the people who watch; any thread may."""
+        self.tell(kind, text, self.clock.now(), values)
+
+    def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
+        """Tell the people who watch about mission time `stamp`; any thread may."""
+        with self._alerting:
+            header = Header(self.alerts.sent, stamp, self.name)
+            alert = Alert(header, kind, text, values)
+            self._newest_alerts.append(alert)
+            self.alerts.measure(alert, header, host_time_ns())
 
     def reads(self) -> list[str]:
         """Streams that this actor reads."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future
 from typing import Any
 
 import ray
@@ -14,14 +16,19 @@ from aerodaas.status import Message
 
 __all__ = ["Cloud"]
 
+_FRAMES_KEPT = 8
+
 
 class Cloud:
     """Executions in the cloud; a frame crosses the link once, however many analyses want it."""
 
-    def __init__(self, executor: Any, timeout_ns: int) -> None:  # noqa: ANN401 - a Ray handle
+    def __init__(self, executor: Any, timeout_ns: int, wake: Callable[[], None]) -> None:  # noqa: ANN401 - a Ray handle
+        """Execute on `executor`; `wake` is called, from another thread, when an answer is there."""
         self._executor = executor
         self._timeout = timeout_ns
-        self._under_way: dict[Any, tuple[Task, int]] = {}
+        self._wake = wake
+        self._started: dict[int, tuple[Task, int]] = {}
+        self._answered: deque[tuple[Task, Future[bytes]]] = deque()
         self._frames: dict[tuple[str, int], Any] = {}
 
     def send(self, task: Task, message: Message[Any], now: int) -> None:
@@ -31,31 +38,28 @@ class Cloud:
             self._frames = dict(list(self._frames.items())[-_FRAMES_KEPT:])
             self._frames[key] = ray.put(encode_message(message))
         reference = self._executor.execute.remote(task.profile.model, self._frames[key])
-        self._under_way[reference] = (task, now)
+        self._started[task.id] = (task, now)
+
+        def answered(future: Future[bytes]) -> None:
+            self._answered.append((task, future))
+            self._wake()
+
+        reference.future().add_done_callback(answered)
 
     def answers(self, now: int) -> Iterator[tuple[Task, Message[Any] | None, bool]]:
-        """Yield what has come back: the task, its result if any, and whether it timed out."""
-        if not self._under_way:
-            return
-        ready, _ = ray.wait(
-            list(self._under_way), num_returns=len(self._under_way), timeout=0, fetch_local=True
-        )
-        for reference in ready:
-            task, _ = self._under_way.pop(reference)
+        """Yield what has come back: the task, its result if any, and whether it timed out.
+
+        An answer that comes after its time-out is passed over.
+        """
+        while self._answered:
+            task, future = self._answered.popleft()
+            if self._started.pop(task.id, None) is None:
+                continue
             try:
-                yield task, decode_message(memoryview(ray.get(reference))), False
+                yield task, decode_message(memoryview(future.result())), False
             except RayError:
                 yield task, None, False
-        for reference, (task, started) in list(self._under_way.items()):
+        for task, started in list(self._started.values()):
             if now - started > self._timeout:
-                del self._under_way[reference]
-                ray.cancel(reference)
+                del self._started[task.id]
                 yield task, None, True
-
-    @property
-    def busy(self) -> bool:
-        """True while executions are under way."""
-        return bool(self._under_way)
-
-
-_FRAMES_KEPT = 8

@@ -9,15 +9,18 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
-from aerodaas.actors.session import Session, is_due, next_due
+from aerodaas.actors._link import StreamLink
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
 from aerodaas.actors.streams import Inbox, Outlet
-from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.base import Analytics, ComputeKind
+from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.status import Message
@@ -25,7 +28,6 @@ from aerodaas.vehicle import VehicleState
 
 __all__ = ["AnalyticsActor", "NodeSpec", "TriggerSpec", "Wake"]
 
-_LOCKSTEP_DEPTH = 64
 _WAKE_DEPTH = 8
 
 
@@ -49,7 +51,10 @@ class NodeSpec:
 
     stream: str
     work: Analytics[Any]
-    inputs: tuple[str, ...]
+    inputs: dict[str, int]
+    """Streams that it reads, and how many messages of each may wait."""
+    robot: str
+    """The robot that its data belongs to, or that it commands."""
     state: str
     """Stream of the states of the vehicle that its data belongs to."""
     external: bool
@@ -57,6 +62,8 @@ class NodeSpec:
     triggers: tuple[TriggerSpec, ...]
     acknowledges: bool
     """True in lockstep for an analysis whose results nobody reads."""
+    kind: ComputeKind
+    """Where its actor stands."""
     answers_always: bool
     """True under a dispatcher, which waits for an answer to each task."""
     wakes: tuple[str, ...]
@@ -136,20 +143,24 @@ class _Worker:
 
     def __init__(self, actor: AnalyticsActor, node: NodeSpec) -> None:
         self.node = node
-        depth = _LOCKSTEP_DEPTH if actor.session.lockstep else 1
-        clocked = depth if node.external else 1
+        states = MESSAGE_DEPTH if actor.session.lockstep else 1
         self.depths = {
-            node.state: clocked,
-            **dict.fromkeys(node.inputs, depth),
+            node.state: states,
+            **node.inputs,
             **dict.fromkeys(node.wakes, _WAKE_DEPTH),
         }
+        self._link: StreamLink | None = None
+        if isinstance(node.work, CommandingAnalytics):
+            self._link = StreamLink(actor, node.stream, node.robot)
+            self.depths.update(self._link.depths)
         self.busy = 0.0
         self.errors = 0
         self.last_error = ""
         self.opened = False
         self._actor = actor
-        self._dormant = node.dormant
-        self._vehicle: VehicleState | None = None
+        self._woken: int | None = None if node.dormant else -1
+        """Stamp of the measurement that woke it; None while it sleeps."""
+        self._states: deque[tuple[int, VehicleState]] = deque(maxlen=states)
         self._now = 0
 
     def open(self) -> None:
@@ -162,24 +173,35 @@ class _Worker:
         self._acks: Outlet | None = None
         if session.lockstep and self.node.acknowledges:
             self._acks = self._actor.outlet(f"{ACKS}/{self.node.stream}")
+        if self._link is not None:
+            self._link.open()
         self.node.work.open()
         self.opened = True
 
     def run(self) -> None:
+        self._begin()
         turn = self._run_external if self.node.external else self._run_inputs
         if self.node.external and not self._actor.session.lockstep:
             turn = self._run_paced
         while not self._actor.stopping:
             turn()
 
+    def _begin(self) -> None:
+        if self._link is None or not isinstance(self.node.work, CommandingAnalytics):
+            return
+        try:
+            self.node.work.begin(self._link)
+        except Exception as error:  # noqa: BLE001 - a user's analysis may raise anything
+            self._complain(error)
+
     def _run_inputs(self) -> None:
         for message in self._receive(0.5):
-            self._work(message)
+            if message.stream in self.node.inputs:
+                self._work(message)
 
     def _run_external(self) -> None:
         """In lockstep an external source ticks with the drone's states."""
-        for message in self.inbox.receive(0.5):
-            self._note(message)
+        for message in self._receive(0.5):
             if message.stream == self.node.state and is_due(self._rate, message.stamp):
                 self._produce(message.stamp)
 
@@ -197,31 +219,37 @@ class _Worker:
     def _produce(self, stamp: int) -> None:
         header = Header(self._results.sent, stamp, self.node.stream)
         captured = host_time_ns()
-        item = self._process(None, stamp)
+        item = self._process(None, stamp) if self._awake(stamp) else None
+        if item is not None:
+            origin = Message(self.node.stream, header.id, stamp, header, captured, (), item)
+            self._fire(item, origin)
         if item is not None or self._actor.session.lockstep:
-            message = self._results.measure(item, header, captured)
-            self._fire(item, message)
-            self._acknowledge(message)
+            self._acknowledge(self._results.measure(item, header, captured))
 
     def _receive(self, timeout: float) -> list[Message[Any]]:
-        inputs = []
-        for message in self.inbox.receive(timeout):
-            if message.stream in self.node.inputs:
-                inputs.append(message)
-            else:
-                self._note(message)
-        return inputs
+        """Take note of what has arrived, and return it."""
+        messages = self.inbox.receive(timeout)
+        if messages and self._actor.session.lockstep:
+            # A state is published before what was measured in it, but may arrive in between.
+            messages += self.inbox.receive(0.0)
+        for message in messages:
+            if self._link is not None:
+                self._link.note(message)
+            if message.stream == self.node.state and message.item is not None:
+                self._states.append((message.stamp, message.item))
+            elif isinstance(message.item, Wake):
+                stamp = message.header.stamp
+                self._woken = stamp if self._woken is None else min(self._woken, stamp)
+        return messages
 
-    def _note(self, message: Message[Any]) -> None:
-        if isinstance(message.item, VehicleState):
-            self._vehicle = message.item
-        elif isinstance(message.item, Wake):
-            self._dormant = False
+    def _awake(self, stamp: int) -> bool:
+        """Tell whether to work on what was measured at `stamp`: later than what woke us."""
+        return self._woken is not None and stamp > self._woken
 
     def _work(self, message: Message[Any]) -> None:
         received = host_time_ns()
         result = None
-        if message.item is not None and not self._dormant:
+        if message.item is not None and self._awake(message.header.stamp):
             result = self._process(message.item, message.header.stamp)
         if result is not None:
             self._fire(result, message)
@@ -248,7 +276,7 @@ class _Worker:
         line = f"{self.node.stream}: {failure_line(error)}"
         if line != self.last_error:
             self.last_error = line
-            self._actor.alert("analysis_failed", line)
+            self._actor.tell("analysis_failed", line, self._now, {})
 
     def _fire(self, result: Any, origin: Message[Any]) -> None:  # noqa: ANN401
         for trigger in self.node.triggers:
@@ -277,13 +305,19 @@ class _Worker:
                 self.node.work.close()
             self.inbox.close()
 
+    @property
+    def kind(self) -> ComputeKind:
+        return self.node.kind
+
     def now(self) -> int:
         return self._now
 
     def vehicle(self) -> VehicleState | None:
-        return self._vehicle
+        """In lockstep the state at the item's own time, however far the drone has flown since."""
+        lockstep = self._actor.session.lockstep
+        known = (s for at, s in reversed(self._states) if at <= self._now or not lockstep)
+        return next(known, None)
 
     def alert(self, alert: Alert) -> None:
-        self._actor.alert(alert.kind, alert.text, **alert.values)
-
-
+        # In lockstep only the messages know the time, not the actor's clock.
+        self._actor.tell(alert.kind, alert.text, alert.header.stamp, alert.values)

@@ -13,7 +13,7 @@ import ray
 from aerodaas.config import ComputeConfig
 from aerodaas.errors import AeroDaaSError, ConfigError
 
-__all__ = ["Place", "connect", "discover", "disconnect", "options_for"]
+__all__ = ["Place", "connect", "disconnect", "discover", "options_for"]
 
 _KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
 _SHARE = 0.001
@@ -26,7 +26,7 @@ _STORE_BYTES = 128 * 2**20
 class Place:
     """Where an actor belongs."""
 
-    kind: str = "edge"
+    kind: Literal["edge", "cloud"] = "edge"
     node: str | None = None
     """IP address of one node, where the kind alone does not say."""
 
@@ -53,6 +53,7 @@ def connect(address: str | None) -> None:
         _require_edge(address)
         return
     ray.init(
+        address="local",  # else Ray would join whatever cluster runs on this machine
         num_cpus=os.cpu_count(),
         include_dashboard=False,
         object_store_memory=_STORE_BYTES,

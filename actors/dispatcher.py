@@ -18,7 +18,7 @@ from typing import Any
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor, failure_line
 from aerodaas.actors._cloud import Cloud
-from aerodaas.actors.session import Session
+from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Header
 from aerodaas.schedulers.analytics.base import (
@@ -42,8 +42,6 @@ __all__ = ["DECISIONS", "DispatcherActor", "Managed", "done_stream", "task_strea
 
 DECISIONS = "decisions"
 """Stream of the scheduler's decisions and their outcomes."""
-_DEPTH = 64
-_CLOUD_POLL = 0.005
 _EDGE_PATIENCE = 10
 """An execution on the edge that takes so many times its expected time has failed."""
 _SLOW_DECISION = 0.05
@@ -83,8 +81,8 @@ class DispatcherActor(StreamActor):
         resources: Resources,
     ) -> None:
         """Belong to `session`; without a cloud, `resources` has no slots there."""
-        inputs = dict.fromkeys((s for one in managed for s in one.inputs), _DEPTH)
-        answers = dict.fromkeys((done_stream(one.stream) for one in managed), _DEPTH)
+        inputs = dict.fromkeys((s for one in managed for s in one.inputs), FRAME_DEPTH)
+        answers = dict.fromkeys((done_stream(one.stream) for one in managed), MESSAGE_DEPTH)
         super().__init__(session, "dispatcher", {**inputs, **answers})
         self._managed = managed
         self._by_done = {done_stream(one.stream): one for one in managed}
@@ -102,8 +100,11 @@ class DispatcherActor(StreamActor):
 
     def prepare(self, cloud: Any = None) -> Any:  # noqa: ANN401 - a Ray handle; the base's info
         """Open the streams; `cloud` is the executor in the cloud, where there is one."""
-        self._cloud = Cloud(cloud, self._resources.cloud_timeout) if cloud is not None else None
-        return super().prepare()
+        info = super().prepare()
+        assert self.inbox is not None  # noqa: S101 - prepared
+        timeout = self._resources.cloud_timeout
+        self._cloud = Cloud(cloud, timeout, self.inbox.wake) if cloud is not None else None
+        return info
 
     def _open(self) -> None:
         self._decisions = self.outlet(DECISIONS)
@@ -268,8 +269,6 @@ class DispatcherActor(StreamActor):
         return self._now
 
     def _patience(self) -> float:
-        if self._cloud is not None and self._cloud.busy:
-            return _CLOUD_POLL
         if self._timers and not self.session.lockstep:
             return min(0.2, max(0.0, self.session.host_seconds(self._timers[0] - self._time())))
         return 0.2

@@ -7,14 +7,16 @@ measured there, and goes on once everyone whose work can reach a drone is done.
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import dataclass, field
 from typing import Any
 
 from aerodaas.actors._barrier import ACKS, Barrier
 from aerodaas.actors._base import StreamActor
-from aerodaas.actors.pilot import Pilot, RobotSpec, state_stream
-from aerodaas.actors.session import CONTROL_PERIOD_NS, Session, next_due
+from aerodaas.actors._names import reply_stream, request_stream, state_stream
+from aerodaas.actors.pilot import Pilot, RobotSpec
+from aerodaas.actors.session import CONTROL_PERIOD_NS, MESSAGE_DEPTH, Session, next_due
 from aerodaas.clock import NANOSECONDS, LockstepClock
 from aerodaas.errors import AeroDaaSError
 from aerodaas.navigation.commands import Answer, Command, ReturnHome
@@ -25,7 +27,6 @@ from aerodaas.vehicle import VehicleState
 __all__ = ["Conduct", "DroneActor", "RobotReport"]
 
 _CONTROL_RATE = NANOSECONDS / CONTROL_PERIOD_NS
-_COMMAND_DEPTH = 64
 _APPLICATION_TIMEOUT = 5.0
 """Seconds without a word from the application's process after which the drone comes home."""
 
@@ -74,7 +75,8 @@ class DroneActor(StreamActor):
         `neighbours` are the robots that other actors fly, to be kept away from.
         """
         streams = [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
-        depths = dict.fromkeys([*streams, *conduct.readers], _COMMAND_DEPTH)
+        streams += [request_stream(node) for robot in robots for node in robot.requesters]
+        depths = dict.fromkeys([*streams, *conduct.readers], MESSAGE_DEPTH)
         depths.update(dict.fromkeys((state_stream(other) for other in neighbours), 1))
         super().__init__(session, name, depths)
         self._conduct = conduct
@@ -83,6 +85,8 @@ class DroneActor(StreamActor):
         self._steering = {stream for robot in robots for stream in robot.navigation}
         self._specs = robots
         self._pilots: dict[str, Pilot] = {}
+        self._obeying = threading.Lock()
+        """A mission is used by one thread at a time: the loop's, or one that brings a command."""
         self._late = 0
         self._heard = time.monotonic()
         self._orphaned = False
@@ -90,12 +94,14 @@ class DroneActor(StreamActor):
     def _open(self) -> None:
         for spec in self._specs:
             pilot = Pilot(spec, self.session)
-            pilot.open({stream: self.outlet(stream) for stream in Pilot.streams(spec)})
+            streams = (*Pilot.streams(spec), *map(reply_stream, spec.requesters))
+            pilot.open({stream: self.outlet(stream) for stream in streams})
             self._pilots[pilot.id] = pilot
 
     def command(self, robot: str, command: Command) -> Answer:
         """Tell one robot's mission something; called by the application's process."""
-        return self._pilots[robot].handle(command, self.clock.now())
+        with self._obeying:
+            return self._pilots[robot].handle(command, self.clock.now())
 
     def robots(self, newest: int = 200) -> dict[str, RobotReport]:
         """How each robot fares; also the sign that the application's process is alive."""
@@ -111,6 +117,7 @@ class DroneActor(StreamActor):
         }
 
     def _run(self) -> None:
+        self._heard = time.monotonic()
         for pilot in self._pilots.values():
             pilot.start(self.clock)
         if self.session.lockstep:
@@ -131,7 +138,7 @@ class DroneActor(StreamActor):
             self._late += now - due > CONTROL_PERIOD_NS // 2
             self._turn(now)
             for pilot in self._pilots.values():
-                pilot.observe(now, all_sensors=True)
+                pilot.observe(now)
             self._watch_application()
             due = next_due(_CONTROL_RATE, now)
 
@@ -141,7 +148,8 @@ class DroneActor(StreamActor):
         due = {source: next_due(rate, -1) for source, rate in self._conduct.rates.items()}
         control = 0
         while not self._over():
-            now = min([control, *due.values()])
+            readings = [pilot.next_reading for pilot in self._pilots.values()]
+            now = min([control, *due.values(), *(stamp for stamp in readings if stamp is not None)])
             self.clock.advance_to(now)
             for pilot in self._pilots.values():
                 pilot.advance_to(now)
@@ -160,7 +168,7 @@ class DroneActor(StreamActor):
                 self._barrier.expect(source, now, counts.get(source, 0))
                 due[source] = next_due(self._conduct.rates[source], now)
         for pilot in self._pilots.values():
-            for stream, stamp in pilot.observe(now, all_sensors=False):
+            for stream, stamp in pilot.observe(now):
                 self._barrier.expect(stream, stamp, counts.get(stream, 0))
 
     def _await(self, *, drain: bool) -> None:
@@ -199,7 +207,8 @@ class DroneActor(StreamActor):
             if not self.session.lockstep:
                 pilot.advance_to(now)
             others = [where for name, where in self._whereabouts.items() if name != pilot.id]
-            pilot.turn(now, others)
+            with self._obeying:
+                pilot.turn(now, others)
             state = pilot.loop.state
             if state is not None:
                 self._whereabouts[pilot.id] = _neighbour(state)
@@ -211,7 +220,8 @@ class DroneActor(StreamActor):
             self._whereabouts[self._neighbours[message.stream]] = _neighbour(message.item)
             return
         for pilot in self._pilots.values():
-            pilot.take(message, now)
+            with self._obeying:
+                pilot.take(message, now)
 
     def _over(self) -> bool:
         return self.stopping or all(pilot.over for pilot in self._pilots.values())

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from aerodaas.actors.streams import decode_message, encode_message
-from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.data import Alert
 from aerodaas.status import Message
 from aerodaas.vehicle import VehicleState
@@ -33,6 +33,8 @@ class CloudExecutor:
 
 class _Context:
     """What an analysis may ask of the cloud: the time of its item, and nobody to alert."""
+
+    kind: ComputeKind = "cloud"
 
     def __init__(self, stamp: int) -> None:
         self._stamp = stamp

@@ -11,6 +11,7 @@ from typing import Any
 
 import ray
 from ray.exceptions import RayActorError, RayError, RayTaskError
+from typing_extensions import Self
 
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors.analytics import AnalyticsActor
@@ -63,6 +64,8 @@ class _Member:
     info: ActorInfo | None = None
     report: ActorReport = field(default_factory=lambda: ActorReport("new"))
     pending: ray.ObjectRef[ActorReport] | None = None
+    reviving: ray.ObjectRef[ActorInfo] | None = None
+    """Under way after a restart."""
 
 
 class Flight:
@@ -84,7 +87,10 @@ class Flight:
             self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
             mine = {spec.robot.id for spec in specs}
             others = tuple(
-                spec.robot.id for group in plan.drones for spec in group if spec.robot.id not in mine
+                spec.robot.id
+                for group in plan.drones
+                for spec in group
+                if spec.robot.id not in mine
             )
             self._create(name, DroneActor, edge, (session, name, specs, plan.conduct, others))
         for camera in plan.cameras:
@@ -108,7 +114,7 @@ class Flight:
         self._next_reports = 0.0
         self._stopped = False
 
-    def __enter__(self) -> Flight:
+    def __enter__(self) -> Self:
         """Stop the actors when left."""
         return self
 
@@ -128,12 +134,17 @@ class Flight:
         # Those that only listen go first, so that nobody speaks to an empty room.
         for member in reversed(self._members.values()):
             member.handle.start.remote(self._origin)
+            member.report = ActorReport("running")
 
     def poll(self, newest: int = 200) -> FlightState:
-        """Ask how everyone fares, with the `newest` latencies of each robot; also tells the drones that the application is alive."""
+        """Ask how everyone fares, with the `newest` latencies of each robot.
+
+        Also tells the drones that the application is alive.
+        """
         if time.monotonic() >= self._next_reports:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
+            self._record_vitals()
         robots: dict[str, RobotReport] = {}
         for name in set(self._drones.values()):
             robots.update(self._ask(self._members[name].handle.robots.remote(newest)))
@@ -154,6 +165,11 @@ class Flight:
         """Where each actor lives, once launched."""
         return {m.name: m.info for m in self._members.values() if m.info is not None}
 
+    @property
+    def streams(self) -> set[str]:
+        """Streams that the flight's actors publish, once launched."""
+        return {stream for info in self.infos().values() for stream in info.publishes}
+
     def stop(self) -> dict[str, ActorReport]:
         """Stop all actors, the recorder last, and return their last reports."""
         if self._stopped:
@@ -163,9 +179,11 @@ class Flight:
         others = [m for m in self._members.values() if m.name != "recorder"]
         for group in (others, recorder):
             references = {m.handle.stop.remote(): m for m in group}
-            done, _ = ray.wait(
-                list(references), num_returns=len(references), timeout=_STOP_TIMEOUT
-            ) if references else ([], [])
+            done, _ = (
+                ray.wait(list(references), num_returns=len(references), timeout=_STOP_TIMEOUT)
+                if references
+                else ([], [])
+            )
             for reference in done:
                 with contextlib.suppress(RayError, AeroDaaSError):
                     references[reference].report = ray.get(reference)
@@ -239,6 +257,7 @@ class Flight:
 
     def _gather_reports(self) -> None:
         for member in self._members.values():
+            self._revive(member)
             if member.pending is None:
                 member.pending = member.handle.report.remote()
             ready, _ = ray.wait([member.pending], timeout=0.05)
@@ -249,8 +268,19 @@ class Flight:
                 member.report = ray.get(reference)
             except RayActorError:
                 self._lost(member)
-            else:
-                self._revive(member)
+
+    def _record_vitals(self) -> None:
+        """Have the recorder note what each process takes; it alone could not ask other nodes."""
+        recorder = self._members.get("recorder")
+        if recorder is None or recorder.report.phase != "running":
+            return
+        recorder.handle.vitals.remote(
+            {
+                f"{member.name}@{member.info.node_id[:8]}": member.report.vitals
+                for member in self._members.values()
+                if member.info is not None and member.report.vitals is not None
+            }
+        )
 
     def _lost(self, member: _Member) -> None:
         """A dead actor is reported; Ray restarts analytics, the next report finds it new."""
@@ -260,9 +290,17 @@ class Flight:
         member.report = ActorReport("failed", error)
 
     def _revive(self, member: _Member) -> None:
-        if member.report.phase == "new" and member.info is not None:
-            self._prepare([member], lambda _: None)
-            member.handle.start.remote(self._origin)
+        """Set an actor up that Ray has restarted, without waiting: the drones need our word."""
+        if member.reviving is None:
+            if member.report.phase == "new" and member.info is not None:
+                member.reviving = member.handle.prepare.remote(*member.setup)
+        elif ray.wait([member.reviving], timeout=0)[0]:
+            reference, member.reviving = member.reviving, None
+            with contextlib.suppress(AeroDaaSError):  # it died again, or its next report says why
+                member.info = self._ask(reference)
+                self._connect([member])
+                member.handle.start.remote(self._origin)
+                member.report = ActorReport("running")
 
     @staticmethod
     def _ask(reference: Any) -> Any:  # noqa: ANN401 - whatever the actor returns

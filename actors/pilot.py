@@ -10,14 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.actors.session import Session, is_due
+from aerodaas.actors._names import reply_stream, request_stream, state_stream, status_stream
+from aerodaas.actors.session import Session, next_due
 from aerodaas.actors.streams import Outlet
 from aerodaas.clock import Clock, host_time_ns
 from aerodaas.config import RobotConfig, SensorConfig
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.geometry import GeodeticOrigin
-from aerodaas.navigation.commands import Answer, Command, Start, StreamItem
+from aerodaas.navigation.commands import Answer, Command, Reply, Request, Start, StreamItem
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
 from aerodaas.navigation.planner import BackgroundPlanner, InlinePlanner
@@ -27,19 +28,9 @@ from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.status import Message, MissionStatus, SetpointRecord
 from aerodaas.vehicle import ClockedVehicle, SteppedVehicle, Vehicle, VehicleState
 
-__all__ = ["Pilot", "RobotSpec", "sensor_item", "state_stream", "status_stream"]
+__all__ = ["Pilot", "RobotSpec", "sensor_item"]
 
 _LATENCIES_KEPT = 100_000
-
-
-def state_stream(robot: str) -> str:
-    """Name of the stream of a robot's vehicle states."""
-    return f"{robot}/state"
-
-
-def status_stream(robot: str) -> str:
-    """Name of the stream of a robot's mission status."""
-    return f"{robot}/status"
 
 
 def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
@@ -64,6 +55,8 @@ class RobotSpec:
     """Streams that feed its mission."""
     commands: tuple[str, ...]
     """Streams that carry commands from triggers and cameras."""
+    requesters: tuple[str, ...]
+    """Analyses that command its mission and wait for an answer."""
     initial: tuple[Command, ...]
     """Navigation known before take-off."""
     scheduler: TrajectoryScheduler
@@ -80,6 +73,8 @@ class Pilot:
         """Milliseconds from capture to the arrival of the command made from it."""
         self._session = session
         self._told = 0
+        self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
+        self._due = {sensor.id: next_due(sensor.rate, -1) for sensor in spec.sensors}
         plugin = load_plugin("drivers", spec.robot.driver)
         self.vehicle: Vehicle = plugin(spec.robot, session.environment)
 
@@ -108,7 +103,7 @@ class Pilot:
 
     @staticmethod
     def streams(spec: RobotSpec) -> list[str]:
-        """Streams that a pilot of this robot publishes."""
+        """Streams that a pilot of this robot publishes for all, the replies aside."""
         own = [state_stream(spec.robot.id), status_stream(spec.robot.id)]
         return [
             *own,
@@ -140,6 +135,9 @@ class Pilot:
             self.handle(StreamItem(message.stream, message.item, message.header), now)
         elif message.stream in self.spec.commands:
             self.handle(message.item, now)
+        elif message.stream in self._replies and isinstance(message.item, Request):
+            reply = Reply(message.item.number, self.handle(message.item.command, now))
+            self._publish(self._replies[message.stream], reply, now)
 
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
         """One turn of the setpoint loop; publishes what was decided."""
@@ -148,18 +146,24 @@ class Pilot:
         self._publish(status_stream(self.id), self.mission.status, now)
         return record
 
-    def observe(self, now: int, *, all_sensors: bool) -> list[tuple[str, int]]:
-        """Publish the vehicle's state and its sensors' readings; returns (stream, stamp) of each.
+    def observe(self, now: int) -> list[tuple[str, int]]:
+        """Publish the vehicle's state and the readings of the sensors that are due by now.
 
-        Without `all_sensors`, only those that are due at exactly `now`.
+        Returns (stream, stamp) of each.
         """
         state = self.vehicle.read()
         published = [self._publish(state_stream(self.id), state, now)]
         for sensor in self.spec.sensors:
-            if all_sensors or is_due(sensor.rate, now):
+            if self._due[sensor.id] <= now:
+                self._due[sensor.id] = next_due(sensor.rate, now)
                 item = sensor_item(sensor, state, self.mission.status)
                 published.append(self._publish(f"{self.id}/{sensor.id}", item, now))
         return published
+
+    @property
+    def next_reading(self) -> int | None:
+        """When the next sensor is due; None without sensors."""
+        return min(self._due.values(), default=None)
 
     @property
     def over(self) -> bool:

@@ -6,17 +6,20 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors._barrier import ACKS, paths
+from aerodaas.actors._names import state_stream
 from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
 from aerodaas.actors.cluster import Place
 from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
 from aerodaas.actors.drone import Conduct
-from aerodaas.actors.pilot import Pilot, RobotSpec, state_stream
-from aerodaas.actors.session import Session
+from aerodaas.actors.pilot import Pilot, RobotSpec
+from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig, TaskConfig
 from aerodaas.data import Frame
 from aerodaas.errors import GraphError
 from aerodaas.graph import Graph, NavigationEdge, Node
+from aerodaas.handles import SENSOR_ITEMS
 from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
@@ -79,8 +82,8 @@ class FlightPlan:
     analyses: tuple[Analyses, ...]
     dispatch: Dispatching | None
     conduct: Conduct
-    recorded: tuple[str, ...]
-    """Streams for the recorder; empty for no recording."""
+    recorded: dict[str, int]
+    """Streams for the recorder and how many messages of each may wait; empty for none."""
 
 
 class _Planner:
@@ -102,16 +105,18 @@ class _Planner:
         named = {edge.robot for edge in graph.navigation}
         self.robots = [r for r in session.environment.robots if r.id in named]
         self.recorded = session.environment.recording.enabled
-        self._add_cameras()
+        self._add_sensors()
         self.steering = {name for edge in graph.navigation for name in _streams_of(edge)}
 
-    def _add_cameras(self) -> None:
-        """Cameras that the application does not read run all the same: they are recorded."""
-        for robot in self.robots if self.recorded else ():
+    def _add_sensors(self) -> None:
+        """Sensors that the application does not read run all the same, cameras if recorded."""
+        for robot in self.robots:
             for sensor in robot.sensors:
                 stream = f"{robot.id}/{sensor.id}"
-                if sensor.type == "camera" and stream not in self.graph.nodes:
-                    self.graph.add(Node(stream, "sensor", Frame, sensor, robot.id))
+                wanted = self.recorded or sensor.type != "camera"
+                if wanted and stream not in self.graph.nodes:
+                    item = SENSOR_ITEMS[sensor.type]
+                    self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
 
     def sensors(self) -> list[Node]:
         return [node for node in self.graph.nodes.values() if node.kind == "sensor"]
@@ -119,16 +124,26 @@ class _Planner:
     def analyses(self) -> list[Node]:
         return [node for node in self.graph.nodes.values() if node.kind != "sensor"]
 
-    def state_of(self, node: Node) -> str:
-        return state_stream(node.robot or self.robots[0].id)
+    def robot_of(self, node: Node) -> str:
+        return node.robot or self.robots[0].id
 
-    def reaches_a_drone(self, stream: str) -> bool:
-        """Tell whether what `stream` carries can change what a drone does."""
+    def state_of(self, node: Node) -> str:
+        return state_stream(self.robot_of(node))
+
+    def reaches_a_drone(self, stream: str, asked: frozenset[str] = frozenset()) -> bool:
+        """Tell whether what `stream` carries can change what a drone does.
+
+        By navigation, by a trigger's command, or by waking an analysis that can; `asked` are the
+        streams that the question came through.
+        """
         if stream in self.steering:
             return True
-        return any(
-            any(trigger.method for trigger in node.triggers) or self.reaches_a_drone(node.id)
-            for node in self.graph.downstream(stream)
+        node = self.graph.nodes.get(stream)
+        triggers = node.triggers if node is not None else []
+        further = {trigger.target for trigger in triggers if trigger.method is None}
+        further |= {reader.id for reader in self.graph.downstream(stream)}
+        return any(trigger.method is not None for trigger in triggers) or any(
+            self.reaches_a_drone(one, asked | {stream}) for one in further - asked
         )
 
     def acknowledgements(self, stream: str) -> int:
@@ -142,8 +157,8 @@ class _Planner:
         )
 
     def is_managed(self, node: Node) -> bool:
-        """The dispatcher manages the analyses of frames that are heavy enough to be isolated."""
-        if self.dispatch_with is None or not node.work.isolated or not node.inputs:
+        """The dispatcher manages the analyses of frames that want to be scheduled."""
+        if self.dispatch_with is None or not node.work.scheduled or not node.inputs:
             return False
         return all(self.graph.nodes[name].item is Frame for name in node.inputs)
 
@@ -198,21 +213,33 @@ class _Planner:
         return NodeSpec(
             stream=done_stream(node.id) if managed else node.id,
             work=node.work,
-            inputs=(task_stream(node.id),) if managed else tuple(node.inputs),
+            inputs={
+                name: self.depth(name) if self.session.lockstep else 1
+                for name in ([task_stream(node.id)] if managed else node.inputs)
+            },
+            robot=self.robot_of(node),
             state=self.state_of(node),
             external=node.kind == "external",
             dormant=node.dormant,
             triggers=triggers,
+            kind=self.place_of(node).kind,
             acknowledges=self.acknowledgements(node.id) == 0 and not managed,
             answers_always=managed,
             wakes=tuple(_trigger_stream(node.id, waker) for waker in wakers),
         )
 
+    def depth(self, stream: str) -> int:
+        """How many messages may wait for a reader of `stream` that wants them all."""
+        node = self.graph.nodes.get(stream.removesuffix(task_stream("")))
+        frames = stream.endswith(task_stream("")) or (node is not None and node.item is Frame)
+        return FRAME_DEPTH if frames else MESSAGE_DEPTH
+
     def place_of(self, node: Node) -> Place:
         if node.compute is None:
             return Place()
         resource = self.compute[node.compute]
-        return Place(resource.kind, resource.node)
+        # Under a dispatcher, an analysis has an executor on the edge wherever it is deployed.
+        return Place() if self.is_managed(node) else Place(resource.kind, resource.node)
 
     def analyses_by_actor(self) -> tuple[Analyses, ...]:
         shared: dict[Place, list[NodeSpec]] = {}
@@ -242,6 +269,11 @@ class _Planner:
             sensors=tuple(node.work for node in mine if node.work.type != "camera"),
             navigation=tuple(dict.fromkeys(n for edge in edges for n in _streams_of(edge))),
             commands=tuple(commanding),
+            requesters=tuple(
+                node.id
+                for node in self.analyses()
+                if isinstance(node.work, CommandingAnalytics) and self.robot_of(node) == robot.id
+            ),
             initial=tuple(initial_commands(edges)),
             scheduler=self.scheduler,
         )
@@ -305,6 +337,7 @@ def make_plan(
     names += [f"sensor/{camera.stream}" for camera in cameras]
     names += [actor.name for actor in analyses]
     names += ["dispatcher"] if dispatch is not None else []
+    streams += [f"alerts/{name}" for name in names]
     return FlightPlan(
         session=session,
         drones=drones,
@@ -312,7 +345,7 @@ def make_plan(
         analyses=analyses,
         dispatch=dispatch,
         conduct=planner.conduct(specs, cameras) if session.lockstep else Conduct(),
-        recorded=(*streams, *(f"alerts/{name}" for name in names)) if planner.recorded else (),
+        recorded={stream: planner.depth(stream) for stream in streams} if planner.recorded else {},
     )
 
 
@@ -323,5 +356,3 @@ def _streams_of(edge: NavigationEdge) -> list[str]:
 
 def _trigger_stream(target: str, source: Node) -> str:
     return f"{target}/commands/{source.id}"
-
-

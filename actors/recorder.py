@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -9,28 +10,35 @@ from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor
 from aerodaas.actors.session import Session
 from aerodaas.clock import host_time_ns
+from aerodaas.data import Header
 from aerodaas.errors import RecordingError
 from aerodaas.geometry import GeodeticOrigin
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.status import Message
+from aerodaas.vitals import Vitals
 
 __all__ = ["RecorderActor"]
-
-_DEPTH = 64
-"""Messages of each stream that may wait; more are dropped and counted, the flight never waits."""
 
 
 class RecorderActor(StreamActor):
     """Reads all `streams` and writes them; on a full disk it stops writing, not the flight."""
 
     def __init__(
-        self, session: Session, path: Path, streams: tuple[str, ...], provenance: Provenance
+        self, session: Session, path: Path, streams: dict[str, int], provenance: Provenance
     ) -> None:
-        """Write the recording at `path`."""
-        super().__init__(session, "recorder", dict.fromkeys(streams, _DEPTH))
+        """Write the recording at `path`.
+
+        So many messages of each of the `streams` may wait; more are dropped and counted, for the
+        flight never waits.
+        """
+        super().__init__(session, "recorder", streams)
         self._path = path
         self._provenance = provenance
         self._failure = ""
+        self._lost: Counter[str] = Counter()
+        self._newest = 0
+        self._readings = 0
 
     def _open(self) -> None:
         environment = self.session.environment
@@ -44,31 +52,48 @@ class RecorderActor(StreamActor):
         )
         self._acks = self.outlet(f"{ACKS}/recorder") if self.session.lockstep else None
 
+    def vitals(self, readings: dict[str, Vitals]) -> None:
+        """Record what the run's processes take, by `actor@machine`."""
+        stamp = self._newest if self.session.lockstep else self.clock.now()
+        self._readings += 1
+        for source, reading in readings.items():
+            stream = f"vitals/{source.partition('@')[0]}"
+            header = Header(self._readings, stamp, source)
+            message = Message(stream, self._readings, stamp, header, reading.taken, (), reading)
+            self._write(message)
+
     def _run(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first
         while True:
             messages = self.inbox.receive(0.2)
             for message in messages:
-                if not self._failure:
-                    self._write(message)
+                self._newest = max(self._newest, message.stamp)
+                self._write(message)
+            self._note_drops()
             if self._acks is not None and messages:
                 done = tuple((one.header.source, one.header.stamp) for one in messages)
                 self._acks.derive(done, messages[-1], host_time_ns(), messages[-1].stamp)
             if self.stopping and not messages:
                 return
 
-    def _write(self, message: Any) -> None:  # noqa: ANN401 - any message
+    def _write(self, message: Message[Any]) -> None:
+        if self._failure:
+            return
         try:
             self._recorder.write(message)
         except RecordingError as error:
             self._failure = str(error)
             self.alert("recording_stopped", self._failure)
 
-    def _close(self) -> None:
+    def _note_drops(self) -> None:
+        """Record what was lost on its way here as it happens: the run may be killed."""
         assert self.inbox is not None  # noqa: S101 - prepare came first
         for stream, dropped in self.inbox.dropped.items():
-            if dropped:
-                self._recorder.drops(stream, dropped)
+            if dropped > self._lost[stream]:
+                self._recorder.drops(stream, dropped - self._lost[stream])
+                self._lost[stream] = dropped
+
+    def _close(self) -> None:
         self._summary = self._recorder.close()
 
     def _values(self) -> dict[str, Any]:

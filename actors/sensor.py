@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerodaas.actors._base import StreamActor
-from aerodaas.actors.session import Session, is_due, next_due
+from aerodaas.actors._base import StreamActor, StreamCount
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
 from aerodaas.cameras.base import Camera, Picture
 from aerodaas.clock import host_time_ns
 from aerodaas.config import SensorConfig
@@ -16,8 +16,6 @@ from aerodaas.status import Message
 from aerodaas.vehicle import VehicleState
 
 __all__ = ["SensorActor"]
-
-_LOCKSTEP_DEPTH = 64
 
 
 class SensorActor(StreamActor):
@@ -30,7 +28,7 @@ class SensorActor(StreamActor):
 
         With `ends`, the mission is over once the camera has no more pictures.
         """
-        depth = _LOCKSTEP_DEPTH if session.lockstep else 1
+        depth = MESSAGE_DEPTH if session.lockstep else 1
         super().__init__(session, f"sensor/{stream}", {state: depth})
         self._stream = stream
         self._sensor = sensor
@@ -64,6 +62,10 @@ class SensorActor(StreamActor):
             self._capture(now, lockstep=False)
             due = next_due(self._sensor.rate, now)
 
+    def counts(self) -> dict[str, StreamCount]:
+        """Nothing: of the vehicle's states only the newest matters here, by intention."""
+        return {}
+
     def _take(self, message: Message[Any]) -> None:
         if isinstance(message.item, VehicleState):
             self._vehicle = message.item
@@ -72,6 +74,11 @@ class SensorActor(StreamActor):
         vehicle = self._vehicle
         picture = self._camera.capture(stamp, vehicle.truth if vehicle else None)
         taken = host_time_ns()
+        # Before the frame: in lockstep time may go on as soon as the frame has been worked through.
+        if self._camera.finished and self._ends and not self._ended:
+            self._ended = True
+            header = Header(0, stamp, self._stream)
+            self._commands.measure(End(f"{self._stream} has no more pictures"), header, taken)
         if picture is not None:
             # A live camera hands out a picture that is some milliseconds old already.
             age = 0 if lockstep else max(0, stamp - picture.stamp)
@@ -81,13 +88,11 @@ class SensorActor(StreamActor):
         elif lockstep:
             header = Header(self._frames.sent, stamp, self._stream)
             self._frames.measure(None, header, taken)
-        if self._camera.finished and self._ends and not self._ended:
-            self._ended = True
-            header = Header(0, stamp, self._stream)
-            self._commands.measure(End(f"{self._stream} has no more pictures"), header, taken)
 
     def _frame(self, header: Header, picture: Picture) -> Frame:
-        odometry = self._vehicle.odometry if self._vehicle else None
+        odometry = picture.odometry
+        if odometry is None and self._vehicle is not None:
+            odometry = self._vehicle.odometry
         return Frame(header, picture.image, self._camera.model, odometry)
 
     def _close(self) -> None:

@@ -8,8 +8,19 @@ from dataclasses import dataclass, field, replace
 from aerodaas.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
 from aerodaas.config import EnvironmentConfig
 
-__all__ = ["CONTROL_PERIOD_NS", "Session", "next_due", "is_due"]
+__all__ = [
+    "CONTROL_PERIOD_NS",
+    "FRAME_DEPTH",
+    "MESSAGE_DEPTH",
+    "Session",
+    "is_due",
+    "next_due",
+]
 
+FRAME_DEPTH = 8
+"""Frames that may wait for a reader that wants them all; each is megabytes of shared memory."""
+MESSAGE_DEPTH = 32
+"""Other messages that may wait for a reader that wants them all."""
 CONTROL_PERIOD_NS = NANOSECONDS // 20
 """Period of the setpoint loop: 20 Hz, ten times what PX4 asks for in offboard mode."""
 

@@ -1,5 +1,6 @@
 from .analytics.base import Analytics as Analytics
 from .analytics.base import NavigableAnalytics as NavigableAnalytics
+from .analytics.monitoring import MonitoringAnalytics as MonitoringAnalytics
 from .data import (
     AeroData as AeroData,
 )

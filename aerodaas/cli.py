@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `schema`, `doctor`."""
+"""The command line: `aerodaas run`, `remote`, `lab`, `schema`, `doctor`, and for recordings."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ from typing import Annotated
 
 import typer
 
+from aerodaas.commands import lab, remote
+from aerodaas.commands.export import export
+from aerodaas.commands.report import compare, report
 from aerodaas.errors import AeroDaaSError, ConfigError
 from aerodaas.options import RunOptions, current_options
 from aerodaas.overrides import parse_setting
@@ -29,6 +32,8 @@ flies a simulated drone, PX4, ArduPilot or a Tello.
     aerodaas run apps/farm_survey.py --speed max
 """,
 )
+app.add_typer(remote.app, name="remote")
+app.add_typer(lab.app, name="lab")
 
 
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
@@ -114,6 +119,11 @@ def doctor(
     raise typer.Exit(0 if examine(address) else 1)
 
 
+app.command()(report)
+app.command()(compare)
+app.command()(export)
+
+
 def _speed(text: str | None) -> tuple[float | None, bool | None]:
     if text is None:
         return None, None
@@ -135,9 +145,6 @@ def main() -> None:
     except AeroDaaSError as error:
         _say(str(error))
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        _say("interrupted")
-        sys.exit(130)
     except Exception as error:  # noqa: BLE001 - the application may raise anything
         frames = [f for f in traceback.extract_tb(error.__traceback__) if "aerodaas" not in f.name]
         place = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""

@@ -11,7 +11,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, SecretStr, ValidationError, model_validator
 from typing_extensions import Self
 
 from aerodaas.errors import ConfigError
@@ -25,6 +25,7 @@ __all__ = [
     "LimitsConfig",
     "MissionConfig",
     "RecordingConfig",
+    "RemoteConfig",
     "RobotConfig",
     "SchedulersConfig",
     "SensorConfig",
@@ -156,6 +157,8 @@ class CameraConfig(_Strict):
     """Degrees to the left."""
     path: str | None = None
     """Folder of pictures, video file or URL, for the drivers that read one."""
+    topic: str | None = None
+    """Channel of the recording at `path`; None where it holds one camera's pictures only."""
     loop: bool = False
 
 
@@ -224,6 +227,17 @@ class RecordingConfig(_Strict):
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
 
 
+class RemoteConfig(_Strict):
+    """Where `RemoteAnalytics` listens for a remote user, and who may command."""
+
+    host: str = "127.0.0.1"
+    """Address to listen on; beyond the loopback interface a token is compulsory."""
+    port: Annotated[int, Field(ge=1, le=65535)] = 8350
+    token: Annotated[SecretStr, Field(min_length=16)] | None = None
+    """Secret that every request must carry; the environment variable AERODAAS_REMOTE_TOKEN takes
+    its place. It is shown, logged and recorded nowhere."""
+
+
 class SimulationConfig(_Strict):
     """The world of the simulated drones."""
 
@@ -252,6 +266,7 @@ class EnvironmentConfig(_Strict):
     compute: list[ComputeConfig] | Literal["auto"] = "auto"
     schedulers: SchedulersConfig = SchedulersConfig()
     recording: RecordingConfig = RecordingConfig()
+    remote: RemoteConfig = RemoteConfig()
     simulation: SimulationConfig = SimulationConfig()
 
     @model_validator(mode="after")

@@ -23,7 +23,7 @@ from aerodaas.view.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
 if TYPE_CHECKING:
     from aerodaas.actors.flight import FlightState
 
-__all__ = ["Starting", "Watching", "show_results"]
+__all__ = ["Starting", "Watching", "show_results", "show_speed"]
 
 _ALERTS_SHOWN = 4
 
@@ -36,17 +36,14 @@ class Starting:
         self._shown = options.view
         self._stack = ExitStack()
         self._status: Status | None = None
-        self._began = time.monotonic()
 
     def __enter__(self) -> Self:
         if self._shown and self._console.is_terminal:
             self._status = self._stack.enter_context(self._console.status("starting"))
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+    def __exit__(self, *_: object) -> None:
         self._stack.close()
-        if self._shown and kind is None:
-            self._console.print(f"ready after {time.monotonic() - self._began:.1f} s")
 
     def step(self, text: str) -> None:
         """Something has become ready, or is under way."""
@@ -143,7 +140,15 @@ def _commands(state: FlightState) -> list[StreamSnapshot]:
     return rows
 
 
-def show_results(options: RunOptions, recording: Path | None, wall: float) -> None:
+def show_speed(options: RunOptions, mission: float, wall: float, start: float) -> None:
+    """Say how long a mission of `mission` seconds took on the wall, and its start before that."""
+    if options.view and wall > 0:
+        factor = f"{mission / wall:.1f} times as fast as the clock"
+        line = f"flew {mission:.1f} s in {wall:.1f} s, {factor}; ready after {start:.1f} s"
+        Console(highlight=False, soft_wrap=True).print(line)
+
+
+def show_results(options: RunOptions, recording: Path | None) -> None:
     """Write plots and summary of a closed recording, and say where everything lies."""
     if recording is None:
         return
@@ -157,9 +162,7 @@ def show_results(options: RunOptions, recording: Path | None, wall: float) -> No
         return
     if options.view:
         console.print(str(report.summary), markup=False)
-        console.print(f"  {wall:.0f} s on the wall, start included")
-    places = {"recording": recording, "summary": report.summary_text}
-    places |= {f"{path.stem} plot": path for path in report.plots}
+    places = {"recording": recording, "report": report.page, "summary": report.summary_text}
     width = max(map(len, places))
     for name, path in places.items():
         console.print(f"{name:>{width}}  {_shown(path)}", markup=False)

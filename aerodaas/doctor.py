@@ -96,12 +96,7 @@ def _machine() -> Iterator[Finding]:
 
 
 def _packages() -> Iterator[Finding]:
-    for package, module in _PACKAGES.items():
-        try:
-            importlib.import_module(module)
-            yield Finding(package, version(package))
-        except (ImportError, PackageNotFoundError) as error:
-            yield Finding(package, str(error), ok=False, remedy=f"pip install {package}")
+    yield from (_package(package, module) for package, module in _PACKAGES.items())
     try:
         clash = version("opencv-python")
     except PackageNotFoundError:
@@ -112,6 +107,14 @@ def _packages() -> Iterator[Finding]:
         ok=False,
         remedy="pip uninstall opencv-python; pip install --force-reinstall opencv-python-headless",
     )
+
+
+def _package(package: str, module: str) -> Finding:
+    try:
+        importlib.import_module(module)
+        return Finding(package, version(package))
+    except (ImportError, PackageNotFoundError) as error:
+        return Finding(package, str(error), ok=False, remedy=f"pip install {package}")
 
 
 def _providers() -> Iterator[Finding]:

@@ -129,7 +129,8 @@ class Environment(PaperNames, IEnvironment):
         """The scheduler plugged in, or the one that the environment file names."""
         if self._trajectory is None:
             name = self.config.schedulers.trajectory
-            self._trajectory = load_plugin("waypoint_schedulers", name)(self)
+            self.set_trajectory_scheduler(load_plugin("waypoint_schedulers", name)(self))
+        assert self._trajectory is not None  # noqa: S101 - set just now
         return self._trajectory
 
     def analytics_scheduler(self) -> AnalyticsScheduler | None:

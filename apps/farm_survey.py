@@ -3,6 +3,7 @@
 from aerodaas import (
     AeroNavigation,
     Environment,
+    MonitoringAnalytics,
     NavigationType,
     NearestNeighborScheduler,
     SchedulingType,
@@ -19,12 +20,13 @@ def main() -> None:
     env.set_trajectory_scheduler(scheduler)
 
     odometry = drone.get_sensor_by_id("odom").get_data_stream()
+    MonitoringAnalytics(["battery", "height", "gps"]).deploy(edge).analyse(odometry)
 
     corners = [(0, 0), (0, 10), (10, 10), (10, 0)]
-    survey = [Waypoint(f"wp{i}", x, y, 1.5, hover_duration=5) for i, (x, y) in enumerate(corners, 1)]
-    waypoints = AeroNavigation(
-        NavigationType.DISTANCE_DRIVEN, survey, SchedulingType.UNORDERED
-    )
+    survey = [
+        Waypoint(f"wp{i}", x, y, 1.5, hover_duration=5) for i, (x, y) in enumerate(corners, 1)
+    ]
+    waypoints = AeroNavigation(NavigationType.DISTANCE_DRIVEN, survey, SchedulingType.UNORDERED)
     drone.navigate(scheduler.generate_navigation(waypoints))
     drone.start_mission()
 

@@ -160,7 +160,7 @@ def _two_nodes() -> Iterator[None]:
         initialize_head=True, head_node_args={"num_cpus": 1, "resources": {"edge": 1}}
     )
     cluster.add_node(num_cpus=1, resources={"cloud": 1})
-    os.environ["RAY_ADDRESS"] = cluster.address
+    os.environ["RAY_ADDRESS"] = str(cluster.address)
     try:
         yield
     finally:

@@ -1,1 +1,33 @@
-"""Fixtures shared by every test."""
+"""Shared by all tests: one Ray for the session, and flights in this process."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from flying import Flyer
+
+_ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def runtime() -> Iterator[None]:
+    """Ray on this machine, as a run of an application starts it."""
+    from aerodaas.actors import cluster  # noqa: PLC0415 - only where actors are tested
+
+    # Actors import the project and the tests' own analyses from where this process does.
+    ours = [path for path in sys.path if path and Path(path).resolve().is_relative_to(_ROOT)]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", os.pathsep.join(ours))
+        cluster.connect(None)
+        yield
+        cluster.disconnect()
+
+
+@pytest.fixture
+def flyer(runtime: None, tmp_path: Path) -> Flyer:  # noqa: ARG001 - flights need Ray
+    """Flies applications in this process, their files under `tmp_path`."""
+    return Flyer(tmp_path)

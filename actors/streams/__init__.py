@@ -8,9 +8,12 @@ from aerodaas.actors.streams._codec import decode as decode_message
 from aerodaas.actors.streams._codec import encode as encode_message
 from aerodaas.actors.streams._inbox import Inbox
 from aerodaas.actors.streams._outlet import Outlet, RemoteReader
-from aerodaas.actors.streams._shared import shared_memory_available
+from aerodaas.actors.streams._remote import UNDER_WAY
+from aerodaas.actors.streams._shared import MAX_DEPTH, shared_memory_available
 
 __all__ = [
+    "MAX_DEPTH",
+    "UNDER_WAY",
     "Inbox",
     "Outlet",
     "RemoteReader",

@@ -22,6 +22,7 @@ class Outlet:
 
     def __init__(self, scope: str, stream: str) -> None:
         """Open `stream` for writing; `scope` is the prefix of its name on this node."""
+        self.scope = scope
         self.stream = stream
         self.sent = 0
         self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)

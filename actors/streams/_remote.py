@@ -1,7 +1,12 @@
-"""The way to another node: one ObjectRef per message, at most a few under way to each reader."""
+"""The way to another node: one ObjectRef per message, a few under way, the newest kept back.
+
+A link that is busy neither queues nor forgets the latest word: while deliveries are under way,
+one message waits for each reader, and a newer one takes its place.
+"""
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import ray
@@ -10,43 +15,68 @@ from aerodaas.actors.streams._codec import Encoded
 
 __all__ = ["RemoteReader", "send_to"]
 
-_UNDER_WAY = 2
-"""Deliveries not yet acknowledged beyond which a slow link drops instead of queueing."""
+UNDER_WAY = 2
+"""Deliveries not yet acknowledged beyond which a slow link keeps the newest message only."""
+
+
+class _Parcel:
+    """A message on its way, put into the object store once for all who read it."""
+
+    def __init__(self, stream: str, data: bytes) -> None:
+        self.stream = stream
+        self._data = data
+        self._reference: ray.ObjectRef[bytes] | None = None
+
+    def reference(self) -> ray.ObjectRef[bytes]:
+        # Two threads may both put it; that costs a copy and harms nobody.
+        if self._reference is None:
+            self._reference = ray.put(self._data)
+        return self._reference
 
 
 class RemoteReader:
     """An actor on another node that reads a stream."""
 
-    def __init__(self, actor: Any) -> None:  # noqa: ANN401 - a Ray actor handle
-        """Deliver to `actor`, which has a method `deliver(stream, data)`."""
+    def __init__(self, actor: Any, under_way: int = UNDER_WAY) -> None:  # noqa: ANN401
+        """Deliver to `actor`, a Ray actor handle with a method `deliver(stream, data)`.
+
+        At most `under_way` deliveries are not yet acknowledged at any time.
+        """
         self._actor = actor
-        self._under_way: list[ray.ObjectRef[None]] = []
+        self._limit = under_way
+        # Ray may call back from its own thread, or at once from the sending one.
+        self._lock = threading.RLock()
+        self._under_way = 0
+        self._waiting: _Parcel | None = None
         self.skipped = 0
-        """Messages that were not sent because the link was still busy with earlier ones."""
+        """Messages that gave way to newer ones while the link was busy."""
 
-    def busy(self) -> bool:
-        """Tell whether the link still carries as much as it may."""
-        if self._under_way:
-            _, self._under_way = ray.wait(
-                self._under_way, num_returns=len(self._under_way), timeout=0
-            )
-        return len(self._under_way) >= _UNDER_WAY
+    def send(self, parcel: _Parcel) -> None:
+        """Deliver a message, now or as soon as the link is free."""
+        with self._lock:
+            if self._under_way < self._limit:
+                self._under_way += 1
+                self._deliver(parcel)
+            else:
+                self.skipped += self._waiting is not None
+                self._waiting = parcel
 
-    def deliver(self, stream: str, reference: ray.ObjectRef[bytes]) -> None:
-        """Send a message that is in the object store."""
-        self._under_way.append(self._actor.deliver.remote(stream, reference))
+    def _deliver(self, parcel: _Parcel) -> None:
+        done = self._actor.deliver.remote(parcel.stream, parcel.reference())
+        done.future().add_done_callback(self._delivered)
+
+    def _delivered(self, _: object) -> None:
+        """A reader that has died counts as one that is done: the publisher goes on."""
+        with self._lock:
+            parcel, self._waiting = self._waiting, None
+            if parcel is None:
+                self._under_way -= 1
+            else:
+                self._deliver(parcel)
 
 
 def send_to(readers: list[RemoteReader], stream: str, encoded: Encoded) -> None:
-    """Put a message into the object store once and send it to every reader that is free."""
-    free = []
+    """Send a message to every reader; its arrays are copied, for they may change soon."""
+    parcel = _Parcel(stream, encoded.to_bytes())
     for reader in readers:
-        if reader.busy():
-            reader.skipped += 1
-        else:
-            free.append(reader)
-    if not free:
-        return
-    reference = ray.put(encoded.to_bytes())
-    for reader in free:
-        reader.deliver(stream, reference)
+        reader.send(parcel)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import weakref
 from typing import Any
 
 from aerodaas.actors.streams._codec import Encoded, decode
@@ -17,13 +18,13 @@ from aerodaas.status import Message
 __all__ = ["SharedPublisher", "SharedSubscriber", "SharedWaiter", "shared_memory_available"]
 
 MAX_READERS = 16
-MAX_DEPTH = 64
+MAX_DEPTH = 32
 """Messages that a reader may leave waiting."""
 MAX_BORROWED = 16
 """Messages that a reader may hold on to while it goes on receiving."""
-_SLOTS = 48
-"""Messages of a stream that exist at once; memory is only touched when they are used."""
 _INITIAL_BYTES = 4096
+_COPIED_BYTES = 65536
+"""Messages up to this size are copied, which takes microseconds, so that nobody borrows them."""
 
 
 @functools.cache
@@ -96,12 +97,13 @@ class SharedPublisher:
             data.publisher_builder()
             .initial_max_slice_len(_INITIAL_BYTES)
             .allocation_strategy(iox.AllocationStrategy.PowerOfTwo)
-            .override_sample_preallocation(_SLOTS)
             .create()
         )
+        # The library keeps slots for all that its readers may hold; memory is only touched when
+        # they are used. With fewer slots than that, a reader that falls behind aborts us.
         self._notifier = event.notifier_builder().create()
         self.refused = 0
-        """Messages not sent because every slot was held by readers."""
+        """Messages not sent because there was no memory for them."""
 
     def send(self, encoded: Encoded) -> None:
         """Write a message and wake the readers."""
@@ -122,6 +124,15 @@ class SharedPublisher:
         self._notifier.delete()
 
 
+class _Loan:
+    """A message that its reader has not let go of."""
+
+    __slots__ = ("__weakref__", "_sample")
+
+    def __init__(self, sample: Any) -> None:  # noqa: ANN401
+        self._sample = sample
+
+
 class SharedSubscriber:
     """Reads one stream from shared memory."""
 
@@ -130,23 +141,30 @@ class SharedSubscriber:
         data, event = _services(name)
         self._subscriber = data.subscriber_builder().buffer_size(depth).create()
         self.listener = event.listener_builder().create()
-        self.starved = 0
-        """Times that nothing could be received because the reader held too many messages."""
+        self._loans: weakref.WeakSet[_Loan] = weakref.WeakSet()
 
     def receive(self) -> Message[Any] | None:
-        """Return the oldest message kept, or None; the arrays in it live in shared memory."""
+        """Return the oldest message kept, or None.
+
+        Large arrays in it live in shared memory, unless the reader holds on to so many already
+        that only a copy lets it go on receiving.
+        """
         try:
             sample = self._subscriber.receive()
         except Exception:  # noqa: BLE001 - ReceiveError has no stable import path
-            # The reader holds too many messages already; the next one waits in the buffer.
-            self.starved += 1
+            # A publisher that died halfway; the living must not fall over it.
             return None
         if sample is None:
             return None
         payload = sample.payload()
-        block = (ctypes.c_uint8 * payload.number_of_elements).from_address(payload.data_ptr)
+        size = payload.number_of_elements
+        block = (ctypes.c_uint8 * size).from_address(payload.data_ptr)
+        if size <= _COPIED_BYTES or len(self._loans) >= MAX_BORROWED - 1:
+            return decode(memoryview(bytes(block)))
         # The views that decode makes keep `block` alive, and `block` keeps the sample borrowed.
-        block._sample = sample  # noqa: SLF001
+        loan = _Loan(sample)
+        self._loans.add(loan)
+        block._loan = loan  # noqa: SLF001
         return decode(memoryview(block).cast("B"))
 
     def close(self) -> None:

@@ -16,7 +16,7 @@ only what is cheap to send and checks only what the user could have got wrong.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, Protocol, TypeVar
+from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar
 
 from typing_extensions import Self
 
@@ -28,8 +28,9 @@ from aerodaas.names import PaperNames, snake_case
 from aerodaas.vehicle import VehicleState
 from aerodaas.waypoints import AeroNavigation
 
-__all__ = ["Analytics", "Context", "NavigableAnalytics"]
+__all__ = ["Analytics", "ComputeKind", "Context", "NavigableAnalytics"]
 
+ComputeKind: TypeAlias = Literal["edge", "cloud"]
 O_co = TypeVar("O_co", covariant=True)
 
 
@@ -48,6 +49,11 @@ class Context(Protocol):
         """Tell the people who watch: shown, logged and recorded."""
         ...
 
+    @property
+    def kind(self) -> ComputeKind:
+        """Where this runs: on the edge node beside the vehicle, or in the cloud."""
+        ...
+
 
 class Analytics(PaperNames, IAnalyse[O_co]):
     """An analysis; subclasses say what they accept and produce, and implement `process`.
@@ -62,6 +68,8 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     """Type of the results."""
     isolated: bool = False
     """True for an analysis that needs a process of its own, such as a neural network."""
+    scheduled: bool = False
+    """True for an analysis of frames whose every run the analytics scheduler decides on."""
     rate: float = 1.0
     """How often an external source (`instantiate`) is asked, in Hz."""
     name: str = ""

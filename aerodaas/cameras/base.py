@@ -24,6 +24,8 @@ class Picture:
     """Mission clock at capture, in nanoseconds."""
     label: str = ""
     """Where it came from, such as a file's name."""
+    odometry: Odometry | None = None
+    """The vehicle's at capture where the source knows it; None: the vehicle's newest is it."""
 
 
 @runtime_checkable

@@ -19,6 +19,8 @@ __all__ = [
     "End",
     "OpenStream",
     "Pause",
+    "Reply",
+    "Request",
     "Resume",
     "ReturnHome",
     "Start",
@@ -72,6 +74,11 @@ class StreamItem:
     item: object
     """AeroNavigation, or anything at all in a stream that only empties the queue."""
     cause: Header | None = None
+    index: int | None = None
+    """Waypoints to be visited before these, as in AddNavigation; None as the stream says."""
+    replaces: bool = True
+    """A waypoint takes the place of the one of its id that the stream queued before, for its
+    target has moved; False refuses it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +141,22 @@ class Answer:
     """One sentence for a person."""
     refused: Mapping[str, str] = field(default_factory=dict)
     """Reason by waypoint id, for the waypoints that were not taken."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """A command whose sender waits for a `Reply` of the same number."""
+
+    number: int
+    command: Command
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """What the mission said to a `Request`."""
+
+    number: int
+    answer: Answer
 
 
 def initial_commands(edges: Iterable[NavigationEdge]) -> list[Command]:

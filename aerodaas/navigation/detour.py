@@ -7,6 +7,7 @@ import math
 import numpy as np
 import shapely
 import shapely.ops
+from shapely.geometry.base import BaseGeometry
 
 from aerodaas.geometry import Vector
 from aerodaas.navigation.free_path import Place, free_path
@@ -22,7 +23,7 @@ class Detour:
         """Keep inside `fence`, turning its corners `clearance` metres beyond its margin."""
         self._fence = fence
         self._clearance = clearance
-        self._corners: shapely.Geometry | None = None
+        self._corners: BaseGeometry | None = None
         if fence.area is not None and fence.inner is not None:
             tighter = fence.inner.buffer(-clearance, join_style="mitre")
             self._corners = fence.inner if tighter.is_empty else tighter
@@ -63,6 +64,8 @@ class Detour:
         )
 
     def _find(self, here: Place, there: Place) -> list[Place] | None:
+        if self._corners is None:
+            return [there]
         inside = _place(self._fence.nearest_allowed(np.array([*here, 0.0])))
         rounded = free_path(self._corners, self._nearest(inside), self._nearest(there))
         return None if rounded is None else [*rounded[1:], there]

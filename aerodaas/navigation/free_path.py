@@ -6,6 +6,7 @@ import heapq
 import math
 
 import shapely
+from shapely.geometry.base import BaseGeometry
 
 __all__ = ["Place", "free_path"]
 
@@ -13,7 +14,7 @@ Place = tuple[float, float]
 """East and north in metres."""
 
 
-def free_path(area: shapely.Geometry, start: Place, end: Place) -> list[Place] | None:
+def free_path(area: BaseGeometry, start: Place, end: Place) -> list[Place] | None:
     """Corners of the shortest way from `start` to `end` inside `area`, both ends included.
 
     The straight line where it is free, otherwise a search (A*) over the visibility graph of the

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import shapely
 from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
 
 from aerodaas.config import GeofenceConfig
 from aerodaas.errors import ConfigError
@@ -27,14 +28,14 @@ class Geofence:
         self.floor = config.floor
         self.ceiling = config.ceiling
         self.margin = config.margin
-        self.area: shapely.Geometry | None = None
-        self.inner: shapely.Geometry | None = None
+        self.area: BaseGeometry | None = None
+        self.inner: BaseGeometry | None = None
         self._starts: NDArray[np.float64] = np.empty((0, 2))
         self._ends: NDArray[np.float64] = np.empty((0, 2))
         if not (config.polygon or config.no_fly):
             return
         unbounded = 1e6
-        area: shapely.Geometry = (
+        area: BaseGeometry = (
             _polygon(config.polygon, "polygon")
             if config.polygon
             else shapely.box(-unbounded, -unbounded, unbounded, unbounded)

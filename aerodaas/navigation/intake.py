@@ -90,10 +90,18 @@ class Intake:
         if stream.priority is not None:
             kind, scheduling = item.navigation_type, item.scheduling_type
             item = AeroNavigation(kind, item, scheduling, priority=stream.priority)
-        return self._take(item, stream, now, message.cause)
+        if message.index is not None:
+            stream = replace(stream, index=message.index)
+        return self._take(item, stream, now, message.cause, replaces=message.replaces)
 
     def _take(
-        self, navigation: AeroNavigation, stream: OpenStream, now: int, cause: Header | None
+        self,
+        navigation: AeroNavigation,
+        stream: OpenStream,
+        now: int,
+        cause: Header | None,
+        *,
+        replaces: bool = True,
     ) -> Answer:
         if navigation.stream is not None:
             text = "navigation that is a stream is opened with OpenStream, not added"
@@ -103,7 +111,7 @@ class Intake:
         for velocity in navigation.commands:
             self._navigator.obey(velocity, now, cause)
         taken, refused = self._navigator.admit(
-            navigation.waypoints, seconds(now), stream.deadline, stream.name
+            navigation.waypoints, seconds(now), stream.deadline, stream.name if replaces else ""
         )
         self._groups += not stream.name
         ordered = navigation.scheduling_type is SchedulingType.ORDERED and stream.ordered

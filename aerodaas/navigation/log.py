@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from aerodaas.data import Alert, Header
+from aerodaas.geometry import Vector
 
 __all__ = ["MissionLog"]
+
+_STRIDE = 0.5
+"""Metres that the drone must be away from where it was last counted; far above the noise of
+odometry, which would add up to metres in a minute's hover."""
 
 
 @dataclass
@@ -19,9 +26,20 @@ class MissionLog:
     given_up: dict[str, str] = field(default_factory=dict)
     """Reason by waypoint id."""
     distance: float = 0.0
-    """Metres flown."""
+    """Metres flown, counted in strides of half a metre."""
+    _counted_at: Vector | None = None
     alerts: list[Alert] = field(default_factory=list)
     """Every alert of the mission, oldest first."""
+
+    def fly(self, position: Vector) -> None:
+        """Count the way to `position`, ENU metres."""
+        if self._counted_at is None:
+            self._counted_at = position
+            return
+        way = float(np.linalg.norm(position - self._counted_at))
+        if way >= _STRIDE:
+            self.distance += way
+            self._counted_at = position
 
     def alert(self, now: int, kind: str, text: str) -> None:
         """Tell people something."""

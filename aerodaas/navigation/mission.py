@@ -236,8 +236,7 @@ class Mission:
         on_ground = state.mode is VehicleMode.GROUNDED or not has_position(state)
         if last is None or on_ground or not has_position(last):
             return
-        way = state.odometry.position - last.odometry.position
-        self._log.distance += float(np.linalg.norm(way))
+        self._log.fly(state.odometry.position)
         self._meter.observe(
             state.battery.fraction, state.odometry.velocity, seconds(state.stamp - last.stamp)
         )

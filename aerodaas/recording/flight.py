@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from aerodaas.clock import seconds
 from aerodaas.recording.reader import Record, Recording
 
-__all__ = ["Band", "Flight", "RobotFlight", "StreamLatency"]
+__all__ = ["Band", "Flight", "Load", "Outcome", "RobotFlight", "Sighting", "StreamLatency"]
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +27,41 @@ class Band:
     start: float
     end: float
     reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """One object found in one frame."""
+
+    stamp: int
+    """Of the frame, mission nanoseconds."""
+    source: str
+    """The frame's camera."""
+    label: str
+    score: float
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One word of the analytics scheduler about one task."""
+
+    time: float
+    """Mission seconds."""
+    analysis: str
+    action: str
+    """`edge`, `cloud` and `drop` are decisions; `done`, `late` and the like what came of them."""
+
+
+@dataclass
+class Load:
+    """What a process, or a machine, was busy with over time."""
+
+    time: list[float] = field(default_factory=list)
+    """Mission seconds."""
+    cpu: list[float] = field(default_factory=list)
+    """Cores in use by a process; share of all cores, 0 to 1, of a machine."""
+    memory: list[float] = field(default_factory=list)
+    """Megabytes of a process; share, 0 to 1, of a machine."""
 
 
 @dataclass
@@ -88,6 +123,8 @@ class StreamLatency:
 
     total: list[float] = field(default_factory=list)
     """From capture to publishing."""
+    overhead: list[float] = field(default_factory=list)
+    """The part of it in which nobody worked: on the way between actors, or waiting for one."""
     wait: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     """From the previous actor's publishing to this one's receiving, by actor."""
     work: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
@@ -103,10 +140,18 @@ class Flight:
     """By stream."""
     frames: Counter[str] = field(default_factory=Counter)
     """Frames by camera."""
+    frame_stamps: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
+    """Mission nanoseconds of the frames, by camera."""
+    sightings: list[Sighting] = field(default_factory=list)
     detections: Counter[str] = field(default_factory=Counter)
     """Objects found, by label."""
     decisions: Counter[str] = field(default_factory=Counter)
     """Scheduler decisions, by action."""
+    outcomes: list[Outcome] = field(default_factory=list)
+    loads: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
+    """By actor."""
+    machines: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
+    """By machine."""
     alerts: list[tuple[float, str, str]] = field(default_factory=list)
     """Mission seconds, kind, text."""
     drops: dict[str, int] = field(default_factory=dict)
@@ -177,18 +222,28 @@ def _latency(flight: Flight, record: Record) -> None:
     for hop in record.value["hops"]:
         latency.wait[hop["node"]].append(float(hop["wait_ms"]))
         latency.work[hop["node"]].append(float(hop["work_ms"]))
+    latency.overhead.append(sum(float(hop["wait_ms"]) for hop in record.value["hops"]))
 
 
 def _frame(flight: Flight, record: Record) -> None:
     flight.frames[record.value["source"]] += 1
+    flight.frame_stamps[record.value["source"]].append(record.value["stamp"])
 
 
 def _detections(flight: Flight, record: Record) -> None:
-    flight.detections.update(item["label"] for item in record.value["items"])
+    value = record.value
+    flight.detections.update(item["label"] for item in value["items"])
+    flight.sightings.extend(
+        Sighting(value["stamp"], value["source"], item["label"], item["score"])
+        for item in value["items"]
+    )
 
 
 def _decision(flight: Flight, record: Record) -> None:
-    flight.decisions[record.value["action"]] += 1
+    value = record.value
+    flight.decisions[value["action"]] += 1
+    analysis = value["task"].rpartition("#")[0]
+    flight.outcomes.append(Outcome(seconds(value["stamp"]), analysis, value["action"]))
 
 
 def _alert(flight: Flight, record: Record) -> None:
@@ -198,6 +253,22 @@ def _alert(flight: Flight, record: Record) -> None:
 
 def _drops(flight: Flight, record: Record) -> None:
     flight.drops[record.value["stream"]] = int(record.value["total"])
+
+
+def _vitals(flight: Flight, record: Record) -> None:
+    value = record.value
+    now = seconds(value["stamp"])
+    if value["cpu_cores"] is not None:
+        load = flight.loads[value["actor"]]
+        load.time.append(now)
+        load.cpu.append(value["cpu_cores"])
+        load.memory.append(value["memory_mb"])
+    machine = flight.machines[value["machine"]]
+    # Each of a machine's actors tells of it; one reading a moment is enough.
+    if not machine.time or now > machine.time[-1]:
+        machine.time.append(now)
+        machine.cpu.append(value["machine_cpu"])
+        machine.memory.append(value["machine_memory"])
 
 
 _READERS: dict[str, Callable[[Flight, Record], None]] = {
@@ -212,4 +283,5 @@ _READERS: dict[str, Callable[[Flight, Record], None]] = {
     "aerodaas.Decision": _decision,
     "aerodaas.Alert": _alert,
     "aerodaas.Drops": _drops,
+    "aerodaas.Vitals": _vitals,
 }

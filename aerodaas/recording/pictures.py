@@ -2,44 +2,71 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Iterator
+from dataclasses import dataclass
 from typing import Any
 
-import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from aerodaas.data import Detection, Detections, Frame, Header, Odometry
+from aerodaas.recording.images import IMAGE_SCHEMAS, decode_image
 from aerodaas.recording.reader import Record, Recording
 
-__all__ = ["detections", "frames"]
+__all__ = ["Shot", "detections", "detections_by_frame", "frames", "shots"]
 
 
-def frames(recording: Recording, topics: Collection[str] | None = None) -> Iterator[Frame]:
-    """Every picture in the order of recording, decoded; a broken one is left out.
+@dataclass(frozen=True, slots=True)
+class Shot:
+    """A picture of a recording, not decoded yet."""
+
+    header: Header
+    odometry: Odometry | None
+    """The vehicle's at capture, where it was recorded."""
+    record: Record
+
+    def image(self) -> NDArray[np.uint8] | None:
+        """Decode the picture, BGR; None if it is broken, SourceError for an unknown format."""
+        return decode_image(self.record.schema, self.record.value)
+
+
+def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterator[Shot]:
+    """Every picture in the order of recording; nothing is decoded.
 
     A recording of others has no frame numbers: the message's sequence and frame id serve.
     """
     heads: dict[str, Record] = {}
-    schemas = ("aerodaas.Frame", "foxglove.CompressedImage")
-    for record in recording.records(schemas=schemas, topics=topics):
+    schemas = ("aerodaas.Frame", *IMAGE_SCHEMAS)
+    wanted = None if topics is None else {name for one in topics for name in (one, *_heads(one))}
+    for record in recording.records(schemas=schemas, topics=wanted):
         if record.schema == "aerodaas.Frame":
             heads[record.topic] = record
             continue
-        data = np.frombuffer(record.value.data, np.uint8)
-        image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
-        if image is None:
-            continue
-        head = heads.get(record.topic.removesuffix("/image")) or heads.get(
-            record.topic.removesuffix("/image") + "/frame"
-        )
-        picture = np.asarray(image, dtype=np.uint8)
+        head = next((heads[name] for name in _heads(record.topic) if name in heads), None)
         if head is None or head.captured != record.captured:
-            header = Header(record.sequence, record.captured, record.value.frame_id)
-            yield Frame(header, picture)
+            header = Header(record.sequence, record.captured, _frame_id(record.value))
+            yield Shot(header, None, record)
         else:
             value = head.value
             header = Header(value["id"], value["stamp"], value["source"])
-            yield Frame(header, picture, odometry=_odometry(value.get("odometry")))
+            yield Shot(header, _odometry(value.get("odometry")), record)
+
+
+def frames(
+    recording: Recording,
+    topics: Collection[str] | None = None,
+    stamps: Collection[int] | None = None,
+) -> Iterator[Frame]:
+    """Every picture in the order of recording, decoded; a broken one is left out.
+
+    With `stamps`, only pictures captured at these mission times, and no other is decoded.
+    """
+    for shot in shots(recording, topics):
+        if stamps is None or shot.record.captured in stamps:
+            image = shot.image()
+            if image is not None:
+                yield Frame(shot.header, image, odometry=shot.odometry)
 
 
 def detections(recording: Recording) -> Iterator[tuple[str, Detections]]:
@@ -49,6 +76,30 @@ def detections(recording: Recording) -> Iterator[tuple[str, Detections]]:
         header = Header(value["id"], value["stamp"], value["source"])
         items = tuple(_detection(item) for item in value["items"])
         yield record.topic, Detections(header, items, value["width"], value["height"])
+
+
+def detections_by_frame(recording: Recording) -> dict[tuple[str, int], list[Detection]]:
+    """What was found in each frame, by the frame's camera and stamp.
+
+    A tracker repeats what its detector found, and adds to it: the later word counts.
+    """
+    found: dict[tuple[str, int], dict[tuple[str, object], Detection]] = defaultdict(dict)
+    for _, result in detections(recording):
+        at = found[result.header.source, result.header.stamp]
+        at.update({(item.label, item.box): item for item in result})
+    return {key: list(items.values()) for key, items in found.items()}
+
+
+def _heads(topic: str) -> tuple[str, str]:
+    """Topics on which the frame of a picture on `topic` is described."""
+    stream = topic.removesuffix("/image")
+    return stream, f"{stream}/frame"
+
+
+def _frame_id(value: Any) -> str:  # noqa: ANN401 - by the schema
+    head = getattr(value, "header", value)
+    found = value.get("frame_id", "") if isinstance(value, dict) else getattr(head, "frame_id", "")
+    return str(found)
 
 
 def _odometry(value: dict[str, Any] | None) -> Odometry | None:

@@ -14,6 +14,7 @@ from typing import Any, BinaryIO
 from mcap.data_stream import ReadDataStream
 from mcap.records import Attachment, Channel, Message
 from mcap_protobuf.decoder import DecoderFactory
+from mcap_ros2.decoder import DecoderFactory as RosDecoderFactory
 from typing_extensions import Self
 
 from aerodaas.clock import seconds
@@ -50,7 +51,7 @@ class Record:
     """Mission clock of what it describes, nanoseconds."""
     sequence: int
     value: Any
-    """A dictionary for JSON, a protobuf message with its fields, or bytes of other encodings."""
+    """A dictionary for JSON, an object with fields for protobuf and ROS 2, or else bytes."""
 
 
 class Recording:
@@ -62,6 +63,7 @@ class Recording:
         self._file = file
         self._index = index
         self._protobuf = DecoderFactory()
+        self._ros = RosDecoderFactory()
         self._decoders: dict[int, Callable[[bytes], Any]] = {}
         starts = [block.start for block in index.blocks]
         self.metadata: dict[str, dict[str, str]] = {
@@ -231,6 +233,7 @@ class Recording:
         if decoder is None:
             schema = self._index.schemas.get(channel.schema_id)
             decoder = self._protobuf.decoder_for(channel.message_encoding, schema)
+            decoder = decoder or self._ros.decoder_for(channel.message_encoding, schema)
             if decoder is None:
                 decoder = json.loads if channel.message_encoding == "json" else bytes
             self._decoders[channel.id] = decoder

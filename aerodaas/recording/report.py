@@ -6,15 +6,27 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+import cv2
+
 from aerodaas.errors import RecordingError
 from aerodaas.recording.flight import Flight
-from aerodaas.recording.plots import latency_figure, timeline_figure, trajectory_figure
+from aerodaas.recording.moments import MomentPicture, key_moments, picture_moments
+from aerodaas.recording.page.figures import Plot, plots_of
+from aerodaas.recording.page.flight import flight_page
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.sheet import contact_sheet
 from aerodaas.recording.summary import FlightSummary
 
-__all__ = ["ReportFiles", "write_report"]
+__all__ = ["Report", "ReportFiles", "read_report", "write_report"]
 
-_DPI = 150
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A recording, worked out."""
+
+    summary: FlightSummary
+    plots: list[Plot]
+    moments: list[MomentPicture]
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,39 +34,54 @@ class ReportFiles:
     """What `write_report` has written; pictures for which there was no data are missing."""
 
     summary: FlightSummary
+    page: Path
     summary_json: Path
     summary_text: Path
     plots: tuple[Path, ...]
 
 
+def read_report(recording: str | Path) -> Report:
+    """Work out what there is to say and to show about a recording.
+
+    Raises RecordingError if it cannot be read, or holds no flight.
+    """
+    with Recording.open(recording) as opened:
+        flight = Flight.read(opened)
+        if not flight.robots and not flight.latencies:
+            raise RecordingError(f"{recording} holds no flight: no vehicle states and no latencies")
+        moments = picture_moments(opened, key_moments(flight))
+        summary = FlightSummary.of(opened, flight)
+    return Report(summary, plots_of(flight), moments)
+
+
 def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
-    """Write `summary.json`, `summary.txt` and the plots of a recording into `folder`.
+    """Write `report.html`, `summary.json`, `summary.txt` and the plots as PNG into `folder`.
 
     An earlier report in `folder` is replaced. Raises RecordingError if the recording cannot be
     read, holds no flight, or the folder cannot be written.
     """
-    with Recording.open(recording) as opened:
-        flight = Flight.read(opened)
-        summary = FlightSummary.of(opened, flight)
-    if not flight.robots and not flight.latencies:
-        raise RecordingError(f"{recording} holds no flight: no vehicle states and no latencies")
-    figures = {}
-    if any(robot.states for robot in flight.robots.values()):
-        outcomes = [robot.outcome for robot in flight.robots.values()]
-        title = f"{summary.title}\n{outcomes[0]}" if len(outcomes) == 1 else summary.title
-        figures["trajectory"] = trajectory_figure(flight, title)
-        figures["timeline"] = timeline_figure(flight, title)
-    if flight.latencies:
-        figures["latency"] = latency_figure(flight, summary.title)
-    folder = Path(folder)
-    json_path, text_path = folder / "summary.json", folder / "summary.txt"
-    plots = {folder / f"{name}.png": figure for name, figure in figures.items()}
+    report, folder = read_report(recording), Path(folder)
+    files = ReportFiles(
+        report.summary,
+        folder / "report.html",
+        folder / "summary.json",
+        folder / "summary.txt",
+        tuple(folder / f"{plot.name}.png" for plot in report.plots),
+    )
+    contents = {path: plot.png for path, plot in zip(files.plots, report.plots, strict=True)}
+    if report.moments:
+        _, sheet = cv2.imencode(".png", contact_sheet(report.moments))
+        contents[folder / "moments.png"] = sheet.tobytes()
+    summary = report.summary
+    contents |= {
+        files.page: flight_page(summary, report.plots, report.moments).encode(),
+        files.summary_json: (json.dumps(summary.as_dict(), indent=2) + "\n").encode(),
+        files.summary_text: f"{summary}\n".encode(),
+    }
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        json_path.write_text(json.dumps(summary.as_dict(), indent=2) + "\n", encoding="utf-8")
-        text_path.write_text(f"{summary}\n", encoding="utf-8")
-        for path, figure in plots.items():
-            figure.savefig(path, dpi=_DPI)
+        for path, data in contents.items():
+            path.write_bytes(data)
     except OSError as error:
         raise RecordingError(f"cannot write the report to {folder}: {error.strerror}") from None
-    return ReportFiles(summary, json_path, text_path, tuple(plots))
+    return files

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from typing_extensions import Self
 
-from aerodaas.recording.flight import Flight, RobotFlight
+from aerodaas.recording.flight import Flight, RobotFlight, StreamLatency
 from aerodaas.recording.reader import Recording
 
 __all__ = ["FlightSummary", "LatencyFigures", "RobotFigures"]
@@ -22,6 +22,8 @@ class LatencyFigures:
     count: int
     median_ms: float
     p99_ms: float
+    overhead_ms: float
+    """Median of the part in which nobody worked: on the way, or waiting for an actor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +77,7 @@ class FlightSummary:
             complete=recording.complete and not recording.damaged,
             robots={name: _robot(robot) for name, robot in flight.robots.items()},
             frames=dict(flight.frames),
-            latencies={name: _latency(it.total) for name, it in flight.latencies.items()},
+            latencies={name: _latency(it) for name, it in flight.latencies.items()},
             detections=dict(flight.detections),
             decisions=dict(flight.decisions),
             alerts=[{"time_s": at, "kind": kind, "text": t} for at, kind, t in flight.alerts],
@@ -94,8 +96,7 @@ class FlightSummary:
             lines[0] += " (cut off: the file was not closed or is damaged)"
         for name, robot in self.robots.items():
             lines.append(
-                f"  {name}: {robot.outcome}; {robot.waypoints_visited} of "
-                f"{robot.waypoints_planned} waypoints, {robot.distance_m:.1f} m in "
+                f"  {name}: {robot.outcome}; {_waypoints_text(robot)}{robot.distance_m:.1f} m in "
                 f"{robot.duration_s:.1f} s{_battery_text(robot)}"
             )
         for camera, count in self.frames.items():
@@ -111,13 +112,22 @@ class FlightSummary:
         return "\n".join(lines)
 
 
+def _waypoints_text(robot: RobotFigures) -> str:
+    if not robot.waypoints_planned:
+        return ""
+    return f"{robot.waypoints_visited} of {robot.waypoints_planned} waypoints, "
+
+
 def _battery_text(robot: RobotFigures) -> str:
     return "" if robot.battery_used is None else f", {100 * robot.battery_used:.0f} % of battery"
 
 
-def _latency(milliseconds: list[float]) -> LatencyFigures:
-    median, late = np.percentile(milliseconds, [50, 99])
-    return LatencyFigures(len(milliseconds), round(float(median), 3), round(float(late), 3))
+def _latency(latency: StreamLatency) -> LatencyFigures:
+    median, late = np.percentile(latency.total, [50, 99])
+    overhead = float(np.median(latency.overhead))
+    return LatencyFigures(
+        len(latency.total), round(float(median), 3), round(float(late), 3), round(overhead, 3)
+    )
 
 
 def _robot(robot: RobotFlight) -> RobotFigures:

@@ -32,12 +32,13 @@ from aerodaas.simulation.world import World
 
 __all__ = ["Renderer"]
 
+# A moving camera fills panda3d's cache of transforms by some 36 a frame, for good.
 _SETTINGS = """
+transform-cache false
 load-display p3tinydisplay
 window-type offscreen
 audio-library-name null
 notify-level warning
-garbage-collect-states true
 """
 
 _NEAR, _FAR = 0.1, 1200.0

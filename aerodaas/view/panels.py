@@ -59,7 +59,9 @@ def waypoints_text(mission: MissionStatus) -> tuple[float, str]:
     if mission.target is not None and mission.target.id not in mission.visited:
         ahead += 1
     known = visited + ahead
-    return (visited / known if known else 0.0), f"{visited} of {known} waypoints"
+    if not known:
+        return 0.0, "no waypoints"
+    return visited / known, f"{visited} of {known} waypoints"
 
 
 def robot_panel(

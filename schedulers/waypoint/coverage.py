@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 import shapely
 from shapely import affinity
+from shapely.geometry.base import BaseGeometry
 
 from aerodaas.errors import SchedulerError
 from aerodaas.navigation.free_path import Place, free_path
@@ -123,7 +124,7 @@ def _angles(outline: Sequence[Place]) -> list[float]:
 
 
 def _strips(
-    wanted: shapely.Geometry, angle: float, spacing: float, width: float
+    wanted: BaseGeometry, angle: float, spacing: float, width: float
 ) -> list[tuple[Place, Place]]:
     """Middle lines of the strips, spread evenly over the area's extent across the sweeps.
 
@@ -146,7 +147,7 @@ def _strips(
     return strips
 
 
-def _merged_extents(seen: shapely.Geometry) -> list[tuple[float, float]]:
+def _merged_extents(seen: BaseGeometry) -> list[tuple[float, float]]:
     """Extents of the parts of a band along the sweep, joined where they overlap."""
     extents = sorted(
         (part.bounds[0], part.bounds[2])
@@ -163,7 +164,7 @@ def _merged_extents(seen: shapely.Geometry) -> list[tuple[float, float]]:
 
 
 def _join(
-    strips: list[tuple[Place, Place]], flyable: shapely.Geometry, start: Place | None
+    strips: list[tuple[Place, Place]], flyable: BaseGeometry, start: Place | None
 ) -> list[Place] | None:
     """Fly the strips one after the other, always the one whose end is nearest, around obstacles."""
     left = list(strips)
@@ -187,7 +188,7 @@ def _join(
     return way
 
 
-def _append(way: list[Place], flyable: shapely.Geometry, target: Place) -> bool:
+def _append(way: list[Place], flyable: BaseGeometry, target: Place) -> bool:
     """Go on to `target`, or to the flyable place nearest to it; False where there is no way."""
     if not shapely.covers(flyable, shapely.Point(target)):
         nearest = shapely.shortest_line(flyable, shapely.Point(target))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pyvrp
@@ -89,8 +90,8 @@ def solve_routes(problem: RoutingProblem, budget: float, seed: int = 0) -> list[
         clients,
         depots,
         vehicles,
-        [np.ceil(tour.costs * unit).astype(np.int64) for tour in tours],
-        [np.ceil(tour.durations * _MILLISECONDS).astype(np.int64) for tour in tours],
+        _whole([tour.costs for tour in tours], unit),
+        _whole([tour.durations for tour in tours], _MILLISECONDS),
     )
     result = pyvrp.solve(data, MaxRuntime(budget), seed=seed, collect_stats=False, display=False)
     if not result.is_feasible():
@@ -99,6 +100,11 @@ def solve_routes(problem: RoutingProblem, budget: float, seed: int = 0) -> list[
     for route in result.best.routes():
         routes[route.vehicle_type()] = [step.idx for step in route if step.is_client()]
     return routes
+
+
+def _whole(matrices: list[Matrix], unit: float) -> list[Any]:
+    """Matrices in PyVRP's whole units, rounded up so that a bound that is kept is kept."""
+    return [np.ceil(matrix * unit).astype(np.int64) for matrix in matrices]
 
 
 def _bound(value: float) -> int:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from aerodaas.analytics.base import ComputeKind
 from aerodaas.analytics.follow import FollowAnalytics
 from aerodaas.clock import NANOSECONDS
 from aerodaas.data import Alert, Battery, Detection, Detections, Header, Odometry
@@ -27,6 +28,7 @@ class Snapshot:
     stamp: int
     odometry: Odometry | None
     alerts: list[Alert]
+    kind: ComputeKind = "edge"
 
     def now(self) -> int:
         """Stamp of the item."""

@@ -43,7 +43,7 @@ def circle(speed: float, radius: float = 6.0) -> Path:
     seed=st.integers(0, 1000),
 )
 @settings(max_examples=25, deadline=None)
-def test_it_comes_to_2_m_of_a_standing_person(  # noqa: PLR0917 - drawn by hypothesis
+def test_it_comes_to_2_m_of_a_standing_person(
     distance: float,
     bearing: float,
     height: float,

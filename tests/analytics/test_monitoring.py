@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from aerodaas.analytics.base import ComputeKind
 from aerodaas.analytics.monitoring import MonitoringAnalytics
 from aerodaas.clock import NANOSECONDS
 from aerodaas.data import Alert, Battery, Frame, GpsFix, Header, Odometry
@@ -21,6 +22,7 @@ class Desk:
     def __init__(self) -> None:
         """Start at zero with a full battery."""
         self.stamp = 0
+        self.kind: ComputeKind = "edge"
         self.alerts: list[Alert] = []
         self.state: VehicleState | None = None
 
@@ -77,9 +79,9 @@ def test_camera_rate() -> None:
     """From the stamps of the frames."""
     desk, monitor = Desk(), MonitoringAnalytics(["camera"])
     picture = np.zeros((2, 2, 3), np.uint8)
-    for number in range(2):
-        header = Header(number, number * NANOSECONDS // 15, "drone/cam")
-        readings = monitor.process(Frame(header, picture), desk)
+    first, second = (Header(i, i * NANOSECONDS // 15, "drone/cam") for i in range(2))
+    monitor.process(Frame(first, picture), desk)
+    readings = monitor.process(Frame(second, picture), desk)
     assert readings.values["camera.rate"] == pytest.approx(15.0)
 
 

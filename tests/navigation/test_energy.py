@@ -82,6 +82,7 @@ def test_free_path_is_the_shortest_way_round() -> None:
     """Around a block: by its near corners, as long as geometry says."""
     area = shapely.box(0, 0, 20, 20).difference(shapely.box(8, -1, 12, 15))
     path = free_path(area, (0.0, 0.0), (20.0, 0.0))
+    assert path is not None
     assert path == [(0.0, 0.0), (8.0, 15.0), (12.0, 15.0), (20.0, 0.0)]
     assert math.dist(path[0], path[1]) == pytest.approx(17.0)
     assert free_path(area, (0.0, 0.0), (5.0, 20.0)) == [(0.0, 0.0), (5.0, 20.0)]

@@ -8,6 +8,7 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from shapely.geometry.base import BaseGeometry
 
 from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.waypoint.coverage import Coverage, cover, footprint
@@ -22,7 +23,7 @@ def way(plan: Coverage) -> shapely.LineString:
     return shapely.LineString([(w.x, w.y) for w in plan.waypoints])
 
 
-def seen(plan: Coverage, area: shapely.Geometry, width: float) -> float:
+def seen(plan: Coverage, area: BaseGeometry, width: float) -> float:
     """Share of the area that the camera has seen."""
     strip = way(plan).buffer(width / 2, cap_style="flat")
     return float(area.intersection(strip).area / area.area)

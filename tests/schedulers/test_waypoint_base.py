@@ -24,9 +24,8 @@ def edges(scheduler: NearestNeighborScheduler, *given: AeroNavigation) -> list[N
     for entry in scheduler.entries:
         live = entry.navigation.stream
         clear_on = live.name if entry.clear_first and live is not None else None
-        made.append(
-            NavigationEdge("drone", entry.navigation, entry.index, entry.deadline, clear_on=clear_on)
-        )
+        index, deadline = entry.index, entry.deadline
+        made.append(NavigationEdge("drone", entry.navigation, index, deadline, clear_on))
     return made
 
 

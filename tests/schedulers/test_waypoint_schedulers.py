@@ -64,6 +64,16 @@ def test_optimal_is_never_longer_than_nearest_neighbor(
     assert best <= tour_length(NearestNeighborScheduler().plan(pending, HOME), HOME) + 1e-6
 
 
+@pytest.mark.parametrize("count", [4, 14])
+def test_of_two_directions_the_given_one_is_flown(count: int) -> None:
+    """A round trip is as long backwards; people expect the first waypoint first."""
+    turns = np.linspace(0, 2 * np.pi, count, endpoint=False)[1:]
+    pending = waypoints([(50 * np.cos(a), 50 * np.sin(a), 5) for a in turns])
+    start = np.array([50.0, 0.0, 5.0])
+    plan = OptimalScheduler(budget=0.1).plan(pending, Situation(0.0, start, start))
+    assert list(plan) == pending
+
+
 @given(points=places.filter(lambda points: len(points) <= 6))
 @settings(max_examples=25, deadline=None)
 def test_exact_equals_brute_force(points: list[tuple[float, float, float]]) -> None:

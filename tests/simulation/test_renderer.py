@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from panda3d.core import TransformState
 
 from aerodaas.config import SimulationConfig
 from aerodaas.data import Odometry
@@ -186,3 +187,14 @@ def test_a_landed_camera_still_sees_the_ground() -> None:
     below = renderer.render(0.0, pose(0, 0, 0)).astype(float)[100:].mean(axis=(0, 1))
     renderer.close()
     assert below[1] > 1.3 * below[0]
+
+
+def test_a_long_flight_does_not_fill_the_memory() -> None:
+    """panda3d keeps nothing of the poses that a camera has passed through."""
+    renderer = Renderer(world(), CameraModel.from_fov(64, 48, 1.0))
+    renderer.render(0.0, pose(0, 0, 1.5))
+    before = TransformState.get_num_states()
+    for step in range(50):
+        renderer.render(0.0, pose(0.1 * step, 0, 1.5, yaw=0.02 * step))
+    renderer.close()
+    assert TransformState.get_num_states() <= before + 5

@@ -41,6 +41,7 @@ class OnnxDetector(Analytics[Detections]):
     accepts: ClassVar[tuple[type, ...]] = (Frame,)
     produces: ClassVar[type] = Detections
     isolated = True
+    scheduled = True
 
     def __init__(
         self,

@@ -1,0 +1,118 @@
+"""RemoteAnalytics: a person or a program takes part in the mission over the network."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from pydantic import ValidationError
+
+from aerodaas.analytics.base import Context
+from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
+from aerodaas.analytics.remote.guard import Guard, is_loopback
+from aerodaas.config import RemoteConfig
+from aerodaas.data import Frame
+from aerodaas.errors import ConfigError, SourceError
+
+if TYPE_CHECKING:
+    import uvicorn
+
+__all__ = ["TOKEN_VARIABLE", "RemoteAnalytics"]
+
+TOKEN_VARIABLE = "AERODAAS_REMOTE_TOKEN"  # noqa: S105 - a name, not a secret
+_STOPPING = 5.0
+
+
+class RemoteAnalytics(CommandingAnalytics):
+    """Serves HTTP and WebSocket while the mission runs: waypoints in, commands in, state out.
+
+    Analyse a camera's stream to show its newest picture, or `instantiate` for none. The stream
+    of this analysis is navigation: without `scheduler.add_navigation(…)`, waypoints are refused.
+    `aerodaas remote` and `aerodaas.analytics.remote.client.RemoteClient` speak with the service.
+    """
+
+    isolated = True
+    rate = 20.0
+
+    def __init__(
+        self,
+        env_data: Mapping[str, Any] | None = None,
+        *,
+        host: str | None = None,
+        port: int | None = None,
+    ) -> None:
+        """Listen as the section `remote` of `env_data` (`Environment.env_data`) says.
+
+        `host` and `port` lie over it. Raises ConfigError for an address beyond this machine
+        without a token, for everybody could fly the drone.
+        """
+        asked = dict((env_data or {}).get("remote", {}))
+        asked |= {"host": host} if host is not None else {}
+        asked |= {"port": port} if port is not None else {}
+        asked |= {"token": value} if (value := os.environ.get(TOKEN_VARIABLE)) else {}
+        try:
+            self._settings = RemoteConfig.model_validate(asked)
+        except ValidationError as error:
+            # The error's own text repeats its input, which may hold the token.
+            said = "; ".join(f"{'.'.join(map(str, e['loc']))}: {e['msg']}" for e in error.errors())
+            raise ConfigError(f"remote: {said}") from None
+        if self._settings.token is None and not is_loopback(self._settings.host):
+            raise ConfigError(
+                f"remote control does not listen on {self._settings.host} without a token: set "
+                f"{TOKEN_VARIABLE}, or remote.token in the environment file"
+            )
+        self._frame: Frame | None = None
+        self._socket: socket.socket | None = None
+        self._server: uvicorn.Server | None = None
+        self._thread: threading.Thread | None = None
+
+    def open(self) -> None:
+        """Take the port; raises SourceError if it cannot be had."""
+        host, port = self._settings.host, self._settings.port
+        family = socket.AF_INET6 if ":" in host else socket.AF_INET
+        try:
+            self._socket = socket.create_server((host, port), family=family)
+        except OSError as error:
+            raise SourceError(
+                f"remote control cannot listen on {host}:{port}: {error.strerror}; "
+                "choose another remote.port in the environment file"
+            ) from None
+
+    def begin(self, mission: MissionLink) -> None:
+        """Serve from now on, in a thread."""
+        import uvicorn  # noqa: PLC0415 - only in the actor
+
+        from aerodaas.analytics.remote.app import build_app  # noqa: PLC0415 - only in the actor
+
+        assert self._socket is not None  # noqa: S101 - open came first
+        token = self._settings.token.get_secret_value() if self._settings.token else None
+        app = Guard(build_app(mission, lambda: self._frame), token)
+        config = uvicorn.Config(
+            app, log_config=None, access_log=False, lifespan="off", timeout_graceful_shutdown=1
+        )
+        self._server = uvicorn.Server(config)
+        self._thread = threading.Thread(
+            target=self._server.run,
+            kwargs={"sockets": [self._socket]},
+            name="remote control",
+            daemon=True,
+        )
+        self._thread.start()
+
+    def process(self, item: object, context: Context) -> None:  # noqa: ARG002 - the base's
+        """Keep the newest picture to be looked at."""
+        if isinstance(item, Frame):
+            # A copy, so that the frame's shared memory is free for the next ones.
+            self._frame = Frame(item.header, np.array(item.image))
+
+    def close(self) -> None:
+        """Stop serving."""
+        if self._server is not None and self._thread is not None:
+            self._server.should_exit = True
+            self._thread.join(_STOPPING)
+        if self._socket is not None:
+            self._socket.close()

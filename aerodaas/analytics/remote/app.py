@@ -1,0 +1,172 @@
+"""The service's routes: each turns a request into a command, and the mission's answer into JSON."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Annotated, Any
+
+from fastapi import FastAPI, HTTPException, Query, Request, WebSocket, WebSocketDisconnect
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse, Response
+from starlette.exceptions import HTTPException as AnyHTTPException
+
+from aerodaas.analytics.commanding import MissionLink
+from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut, WaypointsIn
+from aerodaas.data import Alert, Frame, Header
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.navigation.commands import (
+    Answer,
+    ClearNavigation,
+    Command,
+    End,
+    Pause,
+    Resume,
+    ReturnHome,
+)
+from aerodaas.navigation.state_machine import TERMINAL
+
+__all__ = ["build_app"]
+
+_PATIENCE = 5.0
+"""Seconds within which the drone's actor answers; it turns 20 times a second."""
+
+_COMMANDS: dict[str, tuple[Command, str]] = {
+    "pause": (Pause(), "Hover until told to resume."),
+    "resume": (Resume(), "Go on where the mission was paused."),
+    "clear": (ClearNavigation(), "Empty the queue, hover, and wait for new waypoints."),
+    "return-home": (ReturnHome("a remote user asked to return"), "Fly back to take-off and land."),
+    "abort": (End("a remote user aborted the mission"), "Land at once, where the drone is."),
+}
+
+
+def build_app(mission: MissionLink, newest_frame: Callable[[], Frame | None]) -> FastAPI:
+    """Build the service that commands `mission` and shows its camera's newest picture."""
+    app = FastAPI(title="AeroDaaS remote control", docs_url=None, redoc_url=None)
+    app.add_exception_handler(RequestValidationError, _malformed)
+    app.add_exception_handler(AnyHTTPException, _failed)
+    desk = _Desk(mission, newest_frame)
+    answers: dict[str, Any] = {
+        "methods": ["POST"],
+        "response_model": AnswerOut,
+        "responses": {code: {"model": AnswerOut} for code in (400, 401, 409, 422, 504)},
+    }
+    app.add_api_route("/status", desk.status, response_model=StatusOut)
+    app.add_api_route("/frame.jpg", desk.frame, response_class=Response)
+    app.add_api_route("/waypoints", desk.add, **answers)
+    for name, (command, text) in _COMMANDS.items():
+        app.add_api_route(f"/{name}", desk.route(name, command), description=text, **answers)
+    app.add_api_websocket_route("/stream", desk.stream)
+    return app
+
+
+class _Desk:
+    """Hands requests to the mission and waits for what it says."""
+
+    def __init__(self, mission: MissionLink, newest_frame: Callable[[], Frame | None]) -> None:
+        self._mission = mission
+        self._newest_frame = newest_frame
+        self._count = 0
+
+    def status(self) -> StatusOut:
+        """Say how the mission fares."""
+        status = self._mission.status()
+        if status is None:
+            raise HTTPException(503, "the mission has not said anything yet")
+        return StatusOut.of(status, self._mission.vehicle())
+
+    def frame(self) -> Response:
+        """Show what the camera sees."""
+        picture = self._newest_frame()
+        if picture is None:
+            raise HTTPException(404, "the camera has not shown anything yet")
+        return Response(_jpeg(picture), media_type="image/jpeg")
+
+    async def add(self, body: WaypointsIn) -> JSONResponse:
+        """Add waypoints to the mission."""
+        try:
+            navigation = body.navigation()
+        except InvalidWaypointError as error:
+            raise HTTPException(422, str(error)) from None
+        ids = ", ".join(waypoint.id for waypoint in body.waypoints)
+        return await self._tell(f"add {ids}", self._mission.fly(navigation, body.index))
+
+    def route(self, name: str, command: Command) -> Callable[[], Any]:
+        """Make the route of one command."""
+
+        async def tell() -> JSONResponse:
+            return await self._tell(name, self._mission.command(command))
+
+        return tell
+
+    async def stream(
+        self,
+        socket: WebSocket,
+        rate: Annotated[float, Query(gt=0, le=20, allow_inf_nan=False)] = 5.0,
+    ) -> None:
+        """Send the status `rate` times a second until the mission is over."""
+        await socket.accept()
+        try:
+            while True:
+                if self._mission.status() is not None:
+                    await socket.send_text(self.status().model_dump_json())
+                if self._over:
+                    break
+                await asyncio.sleep(1.0 / rate)
+            await socket.close()
+        except (WebSocketDisconnect, RuntimeError):
+            return
+
+    @property
+    def _over(self) -> bool:
+        status = self._mission.status()
+        return status is not None and status.state in TERMINAL
+
+    async def _tell(self, what: str, answer: Future[Answer]) -> JSONResponse:
+        """Wait for the mission's answer; everybody who watches learns of it."""
+        try:
+            said = await asyncio.wait_for(asyncio.wrap_future(answer), _PATIENCE)
+        except asyncio.TimeoutError:
+            text = f"the drone did not answer within {_PATIENCE:g} s"
+            self._note(f"{what}: {text}")
+            raise HTTPException(504, text) from None
+        word = "accepted" if said.accepted else "refused"
+        self._note(f"{what}: {word}{': ' if said.text else ''}{said.text}")
+        content = AnswerOut.of(said).model_dump()
+        return JSONResponse(content, 200 if said.accepted else 409)
+
+    def _note(self, text: str) -> None:
+        status = self._mission.status()
+        header = Header(self._count, status.stamp if status else 0, "remote")
+        self._count += 1
+        self._mission.alert(Alert(header, "remote_command", f"a remote user asked to {text}"))
+
+
+def _jpeg(frame: Frame) -> bytes:
+    import cv2  # noqa: PLC0415 - only where somebody looks
+
+    _, encoded = cv2.imencode(".jpg", frame.image, [cv2.IMWRITE_JPEG_QUALITY, 80])
+    return encoded.tobytes()
+
+
+def _malformed(_: Request, error: Exception) -> JSONResponse:
+    """Name what is wrong and where; what was sent is not repeated, for it may hold NaN."""
+    assert isinstance(error, RequestValidationError)  # noqa: S101 - registered for it alone
+    problems = error.errors()
+    status = 400 if any(problem["type"] == "json_invalid" for problem in problems) else 422
+    said = [f"{_place(problem['loc'])}: {problem['msg']}" for problem in problems]
+    return _refusal(status, "; ".join(said))
+
+
+def _place(location: tuple[int | str, ...]) -> str:
+    return ".".join(str(part) for part in location[1:]) or str(location[0])
+
+
+def _failed(_: Request, error: Exception) -> JSONResponse:
+    assert isinstance(error, AnyHTTPException)  # noqa: S101 - registered for it alone
+    return _refusal(error.status_code, str(error.detail))
+
+
+def _refusal(status: int, text: str) -> JSONResponse:
+    return JSONResponse(AnswerOut(accepted=False, text=text).model_dump(), status)

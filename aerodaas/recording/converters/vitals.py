@@ -1,0 +1,49 @@
+"""Vitals of the run's processes, one channel for each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from aerodaas.clock import seconds
+from aerodaas.recording.converters.base import Session, convert
+from aerodaas.recording.encoding import Entry, json_bytes, json_schema
+from aerodaas.status import Message
+from aerodaas.vitals import Vitals
+
+__all__: list[str] = []
+
+VITALS = json_schema(
+    "Vitals",
+    stamp="integer",
+    actor="string",
+    machine="string",
+    cpu_cores="number",
+    cpu_seconds="number",
+    memory_mb="number",
+    machine_cpu="number",
+    machine_memory="number",
+)
+
+
+@convert.register
+def vitals(item: Vitals, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write a reading, with the cores that were busy since the last one."""
+    actor, _, machine = message.header.source.partition("@")
+    key = ("vitals", actor)
+    before: Vitals | None = session.last.get(key)
+    session.last[key] = item
+    took = seconds(item.taken - before.taken) if before else 0.0
+    used = item.cpu_seconds - before.cpu_seconds if before else 0.0
+    value = {
+        "stamp": message.stamp,
+        "actor": actor,
+        "machine": machine,
+        # An actor that was restarted begins to count anew.
+        "cpu_cores": used / took if took > 0 and used >= 0 else None,
+        "cpu_seconds": item.cpu_seconds,
+        "memory_mb": item.memory / 1e6,
+        "machine_cpu": item.machine_cpu,
+        "machine_memory": item.machine_memory,
+    }
+    yield Entry("/" + message.stream, VITALS, json_bytes(value), message.stamp)

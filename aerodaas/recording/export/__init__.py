@@ -1,0 +1,1 @@
+"""A recording as files that other programs open: tables, videos, tracks."""

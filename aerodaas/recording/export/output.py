@@ -1,0 +1,28 @@
+"""Where exports go: never over a file that is there already."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from aerodaas.errors import RecordingError
+
+__all__ = ["file_name", "new_file"]
+
+
+def file_name(topic: str) -> str:
+    """A file's name, without ending, for a topic: `/tello/camera/image` -> `tello-camera-image`."""
+    return re.sub(r"[^A-Za-z0-9_]+", "-", topic).strip("-")
+
+
+def new_file(path: Path) -> Path:
+    """Make `path`'s folder; raises RecordingError if the file exists or the folder cannot be."""
+    if path.exists():
+        raise RecordingError(
+            f"{path} already exists and is not overwritten; give another folder with --out"
+        )
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise RecordingError(f"cannot make the folder {path.parent}: {error.strerror}") from None
+    return path

@@ -1,0 +1,105 @@
+"""A camera's recording as MP4 (H.264), at the times at which the pictures were taken."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.clock import NANOSECONDS, seconds
+from aerodaas.data import Frame
+from aerodaas.errors import RecordingError
+from aerodaas.recording.export.output import file_name, new_file
+from aerodaas.recording.flight import Flight
+from aerodaas.recording.overlay import draw_detections, draw_line
+from aerodaas.recording.pictures import detections_by_frame, frames
+from aerodaas.recording.reader import Recording
+
+__all__ = ["write_videos"]
+
+_TICKS = 90_000
+"""Units of the video's clock in a second, as in MPEG."""
+_QUALITY = {"crf": "23", "preset": "veryfast"}
+
+
+def write_videos(recording: Recording, folder: Path, *, overlays: bool = True) -> list[Path]:
+    """Write an MP4 for each camera into `folder`; returns the files.
+
+    With `overlays`, detections, the mission's time and its state are drawn in. Raises
+    RecordingError without PyAV, for a recording without pictures, and for a file in the way.
+    """
+    try:
+        import av  # noqa: F401, PLC0415 - an extra
+    except ImportError:
+        raise RecordingError('videos need PyAV: pip install "aerodaas[video]"') from None
+    writers: dict[str, _Video] = {}
+    found = detections_by_frame(recording) if overlays else {}
+    flight = Flight.read(recording)
+    try:
+        for frame in frames(recording):
+            source = frame.header.source
+            if source not in writers:
+                path = new_file(folder / f"{file_name(source) or 'camera'}.mp4")
+                writers[source] = _Video(path, frame)
+            image = frame.image
+            if overlays:
+                image = image.copy()
+                draw_detections(image, found.get((source, frame.header.stamp), ()))
+                draw_line(image, _caption(flight, frame))
+            writers[source].add(image, frame.header.stamp)
+    finally:
+        for writer in writers.values():
+            writer.close()
+    if not writers:
+        raise RecordingError(f"{recording.path} holds no pictures; were they switched off?")
+    return [writer.path for writer in writers.values()]
+
+
+def _caption(flight: Flight, frame: Frame) -> str:
+    now = seconds(frame.header.stamp)
+    robot = flight.robots.get(frame.header.source.partition("/")[0])
+    state = robot.state_at(np.array([now]))[0].replace("_", " ") if robot else ""
+    return f"{now:.1f} s  {state}"
+
+
+class _Video:
+    """One MP4 file."""
+
+    def __init__(self, path: Path, first: Frame) -> None:
+        import av  # noqa: PLC0415 - an extra
+
+        self.path = path
+        self._frame = av.VideoFrame
+        self._container = av.open(str(path), "w", options={"movflags": "+faststart"})
+        # H.264 halves the colours' resolution, so that sizes must be even.
+        self._size = first.width // 2 * 2, first.height // 2 * 2
+        stream = self._container.add_stream("libx264", options=_QUALITY)
+        stream.width, stream.height = self._size
+        stream.pix_fmt = "yuv420p"
+        stream.time_base = stream.codec_context.time_base = Fraction(1, _TICKS)
+        self._stream: Any = stream
+        self._start = first.header.stamp
+        self._last = -1
+
+    def add(self, image: NDArray[np.uint8], stamp: int) -> None:
+        """Add a picture; one that is not later than the last is left out."""
+        width, height = self._size
+        ticks = (stamp - self._start) * _TICKS // NANOSECONDS
+        if ticks <= self._last or image.shape[0] < height or image.shape[1] < width:
+            return
+        self._last = ticks
+        frame = self._frame.from_ndarray(np.ascontiguousarray(image[:height, :width]), "bgr24")
+        frame.pts, frame.time_base = ticks, self._stream.time_base
+        self._write(self._stream.encode(frame))
+
+    def close(self) -> None:
+        self._write(self._stream.encode())
+        self._container.close()
+
+    def _write(self, packets: Iterator[Any]) -> None:
+        for packet in packets:
+            self._container.mux(packet)

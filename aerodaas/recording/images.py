@@ -1,0 +1,99 @@
+"""Pictures as others record them, too: Foxglove's and ROS 2's, compressed or raw, to BGR."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any, NamedTuple
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.errors import SourceError
+
+__all__ = ["IMAGE_SCHEMAS", "decode_image"]
+
+_COMPRESSED = frozenset({"foxglove.CompressedImage", "sensor_msgs/msg/CompressedImage"})
+_RAW = frozenset({"foxglove.RawImage", "sensor_msgs/msg/Image"})
+IMAGE_SCHEMAS = _COMPRESSED | _RAW
+"""Schemas whose messages `decode_image` knows."""
+
+
+class _Layout(NamedTuple):
+    """How a raw picture's pixels lie in memory."""
+
+    channels: int
+    kind: str
+    """numpy's type of one channel."""
+    conversion: int | None
+    """OpenCV's, to BGR; None for BGR itself."""
+
+
+_LAYOUTS = {
+    "bgr8": _Layout(3, "u1", None),
+    "8UC3": _Layout(3, "u1", None),
+    "rgb8": _Layout(3, "u1", cv2.COLOR_RGB2BGR),
+    "bgra8": _Layout(4, "u1", cv2.COLOR_BGRA2BGR),
+    "rgba8": _Layout(4, "u1", cv2.COLOR_RGBA2BGR),
+    "mono8": _Layout(1, "u1", cv2.COLOR_GRAY2BGR),
+    "8UC1": _Layout(1, "u1", cv2.COLOR_GRAY2BGR),
+    "mono16": _Layout(1, "u2", cv2.COLOR_GRAY2BGR),
+    "16UC1": _Layout(1, "u2", cv2.COLOR_GRAY2BGR),
+    "yuv422": _Layout(2, "u1", cv2.COLOR_YUV2BGR_UYVY),
+    "uyvy": _Layout(2, "u1", cv2.COLOR_YUV2BGR_UYVY),
+    "yuv422_yuy2": _Layout(2, "u1", cv2.COLOR_YUV2BGR_YUYV),
+    "yuyv": _Layout(2, "u1", cv2.COLOR_YUV2BGR_YUYV),
+    # OpenCV names Bayer patterns by the second row's second and third pixel.
+    "bayer_rggb8": _Layout(1, "u1", cv2.COLOR_BayerBG2BGR),
+    "bayer_bggr8": _Layout(1, "u1", cv2.COLOR_BayerRG2BGR),
+    "bayer_gbrg8": _Layout(1, "u1", cv2.COLOR_BayerGR2BGR),
+    "bayer_grbg8": _Layout(1, "u1", cv2.COLOR_BayerGB2BGR),
+}
+
+
+def decode_image(schema: str, value: Any) -> NDArray[np.uint8] | None:  # noqa: ANN401 - by schema
+    """Decode a message of one of `IMAGE_SCHEMAS` to height x width x 3 of BGR.
+
+    Returns None for a broken picture; raises SourceError for a pixel format that isn't known.
+    """
+    data = np.frombuffer(_data(value), np.uint8)
+    if schema in _COMPRESSED:
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
+        return None if image is None else np.asarray(image, np.uint8)
+    return _decode_raw(value, data)
+
+
+def _decode_raw(value: Any, data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:  # noqa: ANN401
+    encoding = str(_field(value, "encoding"))
+    layout = _LAYOUTS.get(encoding)
+    if layout is None:
+        known = ", ".join(_LAYOUTS)
+        raise SourceError(
+            f"pictures in {encoding!r} cannot be decoded; record them in one of: {known}"
+        )
+    width, height = int(_field(value, "width")), int(_field(value, "height"))
+    pixel = layout.channels * np.dtype(layout.kind).itemsize
+    step = int(_field(value, "step")) or width * pixel
+    if not width or not height or step < width * pixel or data.size < step * height:
+        return None
+    rows = data[: step * height].reshape(height, step)[:, : width * pixel]
+    order = ">" if _field(value, "is_bigendian", default=0) else "<"
+    pixels = np.ascontiguousarray(rows).view(f"{order}{layout.kind}")
+    pixels = pixels.reshape(height, width, layout.channels)
+    if layout.kind == "u2":
+        pixels = (pixels >> 8).astype(np.uint8)
+    if layout.conversion is None:
+        return np.asarray(pixels, np.uint8)
+    return np.asarray(cv2.cvtColor(pixels, layout.conversion), np.uint8)
+
+
+def _data(value: Any) -> bytes:  # noqa: ANN401
+    data = _field(value, "data")
+    # JSON carries bytes as Base64.
+    return base64.b64decode(data) if isinstance(data, str) else bytes(data)
+
+
+def _field(value: Any, name: str, default: Any = None) -> Any:  # noqa: ANN401
+    if isinstance(value, dict):
+        return value.get(name, default)
+    return getattr(value, name, default)

@@ -1,0 +1,88 @@
+"""HTML in small pieces; whatever comes from a recording is escaped."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Sequence
+from functools import cache
+from html import escape
+from pathlib import Path
+
+__all__ = ["document", "paragraph", "picture", "section", "table"]
+
+_STYLE = Path(__file__).with_name("style.css")
+
+
+def document(title: str, head: Iterable[str], sections: Iterable[str], foot: str = "") -> str:
+    """A whole page: `head` stands under the title, `sections` in columns, `foot` at the end."""
+    return "\n".join(
+        [
+            "<!doctype html>",
+            '<html lang="en"><head><meta charset="utf-8">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            # A page without an icon of its own makes browsers ask the server for one.
+            '<link rel="icon" href="data:,">',
+            f"<title>{escape(title)}</title><style>{_style()}</style></head><body>",
+            f"<header><h1>{escape(title)}</h1>",
+            *head,
+            '</header><main class="columns">',
+            *sections,
+            "</main>",
+            f"<footer>{escape(foot)}</footer></body></html>\n",
+        ]
+    )
+
+
+def section(title: str, *content: str, wide: bool = False) -> str:
+    """A part of the page, over both columns if `wide`."""
+    kind = ' class="wide"' if wide else ""
+    return f"<section{kind}><h2>{escape(title)}</h2>{''.join(content)}</section>"
+
+
+def paragraph(text: str, kind: str = "") -> str:
+    """Text, in the style `kind`."""
+    return f'<p class="{kind}">{escape(text)}</p>' if kind else f"<p>{escape(text)}</p>"
+
+
+def picture(data: bytes, alt: str, *, media: str = "image/png", caption: str = "") -> str:
+    """A picture inside the page."""
+    text = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    kind = "" if caption else ' class="plot"'
+    source = f"data:{media};base64,{base64.b64encode(data).decode()}"
+    return f'<figure{kind}><img src="{source}" alt="{escape(alt)}">{text}</figure>'
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """A table; numbers stand at the right."""
+    rows = list(rows)
+    body = [
+        "<tr>" + "".join(_cell(value, first=not place) for place, value in enumerate(row)) + "</tr>"
+        for row in rows
+    ]
+    numeric = [
+        any(isinstance(value, int | float) for value in column)
+        for column in zip(*rows, strict=True)
+    ]
+    titles = "".join(
+        f'<th class="number">{escape(title)}</th>' if right else f"<th>{escape(title)}</th>"
+        for title, right in zip(head, numeric, strict=False)
+    )
+    return (
+        f'<div class="scroll"><table><thead><tr>{titles}</tr></thead>'
+        f"<tbody>{''.join(body)}</tbody></table></div>"
+    )
+
+
+def _cell(value: object, *, first: bool) -> str:
+    if first:
+        return f"<th>{escape(str(value))}</th>"
+    if isinstance(value, float):
+        return f'<td class="number">{value:,.1f}</td>'
+    if isinstance(value, int):
+        return f'<td class="number">{value:,}</td>'
+    return f"<td>{escape(str(value))}</td>"
+
+
+@cache
+def _style() -> str:
+    return _STYLE.read_text(encoding="utf-8")

@@ -1,0 +1,1 @@
+"""A flight's pictures, one module each; no picture is read by colour alone."""

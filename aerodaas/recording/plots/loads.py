@@ -1,0 +1,48 @@
+"""Processor and memory over time."""
+
+from __future__ import annotations
+
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+
+from aerodaas.recording.flight import Flight
+from aerodaas.recording.palette import OKABE_ITO
+from aerodaas.recording.plots.style import CYCLE, grid, legend, new_figure
+
+__all__ = ["loads_figure"]
+
+_MOST_LINES = 10
+
+
+def loads_figure(flight: Flight) -> Figure:
+    """Cores and memory of each actor over mission time; the busiest ten of them."""
+    figure = new_figure(5.0)
+    cores, memory = figure.subplots(2, 1, sharex=True)
+    busiest = sorted(flight.loads, key=lambda name: -sum(flight.loads[name].cpu))[:_MOST_LINES]
+    lines: list[Artist] = []
+    for name, (colour, style) in zip(busiest, CYCLE, strict=False):
+        load = flight.loads[name]
+        (line,) = cores.plot(load.time, load.cpu, style, color=colour, label=name)
+        memory.plot(load.time, load.memory, style, color=colour)
+        lines.append(line)
+    share = cores.twinx()
+    for number, (name, machine) in enumerate(flight.machines.items()):
+        label = f"machine {name}" if len(flight.machines) > 1 else "whole machine"
+        (line,) = share.plot(
+            machine.time,
+            [100 * cpu for cpu in machine.cpu],
+            color=OKABE_ITO["grey"],
+            linestyle=("-", "--", ":")[number % 3],
+            linewidth=1.2,
+            label=f"{label} (right scale)",
+        )
+        lines.append(line)
+    share.set(ylim=(0, 105), ylabel="Whole machine (%)")
+    share.set_zorder(cores.get_zorder() - 1)
+    cores.patch.set_visible(False)
+    cores.set(ylabel="Processor (cores)", ylim=(0, None))
+    memory.set(ylabel="Memory (MB)", xlabel="Mission time (s)", ylim=(0, None))
+    for axes in (cores, memory):
+        grid(axes, "y")
+    legend(figure, lines, columns=2)
+    return figure

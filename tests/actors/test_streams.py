@@ -1,0 +1,329 @@
+"""Streams behave alike in shared memory and by way of another node's ObjectRefs."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import ray
+from stream_reader import Reader, Seen, digest
+
+from aerodaas.actors.streams import (
+    MAX_DEPTH,
+    UNDER_WAY,
+    Inbox,
+    Outlet,
+    RemoteReader,
+    shared_memory_available,
+)
+from aerodaas.data import Frame, Header
+from aerodaas.status import Message
+
+pytestmark = pytest.mark.skipif(
+    not shared_memory_available(), reason="this host has no shared memory for streams"
+)
+
+
+def start_reader() -> Any:  # noqa: ANN401 - a Ray actor handle
+    """Start a reader in a process of its own."""
+    return ray.remote(Reader).options(num_cpus=0).remote()
+
+
+@pytest.fixture(scope="module")
+def reader(runtime: None) -> Iterator[Any]:  # noqa: ARG001
+    """A reader in a process of its own."""
+    handle = start_reader()
+    yield handle
+    ray.kill(handle)
+
+
+def ask(reference: Any) -> Any:  # noqa: ANN401
+    """The answer of the reader."""
+    return ray.get(reference, timeout=30)
+
+
+@dataclass
+class Link:
+    """A stream from this process to the reader's."""
+
+    outlet: Outlet
+    reader: Any
+    stream: str
+
+    def publish(self, stamp: int, item: object) -> Message[Any]:
+        """Publish a measurement."""
+        return self.outlet.measure(item, Header(stamp, stamp, "camera"), 7 * stamp)
+
+    def settle(self) -> None:
+        """Wait until whatever was sent has arrived."""
+        deadline = time.monotonic() + 20
+        while any(remote._under_way for remote in self.outlet.remote):
+            assert time.monotonic() < deadline
+            time.sleep(0.002)
+
+    def take(self, *, keep: bool = False) -> list[Seen]:
+        """What the reader has got since the last call."""
+        self.settle()
+        seen: list[Seen] = ask(self.reader.take.remote(self.stream, keep=keep))
+        return seen
+
+
+Connect = Callable[..., Link]
+
+
+@pytest.fixture(params=["shared memory", "another node"])
+def connect(request: pytest.FixtureRequest, reader: Any) -> Iterator[Connect]:  # noqa: ANN401
+    """Makes links over one transport, with a reader of the given depth.
+
+    Two scopes on one host are two nodes: what is published in one is not seen in the other.
+    """
+    links: list[Link] = []
+
+    def make(depth: int, under_way: int = UNDER_WAY) -> Link:
+        scope, stream = f"test/{uuid.uuid4().hex[:8]}", f"s{uuid.uuid4().hex[:8]}"
+        remote = request.param == "another node"
+        ask(reader.open.remote(f"{scope}/other" if remote else scope, stream, depth))
+        outlet = Outlet(scope, stream)
+        if remote:
+            outlet.remote = [RemoteReader(reader, under_way)]
+        links.append(Link(outlet, reader, stream))
+        return links[-1]
+
+    yield make
+    for link in links:
+        link.settle()
+        link.outlet.close()
+
+
+def test_items_arrive_in_order_with_their_stamps(connect: Connect) -> None:
+    """What a reader of some depth gets is what was published, unchanged and in order."""
+    link = connect(MAX_DEPTH, under_way=MAX_DEPTH)
+    for stamp in range(MAX_DEPTH):
+        link.publish(stamp, f"item {stamp}")
+    seen = link.take()
+    told = [(one.seq, one.stamp, one.captured) for one in seen]
+    assert told == [(i, i, 7 * i) for i in range(MAX_DEPTH)]
+    assert [one.digest for one in seen] == [digest(f"item {i}") for i in range(MAX_DEPTH)]
+    assert ask(link.reader.counts.remote(link.stream)) == (MAX_DEPTH, 0)
+
+
+@pytest.mark.parametrize("depth", [1, 4])
+def test_a_slow_reader_gets_the_newest_and_counts_what_it_missed(
+    connect: Connect, depth: int
+) -> None:
+    """Keep-latest: a burst leaves its end; every gap is counted as drops."""
+    link = connect(depth)
+    link.publish(0, "first")
+    assert [one.seq for one in link.take()] == [0]
+    for stamp in range(1, 31):
+        link.publish(stamp, stamp)
+    seen = [one.seq for one in link.take()]
+    assert seen[-1] == 30
+    assert len(seen) <= depth
+    assert seen == sorted(set(seen))
+    received, dropped = ask(link.reader.counts.remote(link.stream))
+    assert received == 1 + len(seen)
+    assert received + dropped == 31
+
+
+def test_the_last_word_arrives_though_the_link_was_busy(connect: Connect) -> None:
+    """A command that ends a burst is not lost to what came before it."""
+    link = connect(depth=MAX_DEPTH)
+    picture = np.zeros((720, 1280, 3), np.uint8)
+    for stamp in range(8):
+        link.publish(stamp, Frame(Header(stamp, stamp, "camera"), picture))
+    link.publish(8, "land")
+    assert link.take()[-1].digest == digest("land")
+
+
+def test_a_reader_that_never_reads_harms_nobody(connect: Connect) -> None:
+    """A reader that is stuck, however deep its inbox, does not hold up the others."""
+    link = connect(depth=MAX_DEPTH)
+    with_local = Inbox(link.outlet.scope, "quick", {link.stream: 1})
+    for stamp in range(4 * MAX_DEPTH):
+        link.publish(stamp, stamp)
+        assert [message.seq for message in with_local.receive(0)] == [stamp]
+    seen = link.take()
+    assert seen[-1].seq == 4 * MAX_DEPTH - 1
+    with_local.close()
+
+
+def test_pictures_kept_by_a_reader_stay_as_they_were(connect: Connect) -> None:
+    """A reader may keep as many pictures as it likes; later ones neither spoil nor stop them."""
+    link = connect(depth=4)
+    rng = np.random.default_rng(1)
+    published = []
+    for stamp in range(40):
+        image = rng.integers(0, 255, (180, 320, 3), dtype=np.uint8)
+        frame = Frame(Header(stamp, stamp, "camera"), image)
+        link.publish(stamp, frame)
+        published.append(digest(frame))
+        image[:] = 0  # a camera may write its next picture into the same memory
+        assert [one.seq for one in link.take(keep=True)] == [stamp]
+    assert ask(link.reader.kept.remote(link.stream)) == published
+    assert ask(link.reader.close.remote(link.stream)) == published
+
+
+@pytest.mark.parametrize("shape", [(16, 16, 3), (720, 1280, 3), (2160, 3840, 3)])
+def test_frames_of_any_size_pass(connect: Connect, shape: tuple[int, int, int]) -> None:
+    """A stream takes small and large frames, one after the other."""
+    link = connect(depth=2)
+    for stamp, size in enumerate([shape, (8, 8, 3), shape]):
+        image = np.full(size, stamp + 1, np.uint8)
+        frame = Frame(Header(stamp, stamp, "camera"), image)
+        link.publish(stamp, frame)
+        (seen,) = link.take()
+        assert seen.digest == digest(frame)
+
+
+def test_a_reader_that_leaves_harms_nobody(connect: Connect) -> None:
+    """The publisher goes on after a reader has closed its inbox."""
+    link = connect(depth=2)
+    leaving = Inbox(link.outlet.scope, "leaving", {link.stream: 2})
+    link.publish(0, "a")
+    leaving.close()
+    link.publish(1, "b")
+    assert [one.seq for one in link.take()] == [0, 1]
+
+
+def test_many_readers_see_the_same() -> None:
+    """Every reader gets every message."""
+    scope = f"test/{uuid.uuid4().hex[:8]}"
+    outlet = Outlet(scope, "s")
+    readers = [Inbox(scope, f"r{i}", {"s": 8}) for i in range(12)]
+    for stamp in range(5):
+        outlet.measure(stamp, Header(stamp, stamp, "c"), 0)
+    for inbox in readers:
+        assert [message.item for message in inbox.receive(0)] == list(range(5))
+        inbox.close()
+    outlet.close()
+
+
+def test_one_inbox_keeps_the_order_in_which_its_streams_were_named() -> None:
+    """Messages that wait together come stream by stream, whatever their order of arrival."""
+    scope = f"test/{uuid.uuid4().hex[:8]}"
+    outlets = {name: Outlet(scope, name) for name in ("b", "a")}
+    inbox = Inbox(scope, "r", {"a": 4, "b": 4})
+    for stamp in range(3):
+        for name, outlet in outlets.items():
+            outlet.measure(f"{name}{stamp}", Header(stamp, stamp, name), 0)
+    assert [message.item for message in inbox.receive(0)] == ["a0", "a1", "a2", "b0", "b1", "b2"]
+    assert inbox.receive(0) == []
+    inbox.close()
+
+
+def test_a_waiting_reader_wakes_for_a_message_and_for_a_call() -> None:
+    """`receive` sleeps, and returns as soon as there is a reason to."""
+    scope = f"test/{uuid.uuid4().hex[:8]}"
+    outlet, inbox = Outlet(scope, "s"), Inbox(scope, "r", {"s": 1})
+    outlet.measure("x", Header(0, 0, "c"), 0)
+    assert [message.item for message in inbox.receive(60.0)] == ["x"]
+    inbox.wake()
+    assert inbox.receive(60.0) == []
+    inbox.close()
+
+
+_VICTIM = """
+import sys, time
+from aerodaas.actors.streams import Inbox
+inbox = Inbox(sys.argv[1], f"victim{sys.argv[2]}", {"s": 64})
+print("ready", flush=True)
+kept = []
+while True:
+    kept += inbox.receive(1.0)
+    if len(kept) > 3:
+        print("full", flush=True)
+        time.sleep(600)
+"""
+
+
+def test_a_reader_that_is_killed_harms_nobody() -> None:
+    """SIGKILL of readers that hold messages: the publisher and the other readers go on."""
+    scope = f"test/{uuid.uuid4().hex[:8]}"
+    outlet, inbox = Outlet(scope, "s"), Inbox(scope, "survivor", {"s": 4})
+    root = Path(__file__).resolve().parents[2]
+    image = np.zeros((360, 640, 3), np.uint8)
+    stamp = 0
+
+    def publish(times: int) -> None:
+        nonlocal stamp
+        for _ in range(times):
+            outlet.measure(Frame(Header(stamp, stamp, "c"), image), Header(stamp, stamp, "c"), 0)
+            stamp += 1
+            assert [message.seq for message in inbox.receive(0)] == [stamp - 1]
+
+    for round_ in range(3):
+        command = [sys.executable, "-c", _VICTIM, scope, str(round_)]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, cwd=root) as victim:
+            assert victim.stdout is not None
+            assert victim.stdout.readline() == "ready\n"
+            publish(8)
+            assert victim.stdout.readline() == "full\n"
+            victim.send_signal(signal.SIGKILL)
+            victim.wait()
+        publish(100)
+    assert inbox.dropped == {"s": 0}
+    inbox.close()
+    outlet.close()
+
+
+_PUBLISHER = """
+import sys, time
+from aerodaas.actors.streams import Outlet
+from aerodaas.data import Header
+outlet = Outlet(sys.argv[1], "s")
+sys.stdin.readline()
+for stamp in range(5):
+    outlet.measure(stamp, Header(stamp, stamp, "c"), 0)
+print("sent", flush=True)
+time.sleep(600)
+"""
+
+
+def test_a_publisher_that_is_killed_and_returns_is_read_again() -> None:
+    """A restarted actor's stream goes on for those who read the one that died."""
+    scope = f"test/{uuid.uuid4().hex[:8]}"
+    inbox = Inbox(scope, "r", {"s": 8})
+    root = Path(__file__).resolve().parents[2]
+    for _ in range(2):
+        command = [sys.executable, "-c", _PUBLISHER, scope]
+        with subprocess.Popen(
+            command, text=True, cwd=root, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+        ) as publisher:
+            assert publisher.stdin is not None
+            assert publisher.stdout is not None
+            publisher.stdin.write("go\n")
+            publisher.stdin.flush()
+            assert publisher.stdout.readline() == "sent\n"
+            assert [message.item for message in inbox.receive(5.0)] == list(range(5))
+            publisher.kill()
+            publisher.wait()
+    assert inbox.dropped == {"s": 0}
+    inbox.close()
+
+
+def test_a_dead_reader_on_another_node_does_not_stop_the_publisher(runtime: None) -> None:  # noqa: ARG001
+    """The publisher goes on, and the reader that is alive gets everything."""
+    scope = f"test/{uuid.uuid4().hex[:8]}"
+    dead, alive = start_reader(), start_reader()
+    for one in (dead, alive):
+        ask(one.open.remote(f"{scope}/other", "s", 64))
+    outlet = Outlet(scope, "s")
+    outlet.remote = [RemoteReader(dead), RemoteReader(alive)]
+    link = Link(outlet, alive, "s")
+    link.publish(0, 0)
+    assert [one.seq for one in link.take()] == [0]
+    ray.kill(dead)
+    for stamp in range(1, 6):
+        link.publish(stamp, stamp)
+        assert [one.seq for one in link.take()] == [stamp]
+    ray.kill(alive)

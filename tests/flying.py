@@ -1,0 +1,106 @@
+"""Flights of whole applications in the test's own process, without a terminal view."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+from unittest.mock import patch
+
+from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
+from aerodaas.options import RunOptions, current_options
+from aerodaas.recording.flight import Flight
+from aerodaas.recording.reader import Recording
+from aerodaas.run import Run
+
+__all__ = ["FLAT", "Flyer", "hop", "recorded", "robot"]
+
+_FAST = {"cruise_speed": 4.0, "max_speed": 6.0, "max_acceleration": 4.0, "takeoff_height": 1.5}
+
+
+def robot(name: str = "drone", **settings: Any) -> dict[str, Any]:  # noqa: ANN401
+    """A quick simulated drone with its odometry; `settings` go on top."""
+    sensors = [{"id": f"odom_{name}", "type": "odometry", "rate": 10}]
+    return {"id": name, "limits": _FAST, "sensors": sensors, **settings}
+
+
+FLAT: dict[str, Any] = {
+    "name": "flat",
+    "robots": [robot()],
+    "compute": [{"id": "edge", "kind": "edge"}],
+    "simulation": {"world": "empty", "wind": [0.5, 0.2, 0.0], "gust": 0.3},
+}
+"""One drone over flat ground, with wind and gusts, so that the seed matters."""
+
+
+def hop(*places: tuple[float, float], hover: float = 0.0) -> AeroNavigation:
+    """Waypoints at these places (east, north), two metres up."""
+    stops = [Waypoint(f"wp{i}", x, y, 2.0, hover_duration=hover) for i, (x, y) in enumerate(places)]
+    return AeroNavigation(NavigationType.DISTANCE_DRIVEN, stops)
+
+
+class Flyer:
+    """Makes environments in a folder of the test's own and flies them."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def write(self, content: dict[str, Any], name: str = "environment.json") -> Path:
+        """Write an environment file."""
+        path = self.folder / name
+        path.write_text(json.dumps(content))
+        return path
+
+    @contextmanager
+    def options(self, **words: Any) -> Iterator[None]:  # noqa: ANN401
+        """Options of the runs made inside, as `aerodaas run` would set them; without plots."""
+        record = self.folder / "flight"
+        token = current_options.set(RunOptions(**{"view": False, "record": record, **words}))
+        try:
+            with patch("aerodaas.console.show_results"), patch("aerodaas.console.show_speed"):
+                yield
+        finally:
+            current_options.reset(token)
+
+    def fly(
+        self,
+        build: Callable[[Environment], object],
+        content: dict[str, Any] | None = None,
+        **words: Any,  # noqa: ANN401
+    ) -> Run:
+        """Fly what `build` made of a fresh environment to its end; raises what it ended with.
+
+        `build` must call `navigate`; `words` are fields of RunOptions.
+        """
+        with self.flying(build, content, **words) as environment:
+            return environment.launch()
+
+    @contextmanager
+    def flying(
+        self,
+        build: Callable[[Environment], object],
+        content: dict[str, Any] | None = None,
+        **words: Any,  # noqa: ANN401
+    ) -> Iterator[Environment]:
+        """Fly as `fly` does, and let the test act in flight; its end waits for the mission's."""
+        path = self.write(content or FLAT)
+        with self.options(**words):
+            environment = Environment(path)
+            build(environment)
+            run = environment.launch()
+            try:
+                yield environment
+            except BaseException:
+                run.abandon()
+                raise
+            run.wait()
+
+
+def recorded(run: Run) -> Flight:
+    """What the recording of a finished run holds; it must have been closed properly."""
+    assert run.recording is not None
+    with Recording.open(run.recording) as recording:
+        assert recording.complete
+        return Flight.read(recording)

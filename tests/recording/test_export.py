@@ -1,0 +1,138 @@
+"""What leaves a recording for other programs is right by those programs' own reading."""
+
+from __future__ import annotations
+
+import csv
+import json
+import shutil
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import cv2
+import numpy as np
+import pytest
+from synthetic_flight import HOME, PLAN, SyntheticFlight, record
+
+from aerodaas.config import RecordingConfig
+from aerodaas.errors import RecordingError
+from aerodaas.recording.export.tabular import table_of, write_csv, write_parquet
+from aerodaas.recording.export.track import write_gpx, write_kml
+from aerodaas.recording.export.video import write_videos
+from aerodaas.recording.reader import Recording
+
+GPX = "{http://www.topografix.com/GPX/1/1}"
+KML = "{http://www.opengis.net/kml/2.2}"
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A flight with a few frames."""
+    path = tmp_path_factory.mktemp("export") / "flight.mcap"
+    record(path, SyntheticFlight(frames=0.5, rate=10))
+    return path
+
+
+def test_csv_holds_every_message(recorded: Path, tmp_path: Path) -> None:
+    """Nested fields are columns, and numbers are the recorded ones to the last digit."""
+    with Recording.open(recorded) as recording:
+        path = write_csv(recording, "tello/state", tmp_path)
+        states = [record.value for record in recording.records(topics=["/tello/state"])]
+    with path.open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["odometry.position.x"]) for row in rows] == [
+        state["odometry"]["position"]["x"] for state in states
+    ]
+    assert rows[3]["mode"] == "guided"
+    assert float(rows[-1]["recorded_s"]) == pytest.approx(states[-1]["stamp"] / 1e9)
+
+
+def test_binary_channels_have_rows_too(recorded: Path) -> None:
+    """A protobuf message becomes columns, its pictures a length."""
+    with Recording.open(recorded) as recording:
+        rows = table_of(recording, "/tello/camera/image")
+        fixes = table_of(recording, "/tello/state/location")
+    assert rows[0]["format"] == "jpeg"
+    assert rows[0]["data"].endswith("bytes>")
+    assert fixes[0]["latitude"] == pytest.approx(HOME.latitude, abs=1e-3)
+
+
+def test_parquet_reads_back(recorded: Path, tmp_path: Path) -> None:
+    """The same columns and rows, by pyarrow."""
+    parquet = pytest.importorskip("pyarrow.parquet")
+    with Recording.open(recorded) as recording:
+        expected = table_of(recording, "/latency")
+        path = write_parquet(recording, "/latency", tmp_path)
+    table = parquet.read_table(path).to_pylist()
+    assert [row["total_ms"] for row in table] == [row["total_ms"] for row in expected]
+
+
+def test_unknown_channel_names_its_neighbours(recorded: Path, tmp_path: Path) -> None:
+    """A typing error is answered with what is there."""
+    with (
+        Recording.open(recorded) as recording,
+        pytest.raises(RecordingError, match=r"it has: .*/tello/state"),
+    ):
+        write_csv(recording, "telo/state", tmp_path)
+
+
+def test_video_plays_at_the_pictures_times(recorded: Path, tmp_path: Path) -> None:
+    """Every frame is there, as H.264, as long as the flight, with the boxes drawn in."""
+    pytest.importorskip("av")
+    with Recording.open(recorded) as recording:
+        pictures = recording.topics["/tello/camera/image"].count
+        (path,) = write_videos(recording, tmp_path)
+        (plain,) = write_videos(recording, tmp_path / "plain", overlays=False)
+    assert path.name == "tello-camera.mp4"
+    drawn, bare = (cv2.VideoCapture(str(each)).read()[1] for each in (path, plain))
+    difference = np.abs(np.asarray(drawn, float) - np.asarray(bare, float)).mean(axis=2)
+    assert difference[45:135, 98:103].mean() > 10 * difference[20:40, 200:].mean()
+    if shutil.which("ffprobe") is None:
+        pytest.skip("ffprobe is not installed")
+    asked = "stream=codec_name,width,height,nb_frames,duration:format=format_name"
+    command = ["ffprobe", "-v", "error", "-show_entries", asked, "-of", "json", str(path)]
+    told = json.loads(subprocess.check_output(command))
+    stream = told["streams"][0]
+    assert (stream["codec_name"], stream["width"], stream["height"]) == ("h264", 320, 180)
+    assert int(stream["nb_frames"]) == pictures
+    assert float(stream["duration"]) == pytest.approx(106.0, abs=2.5)
+
+
+def test_tracks_lie_where_the_drone_flew(recorded: Path, tmp_path: Path) -> None:
+    """GPX and KML agree with home, waypoints and the height flown."""
+    with Recording.open(recorded) as recording:
+        gpx = ET.parse(write_gpx(recording, tmp_path)).getroot()  # noqa: S314
+        kml = ET.parse(write_kml(recording, tmp_path)).getroot()  # noqa: S314
+    points = gpx.findall(f"{GPX}trk/{GPX}trkseg/{GPX}trkpt")
+    assert len(points) == pytest.approx(212, abs=3)
+    places = [(at.get("lat"), at.get("lon"), at.findtext(f"{GPX}ele")) for at in points]
+    local = np.array([HOME.to_local(*(float(axis or "nan") for axis in at)) for at in places])
+    assert np.ptp(local[:, :2], axis=0) == pytest.approx([10, 10], abs=0.3)
+    assert local[:, 2].max() == pytest.approx(1.5, abs=0.2)
+    assert [at.findtext(f"{GPX}name") for at in gpx.findall(f"{GPX}wpt")] == [w.id for w in PLAN]
+    names = [mark.findtext(f"{KML}name") for mark in kml.iter(f"{KML}Placemark")]
+    assert names == ["tello", *(w.id for w in PLAN)]
+    line = kml.find(f".//{KML}LineString/{KML}coordinates")
+    assert line is not None
+    assert len((line.text or "").split()) == len(points)
+
+
+def test_nothing_is_overwritten(recorded: Path, tmp_path: Path) -> None:
+    """A file in the way stays as it is."""
+    (tmp_path / "tello-state.csv").write_text("mine")
+    with (
+        Recording.open(recorded) as recording,
+        pytest.raises(RecordingError, match="already exists"),
+    ):
+        write_csv(recording, "/tello/state", tmp_path)
+    assert (tmp_path / "tello-state.csv").read_text() == "mine"
+
+
+def test_recording_without_pictures(tmp_path: Path) -> None:
+    """Asking for a video of nothing is answered, and leaves nothing behind."""
+    pytest.importorskip("av")
+    path = tmp_path / "flight.mcap"
+    record(path, SyntheticFlight(frames=1, rate=2), config=RecordingConfig(images="none"))
+    with Recording.open(path) as recording, pytest.raises(RecordingError, match="no pictures"):
+        write_videos(recording, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
