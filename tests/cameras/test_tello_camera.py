@@ -113,11 +113,11 @@ def test_any_loss_order_and_garbage_is_survived(draw: random.Random, share: floa
     spoilt = []
     for packet in _packets(FRAMES[:20]):
         kind = draw.random()
-        if kind < share / 2:
-            continue
-        if kind < share:
-            packet = draw.choice([packet[: len(packet) // 2], packet + packet, draw.randbytes(99)])
-        spoilt.append(packet)
+        if kind >= share:
+            spoilt.append(packet)
+        elif kind >= share / 2:
+            cut, twice, foreign = packet[: len(packet) // 2], packet + packet, draw.randbytes(99)
+            spoilt.append(draw.choice([cut, twice, foreign]))
     shown, _ = _play([*spoilt, *_packets(FRAMES[20:])])
     assert len(shown) >= len(FRAMES) - 20 - 1
 

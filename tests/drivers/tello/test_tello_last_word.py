@@ -42,7 +42,8 @@ def test_a_dead_or_hanging_driver_is_stopped_from_its_own_port(
     ear: socket.socket, blow: signal.Signals
 ) -> None:
     """`rc 0 0 0 0` comes from the socket that the Tello knows, then nothing."""
-    driver = subprocess.Popen([sys.executable, "-c", _FLYING, str(ear.getsockname()[1])])
+    command = [sys.executable, "-c", _FLYING, str(ear.getsockname()[1])]
+    driver = subprocess.Popen(command)
     try:
         for _ in range(5):
             said, known = ear.recvfrom(100)

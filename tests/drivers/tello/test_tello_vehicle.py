@@ -170,7 +170,7 @@ def test_a_refused_take_off_is_told_with_its_reason() -> None:
     with flight(TelloOptions(battery=0.08), battery_minimum=0.0) as pair:
         pair.vehicle.take_off(1.0)
         pair.until(VehicleMode.GROUNDED)
-        with pytest.raises(VehicleError, match="Motor stop.*battery is low"):
+        with pytest.raises(VehicleError, match=r"Motor stop.*battery is low"):
             pair.vehicle.take_off(1.0)
     with flight(TelloOptions(battery=0.15)) as pair:
         assert pair.vehicle.preflight() == ["the battery holds 15%, take-off needs 20%"]
@@ -258,7 +258,7 @@ def test_nobody_there_is_said_in_time() -> None:
     robot = robot_of(free_port())
     vehicle = TelloVehicle(robot, EnvironmentConfig(robots=[robot]))
     began = time.monotonic()
-    with pytest.raises(VehicleError, match="no answer from 127.0.0.1.*Wi-Fi"):
+    with pytest.raises(VehicleError, match=r"no answer from 127.0.0.1.*Wi-Fi"):
         vehicle.connect(timeout=1.0)
     assert time.monotonic() - began < 5.0
 
@@ -266,7 +266,7 @@ def test_nobody_there_is_said_in_time() -> None:
 def test_no_state_packets_is_told_apart_from_no_answer() -> None:
     """The usual firewall: replies come, state packets do not."""
     options = TelloOptions(states=Impairment(loss=1.0))
-    with pytest.raises(VehicleError, match="answers but no state packet.*firewall"):
+    with pytest.raises(VehicleError, match=r"answers but no state packet.*firewall"):
         _connect(options)
 
 
@@ -279,7 +279,7 @@ def test_garbage_instead_of_state_is_told() -> None:
 
 def test_ports_need_sdk_3() -> None:
     """An older Tello cannot send elsewhere, and says so."""
-    with pytest.raises(VehicleError, match="needs SDK 3.0, and it has version 20"):
+    with pytest.raises(VehicleError, match=r"needs SDK 3.0, and it has version 20"):
         _connect(TelloOptions(sdk=20))
 
 
@@ -303,7 +303,7 @@ def test_a_port_that_is_taken_is_named() -> None:
     with pytest.raises(VehicleError, match="no network interface is called 'nonesuch0'"):
         TelloVehicle(robot, EnvironmentConfig(robots=[robot])).connect()
     robot = robot_of(9, local_address="203.0.113.7")
-    with pytest.raises(VehicleError, match="203.0.113.7 is no address of this host"):
+    with pytest.raises(VehicleError, match=r"203.0.113.7 is no address of this host"):
         TelloVehicle(robot, EnvironmentConfig(robots=[robot])).connect()
 
 
