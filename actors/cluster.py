@@ -66,6 +66,7 @@ def connect(address: str | None) -> None:
         _require_edge(address)
         return
     ray.init(
+        address="local",  # else Ray would join whatever cluster runs on this machine
         num_cpus=os.cpu_count(),
         include_dashboard=False,
         object_store_memory=_STORE_BYTES,

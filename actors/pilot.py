@@ -14,12 +14,12 @@ from aerodaas.actors._names import reply_stream, request_stream, state_stream, s
 from aerodaas.actors.planner import PlannerExecutor
 from aerodaas.actors.session import Session, next_due
 from aerodaas.actors.streams import Outlet
-from aerodaas.clock import NANOSECONDS, host_time_ns
+from aerodaas.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.config import RobotConfig, SensorConfig
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.geometry import GeodeticOrigin
-from aerodaas.navigation.commands import Answer, Command, Reply, Request, StreamItem
+from aerodaas.navigation.commands import Answer, Command, Reply, Request, Start, StreamItem
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
 from aerodaas.navigation.planner import BackgroundPlanner, InlinePlanner
@@ -27,7 +27,7 @@ from aerodaas.navigation.safety import Neighbour
 from aerodaas.plugins import load_plugin
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.status import Message, MissionStatus, SetpointRecord
-from aerodaas.vehicle import SteppedVehicle, Vehicle, VehicleState
+from aerodaas.vehicle import ClockedVehicle, SteppedVehicle, Vehicle, VehicleState
 
 __all__ = ["Pilot", "RobotSpec", "sensor_item"]
 
@@ -123,6 +123,12 @@ class Pilot:
             f"{spec.robot.id}/setpoints",
             *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
         ]
+
+    def start(self, clock: Clock) -> None:
+        """Start the mission, whose time is that of `clock`."""
+        if isinstance(self.vehicle, ClockedVehicle):
+            self.vehicle.use_clock(clock)
+        self.handle(Start(), clock.now())
 
     def advance_to(self, stamp: int) -> None:
         """Move a simulated vehicle's time on."""

@@ -50,7 +50,7 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
         known: dict[str, Any] = {
             "id": self._config.id,
             "type": self._config.type,
-            "driver": self._config.driver,
+            "driver": self._config.driver or "",
             "rate": self._config.rate,
             "robot": self._robot or "",
             **self._config.settings,

@@ -16,6 +16,7 @@ from aerodaas.config import EnvironmentConfig
 from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, MissionError
 from aerodaas.navigation.commands import Answer, Command, End
 from aerodaas.options import RunOptions, current_options
+from aerodaas.signals import Terminated, raise_on_termination
 from aerodaas.status import MissionState
 
 if TYPE_CHECKING:
@@ -70,6 +71,7 @@ class Run:
         with Starting(self.options) as starting:
             starting.step("starting Ray")
             cluster.connect(self.options.address)
+            raise_on_termination()
             plan = self._plan()
             provenance = Provenance.collect(
                 app=self.options.application, config=self.config, speed=self._speed_text()
@@ -130,6 +132,9 @@ class Run:
             self._watch(float("inf"))
         except KeyboardInterrupt:
             self._land("interrupted from the keyboard")
+            raise
+        except SystemExit as error:
+            self._land(error.reason if isinstance(error, Terminated) else "the application exits")
             raise
         except AeroDaaSError:
             self._land("the run failed")

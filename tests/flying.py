@@ -75,8 +75,7 @@ class Flyer:
         `build` must call `navigate`; `words` are fields of RunOptions.
         """
         with self.flying(build, content, **words) as environment:
-            run = environment.launch()
-        return run
+            return environment.launch()
 
     @contextmanager
     def flying(
