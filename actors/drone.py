@@ -103,6 +103,10 @@ class DroneActor(StreamActor):
         with self._obeying:
             return self._pilots[robot].handle(command, self.clock.now())
 
+    def note(self, kind: str, text: str) -> None:
+        """Have recorded what the application has found out."""
+        self.alert(kind, text)
+
     def robots(self, newest: int = 200) -> dict[str, RobotReport]:
         """How each robot fares; also the sign that the application's process is alive."""
         self._heard = time.monotonic()
