@@ -5,8 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from aerodaas.lab_cli import app
 from typer.testing import CliRunner
+
+from aerodaas.commands.lab import app
 
 _MINE = """
 from aerodaas.schedulers.analytics import AnalyticsScheduler, Drop
