@@ -71,7 +71,7 @@ print(told[0])
 def start(program: str, path: Path) -> subprocess.Popen[str]:
     """Run a recorder in a process of its own."""
     environment = os.environ | {"PYTHONPATH": f"{ROOT}{os.pathsep}{HERE}"}
-    return subprocess.Popen(  # noqa: S603 - our own program
+    return subprocess.Popen(
         [sys.executable, "-c", PROGRAM + program, str(path)],
         stdout=subprocess.PIPE,
         text=True,
