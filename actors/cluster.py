@@ -65,8 +65,9 @@ def connect(address: str | None) -> None:
             ) from None
         _require_edge(address)
         return
+    # "local": else Ray joins whatever cluster someone has started on this machine.
     ray.init(
-        address="local",  # else Ray would join whatever cluster runs on this machine
+        address="local",
         num_cpus=os.cpu_count(),
         include_dashboard=False,
         object_store_memory=_STORE_BYTES,

@@ -64,6 +64,12 @@ def run(
         typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
     ] = None,
     view: Annotated[bool, typer.Option(help="Show the live view.")] = True,  # noqa: FBT002
+    live: Annotated[  # noqa: FBT002
+        bool, typer.Option("--live", help="Serve the flight to Foxglove while it goes on.")
+    ] = False,
+    live_address: Annotated[
+        str, typer.Option(help="Where --live listens; on 0.0.0.0 anyone on the network may watch.")
+    ] = "127.0.0.1:8765",
 ) -> None:
     """Fly an application.
 
@@ -84,8 +90,11 @@ def run(
         address=address,
         overrides=dict(parse_setting(text) for text in setting or ()),
         view=view,
+        live=live_address if live else None,
         application=application.resolve(),
     )
+    if live:
+        typer.echo(f"live: open ws://{live_address} in Foxglove")
     run_application(application, context.args, options)
 
 

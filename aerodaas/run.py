@@ -70,6 +70,8 @@ class Run:
         from aerodaas.console import Starting  # noqa: PLC0415
         from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
 
+        if self.options.live and self.recording is None:
+            raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
         with Starting(self.options) as starting:
             starting.step("starting Ray")
             cluster.connect(self.options.address)
@@ -78,7 +80,7 @@ class Run:
             provenance = Provenance.collect(
                 app=self.options.application, config=self.config, speed=self._speed_text()
             )
-            flight = Flight(plan, self.recording, provenance)
+            flight = Flight(plan, self.recording, provenance, self.options.live)
             try:
                 flight.launch(starting.step)
             except BaseException:
