@@ -27,7 +27,13 @@ from aerodaas.navigation.safety import Neighbour
 from aerodaas.plugins import load_plugin
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.status import Message, MissionStatus, SetpointRecord
-from aerodaas.vehicle import ClockedVehicle, SteppedVehicle, Vehicle, VehicleState
+from aerodaas.vehicle import (
+    ClockedVehicle,
+    PlayedVehicle,
+    SteppedVehicle,
+    Vehicle,
+    VehicleState,
+)
 
 __all__ = ["Pilot", "RobotSpec", "sensor_item"]
 
@@ -78,6 +84,7 @@ class Pilot:
         """Milliseconds from capture to the arrival of the command made from it."""
         self._session = session
         self._told = 0
+        self._turned = -1
         self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
         self._due = {sensor.id: next_due(sensor.rate, -1) for sensor in spec.sensors}
         plugin = load_plugin("drivers", spec.robot.driver)
@@ -155,6 +162,7 @@ class Pilot:
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
         """One turn of the setpoint loop; publishes what was decided."""
         record = self.loop.turn(now, neighbours)
+        self._turned = now
         self._publish(f"{self.id}/setpoints", record, now)
         self._publish(status_stream(self.id), self.mission.status, now)
         return record
@@ -162,9 +170,11 @@ class Pilot:
     def observe(self, now: int) -> list[tuple[str, int]]:
         """Publish the vehicle's state and the readings of the sensors that are due by now.
 
-        Returns (stream, stamp) of each.
+        Returns (stream, stamp) of each. At the time of a turn the state is the one that the turn
+        went by, so that a replay finds the mission's own input.
         """
-        state = self.vehicle.read()
+        seen = self.loop.state if self._turned == now else None
+        state = seen or self.vehicle.read()
         published = [self._publish(state_stream(self.id), state, now)]
         for sensor in self.spec.sensors:
             if self._due[sensor.id] <= now:
@@ -180,8 +190,9 @@ class Pilot:
 
     @property
     def over(self) -> bool:
-        """True once the mission has ended, on the ground or out of our hands."""
-        return self.mission.finished
+        """True once the mission has ended, on the ground or out of our hands, or was replayed."""
+        played = isinstance(self.vehicle, PlayedVehicle) and self.vehicle.finished
+        return self.mission.finished or played
 
     def new_alerts(self) -> list[Alert]:
         """What the mission has had to say since the last call."""
