@@ -207,7 +207,7 @@ def test_application_killed_in_a_cluster(flyer: Flyer, cluster: Cluster) -> None
     """The drone comes home by itself, the recording is closed, and no actor is left over."""
     port = free_port()
     before = actors_of_ray()
-    application = start_application(flyer, port, "--address", cluster.address)
+    application = start_application(flyer, port, "--address", str(cluster.address))
 
     def kill_and_watch(user: RemoteUser) -> None:
         user.until(lambda status: status["distance"] > 20.0)
