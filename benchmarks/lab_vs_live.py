@@ -110,7 +110,7 @@ def _overheads(recording: Path, profiles: list[Profile]) -> dict[str, list[float
     began: dict[str, tuple[str, float]] = {}
     beyond: dict[str, list[float]] = {"edge": [], "cloud": []}
     with Recording.open(recording) as opened:
-        for record in opened.records(schemas=["aerodaas.decision"]):
+        for record in opened.records(schemas=["aerodaas.Decision"]):
             value = record.value
             if value["action"] in beyond:
                 began[value["task"]] = (value["action"], value["stamp"] / 1e6)
