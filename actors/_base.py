@@ -20,7 +20,7 @@ import ray
 
 from aerodaas.actors.session import Session
 from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteReader
-from aerodaas.clock import host_time_ns
+from aerodaas.clock import LockstepClock, host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError
 from aerodaas.vitals import Vitals, read_vitals
@@ -90,6 +90,17 @@ def failure_line(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}{place}"
 
 
+class _AlertHandler(logging.Handler):
+    """What the project's own modules warn of is told to the people who watch."""
+
+    def __init__(self, actor: StreamActor) -> None:
+        super().__init__(logging.WARNING)
+        self._actor = actor
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._actor.alert("warning", record.getMessage())
+
+
 class StreamActor:
     """Base of the actors; subclasses implement `_open`, `_run` and `_close`."""
 
@@ -105,12 +116,14 @@ class StreamActor:
         self._thread: threading.Thread | None = None
         self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
         self._alerting = threading.Lock()
+        self._telling = threading.Lock()
         self.inbox: Inbox | None = None
         self.outlets: dict[str, Outlet] = {}
 
     def prepare(self) -> ActorInfo:
         """Open everything; raises the project's errors for what cannot be opened."""
         logging.captureWarnings(capture=True)
+        logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
         self.inbox = Inbox(self.scope, self.name, self._reads)
         self.alerts = self.outlet(f"alerts/{self.name}")
         self._open()
