@@ -116,7 +116,6 @@ class StreamActor:
         self._thread: threading.Thread | None = None
         self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
         self._alerting = threading.Lock()
-        self._telling = threading.Lock()
         self.inbox: Inbox | None = None
         self.outlets: dict[str, Outlet] = {}
 
@@ -204,6 +203,12 @@ class StreamActor:
             alert = Alert(header, kind, text, values)
             self._newest_alerts.append(alert)
             self.alerts.measure(alert, header, host_time_ns())
+
+    def follow(self, stamp: int) -> None:
+        """In lockstep mission time is what the newest message says, but for who conducts it."""
+        with self._alerting:
+            if isinstance(self.clock, LockstepClock) and stamp > self.clock.now():
+                self.clock.advance_to(stamp)
 
     def reads(self) -> list[str]:
         """Streams that this actor reads."""

@@ -115,16 +115,17 @@ class _Planner:
             for sensor in robot.sensors:
                 stream = f"{robot.id}/{sensor.id}"
                 wanted = self.recorded or sensor.type != "camera"
-                if wanted and stream not in self.graph.nodes:
-                    item = SENSOR_ITEMS[sensor.type]
-                    self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
+                if sensor.driver == "replayed" or not wanted or stream in self.graph.nodes:
+                    continue
+                item = SENSOR_ITEMS[sensor.type]
+                self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
 
     def require_plugins(self) -> None:
         for robot in self.robots:
             require_plugin("drivers", robot.driver)
         for sensor in (node.work for node in self.sensors()):
             if sensor.type == "camera":
-                require_plugin("cameras", sensor.driver)
+                require_plugin("cameras", self.session.environment.camera_driver(sensor))
 
     def sensors(self) -> list[Node]:
         return [node for node in self.graph.nodes.values() if node.kind == "sensor"]

@@ -261,7 +261,9 @@ def test_an_application_of_its_own_mistakes(aerodaas: Commands, app: str, messag
 
 def test_nothing_navigates(aerodaas: Commands) -> None:
     """The call that is missing is named."""
-    app = 'from aerodaas import *\nenv = Environment()\nenv.get_robot_by_id("drone").start_mission()'
+    app = (
+        'from aerodaas import *\nenv = Environment()\nenv.get_robot_by_id("drone").start_mission()'
+    )
     ended = aerodaas.run(app)
     assert "call drone.navigate(…) before start_mission()" in ended.said
     assert ended.code == 2
@@ -270,8 +272,7 @@ def test_nothing_navigates(aerodaas: Commands) -> None:
 @pytest.mark.parametrize("address", ["127.0.0.1:9", "ray://127.0.0.1:9", "no.such.host:6379"])
 def test_a_cluster_that_is_not_there(aerodaas: Commands, address: str) -> None:
     """The address is named, in seconds and with no word of Ray's."""
-    app = 'from aerodaas.actors import cluster\ncluster.ray.shutdown()\n' if False else HOP + FLY
-    ended = aerodaas.run(app, "--address", address)
+    ended = aerodaas.run(HOP + FLY, "--address", address)
     assert f"cannot join the Ray cluster at {address}" in ended.said
     assert "check the address" in ended.said
     assert ended.code == 1

@@ -16,7 +16,7 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import AeroDaaSError
 from aerodaas.schedulers.analytics.base import MILLISECOND, Resources
 from aerodaas.schedulers.analytics.profiles import PUBLISHED
-from aerodaas.schedulers.analytics.registry import REGISTERED, load_scheduler
+from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 from aerodaas.schedulers.lab import (
     ExecutionTimes,
     LabResult,
@@ -138,7 +138,7 @@ def run(
 def list_all() -> None:
     """Show the registered schedulers, the published models and the workloads' names."""
     table = Table("name", "scheduler", title="Schedulers")
-    for name in REGISTERED:
+    for name in scheduler_names():
         text = (type(load_scheduler(name)).__doc__ or "").strip().splitlines()[0]
         table.add_row(name, text)
     _console.print(table)

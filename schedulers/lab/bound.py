@@ -56,7 +56,7 @@ class _Block:
 
 
 def clairvoyant_bound(
-    path: SamplePath, *, grid: int = MILLISECOND, iterations: int = 60, decay: float = 0.94
+    path: SamplePath, *, grid: int = MILLISECOND, iterations: int = 40, decay: float = 0.9
 ) -> float:
     """Upper bound on the QoS utility of any scheduler on this path.
 
@@ -69,7 +69,7 @@ def clairvoyant_bound(
     blocks = _blocks(jobs)
     horizon = blocks[0].end + int(jobs.length.max()) + 1
     prices: _Floats = np.zeros(len(jobs.first))
-    best = np.inf
+    best = float(jobs.worth.sum())
     step = float(jobs.worth.mean()) / 2
     for _ in range(iterations):
         value, taken = _longest_path(jobs, blocks, jobs.worth - prices, horizon)

@@ -33,6 +33,7 @@ _FULL = 100
 """Percent: the range of each stick of `rc` is -100 to 100."""
 
 _OK = re.compile(r"ok|\d+", re.IGNORECASE)
+_WORDS = re.compile(r"[A-Za-z][\w ?!.,:;/'~-]+")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +48,11 @@ class Command:
 
     def accepts(self, reply: str) -> bool:
         """Tell whether `reply` can be an answer to this: numbers answer questions only."""
-        return reply.isdecimal() == self.text.endswith("?") or reply.startswith("unknown command")
+        if reply.startswith("unknown command"):
+            return True
+        if self.text.endswith("?"):
+            return reply.isdecimal()
+        return _WORDS.fullmatch(reply) is not None
 
     @staticmethod
     def succeeded(reply: str) -> bool:

@@ -22,6 +22,8 @@ _MEANINGS = {
     "unknown command": "its firmware does not know it: update it in the Tello app",
 }
 
+_REFUSALS = 2
+
 
 def meaning(reply: str) -> str:
     """What a refusal means, where its words are known from other people's Tellos."""
@@ -63,18 +65,23 @@ def greet(
 
 
 def _ask(link: TelloLink, command: Command, deadline: float) -> str | None:
-    """The reply to `command`; None if none comes in time."""
+    """The reply to `command`; None if none comes in time.
+
+    Only `command` itself is asked for until time is up; a refusal is asked about again, as the
+    question or the answer may have been garbled.
+    """
     answers: queue.SimpleQueue[str | None] = queue.SimpleQueue()
-    while (left := deadline - time.monotonic()) > 0.0:
+    reply, refusals = None, 0
+    while (left := deadline - time.monotonic()) > 0.0 and refusals < _REFUSALS:
         link.request(command, answers.put)
         try:
             reply = answers.get(timeout=left)
         except queue.Empty:
             return None
-        # Entering SDK mode is asked for until the time is up; the rest has tries of its own.
-        if reply is not None or command is not ENTER:
-            return reply
-    return None
+        if reply is not None and Command.succeeded(reply):
+            break
+        refusals += reply is not None or command is not ENTER
+    return reply
 
 
 def _explain_silence(link: TelloLink, name: str, settings: TelloSettings) -> str:

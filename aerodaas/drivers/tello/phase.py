@@ -15,6 +15,11 @@ LIFTED = 0.3
 """Metres from which it counts as flying."""
 _LOW = 0.3
 """Metres above the ground or the place of take-off below which still motors mean standing."""
+_HOVERS = 10
+"""Packets in a row without climb or descent, a second, after which a take-off has been done, though
+its reply was lost."""
+_CALM = 0.1
+"""m/s."""
 _NO_LIFT = 12.0
 """Seconds after a take-off's request within which it must have lifted."""
 
@@ -30,6 +35,7 @@ class FlightPhase:
         self.refusal = ""
         """Why the latest take-off came to nothing."""
         self._since = -math.inf
+        self._calm = 0
         self._motor_time: float | None = None
         self._ticked_at = -math.inf
 
@@ -47,6 +53,7 @@ class FlightPhase:
         """Change to `mode` by request, at `now` seconds."""
         self.mode, self._since = mode, now
         self.risen = False
+        self._calm = 0
         if mode is VehicleMode.TAKING_OFF:
             self.refusal = ""
 
@@ -69,6 +76,9 @@ class FlightPhase:
         if turning and state.height >= LIFTED:
             if self.mode is VehicleMode.GROUNDED:
                 self.mode = VehicleMode.HOLDING
+            self._calm = self._calm + 1 if abs(state.velocity[2]) <= _CALM else 0
+            if self._calm >= _HOVERS:
+                self.rose()
             return
         standing = not turning and min(state.height, state.ground_distance) < _LOW
         if not standing or now - self._since < _MOTORS_STOPPED:

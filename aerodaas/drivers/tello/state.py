@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 __all__ = ["TelloState", "parse_state"]
 
-_NUMBER = re.compile(r"[+-]?\d{1,9}(\.\d{1,9})?")
+_NUMBER = re.compile(r" *([+-]?\d{1,9}(?:\.\d{1,9})?) *", re.ASCII)
 
 _RANGES = {
     "pitch": (-180.0, 180.0),
@@ -96,10 +96,11 @@ def _fields(text: str) -> dict[str, float] | None:
     """
     found: dict[str, float] = {}
     for part in text.split(";")[:-1]:
-        name, _, value = part.strip().partition(":")
+        name, _, value = part.strip(" ").partition(":")
         if name not in _RANGES:
             continue
-        if name in found or not _NUMBER.fullmatch(value.strip()):
+        number = _NUMBER.fullmatch(value)
+        if name in found or number is None:
             return None
-        found[name] = float(value)
+        found[name] = float(number[1])
     return found

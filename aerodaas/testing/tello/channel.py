@@ -21,7 +21,8 @@ class Channel:
         deliver: Callable[[bytes, tuple[str, int]], None],
     ) -> None:
         """Spoil packets by `impairment`, drawn from `seed`."""
-        self._impairment = impairment
+        self.impairment = impairment
+        """May be changed in between."""
         self._random = random.Random(seed)
         self._deliver = deliver
         self._waiting: list[tuple[float, int, bytes, tuple[str, int]]] = []
@@ -30,7 +31,7 @@ class Channel:
 
     def send(self, content: bytes, peer: tuple[str, int], now: float) -> None:
         """Take a packet at `now` seconds; what has no delay is delivered at once."""
-        bad, draw = self._impairment, self._random.random
+        bad, draw = self.impairment, self._random.random
         if draw() < bad.loss:
             self.lost += 1
             return
@@ -53,7 +54,7 @@ class Channel:
             self._deliver(content, peer)
 
     def _garble(self, content: bytes) -> bytes:
-        cut = bytearray(content[: self._random.randint(0, len(content))])
+        cut = bytearray(content[: self._random.randint(0, len(content) // 2)])
         for _ in range(min(len(cut), self._random.randint(0, 3))):
             cut[self._random.randrange(len(cut))] = self._random.randrange(256)
         return bytes(cut)

@@ -17,7 +17,7 @@ from aerodaas.errors import VehicleError
 from aerodaas.simulation.dynamics import STEP
 from aerodaas.testing.tello.channel import Channel
 from aerodaas.testing.tello.flight import TelloFlight
-from aerodaas.testing.tello.options import TelloOptions
+from aerodaas.testing.tello.options import Impairment, TelloOptions
 from aerodaas.testing.tello.sdk import Outcome, TelloSdk
 from aerodaas.testing.tello.video import VideoStream
 from aerodaas.vehicle import VehicleMode
@@ -78,6 +78,22 @@ class EmulatedTello:
         """What it is doing."""
         with self._lock:
             return self._flight.mode
+
+    def spoil(
+        self,
+        *,
+        commands: Impairment | None = None,
+        replies: Impairment | None = None,
+        states: Impairment | None = None,
+    ) -> None:
+        """Change how bad the air is from now on, for each that is given."""
+        for channel, impairment in (
+            (self._ears, commands),
+            (self._replies, replies),
+            (self._states, states),
+        ):
+            if impairment is not None:
+                channel.impairment = impairment
 
     def start(self) -> None:
         """Switch it on."""
@@ -145,7 +161,7 @@ class EmulatedTello:
         if outcome.moves:
             self._awaiting = client
         if outcome.reply is not None:
-            self._replies.send(outcome.reply.encode("ascii"), client, now)
+            self._replies.send(outcome.reply.encode("ascii", errors="replace"), client, now)
         if streaming != before:
             self._switch_video(on=streaming)
 
