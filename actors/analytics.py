@@ -249,6 +249,7 @@ class _Worker:
             # A state is published before what was measured in it, but may arrive in between.
             messages += self.inbox.receive(0.0)
         for message in messages:
+            self._actor.follow(message.stamp)
             if self._link is not None:
                 self._link.note(message)
             if message.stream == self.node.state and message.item is not None:

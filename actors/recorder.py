@@ -44,7 +44,6 @@ class RecorderActor(StreamActor):
         self._provenance = provenance
         self._failure = ""
         self._lost: Counter[str] = Counter()
-        self._newest = 0
         self._readings = 0
 
     def _open(self) -> None:
@@ -64,7 +63,7 @@ class RecorderActor(StreamActor):
 
     def vitals(self, readings: dict[str, Vitals]) -> None:
         """Record what the run's processes take, by `actor@machine`."""
-        stamp = self._newest if self.session.lockstep else self.clock.now()
+        stamp = self.clock.now()
         self._readings += 1
         for source, reading in readings.items():
             stream = f"vitals/{source.partition('@')[0]}"
@@ -77,7 +76,7 @@ class RecorderActor(StreamActor):
         while True:
             messages = self.inbox.receive(0.2)
             for message in messages:
-                self._newest = max(self._newest, message.stamp)
+                self.follow(message.stamp)
                 self._write(message)
             self._note_drops()
             if self._acks is not None and messages:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from aerodaas.clock import seconds
 from aerodaas.config import EnvironmentConfig
-from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, MissionError
+from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, MissionError, RecordingError
 from aerodaas.navigation.commands import Answer, Command, End
 from aerodaas.options import RunOptions, current_options
 from aerodaas.signals import Terminated, raise_on_termination
@@ -71,13 +71,19 @@ class Run:
         from aerodaas.console import Starting  # noqa: PLC0415
         from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
 
+        # Before Ray, which takes seconds: what is wrong with the graph should be told at once.
+        plan = self._plan()
+        if self.recording is not None and self.recording.exists():
+            raise RecordingError(
+                f"{self.recording} already exists and is not overwritten; "
+                "give --record another path or move the file away"
+            )
         if self.options.live and self.recording is None:
             raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
         with Starting(self.options) as starting:
             starting.step("starting Ray")
             cluster.connect(self.options.address)
             raise_on_termination()
-            plan = self._plan()
             provenance = Provenance.collect(
                 app=self.options.application, config=self.config, speed=self._speed_text()
             )
