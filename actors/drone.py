@@ -103,6 +103,10 @@ class DroneActor(StreamActor):
         with self._obeying:
             return self._pilots[robot].handle(command, self.clock.now())
 
+    def note(self, kind: str, text: str) -> None:
+        """Have recorded what the application has found out."""
+        self.alert(kind, text)
+
     def robots(self, newest: int = 200) -> dict[str, RobotReport]:
         """How each robot fares; also the sign that the application's process is alive."""
         self._heard = time.monotonic()
@@ -145,7 +149,8 @@ class DroneActor(StreamActor):
     def _run_lockstep(self) -> None:
         assert isinstance(self.clock, LockstepClock)  # noqa: S101 - the session says so
         self._barrier = Barrier(self._conduct.windows)
-        due = {source: next_due(rate, -1) for source, rate in self._conduct.rates.items()}
+        rates = self._conduct.rates
+        due = {source: self.session.next_due(source, rates[source], -1) for source in rates}
         control = 0
         while not self._over():
             readings = [pilot.next_reading for pilot in self._pilots.values()]
@@ -166,7 +171,7 @@ class DroneActor(StreamActor):
         for source, stamp in due.items():
             if stamp == now:
                 self._barrier.expect(source, now, counts.get(source, 0))
-                due[source] = next_due(self._conduct.rates[source], now)
+                due[source] = self.session.next_due(source, self._conduct.rates[source], now)
         for pilot in self._pilots.values():
             for stream, stamp in pilot.observe(now):
                 self._barrier.expect(stream, stamp, counts.get(stream, 0))

@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import ray
-from ray.exceptions import RayActorError, RayError, RayTaskError
+from ray.exceptions import RayActorError, RayTaskError
 from typing_extensions import Self
 
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
+from aerodaas.actors._ending import end_actors
 from aerodaas.actors.analytics import AnalyticsActor
-from aerodaas.actors.cluster import Place, options_for
+from aerodaas.actors.caretaker import Caretaker
+from aerodaas.actors.cluster import Place, options_for, outlives_application
 from aerodaas.actors.dispatcher import DispatcherActor
 from aerodaas.actors.drone import DroneActor, RobotReport
 from aerodaas.actors.executor import CloudExecutor
@@ -32,7 +34,6 @@ __all__ = ["Flight", "FlightState"]
 
 _PREPARE_TIMEOUT = 90.0
 _ANSWER_TIMEOUT = 5.0
-_STOP_TIMEOUT = 20.0
 _REPORT_INTERVAL = 0.5
 _ANALYTICS_RESTARTS = 3
 
@@ -72,14 +73,24 @@ class Flight:
     """The actors of one run. Use as a context manager: leaving it stops them all."""
 
     def __init__(
-        self, plan: FlightPlan, recording: Path | None = None, provenance: Provenance | None = None
+        self,
+        plan: FlightPlan,
+        recording: Path | None = None,
+        provenance: Provenance | None = None,
+        live: str | None = None,
     ) -> None:
-        """Create the actors of `plan`, all at once; `recording` is where the MCAP file goes."""
+        """Create the actors of `plan`, all at once; `recording` is where the MCAP file goes.
+
+        With `live`, `host:port`, what is recorded is served there, too.
+        """
         self.plan = plan
         self.recording = recording if plan.recorded else None
         self._drones: dict[str, str] = {}
         self._members: dict[str, _Member] = {}
-        self._executors: list[Any] = []
+        self._helpers: list[Any] = []
+        """Actors without streams, to be killed at the end."""
+        self._detached = outlives_application()
+        self._caretaker: Any = None
         self._opening: list[Any] = []
         session, edge = plan.session, Place()
         for specs in plan.drones:
@@ -108,8 +119,10 @@ class Flight:
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch)
         if self.recording is not None and provenance is not None:
-            recorder = (session, self.recording, plan.recorded, provenance)
+            recorder = (session, self.recording, plan.recorded, provenance, live)
             self._create("recorder", RecorderActor, edge, recorder)
+        if self._detached:
+            self._appoint_caretaker()
         self._origin = 0
         self._next_reports = 0.0
         self._stopped = False
@@ -145,6 +158,8 @@ class Flight:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
             self._record_vitals()
+        if self._caretaker is not None:
+            self._caretaker.heard.remote()
         robots: dict[str, RobotReport] = {}
         for name in set(self._drones.values()):
             robots.update(self._ask(self._members[name].handle.robots.remote(newest)))
@@ -175,21 +190,24 @@ class Flight:
         if self._stopped:
             return self.reports()
         self._stopped = True
-        recorder = [m for m in self._members.values() if m.name == "recorder"]
-        others = [m for m in self._members.values() if m.name != "recorder"]
-        for group in (others, recorder):
-            references = {m.handle.stop.remote(): m for m in group}
-            done, _ = (
-                ray.wait(list(references), num_returns=len(references), timeout=_STOP_TIMEOUT)
-                if references
-                else ([], [])
-            )
-            for reference in done:
-                with contextlib.suppress(RayError, AeroDaaSError):
-                    references[reference].report = ray.get(reference)
-        for handle in (*(member.handle for member in self._members.values()), *self._executors):
-            ray.kill(handle)
+        last = end_actors(self._in_ending_order(), self._helpers)
+        for member in self._members.values():
+            member.report = last.get(member.handle, member.report)
         return self.reports()
+
+    def _in_ending_order(self) -> list[list[Any]]:
+        """All actors with streams; the recorder last, for it records the end of the others."""
+        recorder = [m.handle for m in self._members.values() if m.name == "recorder"]
+        others = [m.handle for m in self._members.values() if m.name != "recorder"]
+        return [others, recorder]
+
+    def _appoint_caretaker(self) -> None:
+        options = self._options("caretaker", Place(), restarts=0)
+        remote: Any = ray.remote(Caretaker)
+        self._caretaker = remote.options(**options, max_concurrency=2).remote()
+        drones = [self._members[name].handle for name in self._ids()]
+        self._caretaker.watch.remote(drones, self._in_ending_order(), list(self._helpers))
+        self._helpers.append(self._caretaker)
 
     def _ids(self) -> set[str]:
         return set(self._drones.values())
@@ -205,17 +223,24 @@ class Flight:
         setup: tuple[Any, ...] = (),
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
-        remote = ray.remote(kind).options(**options_for(place, restarts=restarts))
+        remote = ray.remote(kind).options(**self._options(name, place, restarts=restarts))
         self._members[name] = _Member(name, remote.remote(*args, **kwargs), setup)
+
+    def _options(self, name: str, place: Place, *, restarts: int) -> dict[str, Any]:
+        """Ray's options; in a cluster that outlives us, actors do too, and have a name."""
+        options = options_for(place, restarts=restarts)
+        if self._detached:
+            options |= {"lifetime": "detached", "name": f"{self.plan.session.id}/{name}"}
+        return options
 
     def _create_dispatcher(self, dispatch: Dispatching) -> None:
         executor = None
         if dispatch.cloud is not None:
-            options = options_for(dispatch.cloud, restarts=_ANALYTICS_RESTARTS)
+            options = self._options("cloud", dispatch.cloud, restarts=_ANALYTICS_RESTARTS)
             slots = dispatch.resources.cloud_slots
             remote: Any = ray.remote(CloudExecutor)
             executor = remote.options(**options, max_concurrency=slots).remote()
-            self._executors.append(executor)
+            self._helpers.append(executor)
             self._opening.append(executor.prepare.remote(dispatch.works))
         args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
         self._create("dispatcher", DispatcherActor, Place(), args, setup=(executor,))
@@ -287,6 +312,9 @@ class Flight:
         error = MissionError(f"the actor {member.name} died")
         if member.name in self._ids():
             raise error
+        if member.report.phase != "failed":
+            for name in self._ids():
+                self._members[name].handle.note.remote("actor_lost", str(error))
         member.report = ActorReport("failed", error)
 
     def _revive(self, member: _Member) -> None:

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 
 from aerodaas.actors._names import reply_stream, request_stream, state_stream, status_stream
+from aerodaas.actors.planner import PlannerExecutor
 from aerodaas.actors.session import Session, next_due
 from aerodaas.actors.streams import Outlet
-from aerodaas.clock import Clock, host_time_ns
+from aerodaas.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.config import RobotConfig, SensorConfig
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError, MissionError
@@ -26,11 +27,21 @@ from aerodaas.navigation.safety import Neighbour
 from aerodaas.plugins import load_plugin
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.status import Message, MissionStatus, SetpointRecord
-from aerodaas.vehicle import ClockedVehicle, SteppedVehicle, Vehicle, VehicleState
+from aerodaas.vehicle import (
+    ClockedVehicle,
+    PlayedVehicle,
+    SteppedVehicle,
+    Vehicle,
+    VehicleState,
+)
 
 __all__ = ["Pilot", "RobotSpec", "sensor_item"]
 
 _LATENCIES_KEPT = 100_000
+_PLANS_PATIENCE = 4.0
+"""Times the plan's time-out, after which a scheduler that has not answered is stopped."""
+_LEAST_PATIENCE = 5.0
+"""Wall seconds; enough for an actor that is starting anew, whatever the speed of the mission."""
 
 
 def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
@@ -73,6 +84,7 @@ class Pilot:
         """Milliseconds from capture to the arrival of the command made from it."""
         self._session = session
         self._told = 0
+        self._turned = -1
         self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
         self._due = {sensor.id: next_due(sensor.rate, -1) for sensor in spec.sensors}
         plugin = load_plugin("drivers", spec.robot.driver)
@@ -86,10 +98,10 @@ class Pilot:
         takeoff = self.vehicle.read().odometry.position
         home = environment.home
         # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
-        plan_with = InlinePlanner if self._session.lockstep else BackgroundPlanner
+        inline = self._session.lockstep
         self.mission = Mission(
             robot,
-            plan_with(self.spec.scheduler),
+            InlinePlanner(self.spec.scheduler) if inline else self._background(),
             takeoff=takeoff,
             origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
             wind=np.array(environment.simulation.wind, dtype=np.float64),
@@ -100,6 +112,14 @@ class Pilot:
             if not answer.accepted or answer.refused:
                 reasons = [answer.text, *(f"{name}: {why}" for name, why in answer.refused.items())]
                 raise MissionError(f"{self.id}: {'; '.join(text for text in reasons if text)}")
+
+    def _background(self) -> BackgroundPlanner:
+        scheduler = self.spec.scheduler
+        if not scheduler.isolated:
+            return BackgroundPlanner(scheduler)
+        patience = _PLANS_PATIENCE * self.spec.robot.mission.plan_timeout
+        wall = self._session.host_seconds(round(patience * NANOSECONDS))
+        return BackgroundPlanner(scheduler, PlannerExecutor(max(_LEAST_PATIENCE, wall)))
 
     @staticmethod
     def streams(spec: RobotSpec) -> list[str]:
@@ -142,6 +162,7 @@ class Pilot:
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
         """One turn of the setpoint loop; publishes what was decided."""
         record = self.loop.turn(now, neighbours)
+        self._turned = now
         self._publish(f"{self.id}/setpoints", record, now)
         self._publish(status_stream(self.id), self.mission.status, now)
         return record
@@ -149,9 +170,11 @@ class Pilot:
     def observe(self, now: int) -> list[tuple[str, int]]:
         """Publish the vehicle's state and the readings of the sensors that are due by now.
 
-        Returns (stream, stamp) of each.
+        Returns (stream, stamp) of each. At the time of a turn the state is the one that the turn
+        went by, so that a replay finds the mission's own input.
         """
-        state = self.vehicle.read()
+        seen = self.loop.state if self._turned == now else None
+        state = seen or self.vehicle.read()
         published = [self._publish(state_stream(self.id), state, now)]
         for sensor in self.spec.sensors:
             if self._due[sensor.id] <= now:
@@ -167,8 +190,9 @@ class Pilot:
 
     @property
     def over(self) -> bool:
-        """True once the mission has ended, on the ground or out of our hands."""
-        return self.mission.finished
+        """True once the mission has ended, on the ground or out of our hands, or was replayed."""
+        played = isinstance(self.vehicle, PlayedVehicle) and self.vehicle.finished
+        return self.mission.finished or played
 
     def new_alerts(self) -> list[Alert]:
         """What the mission has had to say since the last call."""

@@ -114,9 +114,10 @@ class _Planner:
             for sensor in robot.sensors:
                 stream = f"{robot.id}/{sensor.id}"
                 wanted = self.recorded or sensor.type != "camera"
-                if wanted and stream not in self.graph.nodes:
-                    item = SENSOR_ITEMS[sensor.type]
-                    self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
+                if sensor.driver == "replayed" or not wanted or stream in self.graph.nodes:
+                    continue
+                item = SENSOR_ITEMS[sensor.type]
+                self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
 
     def sensors(self) -> list[Node]:
         return [node for node in self.graph.nodes.values() if node.kind == "sensor"]

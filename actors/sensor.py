@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from aerodaas.actors._base import StreamActor, StreamCount
-from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
 from aerodaas.cameras.base import Camera, Picture
 from aerodaas.clock import host_time_ns
 from aerodaas.config import SensorConfig
@@ -50,7 +50,7 @@ class SensorActor(StreamActor):
             while not self.stopping:
                 for message in self.inbox.receive(0.5):
                     self._take(message)
-                    if is_due(self._sensor.rate, message.stamp):
+                    if self.session.is_due(self._stream, self._sensor.rate, message.stamp):
                         self._capture(message.stamp, lockstep=True)
             return
         due = next_due(self._sensor.rate, self.clock.now())

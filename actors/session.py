@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import uuid
+from bisect import bisect_right
 from dataclasses import dataclass, field, replace
 
 from aerodaas.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
@@ -12,6 +13,7 @@ __all__ = [
     "CONTROL_PERIOD_NS",
     "FRAME_DEPTH",
     "MESSAGE_DEPTH",
+    "NEVER",
     "Session",
     "is_due",
     "next_due",
@@ -21,6 +23,8 @@ FRAME_DEPTH = 8
 """Frames that may wait for a reader that wants them all; each is megabytes of shared memory."""
 MESSAGE_DEPTH = 32
 """Other messages that may wait for a reader that wants them all."""
+NEVER = 2**63 - 1
+"""A stamp that does not come."""
 CONTROL_PERIOD_NS = NANOSECONDS // 20
 """Period of the setpoint loop: 20 Hz, ten times what PX4 asks for in offboard mode."""
 
@@ -36,6 +40,21 @@ class Session:
     """Prefix of the run's stream names; unique on a host."""
     origin_ns: int = field(default_factory=host_time_ns)
     """Host time at which mission time is zero."""
+
+    frame_stamps: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    """In a replay, when each camera took its pictures, by stream."""
+
+    def next_due(self, source: str, rate: float, after: int) -> int:
+        """The first stamp later than `after` at which `source`, of `rate` Hz, is due."""
+        stamps = self.frame_stamps.get(source)
+        if stamps is None:
+            return next_due(rate, after)
+        place = bisect_right(stamps, after)
+        return stamps[place] if place < len(stamps) else NEVER
+
+    def is_due(self, source: str, rate: float, stamp: int) -> bool:
+        """Tell whether `source`, of `rate` Hz, is due at `stamp`."""
+        return self.next_due(source, rate, stamp - 1) == stamp
 
     def scope(self, node_id: str) -> str:
         """Prefix of the run's stream names on one Ray node; two nodes may share a host."""

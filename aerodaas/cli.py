@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import runpy
 import sys
 import traceback
 from pathlib import Path
@@ -11,10 +10,12 @@ from typing import Annotated
 import typer
 
 from aerodaas.commands import lab, remote
+from aerodaas.commands.application import run_application, speed_option
 from aerodaas.commands.export import export
+from aerodaas.commands.replay import replay
 from aerodaas.commands.report import compare, report
-from aerodaas.errors import AeroDaaSError, ConfigError
-from aerodaas.options import RunOptions, current_options
+from aerodaas.errors import AeroDaaSError
+from aerodaas.options import RunOptions
 from aerodaas.overrides import parse_setting
 
 __all__ = ["app", "main"]
@@ -63,6 +64,12 @@ def run(
         typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
     ] = None,
     view: Annotated[bool, typer.Option(help="Show the live view.")] = True,  # noqa: FBT002
+    live: Annotated[  # noqa: FBT002
+        bool, typer.Option("--live", help="Serve the flight to Foxglove while it goes on.")
+    ] = False,
+    live_address: Annotated[
+        str, typer.Option(help="Where --live listens; on 0.0.0.0 anyone on the network may watch.")
+    ] = "127.0.0.1:8765",
 ) -> None:
     """Fly an application.
 
@@ -73,9 +80,7 @@ def run(
         aerodaas run apps/farm_survey.py --set quadrotor_base.limits.cruise_speed=1
         aerodaas run apps/watch_frames.py -- pictures/ yolov8n.onnx --rate 5
     """
-    if not application.is_file():
-        raise ConfigError(f"there is no application {application}")
-    factor, lockstep = _speed(speed)
+    factor, lockstep = speed_option(speed)
     options = RunOptions(
         environment=env,
         speed=factor,
@@ -85,12 +90,12 @@ def run(
         address=address,
         overrides=dict(parse_setting(text) for text in setting or ()),
         view=view,
+        live=live_address if live else None,
         application=application.resolve(),
     )
-    current_options.set(options)
-    sys.argv = [str(application), *context.args]
-    sys.path.insert(0, str(application.resolve().parent))
-    runpy.run_path(str(application), run_name="__main__")
+    if live:
+        typer.echo(f"live: open ws://{live_address} in Foxglove")
+    run_application(application, context.args, options)
 
 
 @app.command()
@@ -122,20 +127,7 @@ def doctor(
 app.command()(report)
 app.command()(compare)
 app.command()(export)
-
-
-def _speed(text: str | None) -> tuple[float | None, bool | None]:
-    if text is None:
-        return None, None
-    if text == "max":
-        return None, True
-    try:
-        factor = float(text)
-    except ValueError:
-        factor = 0.0
-    if not 0.0 < factor < float("inf"):
-        raise ConfigError(f'--speed takes a positive number or "max", not {text!r}')
-    return factor, False
+app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(replay)
 
 
 def main() -> None:

@@ -223,7 +223,8 @@ class RecordingConfig(_Strict):
     enabled: bool = True
     path: str | None = None
     """None: a new folder under `runs/`."""
-    images: Literal["jpeg", "none"] = "jpeg"
+    images: Literal["jpeg", "png", "none"] = "jpeg"
+    """PNG loses nothing, so that a replay sees what was seen; it takes several times the space."""
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
 
 

@@ -17,6 +17,7 @@ from aerodaas.navigation.commands import AddNavigation, Command, End, Pause, Res
 from aerodaas.options import current_options
 from aerodaas.overrides import overridden
 from aerodaas.plugins import load_plugin
+from aerodaas.replay import replay_environment
 from aerodaas.run import Run
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
 from aerodaas.schedulers.analytics.registry import load_scheduler
@@ -44,7 +45,11 @@ class Environment(PaperNames, IEnvironment):
         settings = {**(overrides or {}), **options.overrides}
         if options.seed is not None:
             settings["simulation.seed"] = options.seed
-        self.config: EnvironmentConfig = overridden(EnvironmentConfig.load(self.path), settings)
+        self.config: EnvironmentConfig = (
+            overridden(EnvironmentConfig.load(self.path), settings)
+            if options.replay is None
+            else overridden(replay_environment(options.replay), options.overrides)
+        )
         self.env_data = self.config.model_dump(by_alias=True)
         """The environment file's content, for analyses that want it."""
         self.graph = Graph()
@@ -135,6 +140,9 @@ class Environment(PaperNames, IEnvironment):
 
     def analytics_scheduler(self) -> AnalyticsScheduler | None:
         """The scheduler plugged in, or the one that the environment file names, if any."""
+        override = current_options.get().scheduler
+        if override is not None:
+            return load_scheduler(override)
         if self._dispatch_with is None and self.config.schedulers.analytics is not None:
             self._dispatch_with = load_scheduler(self.config.schedulers.analytics)
         return self._dispatch_with

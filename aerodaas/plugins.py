@@ -20,6 +20,7 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
     "drivers": {
         "simulated": "aerodaas.drivers.simulated:SimulatedVehicle",
         "tello": "aerodaas.drivers.tello.vehicle:TelloVehicle",
+        "replayed": "aerodaas.drivers.replayed:ReplayedVehicle",
     },
     "cameras": {
         "simulated": "aerodaas.cameras.simulated:SimulatedCamera",

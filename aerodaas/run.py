@@ -20,6 +20,7 @@ from aerodaas.signals import Terminated, raise_on_termination
 from aerodaas.status import MissionState
 
 if TYPE_CHECKING:
+    from aerodaas.actors._base import ActorReport
     from aerodaas.actors.flight import Flight, FlightState
     from aerodaas.actors.plan import FlightPlan
     from aerodaas.environment import Environment
@@ -31,6 +32,8 @@ _BEAT_SECONDS = 1.0
 _LANDING_SECONDS = 60.0
 """Wall time that an interrupted run gives its drones to land."""
 _RECORDING = "flight.mcap"
+_STEPPED = {"simulated", "replayed"}
+"""Drivers of vehicles whose time is ours."""
 
 
 class Run:
@@ -54,7 +57,7 @@ class Run:
     @property
     def lockstep(self) -> bool:
         """True where mission time moves as fast as the machine goes."""
-        simulated = all(robot.driver == "simulated" for robot in self.config.robots)
+        simulated = all(robot.driver in _STEPPED for robot in self.config.robots)
         wanted = self.options.lockstep
         if wanted and not simulated:
             raise ConfigError('--speed max needs every robot to be simulated; use "--speed 1"')
@@ -68,6 +71,8 @@ class Run:
         from aerodaas.console import Starting  # noqa: PLC0415
         from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
 
+        if self.options.live and self.recording is None:
+            raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
         with Starting(self.options) as starting:
             starting.step("starting Ray")
             cluster.connect(self.options.address)
@@ -76,7 +81,7 @@ class Run:
             provenance = Provenance.collect(
                 app=self.options.application, config=self.config, speed=self._speed_text()
             )
-            flight = Flight(plan, self.recording, provenance)
+            flight = Flight(plan, self.recording, provenance, self.options.live)
             try:
                 flight.launch(starting.step)
             except BaseException:
@@ -120,6 +125,11 @@ class Run:
             with contextlib.suppress(AeroDaaSError):
                 self.look()
 
+    def reports(self) -> dict[str, ActorReport]:
+        """The newest report of each actor, by its name."""
+        assert self._flight is not None  # noqa: S101 - launched
+        return self._flight.reports()
+
     def wait(self) -> None:
         """Watch until every mission has ended; raises what they ended with.
 
@@ -148,11 +158,26 @@ class Run:
         from aerodaas.actors.session import Session  # noqa: PLC0415
 
         speed = None if self.lockstep else (self.options.speed or 1.0)
-        session = Session(self.config, speed)
+        session = Session(self.config, speed, frame_stamps=self._frame_stamps())
         scheduler = self._environment.trajectory_scheduler()
         dispatch_with = self._environment.analytics_scheduler()
+        self._change_models()
         compute = self._environment.compute()
         return make_plan(session, self.graph, compute, scheduler, dispatch_with)
+
+    def _frame_stamps(self) -> dict[str, tuple[int, ...]]:
+        from aerodaas.replay import frame_stamps  # noqa: PLC0415 - only for a replay
+
+        return frame_stamps(self.options.replay) if self.options.replay else {}
+
+    def _change_models(self) -> None:
+        """Give every detector the model that the command line asks for."""
+        from aerodaas.analytics.onnx.detector import OnnxDetector  # noqa: PLC0415 - only here
+
+        if self.options.model is not None:
+            for node in self.graph.nodes.values():
+                if isinstance(node.work, OnnxDetector):
+                    node.work = node.work.with_model(self.options.model)
 
     def _speed_text(self) -> str:
         return "max" if self.lockstep else f"{self.options.speed or 1.0:g}"

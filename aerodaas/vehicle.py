@@ -18,6 +18,7 @@ from aerodaas.records import travels
 __all__ = [
     "Capabilities",
     "ClockedVehicle",
+    "PlayedVehicle",
     "PositionSetpoint",
     "Setpoint",
     "SteppedVehicle",
@@ -165,4 +166,14 @@ class ClockedVehicle(Vehicle, Protocol):
 
     def use_clock(self, clock: Clock) -> None:
         """Stamp states by `clock` from now on; called when the mission starts."""
+        ...
+
+
+@runtime_checkable
+class PlayedVehicle(SteppedVehicle, Protocol):
+    """A recorded vehicle, which comes to an end."""
+
+    @property
+    def finished(self) -> bool:
+        """True once there is nothing more to show."""
         ...

@@ -113,6 +113,9 @@ class McapCamera:
             self._next = shot
             return
         self._next = None
+        self._begin_again(stamp)
+
+    def _begin_again(self, stamp: int) -> None:
         if self._settings.loop:
             self._rewind()
             # A moment later, so that a recording of a single picture is not for ever due.
@@ -140,11 +143,22 @@ class McapCamera:
 
 
 class ReplayedCamera(McapCamera):
-    """Plays a recording of this project at its own mission times, with the odometry recorded."""
+    """Plays a recording of this project at its own mission times, with the odometry recorded.
+
+    With `loop`, it does not say that it has finished, as the recorded camera never did.
+    """
+
+    @property
+    def finished(self) -> bool:
+        """True once the last picture was given, of a camera that came to an end in flight, too."""
+        return super().finished and not self._settings.loop
 
     def _due_at(self, shot: Shot, stamp: int) -> int:
         del stamp
         return shot.header.stamp
+
+    def _begin_again(self, stamp: int) -> None:
+        """Mission time does not begin again."""
 
     def _picture(self, picture: Picture, shot: Shot) -> Picture:
         return Picture(picture.image, shot.header.stamp, picture.label, shot.odometry)

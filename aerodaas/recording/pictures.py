@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from aerodaas.data import Detection, Detections, Frame, Header, Odometry
 from aerodaas.recording.images import IMAGE_SCHEMAS, decode_image
 from aerodaas.recording.reader import Record, Recording
+from aerodaas.recording.states import odometry_of
 
 __all__ = ["Shot", "detections", "detections_by_frame", "frames", "shots"]
 
@@ -50,7 +51,7 @@ def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterat
         else:
             value = head.value
             header = Header(value["id"], value["stamp"], value["source"])
-            yield Shot(header, _odometry(value.get("odometry")), record)
+            yield Shot(header, odometry_of(value.get("odometry")), record)
 
 
 def frames(
@@ -100,24 +101,6 @@ def _frame_id(value: Any) -> str:  # noqa: ANN401 - by the schema
     head = getattr(value, "header", value)
     found = value.get("frame_id", "") if isinstance(value, dict) else getattr(head, "frame_id", "")
     return str(found)
-
-
-def _odometry(value: dict[str, Any] | None) -> Odometry | None:
-    if value is None:
-        return None
-    position, velocity = (
-        np.array([value[name][axis] for axis in "xyz"], dtype=np.float64)
-        for name in ("position", "velocity")
-    )
-    return Odometry(
-        position,
-        velocity,
-        value["yaw"],
-        value["roll"],
-        value["pitch"],
-        value["yaw_rate"],
-        value["position_sigma"],
-    )
 
 
 def _detection(value: dict[str, Any]) -> Detection:

@@ -55,11 +55,12 @@ class Provenance:
 
         Passwords in URLs of the configuration are left out.
         """
+        environment = config.model_dump_json(indent=2, by_alias=True) if config else ""
         return cls(
             name=app.stem if app else "",
             seed=seed if seed is not None or config is None else config.simulation.seed,
             speed=speed,
-            config=_PASSWORD.sub("***@", config.model_dump_json(indent=2)) if config else "",
+            config=_PASSWORD.sub("***@", environment),
             app=app.name if app else "",
             app_source=app.read_text(encoding="utf-8", errors="replace") if app else "",
             revision=_revision(app.parent if app else Path.cwd()),

@@ -37,8 +37,12 @@ class Lane:
 
 _Chain = tuple[Any, float, Lane, Job] | None
 """The chain before, a start, a lane and a job."""
-_State = tuple[float, float, tuple[int, ...], _Chain]
-"""Merit, time when the executor is free, per lane the jobs taken or passed over, the plan."""
+_State = tuple[float, float, int, _Chain]
+"""Merit, time when the executor is free, the lanes' positions, the plan.
+
+A lane's position, the number of its jobs taken or passed over, is one digit of an integer: such
+keys are much cheaper to make and to compare than tuples, and they are made most of the time.
+"""
 
 _IDLE_SHARE = 0.5
 """Share of the price that idle time costs where no job is known: some will arrive."""
@@ -54,14 +58,16 @@ def plan(
     survive each step, and no idle time above `gap` is considered. Takes at most
     width x lanes x steps evaluations of a gain.
     """
-    beam: list[_State] = [(0.0, start, (0,) * len(lanes), None)]
+    beam: list[_State] = [(0.0, start, 0, None)]
+    longest = max((len(lane.jobs) for lane in lanes), default=0)
+    digits = longest.bit_length()
     best_merit = -inf
     best: _Chain = None
     while beam:
-        grown: dict[tuple[int, ...], _State] = {}
+        grown: dict[int, _State] = {}
         for state in beam:
             ended = True
-            for successor in _successors(state, lanes, price, gap):
+            for successor in _successors(state, lanes, digits, price, gap):
                 ended = False
                 merit, free, taken, chain = successor
                 if free >= until:
@@ -82,16 +88,22 @@ def plan(
     return steps
 
 
-def _successors(state: _State, lanes: Sequence[Lane], price: float, gap: float) -> Iterator[_State]:
+def _successors(
+    state: _State, lanes: Sequence[Lane], digits: int, price: float, gap: float
+) -> Iterator[_State]:
     merit, free, taken, chain = state
-    for number, lane in enumerate(lanes):
+    mask = (1 << digits) - 1
+    shift = -digits
+    for lane in lanes:
+        shift += digits
         jobs, belief = lane.jobs, lane.time
         mean = belief.mean
-        index = taken[number]
+        count = len(jobs)
+        position = index = taken >> shift & mask
         hopeless = free + mean - belief.sigma
-        while index < len(jobs) and jobs[index].deadline < hopeless:
+        while index < count and jobs[index].deadline < hopeless:
             index += 1
-        if index == len(jobs):
+        if index == count:
             continue
         job = jobs[index]
         begin = max(free, job.release)
@@ -100,5 +112,5 @@ def _successors(state: _State, lanes: Sequence[Lane], price: float, gap: float) 
         gain = job.benefit * chance(belief, job.deadline - begin) - job.loss
         if gain > 0:
             end = begin + mean
-            after = (*taken[:number], index + 1, *taken[number + 1 :])
+            after = taken + (index + 1 - position << shift)
             yield (merit + gain - price * (end - free), end, after, (chain, begin, lane, job))

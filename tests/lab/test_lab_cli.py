@@ -7,7 +7,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner
 
-from aerodaas.lab_cli import app
+from aerodaas.commands.lab import app
 
 _MINE = """
 from aerodaas.schedulers.analytics import AnalyticsScheduler, Drop

@@ -23,6 +23,7 @@ from aerodaas.schedulers.analytics.base import (
     WakeAt,
 )
 from aerodaas.schedulers.analytics.dispatch import Dispatch
+from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 
 MODEL = Profile("m", 10, 100 * MILLISECOND, 10 * MILLISECOND, 20 * MILLISECOND, 1, 2)
 
@@ -183,3 +184,20 @@ def test_another_scheduler_takes_over_what_is_undecided() -> None:
     assert host.asked == [("edge", 0, 0), ("cloud", 1, 5)]
     assert not dispatch.undecided
     assert [r.task.id for r in host.results] == [2]
+
+
+@pytest.mark.parametrize("name", scheduler_names())
+def test_every_scheduler_can_take_over_in_flight(name: str) -> None:
+    """It is told the ends of tasks that it never saw start."""
+    scheduler = _Scripted(lambda t, _: SendToCloud(t), lambda t, _: RunOnEdge(t))
+    dispatch, host = _dispatch_of(scheduler, slots=4)
+    tasks = [_task(number) for number in range(3)]
+    for one in tasks:
+        dispatch.arrived(one, 0)
+    dispatch.replace(load_scheduler(name), 1)
+    dispatch.finished(tasks[0], 2)
+    dispatch.finished(tasks[1], 3, Outcome.FAILED)
+    dispatch.arrived(_task(7, 4), 4)
+    ends = {result.task.id: result.outcome for result in host.results}
+    assert (ends[0], ends[1]) == (Outcome.DONE, Outcome.FAILED)
+    assert dispatch.running is not tasks[1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import logging
 from collections.abc import Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
+from typing_extensions import Self
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.onnx.coco import COCO_NAMES
@@ -73,6 +75,7 @@ class OnnxDetector(Analytics[Detections]):
             raise ModelError(message)
         model = read_model(path, size)
         self.path = str(path)
+        self.classes = classes
         self.min_score = min_score
         self.iou = iou
         self.providers = providers
@@ -93,6 +96,20 @@ class OnnxDetector(Analytics[Detections]):
         self._session: ort.InferenceSession | None = None
         self._letterbox: Letterbox | None = None
         self._buffer: NDArray[np.floating] | None = None
+
+    def with_model(self, path: str | Path) -> Self:
+        """Return the same detector with the model at `path`; raises ModelError."""
+        twin = copy.copy(self)
+        OnnxDetector.__init__(
+            twin,
+            path,
+            classes=self.classes,
+            min_score=self.min_score,
+            iou=self.iou,
+            providers=self.providers,
+            threads=self.threads,
+        )
+        return twin
 
     def open(self) -> None:
         """Create the session and run it, so that the first frame of the mission is not slow."""

@@ -1,0 +1,56 @@
+"""Vehicle states of a recording, as the types that streams carry."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from aerodaas.data import Battery, GpsFix, Odometry
+from aerodaas.recording.reader import Recording
+from aerodaas.vehicle import VehicleMode, VehicleState
+
+__all__ = ["odometry_of", "vehicle_states"]
+
+
+def vehicle_states(recording: Recording, robot: str) -> Iterator[tuple[int, VehicleState]]:
+    """Mission time of publishing and state, in the order of recording."""
+    for record in recording.records(schemas=("aerodaas.VehicleState",)):
+        if record.value["robot"] == robot:
+            yield record.stamp, _state(record.value)
+
+
+def odometry_of(value: dict[str, Any] | None) -> Odometry | None:
+    """Odometry from its JSON, to the last digit; None for None."""
+    if value is None:
+        return None
+    position, velocity = (
+        np.array([_number(value[name][axis]) for axis in "xyz"], dtype=np.float64)
+        for name in ("position", "velocity")
+    )
+    angles = (value[name] for name in ("yaw", "roll", "pitch", "yaw_rate", "position_sigma"))
+    return Odometry(position, velocity, *map(_number, angles))
+
+
+def _state(value: dict[str, Any]) -> VehicleState:
+    odometry = odometry_of(value["odometry"])
+    assert odometry is not None  # noqa: S101 - never null
+    battery, gps = value["battery"], value.get("gps")
+    return VehicleState(
+        value["stamp"],
+        odometry,
+        Battery(*(_number(battery[name]) for name in ("fraction", "voltage", "current"))),
+        VehicleMode(value["mode"]),
+        value["armed"],
+        GpsFix(**{name: _number(part) for name, part in gps.items()}) if gps else None,
+        odometry_of(value.get("truth")),
+        tuple(value["faults"]),
+        dict(value["extra"]),
+    )
+
+
+def _number(value: float | None) -> Any:  # noqa: ANN401 - an int stays one
+    """JSON has no NaN: what was not finite was written as null."""
+    return math.nan if value is None else value
