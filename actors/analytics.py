@@ -7,6 +7,7 @@ neural network, has its own.
 from __future__ import annotations
 
 import contextlib
+import math
 import threading
 import time
 from collections import deque
@@ -29,6 +30,11 @@ from aerodaas.vehicle import VehicleState
 __all__ = ["AnalyticsActor", "NodeSpec", "TriggerSpec", "Wake"]
 
 _WAKE_DEPTH = 8
+_LOOK_INTERVAL = 1.0
+_PARTING = 3.0
+"""Wall seconds that an analysis has to finish its item once the run is over."""
+_HUNG = 5.0
+"""Wall seconds on one item after which people are told; a first inference may take some."""
 
 
 @dataclass(frozen=True)
@@ -95,8 +101,14 @@ class AnalyticsActor(StreamActor):
         ]
         for thread in threads:
             thread.start()
-        for thread in threads:
-            thread.join()
+        given_up = math.inf
+        while any(thread.is_alive() for thread in threads) and time.monotonic() < given_up:
+            if self.stopping:
+                given_up = min(given_up, time.monotonic() + _PARTING)
+            for thread in threads:
+                thread.join(_LOOK_INTERVAL / len(threads))
+            for worker in self._workers:
+                worker.look_after()
 
     def _close(self) -> None:
         for worker in self._workers:
@@ -159,6 +171,8 @@ class _Worker:
         self.errors = 0
         self.last_error = ""
         self.opened = False
+        self._at_work_since: float | None = None
+        self._hung_since: float | None = None
         self._actor = actor
         self._woken: int | None = None if node.dormant else -1
         """Stamp of the measurement that woke it; None while it sleeps."""
@@ -264,13 +278,14 @@ class _Worker:
 
     def _process(self, item: Any, now: int) -> Any:  # noqa: ANN401
         self._now = now
-        began = time.perf_counter()
+        began = self._at_work_since = time.perf_counter()
         try:
             return self.node.work.process(item, self)
         except Exception as error:  # noqa: BLE001 - a user's analysis may raise anything
             self._complain(error)
             return None
         finally:
+            self._at_work_since = None
             self.busy += time.perf_counter() - began
 
     def _complain(self, error: Exception) -> None:
@@ -296,6 +311,15 @@ class _Worker:
         if self._acks is not None:
             done = ((message.header.source, message.header.stamp),)
             self._acks.derive(done, message, host_time_ns(), message.stamp)
+
+    def look_after(self) -> None:
+        """Say once of an item that it takes too long."""
+        since = self._at_work_since
+        if since is None or since == self._hung_since or time.perf_counter() - since < _HUNG:
+            return
+        self._hung_since = since
+        text = f"{self.node.stream} has been at one item for {_HUNG:.0f} s"
+        self._actor.alert("analysis_hung", text)
 
     def wake(self) -> None:
         if self.opened:

@@ -13,13 +13,24 @@ import ray
 from aerodaas.config import ComputeConfig
 from aerodaas.errors import AeroDaaSError, ConfigError
 
-__all__ = ["Place", "connect", "disconnect", "discover", "options_for"]
+__all__ = [
+    "Place",
+    "connect",
+    "disconnect",
+    "discover",
+    "options_for",
+    "outlives_application",
+]
 
 _KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
 _SHARE = 0.001
 """Share of a node's `edge` or `cloud` resource that an actor takes: it says where, not how much."""
 _STORE_BYTES = 128 * 2**20
 """Object store of a one-machine run; its streams travel in shared memory of their own."""
+
+
+_ours = False
+"""Whether this process started the Ray that it is connected to."""
 
 
 @dataclass(frozen=True)
@@ -36,8 +47,10 @@ def connect(address: str | None) -> None:
 
     Raises AeroDaaSError if the cluster cannot be reached, ConfigError if it offers no edge node.
     """
+    global _ours  # noqa: PLW0603 - one Ray for each process
     if ray.is_initialized():
         return
+    _ours = False
     address = address or os.environ.get("RAY_ADDRESS")
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     common: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
@@ -61,6 +74,7 @@ def connect(address: str | None) -> None:
         resources={"edge": 1, "cloud": 1},
         **common,
     )
+    _ours = True
     _trim()
 
 
@@ -82,6 +96,11 @@ def _require_edge(address: str) -> None:
             f"the Ray cluster at {address} has no edge node; start the one beside the drone "
             """with `ray start --address … --resources '{"edge": 1}'`"""
         )
+
+
+def outlives_application() -> bool:
+    """Tell whether the connected Ray goes on when this process dies: nobody here started it."""
+    return not _ours
 
 
 def disconnect() -> None:

@@ -19,7 +19,7 @@ from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import CONTROL_PERIOD_NS, MESSAGE_DEPTH, Session, next_due
 from aerodaas.clock import NANOSECONDS, LockstepClock
 from aerodaas.errors import AeroDaaSError
-from aerodaas.navigation.commands import Answer, Command, ReturnHome, Start
+from aerodaas.navigation.commands import Answer, Command, ReturnHome
 from aerodaas.navigation.safety import Neighbour
 from aerodaas.status import Message, MissionStatus
 from aerodaas.vehicle import VehicleState
@@ -103,6 +103,10 @@ class DroneActor(StreamActor):
         with self._obeying:
             return self._pilots[robot].handle(command, self.clock.now())
 
+    def note(self, kind: str, text: str) -> None:
+        """Have recorded what the application has found out."""
+        self.alert(kind, text)
+
     def robots(self, newest: int = 200) -> dict[str, RobotReport]:
         """How each robot fares; also the sign that the application's process is alive."""
         self._heard = time.monotonic()
@@ -117,8 +121,9 @@ class DroneActor(StreamActor):
         }
 
     def _run(self) -> None:
+        self._heard = time.monotonic()
         for pilot in self._pilots.values():
-            pilot.handle(Start(), self.clock.now())
+            pilot.start(self.clock)
         if self.session.lockstep:
             self._run_lockstep()
         else:

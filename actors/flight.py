@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import Any
 
 import ray
-from ray.exceptions import RayActorError, RayError, RayTaskError
+from ray.exceptions import RayActorError, RayTaskError
 from typing_extensions import Self
 
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
+from aerodaas.actors._ending import end_actors
 from aerodaas.actors.analytics import AnalyticsActor
-from aerodaas.actors.cluster import Place, options_for
+from aerodaas.actors.caretaker import Caretaker
+from aerodaas.actors.cluster import Place, options_for, outlives_application
 from aerodaas.actors.dispatcher import DispatcherActor
 from aerodaas.actors.drone import DroneActor, RobotReport
 from aerodaas.actors.executor import CloudExecutor
@@ -32,7 +34,6 @@ __all__ = ["Flight", "FlightState"]
 
 _PREPARE_TIMEOUT = 90.0
 _ANSWER_TIMEOUT = 5.0
-_STOP_TIMEOUT = 20.0
 _REPORT_INTERVAL = 0.5
 _ANALYTICS_RESTARTS = 3
 
@@ -64,6 +65,8 @@ class _Member:
     info: ActorInfo | None = None
     report: ActorReport = field(default_factory=lambda: ActorReport("new"))
     pending: ray.ObjectRef[ActorReport] | None = None
+    reviving: ray.ObjectRef[ActorInfo] | None = None
+    """Under way after a restart."""
 
 
 class Flight:
@@ -84,7 +87,10 @@ class Flight:
         self.recording = recording if plan.recorded else None
         self._drones: dict[str, str] = {}
         self._members: dict[str, _Member] = {}
-        self._executors: list[Any] = []
+        self._helpers: list[Any] = []
+        """Actors without streams, to be killed at the end."""
+        self._detached = outlives_application()
+        self._caretaker: Any = None
         self._opening: list[Any] = []
         session, edge = plan.session, Place()
         for specs in plan.drones:
@@ -115,6 +121,8 @@ class Flight:
         if self.recording is not None and provenance is not None:
             recorder = (session, self.recording, plan.recorded, provenance, live)
             self._create("recorder", RecorderActor, edge, recorder)
+        if self._detached:
+            self._appoint_caretaker()
         self._origin = 0
         self._next_reports = 0.0
         self._stopped = False
@@ -139,6 +147,7 @@ class Flight:
         # Those that only listen go first, so that nobody speaks to an empty room.
         for member in reversed(self._members.values()):
             member.handle.start.remote(self._origin)
+            member.report = ActorReport("running")
 
     def poll(self, newest: int = 200) -> FlightState:
         """Ask how everyone fares, with the `newest` latencies of each robot.
@@ -149,6 +158,8 @@ class Flight:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
             self._record_vitals()
+        if self._caretaker is not None:
+            self._caretaker.heard.remote()
         robots: dict[str, RobotReport] = {}
         for name in set(self._drones.values()):
             robots.update(self._ask(self._members[name].handle.robots.remote(newest)))
@@ -169,26 +180,34 @@ class Flight:
         """Where each actor lives, once launched."""
         return {m.name: m.info for m in self._members.values() if m.info is not None}
 
+    @property
+    def streams(self) -> set[str]:
+        """Streams that the flight's actors publish, once launched."""
+        return {stream for info in self.infos().values() for stream in info.publishes}
+
     def stop(self) -> dict[str, ActorReport]:
         """Stop all actors, the recorder last, and return their last reports."""
         if self._stopped:
             return self.reports()
         self._stopped = True
-        recorder = [m for m in self._members.values() if m.name == "recorder"]
-        others = [m for m in self._members.values() if m.name != "recorder"]
-        for group in (others, recorder):
-            references = {m.handle.stop.remote(): m for m in group}
-            done, _ = (
-                ray.wait(list(references), num_returns=len(references), timeout=_STOP_TIMEOUT)
-                if references
-                else ([], [])
-            )
-            for reference in done:
-                with contextlib.suppress(RayError, AeroDaaSError):
-                    references[reference].report = ray.get(reference)
-        for handle in (*(member.handle for member in self._members.values()), *self._executors):
-            ray.kill(handle)
+        last = end_actors(self._in_ending_order(), self._helpers)
+        for member in self._members.values():
+            member.report = last.get(member.handle, member.report)
         return self.reports()
+
+    def _in_ending_order(self) -> list[list[Any]]:
+        """All actors with streams; the recorder last, for it records the end of the others."""
+        recorder = [m.handle for m in self._members.values() if m.name == "recorder"]
+        others = [m.handle for m in self._members.values() if m.name != "recorder"]
+        return [others, recorder]
+
+    def _appoint_caretaker(self) -> None:
+        options = self._options("caretaker", Place(), restarts=0)
+        remote: Any = ray.remote(Caretaker)
+        self._caretaker = remote.options(**options, max_concurrency=2).remote()
+        drones = [self._members[name].handle for name in self._ids()]
+        self._caretaker.watch.remote(drones, self._in_ending_order(), list(self._helpers))
+        self._helpers.append(self._caretaker)
 
     def _ids(self) -> set[str]:
         return set(self._drones.values())
@@ -204,17 +223,24 @@ class Flight:
         setup: tuple[Any, ...] = (),
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
-        remote = ray.remote(kind).options(**options_for(place, restarts=restarts))
+        remote = ray.remote(kind).options(**self._options(name, place, restarts=restarts))
         self._members[name] = _Member(name, remote.remote(*args, **kwargs), setup)
+
+    def _options(self, name: str, place: Place, *, restarts: int) -> dict[str, Any]:
+        """Ray's options; in a cluster that outlives us, actors do too, and have a name."""
+        options = options_for(place, restarts=restarts)
+        if self._detached:
+            options |= {"lifetime": "detached", "name": f"{self.plan.session.id}/{name}"}
+        return options
 
     def _create_dispatcher(self, dispatch: Dispatching) -> None:
         executor = None
         if dispatch.cloud is not None:
-            options = options_for(dispatch.cloud, restarts=_ANALYTICS_RESTARTS)
+            options = self._options("cloud", dispatch.cloud, restarts=_ANALYTICS_RESTARTS)
             slots = dispatch.resources.cloud_slots
             remote: Any = ray.remote(CloudExecutor)
             executor = remote.options(**options, max_concurrency=slots).remote()
-            self._executors.append(executor)
+            self._helpers.append(executor)
             self._opening.append(executor.prepare.remote(dispatch.works))
         args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
         self._create("dispatcher", DispatcherActor, Place(), args, setup=(executor,))
@@ -256,6 +282,7 @@ class Flight:
 
     def _gather_reports(self) -> None:
         for member in self._members.values():
+            self._revive(member)
             if member.pending is None:
                 member.pending = member.handle.report.remote()
             ready, _ = ray.wait([member.pending], timeout=0.05)
@@ -266,8 +293,6 @@ class Flight:
                 member.report = ray.get(reference)
             except RayActorError:
                 self._lost(member)
-            else:
-                self._revive(member)
 
     def _record_vitals(self) -> None:
         """Have the recorder note what each process takes; it alone could not ask other nodes."""
@@ -287,12 +312,23 @@ class Flight:
         error = MissionError(f"the actor {member.name} died")
         if member.name in self._ids():
             raise error
+        if member.report.phase != "failed":
+            for name in self._ids():
+                self._members[name].handle.note.remote("actor_lost", str(error))
         member.report = ActorReport("failed", error)
 
     def _revive(self, member: _Member) -> None:
-        if member.report.phase == "new" and member.info is not None:
-            self._prepare([member], lambda _: None)
-            member.handle.start.remote(self._origin)
+        """Set an actor up that Ray has restarted, without waiting: the drones need our word."""
+        if member.reviving is None:
+            if member.report.phase == "new" and member.info is not None:
+                member.reviving = member.handle.prepare.remote(*member.setup)
+        elif ray.wait([member.reviving], timeout=0)[0]:
+            reference, member.reviving = member.reviving, None
+            with contextlib.suppress(AeroDaaSError):  # it died again, or its next report says why
+                member.info = self._ask(reference)
+                self._connect([member])
+                member.handle.start.remote(self._origin)
+                member.report = ActorReport("running")
 
     @staticmethod
     def _ask(reference: Any) -> Any:  # noqa: ANN401 - whatever the actor returns

@@ -26,6 +26,7 @@ class LiveReader:
         scope = session.scope(ray.get_runtime_context().get_node_id())
         self._inbox = Inbox(scope, f"application/{uuid.uuid4().hex[:8]}", {stream: _DEPTH})
         self._waiting: deque[Any] = deque()
+        self._newest: Any = None
         self._over = over
 
     def next(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
@@ -35,11 +36,25 @@ class LiveReader:
         """
         until = time.monotonic() + (float("inf") if timeout is None else timeout)
         while not self._waiting:
-            for message in self._inbox.receive(min(0.2, max(0.0, until - time.monotonic()))):
-                if message.item is not None:
-                    self._waiting.append(message.item)
-            if not self._waiting and self._over():
+            over = self._over()
+            self._take(min(0.2, max(0.0, until - time.monotonic())))
+            if not self._waiting and over:
                 raise StopIteration
             if not self._waiting and time.monotonic() >= until:
                 raise TimeoutError(f"nothing arrived within {timeout} s")
         return self._waiting.popleft()
+
+    def newest(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
+        """Return the newest item, again if there is none newer; raises as `next` before any."""
+        self._take(0.0)
+        if self._newest is None:
+            self.next(timeout)
+        self._waiting.clear()
+        return self._newest
+
+    def _take(self, timeout: float) -> None:
+        items = [message.item for message in self._inbox.receive(timeout)]
+        for item in items:
+            if item is not None:
+                self._waiting.append(item)
+                self._newest = item

@@ -11,14 +11,15 @@ from typing import Any
 import numpy as np
 
 from aerodaas.actors._names import reply_stream, request_stream, state_stream, status_stream
+from aerodaas.actors.planner import PlannerExecutor
 from aerodaas.actors.session import Session, next_due
 from aerodaas.actors.streams import Outlet
-from aerodaas.clock import host_time_ns
+from aerodaas.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.config import RobotConfig, SensorConfig
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.geometry import GeodeticOrigin
-from aerodaas.navigation.commands import Answer, Command, Reply, Request, StreamItem
+from aerodaas.navigation.commands import Answer, Command, Reply, Request, Start, StreamItem
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
 from aerodaas.navigation.planner import BackgroundPlanner, InlinePlanner
@@ -26,11 +27,21 @@ from aerodaas.navigation.safety import Neighbour
 from aerodaas.plugins import load_plugin
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.status import Message, MissionStatus, SetpointRecord
-from aerodaas.vehicle import PlayedVehicle, SteppedVehicle, Vehicle, VehicleState
+from aerodaas.vehicle import (
+    ClockedVehicle,
+    PlayedVehicle,
+    SteppedVehicle,
+    Vehicle,
+    VehicleState,
+)
 
 __all__ = ["Pilot", "RobotSpec", "sensor_item"]
 
 _LATENCIES_KEPT = 100_000
+_PLANS_PATIENCE = 4.0
+"""Times the plan's time-out, after which a scheduler that has not answered is stopped."""
+_LEAST_PATIENCE = 5.0
+"""Wall seconds; enough for an actor that is starting anew, whatever the speed of the mission."""
 
 
 def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
@@ -87,10 +98,10 @@ class Pilot:
         takeoff = self.vehicle.read().odometry.position
         home = environment.home
         # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
-        plan_with = InlinePlanner if self._session.lockstep else BackgroundPlanner
+        inline = self._session.lockstep
         self.mission = Mission(
             robot,
-            plan_with(self.spec.scheduler),
+            InlinePlanner(self.spec.scheduler) if inline else self._background(),
             takeoff=takeoff,
             origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
             wind=np.array(environment.simulation.wind, dtype=np.float64),
@@ -102,6 +113,14 @@ class Pilot:
                 reasons = [answer.text, *(f"{name}: {why}" for name, why in answer.refused.items())]
                 raise MissionError(f"{self.id}: {'; '.join(text for text in reasons if text)}")
 
+    def _background(self) -> BackgroundPlanner:
+        scheduler = self.spec.scheduler
+        if not scheduler.isolated:
+            return BackgroundPlanner(scheduler)
+        patience = _PLANS_PATIENCE * self.spec.robot.mission.plan_timeout
+        wall = self._session.host_seconds(round(patience * NANOSECONDS))
+        return BackgroundPlanner(scheduler, PlannerExecutor(max(_LEAST_PATIENCE, wall)))
+
     @staticmethod
     def streams(spec: RobotSpec) -> list[str]:
         """Streams that a pilot of this robot publishes for all, the replies aside."""
@@ -111,6 +130,12 @@ class Pilot:
             f"{spec.robot.id}/setpoints",
             *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
         ]
+
+    def start(self, clock: Clock) -> None:
+        """Start the mission, whose time is that of `clock`."""
+        if isinstance(self.vehicle, ClockedVehicle):
+            self.vehicle.use_clock(clock)
+        self.handle(Start(), clock.now())
 
     def advance_to(self, stamp: int) -> None:
         """Move a simulated vehicle's time on."""

@@ -19,6 +19,7 @@ from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig, TaskConfig
 from aerodaas.data import Frame
 from aerodaas.errors import GraphError
 from aerodaas.graph import Graph, NavigationEdge, Node
+from aerodaas.handles import SENSOR_ITEMS
 from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
@@ -104,18 +105,19 @@ class _Planner:
         named = {edge.robot for edge in graph.navigation}
         self.robots = [r for r in session.environment.robots if r.id in named]
         self.recorded = session.environment.recording.enabled
-        self._add_cameras()
+        self._add_sensors()
         self.steering = {name for edge in graph.navigation for name in _streams_of(edge)}
 
-    def _add_cameras(self) -> None:
-        """Cameras that the application does not read run all the same: they are recorded."""
-        for robot in self.robots if self.recorded else ():
+    def _add_sensors(self) -> None:
+        """Sensors that the application does not read run all the same, cameras if recorded."""
+        for robot in self.robots:
             for sensor in robot.sensors:
                 stream = f"{robot.id}/{sensor.id}"
-                if sensor.driver == "replayed" or sensor.type != "camera":
+                wanted = self.recorded or sensor.type != "camera"
+                if sensor.driver == "replayed" or not wanted or stream in self.graph.nodes:
                     continue
-                if stream not in self.graph.nodes:
-                    self.graph.add(Node(stream, "sensor", Frame, sensor, robot.id))
+                item = SENSOR_ITEMS[sensor.type]
+                self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
 
     def sensors(self) -> list[Node]:
         return [node for node in self.graph.nodes.values() if node.kind == "sensor"]

@@ -37,8 +37,9 @@ class SensorActor(StreamActor):
         self._vehicle: VehicleState | None = None
 
     def _open(self) -> None:
-        plugin = load_plugin("cameras", self._sensor.driver)
-        self._camera: Camera = plugin(self._sensor, self.session.environment)
+        environment = self.session.environment
+        plugin = load_plugin("cameras", environment.camera_driver(self._sensor))
+        self._camera: Camera = plugin(self._sensor, environment)
         self._camera.open()
         self._frames = self.outlet(self._stream)
         self._commands = self.outlet(f"{self._stream}/commands")

@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `remote`, `schema`, `doctor`, and what looks at recordings."""
+"""The command line: `aerodaas run`, `remote`, `lab`, `schema`, `doctor`, and for recordings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas import cli_remote
+from aerodaas.commands import lab, remote
 from aerodaas.commands.application import run_application, speed_option
 from aerodaas.commands.export import export
 from aerodaas.commands.replay import replay
@@ -33,7 +33,8 @@ flies a simulated drone, PX4, ArduPilot or a Tello.
     aerodaas run apps/farm_survey.py --speed max
 """,
 )
-app.add_typer(cli_remote.app, name="remote")
+app.add_typer(remote.app, name="remote")
+app.add_typer(lab.app, name="lab")
 
 
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
@@ -136,9 +137,6 @@ def main() -> None:
     except AeroDaaSError as error:
         _say(str(error))
         sys.exit(error.exit_code)
-    except KeyboardInterrupt:
-        _say("interrupted")
-        sys.exit(130)
     except Exception as error:  # noqa: BLE001 - the application may raise anything
         frames = [f for f in traceback.extract_tb(error.__traceback__) if "aerodaas" not in f.name]
         place = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""

@@ -135,7 +135,8 @@ class SensorConfig(_Strict):
 
     id: Identifier
     type: Literal["camera", "odometry", "gps", "battery", "status"] = "camera"
-    driver: str = "simulated"
+    driver: str | None = None
+    """None: a camera of its robot's own kind (see `EnvironmentConfig.camera_driver`)."""
     rate: Positive = 15.0
     """Items per second."""
     settings: dict[str, Any] = Field(default_factory=dict)
@@ -282,6 +283,16 @@ class EnvironmentConfig(_Strict):
                 message = f"more than one {kind} is called {', '.join(twice)}"
                 raise ValueError(message)
         return self
+
+    def camera_driver(self, sensor: SensorConfig) -> str:
+        """The driver of a camera: its own, else its robot's, else the simulated one.
+
+        So one word in the file, a robot's driver, takes its camera along.
+        """
+        if sensor.driver is not None:
+            return sensor.driver
+        carriers = [robot.driver for robot in self.robots if sensor in robot.sensors]
+        return carriers[0] if carriers else "simulated"
 
     @classmethod
     def load(cls, path: str | Path) -> EnvironmentConfig:

@@ -37,6 +37,8 @@ E = TypeVar("E")
 E_co = TypeVar("E_co", covariant=True)
 NodeKind = typing.Literal["sensor", "analytics", "external"]
 _PACKAGE = Path(__file__).resolve().parent
+# Two of the package's folders may stand elsewhere, behind links.
+_OURS = (_PACKAGE, *((_PACKAGE / name).resolve() for name in ("actors", "schedulers")))
 
 
 def application_line() -> str:
@@ -44,8 +46,7 @@ def application_line() -> str:
     frame = inspect.currentframe()
     while frame is not None:
         path = Path(frame.f_code.co_filename).resolve()
-        inside = path.is_relative_to(_PACKAGE) or path.parent.name in {"actors", "waypoint"}
-        if not inside:
+        if not any(path.is_relative_to(folder) for folder in _OURS):
             code = linecache.getline(str(path), frame.f_lineno).strip()
             return f"{path.name}:{frame.f_lineno}: {code}"
         frame = frame.f_back
@@ -62,6 +63,10 @@ class StreamReader(Protocol[E_co]):
 
     def next(self, timeout: float | None) -> E_co:
         """The next item; raises TimeoutError, or StopIteration once the mission has ended."""
+        ...
+
+    def newest(self, timeout: float | None) -> E_co:
+        """The newest item, seen before or not; waits for the first one, and raises as `next`."""
         ...
 
 
@@ -183,6 +188,16 @@ class AeroStreamData(PaperNames, IAeroData[E], Generic[E]):
         Raises GraphError before the mission has started, TimeoutError when nothing came, and
         StopIteration once the mission has ended.
         """
+        return self._live().next(timeout)
+
+    def get_newest(self, timeout: float | None = None) -> E:
+        """Return the newest item in flight, waiting up to `timeout` seconds for the first one.
+
+        Raises what `get_data` raises.
+        """
+        return self._live().newest(timeout)
+
+    def _live(self) -> StreamReader[E]:
         if self._reader is None:
             if self.graph.reader is None:
                 message = (
@@ -191,7 +206,7 @@ class AeroStreamData(PaperNames, IAeroData[E], Generic[E]):
                 )
                 raise _refuse(message)
             self._reader = self.graph.reader(self.name)
-        return self._reader.next(timeout)
+        return self._reader
 
     def set_data(self, data: E) -> None:
         """Refuse: a stream's data comes from its node."""

@@ -14,17 +14,18 @@ from aerodaas.interfaces import ICompute, IPullSensor, IPushSensor
 from aerodaas.names import PaperNames
 from aerodaas.status import MissionStatus
 
-__all__ = ["Compute", "Sensor"]
+__all__ = ["SENSOR_ITEMS", "Compute", "Sensor"]
 
 E = TypeVar("E")
 
-_ITEMS: dict[str, type] = {
+SENSOR_ITEMS: dict[str, type] = {
     "camera": Frame,
     "odometry": Odometry,
     "gps": GpsFix,
     "battery": Battery,
     "status": MissionStatus,
 }
+"""Type of the items of each type of sensor."""
 
 
 class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
@@ -49,7 +50,7 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
         known: dict[str, Any] = {
             "id": self._config.id,
             "type": self._config.type,
-            "driver": self._config.driver,
+            "driver": self._config.driver or "",
             "rate": self._config.rate,
             "robot": self._robot or "",
             **self._config.settings,
@@ -61,7 +62,7 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
     def get_data_stream(self) -> AeroStreamData[E]:
         """Return the stream of the sensor's data."""
         name = f"{self._robot}/{self._config.id}" if self._robot else self._config.id
-        item = _ITEMS[self._config.type]
+        item = SENSOR_ITEMS[self._config.type]
         if name not in self._graph.nodes:
             self._graph.add(Node(name, "sensor", item, self._config, self._robot))
         return AeroStreamData(self._graph, name, item)
@@ -86,7 +87,7 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
         """
         if self._poller is None:
             self._poller = self.get_data_stream()
-        return self._poller.get_data(timeout)
+        return self._poller.get_newest(timeout)
 
 
 class Compute(PaperNames, ICompute):

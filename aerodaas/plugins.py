@@ -14,15 +14,17 @@ from aerodaas.errors import AeroDaaSError, ConfigError, UnknownIdError
 
 __all__ = ["PluginKind", "load_plugin", "plugin_names"]
 
-PluginKind = Literal["drivers", "cameras", "waypoint_schedulers"]
+PluginKind = Literal["drivers", "cameras", "waypoint_schedulers", "analytics_schedulers"]
 
 _BUILT_IN: dict[PluginKind, dict[str, str]] = {
     "drivers": {
         "simulated": "aerodaas.drivers.simulated:SimulatedVehicle",
+        "tello": "aerodaas.drivers.tello.vehicle:TelloVehicle",
         "replayed": "aerodaas.drivers.replayed:ReplayedVehicle",
     },
     "cameras": {
         "simulated": "aerodaas.cameras.simulated:SimulatedCamera",
+        "tello": "aerodaas.cameras.tello:TelloCamera",
         "recorded": "aerodaas.cameras.recorded:recorded_camera",
         "folder": "aerodaas.cameras.folder:FolderCamera",
         "video": "aerodaas.cameras.video:VideoCamera",
@@ -37,6 +39,24 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
         "priority": "aerodaas.schedulers.waypoint.priority:PriorityScheduler",
         "deadline": "aerodaas.schedulers.waypoint.deadline:DeadlineScheduler",
         "optimal": "aerodaas.schedulers.waypoint.optimal:OptimalScheduler",
+    },
+    "analytics_schedulers": {
+        "fifo": "aerodaas.schedulers.analytics.edge_only:Fifo",
+        "edf": "aerodaas.schedulers.analytics.edge_only:Edf",
+        "sjf": "aerodaas.schedulers.analytics.edge_only:Sjf",
+        "hbf": "aerodaas.schedulers.analytics.edge_only:Hbf",
+        "huf": "aerodaas.schedulers.analytics.edge_only:Huf",
+        "hpf": "aerodaas.schedulers.analytics.edge_only:Hpf",
+        "cld": "aerodaas.schedulers.analytics.cloud_only:CloudOnly",
+        "ec_edf": "aerodaas.schedulers.analytics.edge_cloud:EdgeCloudEdf",
+        "ec_sjf": "aerodaas.schedulers.analytics.edge_cloud:EdgeCloudSjf",
+        "dem": "aerodaas.schedulers.analytics.dem:Dem",
+        "dems": "aerodaas.schedulers.analytics.dems:Dems",
+        "dems_a": "aerodaas.schedulers.analytics.dems_a:DemsA",
+        "gems": "aerodaas.schedulers.analytics.gems:Gems",
+        "kalmia": "aerodaas.schedulers.analytics.kalmia:Kalmia",
+        "dedas": "aerodaas.schedulers.analytics.dedas:Dedas",
+        "margin": "aerodaas.schedulers.analytics.margin:Margin",
     },
 }
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import atexit
+import contextlib
+import threading
 import time
 from collections.abc import Callable
 from datetime import datetime
@@ -11,12 +13,14 @@ from typing import TYPE_CHECKING
 
 from aerodaas.clock import seconds
 from aerodaas.config import EnvironmentConfig
-from aerodaas.errors import AeroDaaSError, ConfigError, MissionError
+from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, MissionError
 from aerodaas.navigation.commands import Answer, Command, End
 from aerodaas.options import RunOptions, current_options
+from aerodaas.signals import Terminated, raise_on_termination
 from aerodaas.status import MissionState
 
 if TYPE_CHECKING:
+    from aerodaas.actors._base import ActorReport
     from aerodaas.actors.flight import Flight, FlightState
     from aerodaas.actors.plan import FlightPlan
     from aerodaas.environment import Environment
@@ -24,6 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["Run"]
 
 _POLL_SECONDS = 0.1
+_BEAT_SECONDS = 1.0
 _LANDING_SECONDS = 60.0
 """Wall time that an interrupted run gives its drones to land."""
 _RECORDING = "flight.mcap"
@@ -43,7 +48,9 @@ class Run:
         self.state: FlightState | None = None
         self._environment = environment
         self._flight: Flight | None = None
-        self._finished = False
+        self._over = False
+        self._finished = threading.Event()
+        self._polling = threading.Lock()
         self._began = time.monotonic()
         self._launched = self._began
 
@@ -69,6 +76,7 @@ class Run:
         with Starting(self.options) as starting:
             starting.step("starting Ray")
             cluster.connect(self.options.address)
+            raise_on_termination()
             plan = self._plan()
             provenance = Provenance.collect(
                 app=self.options.application, config=self.config, speed=self._speed_text()
@@ -82,35 +90,61 @@ class Run:
         self._flight = flight
         self._launched = time.monotonic()
         session = plan.session
-        self.graph.reader = lambda stream: LiveReader(session, stream, lambda: self._finished)
+
+        def read(stream: str) -> LiveReader:
+            if stream not in flight.streams:
+                raise GraphError(
+                    f"{stream} does not run: call get_data_stream() before start_mission()"
+                )
+            return LiveReader(session, stream, lambda: self._over)
+
+        self.graph.reader = read
         for callback in self.graph.on_launch:
             callback()
-        atexit.register(self._abandon)
+        threading.Thread(target=self._keep_alive, name="heartbeat", daemon=True).start()
+        atexit.register(self.abandon)
 
     def command(self, robot: str, command: Command) -> Answer:
         """Tell a robot's mission something; raises MissionError once the run is over."""
-        if self._flight is None or self._finished:
+        if self._flight is None or self._finished.is_set():
             raise MissionError(f"{robot} is no longer flying")
         return self._flight.command(robot, command)
 
     def look(self, newest: int = 200) -> FlightState:
         """Return the present state, with the `newest` latencies of each robot."""
         assert self._flight is not None  # noqa: S101 - launched
-        self.state = self._flight.poll(newest)
+        with self._polling:
+            self.state = self._flight.poll(newest)
+        self._over = self.state.over
         return self.state
+
+    def _keep_alive(self) -> None:
+        """Tell the drones that the application lives, whatever it is busy with."""
+        while not self._finished.wait(_BEAT_SECONDS):
+            # Whoever waits for the run meets the same error and deals with it.
+            with contextlib.suppress(AeroDaaSError):
+                self.look()
+
+    def reports(self) -> dict[str, ActorReport]:
+        """The newest report of each actor, by its name."""
+        assert self._flight is not None  # noqa: S101 - launched
+        return self._flight.reports()
 
     def wait(self) -> None:
         """Watch until every mission has ended; raises what they ended with.
 
         Ctrl-C lands the drones first; a second one stops at once.
         """
-        if self._finished:
+        if self._finished.is_set():
             return
         assert self._flight is not None  # noqa: S101 - launched
         try:
             self._watch(float("inf"))
         except KeyboardInterrupt:
             self._land("interrupted from the keyboard")
+            raise
+        except SystemExit as error:
+            self._land(error.reason if isinstance(error, Terminated) else "the application exits")
             raise
         except AeroDaaSError:
             self._land("the run failed")
@@ -174,10 +208,12 @@ class Run:
         from aerodaas.console import show_results, show_speed  # noqa: PLC0415
 
         assert self._flight is not None  # noqa: S101 - launched
-        self._finished = True
-        atexit.unregister(self._abandon)
+        self._finished.set()
+        self._over = True
+        atexit.unregister(self.abandon)
         flown = time.monotonic() - self._launched
-        self._flight.stop()
+        with self._polling:
+            self._flight.stop()
         for hook in self.on_end:
             hook()
         stamps = [robot.status.stamp for robot in self.state.robots.values()] if self.state else []
@@ -186,9 +222,9 @@ class Run:
         )
         show_results(self.options, self._flight.recording)
 
-    def _abandon(self) -> None:
-        """The application ended without waiting: land, then stop."""
-        if not self._finished:
+    def abandon(self) -> None:
+        """Land and stop: the application has ended without waiting."""
+        if not self._finished.is_set():
             self._land("the application ended")
             self._finish()
 

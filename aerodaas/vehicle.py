@@ -10,12 +10,14 @@ import enum
 from dataclasses import dataclass, field
 from typing import Protocol, TypeAlias, runtime_checkable
 
+from aerodaas.clock import Clock
 from aerodaas.data import Battery, GpsFix, Odometry
 from aerodaas.geometry import Vector
 from aerodaas.records import travels
 
 __all__ = [
     "Capabilities",
+    "ClockedVehicle",
     "PlayedVehicle",
     "PositionSetpoint",
     "Setpoint",
@@ -155,6 +157,15 @@ class SteppedVehicle(Vehicle, Protocol):
 
     def advance_to(self, stamp: int) -> None:
         """Simulate up to mission time `stamp`, in nanoseconds."""
+        ...
+
+
+@runtime_checkable
+class ClockedVehicle(Vehicle, Protocol):
+    """A vehicle whose time is its own, and whose states are stamped by the mission's clock."""
+
+    def use_clock(self, clock: Clock) -> None:
+        """Stamp states by `clock` from now on; called when the mission starts."""
         ...
 
 

@@ -59,7 +59,7 @@ class Flyer:
         record = self.folder / "flight"
         token = current_options.set(RunOptions(**{"view": False, "record": record, **words}))
         try:
-            with patch("aerodaas.console.show_results"):
+            with patch("aerodaas.console.show_results"), patch("aerodaas.console.show_speed"):
                 yield
         finally:
             current_options.reset(token)
@@ -74,13 +74,28 @@ class Flyer:
 
         `build` must call `navigate`; `words` are fields of RunOptions.
         """
+        with self.flying(build, content, **words) as environment:
+            return environment.launch()
+
+    @contextmanager
+    def flying(
+        self,
+        build: Callable[[Environment], object],
+        content: dict[str, Any] | None = None,
+        **words: Any,  # noqa: ANN401
+    ) -> Iterator[Environment]:
+        """Fly as `fly` does, and let the test act in flight; its end waits for the mission's."""
         path = self.write(content or FLAT)
         with self.options(**words):
             environment = Environment(path)
             build(environment)
             run = environment.launch()
+            try:
+                yield environment
+            except BaseException:
+                run.abandon()
+                raise
             run.wait()
-        return run
 
 
 def recorded(run: Run) -> Flight:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import logging
 import os
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 import cv2
 import numpy as np
@@ -25,8 +26,8 @@ _FIRST_FRAME_TIMEOUT = 10.0
 _READ_TIMEOUT_MS = 3000
 _SHORTEST_WAIT = 0.5
 _LONGEST_WAIT = 8.0
-# FFmpeg otherwise gathers frames before it gives out the first.
-_LOW_LATENCY = "rtsp_transport;tcp|fflags;nobuffer|flags;low_delay"
+_OPTIONS = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
+_OPENING = threading.Lock()
 
 
 class LiveSource:
@@ -48,7 +49,6 @@ class LiveSource:
 
     def open(self) -> NDArray[np.uint8]:
         """Start decoding and return the first frame; raises SourceError if none comes."""
-        os.environ.setdefault("OPENCV_FFMPEG_CAPTURE_OPTIONS", _LOW_LATENCY)
         self._thread = threading.Thread(target=self._decode, name="live-source", daemon=True)
         self._thread.start()
         if not self._arrived.wait(self._timeout):
@@ -118,4 +118,22 @@ def _connect(address: str) -> cv2.VideoCapture:
         cv2.CAP_PROP_READ_TIMEOUT_MSEC,
         _READ_TIMEOUT_MS,
     ]
-    return cv2.VideoCapture(address, cv2.CAP_FFMPEG, timeouts)
+    with _low_latency():
+        return cv2.VideoCapture(address, cv2.CAP_FFMPEG, timeouts)
+
+
+@contextmanager
+def _low_latency() -> Iterator[None]:
+    """Have a capture that is opened meanwhile gather no frames before it gives out the first.
+
+    OpenCV takes FFmpeg's options from the environment only, where they would spoil the reading of
+    files that are opened later.
+    """
+    with _OPENING:
+        before = os.environ.get(_OPTIONS)
+        os.environ.setdefault(_OPTIONS, "rtsp_transport;tcp|fflags;nobuffer|flags;low_delay")
+        try:
+            yield
+        finally:
+            if before is None:
+                del os.environ[_OPTIONS]

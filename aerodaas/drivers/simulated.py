@@ -12,8 +12,9 @@ from pydantic import ValidationError
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.drivers.setpoints import require_finite
 from aerodaas.errors import ClockError, ConfigError, InvalidWaypointError, VehicleError
-from aerodaas.geometry import GeodeticOrigin, Vector
+from aerodaas.geometry import GeodeticOrigin
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, STEP_NS, Multirotor
@@ -164,7 +165,7 @@ class SimulatedVehicle:
         Raises InvalidWaypointError for numbers that are not finite, and VehicleError on the
         ground, during take-off and when the drone's own protection has taken over.
         """
-        _require_finite(self._name, setpoint)
+        require_finite(self._name, setpoint)
         self._require_flight("follow a setpoint")
         if self._autopilot.mode is VehicleMode.TAKING_OFF:
             raise VehicleError(
@@ -221,23 +222,6 @@ class SimulatedVehicle:
             raise VehicleError(f"{self._name} cannot {deed} on the ground; take off first")
         if self._autopilot.mode is VehicleMode.FAILSAFE:
             raise VehicleError(f"{self._name} cannot {deed}: it is landing on its last charge")
-
-
-def _require_finite(name: str, setpoint: Setpoint) -> None:
-    if isinstance(setpoint, VelocitySetpoint):
-        vector: Vector = setpoint.velocity
-        scalars: dict[str, float | None] = {"yaw_rate": setpoint.yaw_rate}
-    else:
-        vector = setpoint.position
-        scalars = {"yaw": setpoint.yaw, "speed": setpoint.speed}
-    if np.shape(vector) != (3,) or not np.isfinite(vector).all():
-        raise InvalidWaypointError(f"{name}: a setpoint needs three finite numbers, not {vector}")
-    for key, value in scalars.items():
-        if value is not None and not math.isfinite(value):
-            raise InvalidWaypointError(f"{name}: a setpoint's {key} must be finite, not {value}")
-    speed = scalars.get("speed")
-    if speed is not None and speed <= 0:
-        raise InvalidWaypointError(f"{name}: a setpoint's speed must be positive, not {speed}")
 
 
 def _explain(name: str, error: ValidationError) -> str:

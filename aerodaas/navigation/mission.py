@@ -332,8 +332,16 @@ class Mission:
         """Whether to hold for the plan that is being made, rather than set out for `stop`."""
         if not self._navigator.waits_for_plan or stop.under_way:
             return False
-        waited = seconds(self._now - self._machine.since)
-        return self.state is not MissionState.HOLDING or waited < self._options.plan_timeout
+        timeout = self._options.plan_timeout
+        if self.state is not MissionState.HOLDING:
+            return True
+        if seconds(self._now - self._machine.since) < timeout:
+            return True
+        text = f"no plan within {timeout:g} s: flying the order given"
+        if self._navigator.fault != text:
+            self._navigator.fault = text
+            self._log.alert(self._now, "scheduler", text)
+        return False
 
     def _finish(self, stop: Stop, phase: LegPhase) -> None:
         if phase is LegPhase.DONE:

@@ -13,10 +13,9 @@ from aerodaas.schedulers.analytics.base import (
     Task,
     WakeAt,
 )
-from aerodaas.schedulers.analytics.registry import REGISTERED, load_scheduler
+from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 
 __all__ = [
-    "REGISTERED",
     "AnalyticsScheduler",
     "Drop",
     "Profile",
@@ -27,4 +26,5 @@ __all__ = [
     "Task",
     "WakeAt",
     "load_scheduler",
+    "scheduler_names",
 ]

@@ -234,7 +234,7 @@ class AnalyticsScheduler:
 
     An instance is a recipe: each edge and each run gets a deep copy, then one `start`. Each
     event returns decisions (a list, or a generator that yields them). Every task that arrived
-    must be run, sent or dropped exactly once, by its deadline at the latest.
+    must be run, sent or dropped exactly once.
     """
 
     resources: Resources = Resources()

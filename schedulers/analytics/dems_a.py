@@ -25,6 +25,7 @@ TOLERANCE = 10 * MILLISECOND
 """Difference between the mean and the estimate that is not worth a change."""
 COOLING = 10 * NANOSECONDS
 """Time for which a model stays away from a cloud that became too slow for it."""
+_ANSWERED = (Outcome.DONE, Outcome.LATE)
 
 
 @dataclass(slots=True)
@@ -40,7 +41,7 @@ class DemsA(Dems):
 
     The first task that the estimate keeps away from the cloud starts a cooling time; after it
     the next one is a probe with the profile's time. A probe in time refills the window with its
-    own time; any other starts the cooling again. A time-out counts as an observation.
+    own time; any other starts the cooling again. A task that never came back has no observed time.
     """
 
     def __init__(self, *, published: bool = False) -> None:
@@ -85,7 +86,7 @@ class DemsA(Dems):
                 model.cloud_time, model.cooling_until = taken, None
             elif result.place is not Place.EDGE:
                 model.cooling_until = now + COOLING
-        elif result.place is Place.CLOUD:
+        elif result.place is Place.CLOUD and result.outcome in _ANSWERED:
             model.observed.append(taken)
             mean = sum(model.observed) // len(model.observed)
             if len(model.observed) == WINDOW and abs(mean - model.cloud_time) > TOLERANCE:

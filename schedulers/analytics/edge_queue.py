@@ -6,7 +6,6 @@ from bisect import bisect_right, insort_right
 from collections.abc import Iterable, Mapping
 
 from aerodaas.schedulers.analytics.base import (
-    MILLISECOND,
     AnalyticsScheduler,
     Decision,
     Drop,
@@ -95,6 +94,5 @@ class EdgeQueue(AnalyticsScheduler):
         return ()
 
     def observe(self) -> Mapping[str, float]:
-        """Length of the queue and the work in it."""
-        work = sum(task.profile.edge_time for task in self.queue)
-        return {"edge queue": len(self.queue), "edge queue (ms)": work / MILLISECOND}
+        """Length of the queue."""
+        return {"edge queue": len(self.queue)}

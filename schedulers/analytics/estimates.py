@@ -49,7 +49,7 @@ class ExecutionBeliefs:
         """Learn from one execution."""
         model = self._model(profile)
         offset, variance, count = model
-        error = taken - profile_time(profile, shared=self._shared) - offset - self.delay
+        error = taken - self._nominal(profile) - offset - self.delay
         if self._shared:
             self._uncertainty += _DRIFT * (now - self._at)
             self._at = now
@@ -65,26 +65,25 @@ class ExecutionBeliefs:
         model[2] += 1
         self._cache.clear()
 
-    def belief(self, profile: Profile, now: int) -> Belief:
+    def belief(self, profile: Profile) -> Belief:
         """The present belief about a model's execution time."""
         found = self._cache.get(profile.model)
         if found is None:
             offset, variance, _ = self._model(profile)
-            mean = profile_time(profile, shared=self._shared) + offset + self.delay
+            mean = self._nominal(profile) + offset + self.delay
             spread = variance + self._uncertainty + (MILLISECOND * MILLISECOND)
             found = self._cache[profile.model] = Belief(mean, sqrt(spread))
         return found
 
+    def _nominal(self, profile: Profile) -> int:
+        return profile.cloud_time if self._shared else profile.edge_time
+
     def _model(self, profile: Profile) -> list[float]:
         found = self._models.get(profile.model)
         if found is None:
-            nominal = profile_time(profile, shared=self._shared)
+            nominal = self._nominal(profile)
             found = self._models[profile.model] = [0.0, (_PRIOR_VARIATION * nominal) ** 2, 0]
         return found
-
-
-def profile_time(profile: Profile, *, shared: bool) -> int:
-    return profile.cloud_time if shared else profile.edge_time
 
 
 def chance(belief: Belief, room: float) -> float:

@@ -1,223 +1,318 @@
-"""prototype."""
+"""MARGIN: expected utility at the margin, planned ahead. The project's own scheduler.
+
+Idea. Every waiting task has a value in the cloud that fades as its time runs out, and a value on
+the edge that depends on when it would start. The edge is scarce, so what counts there is the
+difference: the gain over the cloud, with the chance of being late priced in.
+
+1. Execution times are distributions that are learned online (`estimates`); a cloud task is worth
+   benefit x chance(in time) - cost, so a placement that is likely to fail is never paid for.
+2. The edge follows a plan over the next second (`planner`): beam search over sequences of waiting
+   and of forecast tasks (`forecast`: video is periodic), by gain over the cloud less the price of
+   edge time. The plan stands until reality departs from it.
+3. A task waits for the edge only while waiting can still pay (`outlook.patience`, a marginal
+   condition instead of a fixed last moment); then it is kept if the plan runs it, else sent.
+4. A cloud whose answers are overdue is avoided; one cheap task a second goes to see (`outlook`).
+5. A success that decides a window's QoE bonus is worth that much more (`quality`).
+
+Sources: average-reward planning (Howard, 1960); the price of edge time is the dual of the
+fractional knapsack over the models' loads (Dantzig, 1957); deferral and stealing are those of
+DEMS (Raj et al., 2025). Cost: a plan takes width x lanes x steps evaluations, about 0.1 ms in
+Python, twice a second or when surprised; every other event takes O(log n) in the tasks waiting.
+"""
 
 from __future__ import annotations
 
-import os
-from collections import OrderedDict, deque
-from math import log, sqrt
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from heapq import heappop, heappush
+from math import exp
 
-from aerodaas.schedulers.analytics.base import *
-from aerodaas.schedulers.analytics.base import MILLISECOND
-from aerodaas.schedulers.analytics.estimates import ExecutionBeliefs, chance
+from aerodaas.clock import NANOSECONDS
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    STOLEN,
+    AnalyticsScheduler,
+    Decision,
+    Drop,
+    Outcome,
+    Place,
+    Profile,
+    QoeGoal,
+    Resources,
+    Result,
+    RunOnEdge,
+    SendToCloud,
+    Task,
+    WakeAt,
+)
+from aerodaas.schedulers.analytics.estimates import ExecutionBeliefs
+from aerodaas.schedulers.analytics.forecast import LATENESS, Forecast
+from aerodaas.schedulers.analytics.outlook import CloudOutlook
+from aerodaas.schedulers.analytics.planner import Job, Lane, plan
+from aerodaas.schedulers.analytics.quality import QualityWatch
 
-DEPTH = int(os.environ.get("DEPTH", 3))
-FORE = int(os.environ.get("FORE", 1))
-MARGIN = 5 * MILLISECOND
+__all__ = ["Margin"]
+
+HORIZON = 1_000 * MILLISECOND
+REPLAN = 500 * MILLISECOND
+"""A plan that reaches less far ahead is made anew."""
+GAP = 250 * MILLISECOND
+"""Longest time that the edge stays idle for a better task to come."""
+WIDTH = 4
+SURPRISE = 3 * MILLISECOND
+"""Departure from the expected end of an execution that calls for a new plan."""
+RETRY = 20 * MILLISECOND
+"""Between two looks for a free slot in a crowded cloud."""
+_MEMORY = 5 * NANOSECONDS
+_LOOK = 5
+"""Tasks of one model that the planner considers."""
 
 
-class Lane:
-    def __init__(self, profile):
-        self.profile = profile
-        self.tasks = deque()  # entries [task, kept]
-        self.streams = OrderedDict()  # source -> [last, period, regular]
-        self.waited = 1e9
-        self.stolen = 1.0
+@dataclass(slots=True)
+class _Model:
+    profile: Profile
+    quality: QualityWatch
+    waiting: dict[Task, bool] = field(default_factory=dict)
+    """In order of arrival; True once kept for the edge."""
+    forecast: Forecast = field(default_factory=Forecast)
+    rate: float = 0.0
+    """Arrivals per nanosecond, exponentially forgotten."""
+    seen: int = 0
+    on_edge: float = 1.0
+    waited: float = float(NANOSECONDS)
 
 
 class Margin(AnalyticsScheduler):
-    def __init__(self):
-        self.lanes = {}
+    """Plans the edge a second ahead by expected gain over the cloud, with the risk priced in."""
+
+    def __init__(self) -> None:
+        self.cloud = CloudOutlook()
         self.edge = ExecutionBeliefs(shared=False)
-        self.cloud = ExecutionBeliefs(shared=True)
-        self.free_at = 0
-        self.rate = 0.0  # value of edge time per ns
-        self.gained = 0.0
-        self.spent = 0.0
-        self.last_edge = 0
-        self.kept = {}
+        self._models: dict[str, _Model] = {}
+        self._due: list[tuple[int, int, Task]] = []
+        """When each waiting task needs a decision, a heap; entries of others are stale."""
+        self._wakes: list[int] = []
+        """Timers asked for that have not come yet, a heap."""
+        self._free_at = 0.0
+        self._steps: list[tuple[float, Lane, Job]] = []
+        self._planned: set[Task] = set()
+        self._plan_end = 0.0
+        self._stale = True
 
-    def lane(self, task):
-        l = self.lanes.get(task.profile.model)
-        if l is None:
-            l = self.lanes[task.profile.model] = Lane(task.profile)
-        return l
+    def start(self, resources: Resources, now: int) -> None:
+        """Begin a run."""
+        super().start(resources, now)
+        self.cloud.resources = resources
 
-    # -- worth
-    def alt(self, profile, slack, now):
-        """Value of sending now"""
-        if not self.resources.cloud_slots or profile.cloud_gain <= 0:
-            return 0.0
-        b = self.cloud.belief(profile, now)
-        return max(0.0, profile.benefit * chance(b, slack - MARGIN / 5) - profile.cloud_cost)
+    def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
+        """Let the task wait for as long as that can pay, or send it as a probe."""
+        model = self._model(task.profile)
+        model.quality.arrival(task.arrival)
+        model.rate = model.rate * exp((model.seen - now) / _MEMORY) + 1 / _MEMORY
+        model.seen = now
+        self._stale |= not model.forecast.arrived(task.source, now)
+        self._fill_step(task)
+        self.cloud.listen(now)
+        value = self._cloud_value(model, task, now)
+        if (
+            task not in self._planned
+            and value <= 0
+            and self._is_cheapest(model)
+            and self.cloud.wants_probe(now)
+        ):
+            self.cloud.sent(task, now)
+            return [SendToCloud(task, "probe of the cloud")]
+        model.waiting[task] = False
+        heappush(self._due, (self._due_at(model, task, now, value), task.id, task))
+        return self._wake_up(now)
 
-    def leave_slack(self, lane, now):
-        b = self.cloud.belief(lane.profile, now)
-        profile = lane.profile
-        w = max(1.0, profile.edge_gain - profile.cloud_gain)
-        r = lane.stolen / lane.waited
-        x = r * w * b.sigma * 2.5066 / profile.benefit
-        z = sqrt(-2 * log(x)) if x < 0.6 else 1.0
-        return b.mean + min(max(z, 1.0), 3.0) * b.sigma + MARGIN
-
-    def task_arrived(self, task, now):
-        lane = self.lane(task)
-        s = lane.streams.get(task.source)
-        if s is None:
-            lane.streams[task.source] = [now, 0, 0]
-        else:
-            gap = now - s[0]
-            s[2] = s[2] + 1 if abs(gap - s[1]) < 0.05 * gap else 0
-            s[0], s[1] = now, gap
-            lane.streams.move_to_end(task.source)
-        lane.tasks.append(task)
-        if self.alt(task.profile, task.deadline - now, now) > 0:
-            at = int(max(now, task.deadline - self.leave_slack(lane, now)))
-            if at <= now:
-                return list(self.leave(lane, task, now))
-            return [WakeAt(at)]
-        return [WakeAt(self.last_start(task, now))]
-
-    def last_start(self, task, now):
-        b = self.edge.belief(task.profile, now)
-        return int(max(now + 1, task.deadline - b.mean + b.sigma))
-
-    def timer(self, now):
-        out = []
-        for lane in self.lanes.values():
-            if not lane.tasks:
+    def timer(self, now: int) -> Iterable[Decision]:
+        """Decide about the tasks for which waiting no longer pays."""
+        while self._wakes and self._wakes[0] <= now:
+            heappop(self._wakes)
+        self.cloud.listen(now)
+        decisions: list[Decision] = []
+        while self._due and self._due[0][0] <= now:
+            task = heappop(self._due)[2]
+            model = self._models[task.profile.model]
+            if task not in model.waiting:
                 continue
-            slack = self.leave_slack(lane, now)
-            for task in list(lane.tasks):
-                if task in self.kept or self.alt(task.profile, task.deadline - now, now) <= 0:
-                    b = self.edge.belief(task.profile, now)
-                    if task.deadline - now <= b.mean - b.sigma + 1:
-                        lane.tasks.remove(task)
-                        self.kept.pop(task, None)
-                        out.append(Drop(task, "no time left on the edge"))
-                    elif task.deadline - b.mean + b.sigma > now:
-                        pass
-                elif task.deadline - now <= slack + 1:
-                    out.extend(self.leave(lane, task, now))
-                else:
-                    break
-        return out
-
-    def leave(self, lane, task, now):
-        if task in self.plan(max(self.free_at, now), now, task)[1]:
-            self.kept[task] = True
-            return [WakeAt(self.last_start(task, now))]
-        lane.tasks.remove(task)
-        lane.waited += now - task.arrival
-        return [
-            SendToCloud(
-                task,
-                "worth more in the cloud",
-                task.deadline - int(self.cloud.belief(task.profile, now).mean),
-            )
-        ]
-
-    def plan(self, t0, now, focus=None):
-        """-> best score, list of (task or None)"""
-        lanes = []
-        for lane in self.lanes.values():
-            profile = lane.profile
-            b = self.edge.belief(profile, now)
-            c = max(0.0, profile.cloud_gain)
-            items = []
-            for task in lane.tasks:
-                a = 0.0 if task in self.kept else self.alt(profile, task.deadline - now, now)
-                if task.deadline - t0 > b.mean - b.sigma:
-                    items.append(
-                        (
-                            t0,
-                            task.deadline,
-                            profile.edge_gain + profile.edge_cost,
-                            profile.edge_cost + a,
-                            task,
-                        )
-                    )
-            if FORE:
-                k = 0
-                for last, period, regular in lane.streams.values():
-                    if regular < 2:
-                        continue
-                    at = last + period
-                    if at < now - 20 * MILLISECOND:
-                        continue
-                    at = max(at, now + 1)
-                    if at > t0 + 800 * MILLISECOND or k >= 3:
-                        break
-                    a = self.alt(profile, profile.deadline, now)
-                    items.append(
-                        (at, at + profile.deadline, profile.benefit, profile.edge_cost + a, None)
-                    )
-                    k += 1
-            if items:
-                lanes.append((b, items))
-        rho = self.rate
-        best = [0.0, []]
-        n = len(lanes)
-        idx = [0] * n
-        chosen = []
-
-        def go(t, score, depth):
-            for li in range(n):
-                b, items = lanes[li]
-                i0 = idx[li]
-                mean = b.mean
-                lim = t + mean - b.sigma
-                i = i0
-                while i < len(items) and items[i][1] < lim:
-                    i += 1
-                if i == len(items):
+            kept = model.waiting[task]
+            value = 0.0 if kept else self._cloud_value(model, task, now)
+            due = self._due_at(model, task, now, value)
+            if due <= now and value > 0:
+                self._refresh(now)
+                if task not in self._planned:
+                    decisions.append(self._send(model, task, now))
                     continue
-                start, deadline, benefit, cost, task = items[i]
-                s = max(t, start)
-                end = s + mean
-                g = benefit * chance(b, deadline - s) - cost
-                if g <= 0:
-                    continue
-                sc = score + g - rho * (end - t)
-                chosen.append((s, task))
-                if sc > best[0]:
-                    best[0] = sc
-                    best[1] = list(chosen)
-                if depth > 1:
-                    idx[li] = i + 1
-                    go(end, sc, depth - 1)
-                    idx[li] = i0
-                chosen.pop()
+                model.waiting[task] = True
+                due = self._due_at(model, task, now, 0.0)
+            if due <= now:
+                decisions.append(self._drop(model, task))
+            else:
+                heappush(self._due, (due, task.id, task))
+        decisions.extend(self._wake_up(now))
+        return decisions
 
-        go(t0, 0.0, DEPTH)
-        return best[0], [t for _, t in best[1]], best[1]
-
-    def executor_idle(self, now):
-        score, tasks, seq = self.plan(now, now)
-        if not seq:
+    def executor_idle(self, now: int) -> Iterable[Decision]:
+        """Follow the plan: run its first task, or wait for one that is due to arrive."""
+        self._refresh(now)
+        if self._steps and not isinstance(self._steps[0][2].what, Task):
+            expected = int(self._steps[0][2].release) + LATENESS
+            if now < expected:
+                return self._wake_up(now, expected)
+            self._stale = True
+            self._refresh(now)
+        if not self._steps or not isinstance(self._steps[0][2].what, Task):
             return ()
-        s, task = seq[0]
-        if task is None:
-            return [WakeAt(int(s))] if s > now else ()
-        lane = self.lane(task)
-        lane.tasks.remove(task)
-        lane.waited += now - task.arrival
-        lane.stolen += 1
-        b = self.edge.belief(task.profile, now)
-        a = 0 if self.kept.pop(task, None) else self.alt(task.profile, task.deadline - now, now)
-        gain = task.profile.benefit * chance(b, task.deadline - now) - task.profile.edge_cost - a
-        # average gain per elapsed time
-        dt = now + b.mean - self.last_edge
-        self.last_edge = now + b.mean
-        self.gained = self.gained * 0.98 + gain
-        self.spent = self.spent * 0.98 + dt
-        self.rate = self.gained / self.spent * float(os.environ.get("RHO", 1))
-        self.free_at = now + b.mean
-        return [RunOnEdge(task, "best plan")]
+        _, lane, job = self._steps.pop(0)
+        task: Task = job.what
+        self._planned.discard(task)
+        model = self._models[task.profile.model]
+        kept = model.waiting.pop(task)
+        model.waited += now - task.arrival
+        model.on_edge += 1
+        self._free_at = now + lane.time.mean
+        bound_for_cloud = not kept and task.profile.cloud_gain > 0
+        return [RunOnEdge(task, STOLEN if bound_for_cloud else "most valuable plan")]
 
-    def task_finished(self, result, now):
+    def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
+        """Learn from the result."""
+        task = result.task
+        model = self._model(task.profile)
+        model.quality.ended(task.arrival, in_time=result.outcome is Outcome.DONE)
         if result.place is Place.EDGE:
-            self.free_at = now
-            self.edge.observe(result.task.profile, result.finished - result.started, now)
-        elif result.place is Place.CLOUD and result.outcome is not Outcome.TIMEOUT:
-            self.cloud.observe(result.task.profile, result.finished - result.started, now)
+            self._stale |= abs(self._free_at - now) > SURPRISE
+            self._free_at = now
+            if result.outcome is not Outcome.FAILED:
+                self.edge.observe(task.profile, result.finished - result.started, now)
+        else:
+            self.cloud.finished(result, now)
         return ()
+
+    def observe(self) -> Mapping[str, float]:
+        """Tasks waiting, the network's delay, and whether the cloud is silent."""
+        return {
+            "waiting": sum(len(model.waiting) for model in self._models.values()),
+            "planned": len(self._steps),
+            "network delay (ms)": self.cloud.beliefs.delay / MILLISECOND,
+            "cloud silent": float(self.cloud.silent_since is not None),
+        }
+
+    def _model(self, profile: Profile) -> _Model:
+        model = self._models.get(profile.model)
+        if model is None:
+            model = _Model(profile, QualityWatch(profile.qoe or QoeGoal(0.0)))
+            self._models[profile.model] = model
+        return model
+
+    def _is_cheapest(self, model: _Model) -> bool:
+        cost = model.profile.cloud_cost
+        return all(cost <= other.profile.cloud_cost for other in self._models.values())
+
+    def _cloud_value(self, model: _Model, task: Task, now: int) -> float:
+        return self.cloud.value(model.profile, task.deadline - now, model.quality.worth())
+
+    def _due_at(self, model: _Model, task: Task, now: int, value: float) -> int:
+        """When the task needs a decision: to leave for the cloud, or to be given up."""
+        if value > 0 and self.cloud.slot_price > 0:
+            return now
+        if value > 0:
+            worth = max(model.profile.edge_gain - value, 0.0)
+            rate = model.on_edge / model.waited
+            return int(task.deadline - self.cloud.patience(model.profile, worth, rate))
+        belief = self.edge.belief(model.profile)
+        last = int(task.deadline - belief.mean + belief.sigma)
+        if self.cloud.crowded and not model.waiting.get(task) and model.profile.cloud_gain > 0:
+            return min(last, now + RETRY)
+        return last
+
+    def _wake_up(self, now: int, at: int | None = None) -> list[Decision]:
+        if self._due and (at is None or self._due[0][0] < at):
+            at = self._due[0][0]
+        if at is None or (self._wakes and self._wakes[0] <= at):
+            return []
+        at = max(at, now)
+        heappush(self._wakes, at)
+        return [WakeAt(at)]
+
+    def _send(self, model: _Model, task: Task, now: int) -> SendToCloud:
+        del model.waiting[task]
+        model.waited += now - task.arrival
+        self.cloud.sent(task, now)
+        return SendToCloud(task, "worth more there", self.cloud.latest_start(task))
+
+    def _drop(self, model: _Model, task: Task) -> Drop:
+        del model.waiting[task]
+        model.quality.ended(task.arrival, in_time=False)
+        self._stale |= task in self._planned
+        return Drop(task, "no longer worth its cost anywhere")
+
+    def _fill_step(self, task: Task) -> None:
+        """Put a task that came as forecast into its place in the plan."""
+        wanted = (task.profile.model, task.source)
+        for _, _, job in self._steps:
+            if job.what == wanted:
+                job.what = task
+                self._planned.add(task)
+                return
+
+    def _refresh(self, now: int) -> None:
+        """Make a new plan if the present one is wrong or runs out."""
+        if not self._stale and self._plan_end > now + REPLAN:
+            return
+        begin = max(self._free_at, now)
+        self._plan_end = begin + HORIZON
+        lanes = [
+            lane for model in self._models.values() if (lane := self._lane(model, begin, now)).jobs
+        ]
+        self._steps = plan(lanes, begin, self._plan_end, self._price(now), width=WIDTH, gap=GAP)
+        self._planned = {job.what for _, _, job in self._steps if isinstance(job.what, Task)}
+        self._stale = False
+
+    def _lane(self, model: _Model, begin: float, now: int) -> Lane:
+        profile = model.profile
+        bonus = model.quality.worth()
+        benefit = profile.benefit + bonus
+        belief = self.edge.belief(profile)
+        soonest = begin + belief.mean - belief.sigma
+        jobs: list[Job] = []
+        for task, kept in model.waiting.items():
+            if task.deadline > soonest:
+                room = task.deadline - now
+                elsewhere = 0.0 if kept else self.cloud.value(profile, room, bonus)
+                cost = profile.edge_cost + elsewhere
+                jobs.append(Job(task, begin, task.deadline, benefit, cost))
+                if len(jobs) == _LOOK:
+                    return Lane(belief, jobs)
+        cost = profile.edge_cost + self.cloud.value(profile, profile.deadline, bonus)
+        for at, source in model.forecast.due(now, int(begin + HORIZON)):
+            what = (profile.model, source)
+            jobs.append(Job(what, at, at + profile.deadline, benefit, cost))
+            if len(jobs) == _LOOK:
+                break
+        return Lane(belief, jobs)
+
+    def _price(self, now: int) -> float:
+        """Value of edge time, per nanosecond: what the best mix of models would earn on it.
+
+        Prices the cloud's slots on the way, from the same loads.
+        """
+        age = 1 - exp(-(now + NANOSECONDS / 10) / _MEMORY)
+        on_edge: list[tuple[float, float]] = []
+        in_cloud: list[tuple[float, float]] = []
+        for model in self._models.values():
+            profile = model.profile
+            rate = model.rate * exp((model.seen - now) / _MEMORY) / age
+            time = self.edge.belief(profile).mean
+            gain = profile.edge_gain - self.cloud.value(profile, profile.deadline)
+            on_edge.append((gain / time, rate * time))
+            time = self.cloud.beliefs.belief(profile).mean
+            if profile.cloud_gain > 0:
+                in_cloud.append((profile.cloud_gain / time, rate * time))
+        self.cloud.set_slot_price(in_cloud)
+        left, earned = 1.0, 0.0
+        for density, load in sorted(on_edge, reverse=True):
+            earned += min(left, load) * density
+            left = max(0.0, left - load)
+        return earned

@@ -1,4 +1,4 @@
-"""Analytics schedulers by name: registered here, by entry point, or `module:Class`.
+"""Analytics schedulers by registered name, `module:Class`, `file.py:Class`, or as they are.
 
 A published scheduler whose published code departs from its idea is mended by default;
 `dems_published` and the like give the behaviour of that code.
@@ -6,44 +6,24 @@ A published scheduler whose published code departs from its idea is mended by de
 
 from __future__ import annotations
 
-import importlib
 import importlib.util
 import sys
 from importlib.machinery import ModuleSpec, SourceFileLoader
-from importlib.metadata import entry_points
 from pathlib import Path
-from types import ModuleType
-from typing import cast
+from typing import Any, cast
 
 from aerodaas.errors import SchedulerError, UnknownIdError
+from aerodaas.plugins import load_plugin, plugin_names
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
 
-__all__ = ["ENTRY_POINTS", "REGISTERED", "load_scheduler"]
-
-ENTRY_POINTS = "aerodaas.analytics_schedulers"
-"""Entry-point group under which other packages register theirs."""
+__all__ = ["load_scheduler", "scheduler_names"]
 
 _PUBLISHED = "_published"
-_HERE = "aerodaas.schedulers.analytics"
-REGISTERED: dict[str, str] = {
-    "fifo": f"{_HERE}.edge_only:Fifo",
-    "edf": f"{_HERE}.edge_only:Edf",
-    "sjf": f"{_HERE}.edge_only:Sjf",
-    "hbf": f"{_HERE}.edge_only:Hbf",
-    "huf": f"{_HERE}.edge_only:Huf",
-    "hpf": f"{_HERE}.edge_only:Hpf",
-    "cld": f"{_HERE}.cloud_only:CloudOnly",
-    "ec_edf": f"{_HERE}.edge_cloud:EdgeCloudEdf",
-    "ec_sjf": f"{_HERE}.edge_cloud:EdgeCloudSjf",
-    "dem": f"{_HERE}.dem:Dem",
-    "dems": f"{_HERE}.dems:Dems",
-    "dems_a": f"{_HERE}.dems_a:DemsA",
-    "gems": f"{_HERE}.gems:Gems",
-    "kalmia": f"{_HERE}.kalmia:Kalmia",
-    "dedas": f"{_HERE}.dedas:Dedas",
-    "margin": f"{_HERE}.margin:Margin",
-}
-"""Names to `module:Class`, imported when asked for."""
+
+
+def scheduler_names() -> list[str]:
+    """The registered names, sorted."""
+    return plugin_names("analytics_schedulers")
 
 
 def load_scheduler(
@@ -58,36 +38,32 @@ def load_scheduler(
         return wanted
     if not isinstance(wanted, str):
         return _build(wanted, repr(wanted))
-    found = {**{e.name: e.value for e in entry_points(group=ENTRY_POINTS)}, **REGISTERED}
+    if ":" in wanted:
+        return _build(_import(wanted), wanted)
     name = wanted.replace("-", "_").lower()
-    published = name not in found and name.endswith(_PUBLISHED)
-    if published:
-        name = name.removesuffix(_PUBLISHED)
-    if ":" not in wanted and name not in found:
-        raise UnknownIdError("analytics scheduler", wanted, list(found))
-    module_name, _, class_name = found.get(name, wanted).rpartition(":")
-    made = getattr(_import(module_name, wanted), class_name, None)
-    if made is None:
-        raise SchedulerError(
-            f"{module_name} holds no class {class_name!r}, asked for by {wanted!r}"
-        )
-    return _build(made, wanted, **({"published": True} if published else {}))
+    idea = name.removesuffix(_PUBLISHED)
+    if name not in scheduler_names() and idea in scheduler_names() and idea != name:
+        return _build(_import(idea), wanted, published=True)
+    return _build(_import(name), wanted)
 
 
-def _import(module_name: str, wanted: str) -> ModuleType:
+def _import(wanted: str) -> Any:  # noqa: ANN401 - whatever the plug-in's author wrote there
     try:
-        if not module_name.endswith(".py"):
-            return importlib.import_module(module_name)
-        name = f"aerodaas_plugin_{Path(module_name).stem}"
-        loader = SourceFileLoader(name, module_name)
-        spec = importlib.util.spec_from_loader(name, loader, origin=module_name)
+        file, _, attribute = wanted.rpartition(":")
+        if not file.endswith(".py"):
+            return load_plugin("analytics_schedulers", wanted)
+        name = f"aerodaas_plugin_{Path(file).stem}"
+        loader = SourceFileLoader(name, file)
+        spec = importlib.util.spec_from_loader(name, loader, origin=file)
         module = importlib.util.module_from_spec(cast("ModuleSpec", spec))
         # Pickling an instance looks its class up in sys.modules.
         sys.modules[name] = module
         loader.exec_module(module)
+        return getattr(module, attribute)
+    except UnknownIdError:
+        raise
     except Exception as error:
-        raise SchedulerError(f"cannot import the scheduler {wanted!r}: {error!r}") from error
-    return module
+        raise SchedulerError(f"cannot import the scheduler {wanted!r}: {error}") from error
 
 
 def _build(made: object, wanted: str, **settings: bool) -> AnalyticsScheduler:

@@ -56,7 +56,7 @@ class _Block:
 
 
 def clairvoyant_bound(
-    path: SamplePath, *, grid: int = MILLISECOND, iterations: int = 60, decay: float = 0.94
+    path: SamplePath, *, grid: int = MILLISECOND, iterations: int = 40, decay: float = 0.9
 ) -> float:
     """Upper bound on the QoS utility of any scheduler on this path.
 
@@ -68,8 +68,8 @@ def clairvoyant_bound(
         return elsewhere
     blocks = _blocks(jobs)
     horizon = blocks[0].end + int(jobs.length.max()) + 1
-    prices = np.zeros(len(jobs.first))
-    best = np.inf
+    prices: _Floats = np.zeros(len(jobs.first))
+    best = float(jobs.worth.sum())
     step = float(jobs.worth.mean()) / 2
     for _ in range(iterations):
         value, taken = _longest_path(jobs, blocks, jobs.worth - prices, horizon)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from statistics import fmean, stdev
@@ -61,41 +61,52 @@ class Score:
 
 def score(tasks: Sequence[Task], trace: Trace) -> Score:
     """Judge one edge's run; a task counts in the QoE window in which it arrived."""
-    total = Score(tasks=len(tasks), undecided=len(trace.undecided))
-    windows: defaultdict[tuple[str, int], list[int]] = defaultdict(lambda: [0, 0])
-    for task in tasks:
-        profile = task.profile
-        total.tasks_by_model[profile.model] = total.tasks_by_model.get(profile.model, 0) + 1
-        if profile.qoe is not None:
-            windows[profile.model, task.arrival // profile.qoe.window][1] += 1
+    total = Score(
+        tasks=len(tasks),
+        undecided=len(trace.undecided),
+        migrated=trace.reasons[MIGRATED],
+        stolen=trace.reasons[STOLEN],
+        tasks_by_model=dict(Counter(task.profile.model for task in tasks)),
+    )
+    done: Counter[str] = Counter()
     for result in trace.results:
         profile = result.task.profile
-        taken = result.finished - result.started
+        total.qos += result.utility
+        if result.outcome is Outcome.DONE:
+            done[profile.model] += 1
+        elif result.place is not Place.NOWHERE:
+            total.late += 1
         if result.place is Place.EDGE:
             total.on_edge += 1
-            total.edge_busy += taken
+            total.edge_busy += result.finished - result.started
             total.cost += profile.edge_cost
         elif result.place is Place.CLOUD:
             total.in_cloud += 1
-            total.cloud_busy += taken
+            total.cloud_busy += result.finished - result.started
             total.cost += profile.cloud_cost
-        total.qos += result.utility
-        if result.outcome is Outcome.DONE:
-            total.done += 1
-            total.done_by_model[profile.model] = total.done_by_model.get(profile.model, 0) + 1
-            if profile.qoe is not None:
-                windows[profile.model, result.task.arrival // profile.qoe.window][0] += 1
-        elif result.place is not Place.NOWHERE:
-            total.late += 1
+    total.done_by_model = dict(done)
+    total.done = sum(done.values())
     total.dropped = total.tasks - total.done - total.late
-    goals = {task.profile.model: task.profile.qoe for task in tasks if task.profile.qoe}
-    for (model, _), (done, arrived) in windows.items():
-        goal = goals[model]
-        if done >= goal.share * arrived:
-            total.qoe += goal.bonus
-    total.migrated = trace.reasons[MIGRATED]
-    total.stolen = trace.reasons[STOLEN]
+    total.qoe = _bonuses(tasks, trace)
     return total
+
+
+def _bonuses(tasks: Sequence[Task], trace: Trace) -> float:
+    goals = {task.profile.model: task.profile.qoe for task in tasks if task.profile.qoe}
+    done: Counter[tuple[str, int]] = Counter()
+    arrived: Counter[tuple[str, int]] = Counter()
+    for task in tasks:
+        if (goal := task.profile.qoe) is not None:
+            arrived[task.profile.model, task.arrival // goal.window] += 1
+    for result in trace.results:
+        goal = result.task.profile.qoe
+        if goal is not None and result.outcome is Outcome.DONE:
+            done[result.task.profile.model, result.task.arrival // goal.window] += 1
+    return sum(
+        goals[window[0]].bonus
+        for window, count in arrived.items()
+        if done[window] >= goals[window[0]].share * count
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ import csv
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from aerodaas.clock import NANOSECONDS
@@ -31,6 +32,7 @@ class Network:
     name: str = "steady"
     latency: Curve = ()
     outages: tuple[tuple[int, int], ...] = ()
+    """Begin and end, nanoseconds."""
     bandwidth: Curve = ()
     upload: int = 40_000
     """Bytes of a one-second segment; about 40 kB in the published setup's 25 fps clips."""
@@ -102,7 +104,7 @@ class Network:
 def _linear(curve: Curve, at: int) -> float:
     if at <= curve[0][0]:
         return curve[0][1]
-    for (left, low), (right, high) in zip(curve, curve[1:], strict=False):
+    for (left, low), (right, high) in pairwise(curve):
         if at < right:
             return low + (high - low) * (at - left) / (right - left)
     return curve[-1][1]

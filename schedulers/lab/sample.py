@@ -41,4 +41,7 @@ class SamplePath:
             max(1, int(task.profile.cloud_time * factor))
             for task, factor in zip(tasks, cloud_factors, strict=True)
         ]
+        for number, arrival in enumerate(workload.arrivals_at(edge)):
+            edge_times[number] = arrival.edge_time or edge_times[number]
+            cloud_times[number] = arrival.cloud_time or cloud_times[number]
         return cls(tasks, edge_times, cloud_times, network)

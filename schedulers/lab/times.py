@@ -6,7 +6,7 @@ import math
 import random
 from dataclasses import dataclass
 from statistics import NormalDist
-from typing import Literal
+from typing import Literal, cast
 
 from aerodaas.errors import SchedulerError
 
@@ -37,6 +37,33 @@ class ExecutionTimes:
             0 < self.quantile < 1 and self.distribution == "lognormal"
         ):
             raise SchedulerError("a quantile lies between 0 and 1 and goes with lognormal times")
+
+    @classmethod
+    def named(cls, text: str) -> ExecutionTimes:
+        """Read `nominal`, `lognormal:0.15`, `gamma:0.15` or `lognormal:0.15@0.95`.
+
+        The first figure is the coefficient of variation, the second one the quantile. Raises
+        SchedulerError.
+        """
+        name, _, setting = text.partition(":")
+        variation, _, quantile = setting.partition("@")
+        try:
+            return cls(
+                cast("Literal['nominal', 'lognormal', 'gamma']", name),
+                float(variation or 0.0),
+                float(quantile) if quantile else None,
+            )
+        except ValueError:
+            raise SchedulerError(
+                f"times {text!r}: write nominal, lognormal:0.15 or gamma:0.15"
+            ) from None
+
+    @property
+    def name(self) -> str:
+        """As `named` reads it."""
+        quantile = "" if self.quantile is None else f"@{self.quantile:g}"
+        spread = "" if self.distribution == "nominal" else f":{self.variation:g}{quantile}"
+        return f"{self.distribution}{spread}"
 
     def factors(self, count: int, draw: random.Random) -> list[float]:
         """Draw `count` factors, all positive."""

@@ -59,7 +59,10 @@ class Workload:
 
     @classmethod
     def named(cls, name: str, duration: int = 300 * NANOSECONDS) -> Workload:
-        """Make `3D-A` (3 drones, all models), `4D-P` (four models), `80D-A/7` (over 7 edges)."""
+        """Make `3D-A` (3 drones, all models), `4D-P` (four models) or `80D-A/7` (over 7 edges).
+
+        Raises UnknownIdError for any other name.
+        """
         match = _NAME.fullmatch(name)
         if match is None:
             raise UnknownIdError("workload", name, [*SIX, "80D-A/7", "a JSON file"])
@@ -80,7 +83,16 @@ class Workload:
     def tasks(self, edge: int, draw: random.Random) -> list[Task]:
         """The tasks of one edge in order of arrival, numbered from zero."""
         if self.arrivals:
-            return self._listed(edge)
+            return [
+                Task(
+                    number,
+                    self.models[a.model],
+                    a.at,
+                    a.at + self.models[a.model].deadline,
+                    a.source,
+                )
+                for number, a in enumerate(self.arrivals_at(edge))
+            ]
         phases = {
             f"drone{drone}": draw.randrange(self.period)
             for drone in range(edge, self.drones, self.edges)
@@ -100,10 +112,6 @@ class Workload:
             ]
         return tasks
 
-    def _listed(self, edge: int) -> list[Task]:
-        here = sorted((a for a in self.arrivals if a.edge == edge), key=lambda a: a.at)
-        return [
-            Task(number, profile, a.at, a.at + profile.deadline, a.source)
-            for number, a in enumerate(here)
-            for profile in [self.models[a.model]]
-        ]
+    def arrivals_at(self, edge: int) -> list[Arrival]:
+        """The listed tasks of one edge, in the order in which `tasks` numbers them."""
+        return sorted((a for a in self.arrivals if a.edge == edge), key=lambda a: a.at)

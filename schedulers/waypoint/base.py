@@ -77,6 +77,9 @@ class TrajectoryScheduler(PaperNames, INavigate):
     """
 
     replans_on_arrival: bool = False
+    isolated: bool = True
+    """Plan in a process of its own, which may take long, hang or die; False for a scheduler that
+    surely answers within some milliseconds."""
 
     def __init__(self, environment: IEnvironment | None = None) -> None:
         """Belong to `environment`, whose graph records the navigation."""

@@ -21,6 +21,7 @@ class NearestNeighborScheduler(TrajectoryScheduler):
     """
 
     replans_on_arrival = True
+    isolated = False
 
     def plan(self, pending: Sequence[Waypoint], situation: Situation) -> Sequence[Waypoint]:
         """Chain nearest neighbours."""

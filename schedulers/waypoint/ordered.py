@@ -13,6 +13,8 @@ __all__ = ["OrderedScheduler"]
 class OrderedScheduler(TrajectoryScheduler):
     """Visits waypoints in the order in which they were added."""
 
+    isolated = False
+
     def plan(self, pending: Sequence[Waypoint], situation: Situation) -> Sequence[Waypoint]:  # noqa: ARG002
         """Keep the order."""
         return pending

@@ -17,6 +17,7 @@ class PriorityScheduler(TrajectoryScheduler):
     """Serves waypoints by urgency; preemption between priorities is the queue's own doing."""
 
     replans_on_arrival = True
+    isolated = False
 
     def plan(self, pending: Sequence[Waypoint], situation: Situation) -> Sequence[Waypoint]:
         """Sort by priority and deadline; the nearest of equals comes next, seen from each stop."""

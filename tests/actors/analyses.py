@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from pathlib import Path
 from typing import ClassVar
 
 from aerodaas import (
@@ -90,11 +91,22 @@ class Broken(Analytics[float]):
 
 
 class ProcessId(Analytics[int]):
-    """Says in which process it runs."""
+    """Says in which process it runs; takes long to restart, as a neural network does."""
 
     accepts: ClassVar[tuple[type, ...]] = (Odometry,)
     produces: ClassVar[type] = int
     isolated = True
+
+    def __init__(self, marker: str) -> None:
+        """`marker` is a file that tells that it was opened before."""
+        self._marker = marker
+
+    def open(self) -> None:
+        """Be slow the second time."""
+        marker = Path(self._marker)
+        if marker.exists():
+            time.sleep(6.5)
+        marker.touch()
 
     def process(self, item: Odometry, context: Context) -> int:  # noqa: ARG002
         """Return the process id."""

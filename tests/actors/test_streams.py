@@ -107,13 +107,13 @@ def connect(request: pytest.FixtureRequest, reader: Any) -> Iterator[Connect]:  
 def test_items_arrive_in_order_with_their_stamps(connect: Connect) -> None:
     """What a reader of some depth gets is what was published, unchanged and in order."""
     link = connect(MAX_DEPTH, under_way=MAX_DEPTH)
-    for stamp in range(40):
+    for stamp in range(MAX_DEPTH):
         link.publish(stamp, f"item {stamp}")
     seen = link.take()
     told = [(one.seq, one.stamp, one.captured) for one in seen]
-    assert told == [(i, i, 7 * i) for i in range(40)]
-    assert [one.digest for one in seen] == [digest(f"item {i}") for i in range(40)]
-    assert ask(link.reader.counts.remote(link.stream)) == (40, 0)
+    assert told == [(i, i, 7 * i) for i in range(MAX_DEPTH)]
+    assert [one.digest for one in seen] == [digest(f"item {i}") for i in range(MAX_DEPTH)]
+    assert ask(link.reader.counts.remote(link.stream)) == (MAX_DEPTH, 0)
 
 
 @pytest.mark.parametrize("depth", [1, 4])

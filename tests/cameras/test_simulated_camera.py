@@ -90,4 +90,4 @@ def test_a_camera_that_is_not_opened_does_not_load_the_renderer() -> None:
         "import sys, aerodaas.cameras.simulated, aerodaas.drivers.simulated;"
         "sys.exit('panda3d' in sys.modules)"
     )
-    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0  # noqa: S603
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

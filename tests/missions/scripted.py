@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, ClassVar
 
+from typing_extensions import Self
+
 from aerodaas import (
     AeroNavigation,
     Analytics,
@@ -80,7 +82,7 @@ class RemoteUser:
         self._script = script
         self._thread = threading.Thread(target=self._play, name="remote user", daemon=True)
 
-    def __enter__(self) -> RemoteUser:
+    def __enter__(self) -> Self:
         """Start."""
         self._thread.start()
         return self

@@ -18,7 +18,6 @@ from aerodaas import (
     NearestNeighborScheduler,
     SchedulingType,
     VelocityCommand,
-    Waypoint,
 )
 from aerodaas.analytics import RemoteAnalytics
 from aerodaas.recording.flight import RobotFlight

@@ -1,0 +1,39 @@
+"""Ending the actors of a run: what still writes comes last, and nobody is waited for for ever."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import ray
+from ray.exceptions import RayError
+
+from aerodaas.actors._base import ActorReport
+from aerodaas.errors import AeroDaaSError
+
+__all__ = ["end_actors"]
+
+_STOP_TIMEOUT = 20.0
+
+
+def end_actors(groups: Iterable[Sequence[Any]], helpers: Sequence[Any]) -> dict[Any, ActorReport]:
+    """Stop each group of actors in turn, then kill them all, and the `helpers` too.
+
+    Returns the last report of each that gave one, by handle.
+    """
+    reports: dict[Any, ActorReport] = {}
+    killed = list(helpers)
+    for group in groups:
+        references = {actor.stop.remote(): actor for actor in group}
+        killed += group
+        if not references:
+            continue
+        done, _ = ray.wait(list(references), num_returns=len(references), timeout=_STOP_TIMEOUT)
+        for reference in done:
+            with contextlib.suppress(RayError, AeroDaaSError):
+                reports[references[reference]] = ray.get(reference)
+    for actor in killed:
+        with contextlib.suppress(RayError):
+            ray.kill(actor)
+    return reports

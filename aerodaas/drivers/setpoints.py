@@ -1,0 +1,31 @@
+"""What every driver asks of a setpoint before it sends it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from aerodaas.errors import InvalidWaypointError
+from aerodaas.geometry import Vector
+from aerodaas.vehicle import Setpoint, VelocitySetpoint
+
+__all__ = ["require_finite"]
+
+
+def require_finite(name: str, setpoint: Setpoint) -> None:
+    """Raise InvalidWaypointError unless the numbers of `setpoint` can be flown by robot `name`."""
+    if isinstance(setpoint, VelocitySetpoint):
+        vector: Vector = setpoint.velocity
+        scalars: dict[str, float | None] = {"yaw_rate": setpoint.yaw_rate}
+    else:
+        vector = setpoint.position
+        scalars = {"yaw": setpoint.yaw, "speed": setpoint.speed}
+    if np.shape(vector) != (3,) or not np.isfinite(vector).all():
+        raise InvalidWaypointError(f"{name}: a setpoint needs three finite numbers, not {vector}")
+    for key, value in scalars.items():
+        if value is not None and not math.isfinite(value):
+            raise InvalidWaypointError(f"{name}: a setpoint's {key} must be finite, not {value}")
+    speed = scalars.get("speed")
+    if speed is not None and speed <= 0:
+        raise InvalidWaypointError(f"{name}: a setpoint's speed must be positive, not {speed}")

@@ -1,0 +1,32 @@
+"""The battery by its percentage, which jumps when a packet is damaged or the load changes."""
+
+from __future__ import annotations
+
+import statistics
+from collections import deque
+
+from aerodaas.data import Battery
+
+__all__ = ["BatteryGauge"]
+
+_WINDOW = 9
+"""Packets, 0.9 s: a reading must hold for half of it before anybody acts on it."""
+
+
+class BatteryGauge:
+    """The median of the newest percentages."""
+
+    def __init__(self) -> None:
+        """Know nothing yet."""
+        self._percent: deque[int] = deque(maxlen=_WINDOW)
+
+    def take(self, percent: int) -> None:
+        """Take note of one packet's figure, 0 to 100."""
+        self._percent.append(percent)
+
+    @property
+    def battery(self) -> Battery:
+        """Charge at present; not a number before the first packet."""
+        if not self._percent:
+            return Battery(float("nan"))
+        return Battery(statistics.median(self._percent) / 100)

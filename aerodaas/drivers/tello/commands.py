@@ -1,0 +1,139 @@
+"""What is said to a Tello, and what its answers mean (SDK 2.0 and 3.0 user guides).
+
+No relative move (`forward 50`, `go …`) is among the commands: its reply may be lost although the
+move was made, so that it can be neither repeated nor left. All motion goes by `rc`, whose newest
+word simply replaces the one before, and which has no smallest distance.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerodaas.geometry import Vector
+
+__all__ = [
+    "ENTER",
+    "LAND",
+    "STILL",
+    "STREAM_ON",
+    "TAKE_OFF",
+    "VERSION",
+    "Command",
+    "Motion",
+    "StickScale",
+    "Sticks",
+    "ports",
+]
+
+_FULL = 100
+"""Percent: the range of each stick of `rc` is -100 to 100."""
+
+_OK = re.compile(r"ok|\d+", re.IGNORECASE)
+_WORDS = re.compile(r"[A-Za-z][\w ?!.,:;/'~-]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """One request to which the Tello replies."""
+
+    text: str
+    timeout: float
+    """Seconds to wait for the reply."""
+    tries: int = 1
+    """More than one only where doing it twice comes to the same as doing it once."""
+
+    def accepts(self, reply: str) -> bool:
+        """Tell whether `reply` can be an answer to this: numbers answer questions only."""
+        if reply.startswith("unknown command"):
+            return True
+        if self.text.endswith("?"):
+            return reply.isdecimal()
+        return _WORDS.fullmatch(reply) is not None
+
+    @staticmethod
+    def succeeded(reply: str) -> bool:
+        """Tell whether `reply` says that it was done."""
+        return _OK.fullmatch(reply) is not None
+
+
+ENTER = Command("command", timeout=0.5, tries=3)
+"""Enter SDK mode; until then a Tello neither listens nor sends."""
+VERSION = Command("sdk?", timeout=1.0, tries=2)
+"""Ask for the SDK's version: 20 or 30; SDK 1.3 does not know the question."""
+STREAM_ON = Command("streamon", timeout=2.0, tries=3)
+TAKE_OFF = Command("takeoff", timeout=20.0)
+"""Rise to about a metre. The reply comes when it hovers; users wait up to 20 s."""
+LAND = Command("land", timeout=8.0, tries=3)
+"""Land here. The reply comes when it stands."""
+
+
+def ports(state: int, video: int) -> Command:
+    """Have the Tello send to these ports of this host; SDK 3.0."""
+    return Command(f"port {state} {video}", timeout=1.0, tries=3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Motion:
+    """How a Tello flies in its own level frame."""
+
+    velocity: Vector
+    """m/s forward, left, up (FLU)."""
+    yaw_rate: float = 0.0
+    """rad/s counter-clockwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sticks:
+    """The four percentages of `rc`, each -100 to 100."""
+
+    right: int = 0
+    ahead: int = 0
+    up: int = 0
+    clockwise: int = 0
+
+    @property
+    def text(self) -> str:
+        """The command that sets them; it has no reply."""
+        return f"rc {self.right} {self.ahead} {self.up} {self.clockwise}"
+
+
+STILL = Sticks()
+"""Hover."""
+
+
+@dataclass(frozen=True, slots=True)
+class StickScale:
+    """What 100 % of each stick does, taken as proportional in between."""
+
+    speed: float
+    """m/s horizontally."""
+    climb: float
+    """m/s vertically."""
+    turn: float
+    """rad/s."""
+
+    def sticks(self, motion: Motion) -> Sticks:
+        """Sticks that fly `motion`; what is more than 100 % is cut to it."""
+        ahead, left, up = motion.velocity
+        return Sticks(
+            _percent(-left / self.speed),
+            _percent(ahead / self.speed),
+            _percent(up / self.climb),
+            _percent(-motion.yaw_rate / self.turn),
+        )
+
+    def motion(self, sticks: Sticks) -> Motion:
+        """How a Tello flies by these `sticks` once it has taken them up."""
+        ahead, left = sticks.ahead * self.speed, -sticks.right * self.speed
+        velocity = np.array([ahead, left, sticks.up * self.climb]) / _FULL
+        return Motion(velocity, -sticks.clockwise * self.turn / _FULL)
+
+
+def _percent(share: float) -> int:
+    if not math.isfinite(share):
+        return 0
+    return min(max(round(_FULL * share), -_FULL), _FULL)

@@ -1,0 +1,269 @@
+"""The link: one thread that owns the sockets to one Tello and speaks on nobody's behalf."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import selectors
+import socket
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from aerodaas.drivers.tello.commands import STILL, Command, Sticks
+from aerodaas.drivers.tello.last_word import LastWord
+from aerodaas.drivers.tello.settings import TelloSettings
+from aerodaas.drivers.tello.sockets import bound_socket, datagrams
+from aerodaas.drivers.tello.state import TelloState, parse_state
+from aerodaas.errors import VehicleError
+
+__all__ = ["LinkCounts", "TelloLink"]
+
+_log = logging.getLogger(__name__)
+
+_TICK = 0.05
+"""Seconds at most between two turns of the thread."""
+_STALE_STICKS = 0.3
+"""Seconds after which sticks that nobody renews are centred: six turns of the setpoint loop."""
+_CENTRINGS = 3
+"""How often they are centred, as `rc` has no reply; then there is silence."""
+_SETTLE = 0.1
+"""Seconds between a reply and the next command: a Tello overhears commands in quick succession,
+and a duplicate of the reply must not be taken for the next one's."""
+_SETTLE_LATE = 0.5
+"""The same after a reply that did not come, and may still."""
+
+
+@dataclass(slots=True)
+class LinkCounts:
+    """What happened on the wire."""
+
+    states: int = 0
+    malformed: int = 0
+    """State packets and replies that could not be understood."""
+    strangers: int = 0
+    """Packets from elsewhere than the Tello."""
+    stray_replies: int = 0
+    """Replies that came late, twice, or to nothing."""
+    timeouts: int = 0
+    """Requests without a reply."""
+    sticks: int = 0
+    """`rc` commands sent."""
+
+
+Done = Callable[[str | None], None]
+"""Told the reply to a command, or None if none came, in the link's thread."""
+
+
+@dataclass(slots=True)
+class _Pending:
+    command: Command
+    done: Done
+    tries: int = 0
+    deadline: float = 0.0
+
+
+class TelloLink:
+    """Commands one after the other, `rc` as it is fed, state packets as they come.
+
+    `request` and `steer` return at once. `on_state` and `on_turn` are called in the link's
+    thread, the latter 20 times a second. Nothing is sent of the link's own accord except the
+    centring of sticks that nobody renews: when the loop above falls silent, so does the wire.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        settings: TelloSettings,
+        on_state: Callable[[TelloState, float], None],
+        on_turn: Callable[[float], None],
+    ) -> None:
+        """Prepare the link of the robot `name`; nothing is opened yet."""
+        self.counts = LinkCounts()
+        self.failure: OSError | None = None
+        """Why the latest packet could not be sent, if it could not."""
+        self.flown = STILL
+        """The sticks as they were last sent."""
+        self._name = name
+        self._settings = settings
+        self._peer = (settings.address, settings.command_port)
+        self._on_state = on_state
+        self._on_turn = on_turn
+        self._lock = threading.Lock()
+        self._queue: deque[_Pending] = deque()
+        self._pending: _Pending | None = None
+        self._quiet_until = 0.0
+        self._sticks: Sticks | None = None
+        self._steered_at = 0.0
+        self._centrings = 0
+        self._closing = threading.Event()
+
+    def open(self) -> None:
+        """Open the sockets and start the thread; raises VehicleError for a port that is taken."""
+        settings, name = self._settings, self._name
+        with contextlib.ExitStack() as opened:
+            self._commands = opened.enter_context(
+                bound_socket(
+                    f"{name}, commands",
+                    settings.local_port,
+                    address=settings.local_address,
+                    interface=settings.interface,
+                    raises=VehicleError,
+                )
+            )
+            self._states = opened.enter_context(
+                bound_socket(
+                    f"{name}, state",
+                    settings.state_port,
+                    address=settings.local_address,
+                    interface=settings.interface,
+                    raises=VehicleError,
+                )
+            )
+            self._bell, self._rope = map(opened.enter_context, socket.socketpair())
+            self._bell.settimeout(0.0)
+            self._rope.settimeout(0.0)
+            self._guard = LastWord(self._commands, self._peer)
+            opened.callback(self._guard.close)
+            self._resources = opened.pop_all()
+        self._thread = threading.Thread(target=self._run, name=f"{name}-link", daemon=True)
+        self._thread.start()
+
+    def request(self, command: Command, done: Done, *, urgent: bool = False) -> None:
+        """Send `command` when those before it are through; an urgent one goes first, at once."""
+        with self._lock:
+            if urgent:
+                self._queue.clear()
+                self._pending = None
+                self._quiet_until = 0.0
+            self._queue.append(_Pending(command, done))
+        self._ring()
+
+    def steer(self, sticks: Sticks) -> None:
+        """Set the sticks, until the next call or until nobody renews them."""
+        with self._lock:
+            self._sticks = sticks
+            self._steered_at = time.monotonic()
+        self._ring()
+
+    def release(self) -> None:
+        """Send no more `rc`: somebody else flies (take-off, landing)."""
+        with self._lock:
+            self._sticks = None
+            self.flown = STILL
+            self._centrings = 0
+        self._guard.note(moving=False)
+
+    def close(self, last: Command | None = None) -> None:
+        """Send `last` without waiting for its reply, end the thread and free the ports."""
+        self._closing.set()
+        self._ring()
+        self._thread.join(timeout=2.0)
+        if last is not None:
+            self._transmit(last.text)
+        self._resources.close()
+
+    def _ring(self) -> None:
+        with contextlib.suppress(OSError):
+            self._rope.send(b"!")
+
+    def _run(self) -> None:
+        with selectors.DefaultSelector() as selector:
+            for source in (self._commands, self._states, self._bell):
+                selector.register(source, selectors.EVENT_READ)
+            next_turn = time.monotonic()
+            while not self._closing.is_set():
+                selector.select(max(0.0, min(_TICK, next_turn - time.monotonic())))
+                with contextlib.suppress(BlockingIOError):
+                    self._bell.recv(4096)
+                self._hear()
+                now = time.monotonic()
+                self._speak(now)
+                self._fly(now)
+                if now >= next_turn:
+                    next_turn = now + _TICK
+                    self._on_turn(now)
+
+    def _hear(self) -> None:
+        for content, address, port in datagrams(self._commands):
+            if (address, port) == self._peer:
+                self._take_reply(content)
+            else:
+                self.counts.strangers += 1
+        for content, address, _ in datagrams(self._states):
+            if address != self._peer[0]:
+                self.counts.strangers += 1
+                continue
+            state = parse_state(content)
+            if state is None:
+                self.counts.malformed += 1
+                _log.debug("%s: not a state packet: %r", self._name, content[:80])
+                continue
+            self.counts.states += 1
+            self._on_state(state, time.monotonic())
+
+    def _take_reply(self, content: bytes) -> None:
+        try:
+            reply = content.decode("ascii").strip()
+        except UnicodeDecodeError:
+            self.counts.malformed += 1
+            return
+        with self._lock:
+            pending = self._pending
+            if pending is None or not pending.command.accepts(reply):
+                self.counts.stray_replies += 1
+                return
+            self._pending = None
+            self._quiet_until = time.monotonic() + _SETTLE
+        pending.done(reply)
+
+    def _speak(self, now: float) -> None:
+        """Send the next command, or the present one again, or give it up."""
+        given_up = None
+        with self._lock:
+            pending = self._pending
+            if pending is not None and now >= pending.deadline:
+                self.counts.timeouts += 1
+                self._pending = None
+                self._quiet_until = now + _SETTLE_LATE
+                if pending.tries < pending.command.tries:
+                    self._queue.appendleft(pending)
+                else:
+                    given_up = pending
+            if self._pending is None and self._queue and now >= self._quiet_until:
+                self._pending = pending = self._queue.popleft()
+                pending.tries += 1
+                pending.deadline = now + pending.command.timeout
+                self._transmit(pending.command.text)
+        if given_up is not None:
+            _log.warning("%s: no reply to %r", self._name, given_up.command.text)
+            given_up.done(None)
+
+    def _fly(self, now: float) -> None:
+        """Pass the sticks on once each time they are set; centre them if that ends."""
+        with self._lock:
+            sticks, self._sticks = self._sticks, None
+            if sticks is None:
+                stale = now - self._steered_at > _STALE_STICKS
+                if not stale or self._centrings == 0:
+                    return
+                self._centrings -= 1
+                self._steered_at = now
+                sticks = STILL
+            else:
+                self._centrings = _CENTRINGS
+            self.flown = sticks
+            self._transmit(sticks.text)
+            self.counts.sticks += 1
+        self._guard.note(moving=sticks != STILL)
+
+    def _transmit(self, text: str) -> None:
+        try:
+            self._commands.sendto(text.encode("ascii"), self._peer)
+        except OSError as error:
+            # Wi-Fi comes and goes; what is lost shows as a missing reply or state.
+            self.failure = error
+        else:
+            self.failure = None

@@ -1,0 +1,92 @@
+"""What a Tello is doing: judged by its state packets, as replies get lost and say little."""
+
+from __future__ import annotations
+
+import math
+
+from aerodaas.drivers.tello.state import TelloState
+from aerodaas.vehicle import VehicleMode
+
+__all__ = ["LIFTED", "FlightPhase"]
+
+_MOTORS_STOPPED = 1.5
+"""Seconds without a tick of the motors' clock, which counts whole seconds, for them to stand."""
+LIFTED = 0.3
+"""Metres from which it counts as flying."""
+_LOW = 0.3
+"""Metres above the ground or the place of take-off below which still motors mean standing."""
+_HOVERS = 10
+"""Packets in a row without climb or descent, a second, after which a take-off has been done, though
+its reply was lost."""
+_CALM = 0.1
+"""m/s."""
+_NO_LIFT = 12.0
+"""Seconds after a take-off's request within which it must have lifted."""
+
+
+class FlightPhase:
+    """The mode of one Tello, moved by requests and by what its packets show."""
+
+    def __init__(self) -> None:
+        """Stand on the ground."""
+        self.mode = VehicleMode.GROUNDED
+        self.risen = False
+        """In a take-off: the Tello has done its own part of it and hovers."""
+        self.refusal = ""
+        """Why the latest take-off came to nothing."""
+        self._since = -math.inf
+        self._calm = 0
+        self._motor_time: float | None = None
+        self._ticked_at = -math.inf
+
+    @property
+    def airborne(self) -> bool:
+        """True in every mode in which the rotors may turn."""
+        return self.mode not in {VehicleMode.GROUNDED, VehicleMode.FAILSAFE}
+
+    @property
+    def steered(self) -> bool:
+        """True if it can be flown by setpoints."""
+        return self.mode in {VehicleMode.HOLDING, VehicleMode.GUIDED}
+
+    def to(self, mode: VehicleMode, now: float) -> None:
+        """Change to `mode` by request, at `now` seconds."""
+        self.mode, self._since = mode, now
+        self.risen = False
+        self._calm = 0
+        if mode is VehicleMode.TAKING_OFF:
+            self.refusal = ""
+
+    def rose(self, refusal: str = "") -> None:
+        """The Tello has answered to `takeoff`: it hovers, or it gives a reason."""
+        if self.mode is not VehicleMode.TAKING_OFF:
+            return
+        if refusal:
+            self.mode = VehicleMode.GROUNDED
+            self.refusal = refusal
+        else:
+            self.risen = True
+
+    def observe(self, state: TelloState, now: float) -> None:
+        """Take note of a packet that came at `now` seconds."""
+        if self._motor_time is not None and state.motor_time != self._motor_time:
+            self._ticked_at = now
+        self._motor_time = state.motor_time
+        turning = now - self._ticked_at < _MOTORS_STOPPED
+        if turning and state.height >= LIFTED:
+            if self.mode is VehicleMode.GROUNDED:
+                self.mode = VehicleMode.HOLDING
+            self._calm = self._calm + 1 if abs(state.velocity[2]) <= _CALM else 0
+            if self._calm >= _HOVERS:
+                self.rose()
+            return
+        standing = not turning and min(state.height, state.ground_distance) < _LOW
+        if not standing or now - self._since < _MOTORS_STOPPED:
+            return
+        if self.mode is VehicleMode.LANDING:
+            self.mode = VehicleMode.GROUNDED
+        elif self.mode is VehicleMode.TAKING_OFF and now - self._since > _NO_LIFT:
+            self.rose(refusal="it did not lift; is there room and light below it?")
+        elif self.steered:
+            # Low battery, too hot, or held for too long without a command: nobody asked for it.
+            self.mode = VehicleMode.FAILSAFE

@@ -1,0 +1,72 @@
+"""The UDP sockets of one Tello on this host, opened with errors that say what to do."""
+
+from __future__ import annotations
+
+import errno
+import os
+import socket
+
+from aerodaas.errors import AeroDaaSError
+
+__all__ = ["bound_socket", "datagrams"]
+
+_LARGEST = 65535
+_AT_ONCE = 256
+"""Datagrams taken before others get their turn."""
+
+
+def bound_socket(
+    place: str,
+    port: int,
+    *,
+    address: str = "",
+    interface: str = "",
+    receive_buffer: int | None = None,
+    raises: type[AeroDaaSError],
+) -> socket.socket:
+    """Open a non-blocking UDP socket at `port` (0 for any) of this host.
+
+    `place` names it in errors of the class `raises`; `receive_buffer` is bytes.
+    """
+    opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        opened.settimeout(0.0)
+        if receive_buffer is not None:
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, receive_buffer)
+        if interface:
+            opened.setsockopt(socket.SOL_SOCKET, socket.SO_BINDTODEVICE, interface.encode())
+        opened.bind((address, port))
+    except OSError as error:
+        opened.close()
+        raise raises(f"{place}: {_explain(error, address, port, interface)}") from None
+    return opened
+
+
+def _explain(error: OSError, address: str, port: int, interface: str) -> str:
+    if error.errno == errno.EADDRINUSE:
+        return (
+            f"UDP port {port} is taken by another program or another Tello of this host; "
+            f"`ss -ulnp sport = :{port}` shows by whom (docs/tello.md: several Tellos)"
+        )
+    if error.errno == errno.EADDRNOTAVAIL:
+        return f"{address} is no address of this host; `ip address` lists them"
+    if error.errno == errno.ENODEV:
+        return f"no network interface is called {interface!r}; `ip link` lists them"
+    if error.errno in {errno.EPERM, errno.EACCES}:
+        return f"not allowed to use UDP port {port} {interface}: {os.strerror(error.errno)}"
+    return f"cannot open UDP port {port}: {error.strerror or error}"
+
+
+def datagrams(source: socket.socket) -> list[tuple[bytes, str, int]]:
+    """What has arrived: content, sender's address, sender's port; never blocks."""
+    arrived = []
+    for _ in range(_AT_ONCE):
+        try:
+            content, (address, port) = source.recvfrom(_LARGEST)
+        except BlockingIOError:
+            break
+        except ConnectionError:
+            # The system reports here that an earlier datagram found nobody at its port.
+            continue
+        arrived.append((content, address, port))
+    return arrived

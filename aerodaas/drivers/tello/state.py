@@ -1,0 +1,106 @@
+"""The state that a Tello sends ten times a second: `pitch:0;roll:0;…;bat:87;…`.
+
+Truncated, garbled or foreign packets are common enough on Wi-Fi that they are an expected result,
+not an error: what cannot be understood whole is refused whole.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+__all__ = ["TelloState", "parse_state"]
+
+_NUMBER = re.compile(r" *([+-]?\d{1,9}(?:\.\d{1,9})?) *", re.ASCII)
+
+_RANGES = {
+    "pitch": (-180.0, 180.0),
+    "roll": (-180.0, 180.0),
+    "yaw": (-180.0, 180.0),
+    "vgx": (-300.0, 300.0),
+    "vgy": (-300.0, 300.0),
+    "vgz": (-300.0, 300.0),
+    "templ": (-40.0, 150.0),
+    "temph": (-40.0, 150.0),
+    "tof": (0.0, 10_000.0),
+    "h": (-10_000.0, 10_000.0),
+    "bat": (0.0, 100.0),
+    "baro": (-1_000.0, 10_000.0),
+    "time": (0.0, 1e6),
+}
+"""The fields that we need, and what is believable of each, in the SDK's units."""
+
+
+@dataclass(frozen=True, slots=True)
+class TelloState:
+    """One state packet in SI units.
+
+    Velocities stand in the ground frame whose x points where the Tello looked when it was
+    switched on (yaw zero), y to the right of that, z down. The SDK gives no unit; pilots measured
+    decimetres per second (tello-vision-telemetry-lab, aerostack2).
+    """
+
+    roll: float
+    """Radians, positive with the right side down."""
+    pitch: float
+    """Radians, positive with the nose down; the SDK's own sign is the other."""
+    yaw: float
+    """Radians clockwise from where it looked when it was switched on."""
+    velocity: tuple[float, float, float]
+    """m/s along x, y, z (down); in steps of 0.1 m/s."""
+    height: float
+    """Metres above the place of take-off, in steps of 0.1 m."""
+    ground_distance: float
+    """Metres to whatever is below, by time of flight: 0.1 on the ground, 65.53 out of range."""
+    barometer: float
+    """Metres above the sea by air pressure: its changes mean something, its value little."""
+    battery: int
+    """Percent."""
+    motor_time: float
+    """Seconds for which the motors have run."""
+    temperature: float
+    """Degrees Celsius at the hottest place."""
+
+
+def parse_state(datagram: bytes) -> TelloState | None:
+    """Read a state packet; None if it is not one, or not a whole one."""
+    try:
+        text = datagram.decode("ascii")
+    except UnicodeDecodeError:
+        return None
+    fields = _fields(text)
+    if fields is None or len(fields) < len(_RANGES):
+        return None
+    for name, (lowest, highest) in _RANGES.items():
+        if not lowest <= fields[name] <= highest:
+            return None
+    return TelloState(
+        roll=math.radians(fields["roll"]),
+        pitch=-math.radians(fields["pitch"]),
+        yaw=math.radians(fields["yaw"]),
+        velocity=(fields["vgx"] / 10, fields["vgy"] / 10, fields["vgz"] / 10),
+        height=fields["h"] / 100,
+        ground_distance=fields["tof"] / 100,
+        barometer=fields["baro"],
+        battery=int(fields["bat"]),
+        motor_time=fields["time"],
+        temperature=fields["temph"],
+    )
+
+
+def _fields(text: str) -> dict[str, float] | None:
+    """Fields of `text` by name; None if a field that we need is broken or comes twice.
+
+    What follows the last semicolon may have been cut off, so that it counts for nothing.
+    """
+    found: dict[str, float] = {}
+    for part in text.split(";")[:-1]:
+        name, _, value = part.strip(" ").partition(":")
+        if name not in _RANGES:
+            continue
+        number = _NUMBER.fullmatch(value)
+        if name in found or number is None:
+            return None
+        found[name] = float(number[1])
+    return found

@@ -1,0 +1,1 @@
+"""What an application's or a plug-in's author tests with."""

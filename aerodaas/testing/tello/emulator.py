@@ -1,0 +1,211 @@
+"""EmulatedTello: the SDK's ports on loopback, in real time."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import selectors
+import threading
+import time
+from types import TracebackType
+
+from typing_extensions import Self
+
+from aerodaas.data import Odometry
+from aerodaas.drivers.tello.sockets import bound_socket, datagrams
+from aerodaas.errors import VehicleError
+from aerodaas.simulation.dynamics import STEP
+from aerodaas.testing.tello.channel import Channel
+from aerodaas.testing.tello.flight import TelloFlight
+from aerodaas.testing.tello.options import Impairment, TelloOptions
+from aerodaas.testing.tello.sdk import Outcome, TelloSdk
+from aerodaas.testing.tello.video import VideoStream
+from aerodaas.vehicle import VehicleMode
+
+__all__ = ["EmulatedTello"]
+
+_log = logging.getLogger(__name__)
+
+_TURN = 0.02
+_STATE_PERIOD = 0.1
+_LONGEST_LEAP = 0.2
+"""Seconds of flight at most in one turn: a host that was held up does not catch up."""
+_SILENCE = 15.0
+"""Seconds without a command after which a flying Tello lands."""
+_HOT = 90.0
+"""Degrees Celsius at which `takeoff` is refused."""
+
+
+class EmulatedTello:
+    """A Tello on loopback, from `start` (or `with`) to `stop`.
+
+    It replies to whoever spoke last, as the real one does, and sends state and video there.
+    """
+
+    def __init__(self, options: TelloOptions | None = None) -> None:
+        """Open the command port, so that `port` is known at once; raises VehicleError if taken."""
+        self.options = options or TelloOptions()
+        self.heard: list[tuple[float, str]] = []
+        """Every command that arrived, with its monotonic second."""
+        self._socket = bound_socket(
+            "emulated Tello", self.options.port, address=self.options.address, raises=VehicleError
+        )
+        self.port: int = self._socket.getsockname()[1]
+        """Where it listens for commands."""
+        self._lock = threading.Lock()
+        self._flight = TelloFlight(self.options)
+        self._sdk = TelloSdk(self.options, self._flight)
+        seed = self.options.seed
+        self._ears = Channel(self.options.commands, f"{seed}/commands", self._obey)
+        self._replies = Channel(self.options.replies, f"{seed}/replies", self._transmit)
+        self._states = Channel(self.options.states, f"{seed}/states", self._transmit)
+        self._client: tuple[str, int] | None = None
+        self._awaiting: tuple[str, int] | None = None
+        """Who gets `ok` once the motion under way is done."""
+        self._idle_since = time.monotonic()
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._video: VideoStream | None = None
+
+    @property
+    def truth(self) -> Odometry:
+        """Exact state of motion."""
+        with self._lock:
+            return self._flight.truth
+
+    @property
+    def mode(self) -> VehicleMode:
+        """What it is doing."""
+        with self._lock:
+            return self._flight.mode
+
+    def spoil(
+        self,
+        *,
+        commands: Impairment | None = None,
+        replies: Impairment | None = None,
+        states: Impairment | None = None,
+    ) -> None:
+        """Change how bad the air is from now on, for each that is given."""
+        for channel, impairment in (
+            (self._ears, commands),
+            (self._replies, replies),
+            (self._states, states),
+        ):
+            if impairment is not None:
+                channel.impairment = impairment
+
+    def start(self) -> None:
+        """Switch it on."""
+        self._thread = threading.Thread(target=self._run, name="emulated-tello", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Switch it off."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+        if self._video is not None:
+            self._video.stop()
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    def _run(self) -> None:
+        began = time.monotonic()
+        flown = 0
+        state_due = began
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._socket, selectors.EVENT_READ)
+            while not self._stopping.is_set():
+                selector.select(_TURN)
+                now = time.monotonic()
+                for content, address, port in datagrams(self._socket):
+                    self._ears.send(content, (address, port), now)
+                self._ears.turn(now)
+                steps = int((now - began) / STEP) - flown
+                flown += steps
+                with self._lock:
+                    self._flight.advance(min(steps * STEP, _LONGEST_LEAP))
+                self._conclude(now)
+                if now >= state_due:
+                    state_due = now + _STATE_PERIOD
+                    self._report(now)
+                for channel in (self._replies, self._states):
+                    channel.turn(now)
+
+    def _obey(self, content: bytes, client: tuple[str, int]) -> None:
+        now = time.monotonic()
+        text = content.decode("ascii", errors="replace").strip()
+        self.heard.append((now, text))
+        self._idle_since = now
+        with self._lock:
+            before = self._sdk.streaming
+            outcome = self._refused(text) or self._sdk.handle(text)
+            entered, streaming = self._sdk.entered, self._sdk.streaming
+        if not entered:
+            return
+        self._client = client
+        if outcome.moves or text in {"stop", "emergency"}:
+            self._dismiss(now)
+        if outcome.moves:
+            self._awaiting = client
+        if outcome.reply is not None:
+            self._replies.send(outcome.reply.encode("ascii", errors="replace"), client, now)
+        if streaming != before:
+            self._switch_video(on=streaming)
+
+    def _refused(self, text: str) -> Outcome | None:
+        hot = self.options.temperature >= _HOT
+        return Outcome("error Motor stop") if hot and text == "takeoff" else None
+
+    def _dismiss(self, now: float) -> None:
+        """A motion was cut short by another command."""
+        if self._awaiting is not None:
+            self._replies.send(b"error", self._awaiting, now)
+            self._awaiting = None
+
+    def _conclude(self, now: float) -> None:
+        """Reply to a motion that is done; land when nobody has spoken for long."""
+        with self._lock:
+            settled, flying, mode = self._flight.settled, self._flight.flying, self._flight.mode
+        if self._awaiting is not None:
+            self._idle_since = now
+            if settled:
+                self._replies.send(b"ok", self._awaiting, now)
+                self._awaiting = None
+        landing = mode in {VehicleMode.LANDING, VehicleMode.FAILSAFE}
+        if flying and not landing and now - self._idle_since > _SILENCE:
+            _log.info("no command for %g s: landing", _SILENCE)
+            with self._lock:
+                self._flight.land()
+
+    def _report(self, now: float) -> None:
+        if self._client is None:
+            return
+        with self._lock:
+            state, port = self._flight.state(), self._sdk.ports[0]
+        self._states.send(state.encode("ascii"), (self._client[0], port), now)
+
+    def _switch_video(self, *, on: bool) -> None:
+        if self._video is not None:
+            self._video.stop()
+            self._video = None
+        if on and self._client is not None:
+            peers = ((self._client[0], self._sdk.ports[1]), *self.options.video.copies)
+            self._video = VideoStream(self.options, peers, lambda: self.truth)
+            self._video.start()
+
+    def _transmit(self, content: bytes, peer: tuple[str, int]) -> None:
+        with contextlib.suppress(OSError):
+            self._socket.sendto(content, peer)

@@ -1,0 +1,79 @@
+"""What an emulated Tello is like, and how bad its Wi-Fi is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+__all__ = ["Impairment", "TelloOptions", "VideoOptions"]
+
+
+@dataclass(frozen=True)
+class Impairment:
+    """What a radio link does to packets: shares of 0 to 1, seconds."""
+
+    loss: float = 0.0
+    duplicates: float = 0.0
+    late: float = 0.0
+    """Share of the packets that come `lateness` seconds after the others."""
+    lateness: float = 1.0
+    delay: float = 0.0
+    jitter: float = 0.0
+    """Drawn evenly from 0 to this and added to `delay`; packets may overtake each other."""
+    garbled: float = 0.0
+    """Share in which bytes are replaced or cut off."""
+
+
+@dataclass(frozen=True)
+class VideoOptions:
+    """The stream that `streamon` starts."""
+
+    source: Literal["world", "clock"] = "world"
+    """The simulated camera, or a moving pattern that carries its own time (`read_clock`)."""
+    world: str = "field"
+    seed: int = 0
+    width: int = 960
+    height: int = 720
+    rate: float = 30.0
+    key_interval: int = 30
+    """Frames from one key frame to the next; a Tello sends one about every second."""
+    bit_rate: int = 4_000_000
+    horizontal_fov: float = 55.2
+    """Degrees."""
+    copies: tuple[tuple[str, int], ...] = ()
+    """Further addresses and ports that get each video packet, to compare clients."""
+
+
+@dataclass(frozen=True)
+class TelloOptions:
+    """One emulated Tello."""
+
+    address: str = "127.0.0.1"
+    port: int = 0
+    """For commands; 0 for any free one."""
+    sdk: Literal[20, 30] = 30
+    """SDK 2.0 does not know `port`."""
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Where it stands, ENU metres."""
+    start_yaw: float = 0.0
+    """Degrees counter-clockwise from east."""
+    switched_on_yaw: float = 0.0
+    """Degrees counter-clockwise by which it has been turned since it was switched on."""
+    battery: float = 0.9
+    capacity: float = 1.1
+    """Ampere-hours."""
+    temperature: float = 60.0
+    """Degrees Celsius."""
+    stick_speed: float = 1.0
+    """m/s that `rc` at 100 % flies."""
+    stick_turn: float = 100.0
+    """Degrees per second that `rc` at 100 % turns."""
+    wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    gust: float = 0.0
+    seed: int = 0
+    commands: Impairment = field(default_factory=Impairment)
+    """On the way to the Tello."""
+    replies: Impairment = field(default_factory=Impairment)
+    states: Impairment = field(default_factory=Impairment)
+    video_link: Impairment = field(default_factory=Impairment)
+    video: VideoOptions = field(default_factory=VideoOptions)

@@ -1,0 +1,50 @@
+"""How fast the lab simulates, from one edge to a thousand.
+
+python benchmarks/lab.py --json lab.json
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from _report import Report
+from rich.progress import track
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.schedulers.lab import Workload, run_lab
+
+UNITS = {"time": "s", "CPU": "s", "tasks": "k", "rate": "k tasks/s", "per task": "us"}
+
+
+def main(
+    scheduler: Annotated[str, typer.Option(help="Comma-separated.")] = "ec_edf,dems,margin",
+    edges: Annotated[str, typer.Option(help="Comma-separated; 3 drones each.")] = "1,10,100,1000",
+    duration: Annotated[float, typer.Option(help="Simulated seconds of the growing fleet.")] = 30,
+    jobs: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+    json: Annotated[Path | None, typer.Option(help="File for the figures.")] = None,
+) -> None:
+    """Simulated tasks per second; the aim is 80 drones, 6 models, 300 s in under 3 s on a core."""
+    report = Report("lab", UNITS)
+    loads = {"80D-A/7 300 s": Workload.named("80D-A/7")}
+    for count in edges.split(","):
+        name = f"{3 * int(count)}D-A/{count}"
+        loads[f"{name} {duration:g} s"] = Workload.named(name, round(duration * NANOSECONDS))
+    cases = [(case, name) for name in scheduler.split(",") for case in loads]
+    for case, name in track(cases, "simulating", transient=True):
+        began, worked = time.perf_counter(), time.process_time()
+        result = run_lab(loads[case], [name], [0], bound=False, jobs=jobs)
+        taken, cpu = time.perf_counter() - began, time.process_time() - worked
+        tasks = result.scores[name][0].tasks
+        figures = (taken, cpu, tasks / 1e3, tasks / 1e3 / taken, taken / tasks * 1e6)
+        report.row(f"{name} {case}", dict(zip(UNITS, figures, strict=True)))
+    report.note(f"{jobs} process(es), without the clairvoyant bound; CPU is of the first process")
+    report.show()
+    if json is not None:
+        report.write(json)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,116 @@
+"""Look-ahead for a serial executor: the most valuable sequence of jobs over the next seconds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from heapq import nlargest
+from math import inf
+from operator import itemgetter
+from typing import Any
+
+from aerodaas.schedulers.analytics.estimates import Belief, chance
+
+__all__ = ["Job", "Lane", "plan"]
+
+
+@dataclass(slots=True)
+class Job:
+    """Something the executor could run."""
+
+    what: Any
+    """A task, or the source of one that is forecast."""
+    release: float
+    deadline: float
+    benefit: float
+    loss: float
+    """What running it costs: its own cost, and what it would be worth elsewhere."""
+
+
+@dataclass(slots=True)
+class Lane:
+    """Jobs of one model in order of release; one is only taken after those before it."""
+
+    time: Belief
+    jobs: list[Job]
+
+
+_Chain = tuple[Any, float, Lane, Job] | None
+"""The chain before, a start, a lane and a job."""
+_State = tuple[float, float, int, _Chain]
+"""Merit, time when the executor is free, the lanes' positions, the plan.
+
+A lane's position, the number of its jobs taken or passed over, is one digit of an integer: such
+keys are much cheaper to make and to compare than tuples, and they are made most of the time.
+"""
+
+_IDLE_SHARE = 0.5
+"""Share of the price that idle time costs where no job is known: some will arrive."""
+
+
+def plan(
+    lanes: Sequence[Lane], start: float, until: float, price: float, *, width: int, gap: float
+) -> list[tuple[float, Lane, Job]]:
+    """Choose jobs and their starts from `start` to about `until`, by beam search.
+
+    A state's merit is the expected gains so far less `price` per nanosecond passed, so that
+    plans of different ends compare (the average-reward criterion, Howard, 1960). `width` states
+    survive each step, and no idle time above `gap` is considered. Takes at most
+    width x lanes x steps evaluations of a gain.
+    """
+    beam: list[_State] = [(0.0, start, 0, None)]
+    longest = max((len(lane.jobs) for lane in lanes), default=0)
+    digits = longest.bit_length()
+    best_merit = -inf
+    best: _Chain = None
+    while beam:
+        grown: dict[int, _State] = {}
+        for state in beam:
+            ended = True
+            for successor in _successors(state, lanes, digits, price, gap):
+                ended = False
+                merit, free, taken, chain = successor
+                if free >= until:
+                    if merit > best_merit:
+                        best_merit, best = merit, chain
+                elif taken not in grown or grown[taken][0] < merit:
+                    grown[taken] = successor
+            if ended:
+                merit = state[0] - price * _IDLE_SHARE * (until - state[1])
+                if merit > best_merit:
+                    best_merit, best = merit, state[3]
+        beam = nlargest(width, grown.values(), key=itemgetter(0))
+    steps: list[tuple[float, Lane, Job]] = []
+    while best is not None:
+        best, begin, lane, job = best
+        steps.append((begin, lane, job))
+    steps.reverse()
+    return steps
+
+
+def _successors(
+    state: _State, lanes: Sequence[Lane], digits: int, price: float, gap: float
+) -> Iterator[_State]:
+    merit, free, taken, chain = state
+    mask = (1 << digits) - 1
+    shift = -digits
+    for lane in lanes:
+        shift += digits
+        jobs, belief = lane.jobs, lane.time
+        mean = belief.mean
+        count = len(jobs)
+        position = index = taken >> shift & mask
+        hopeless = free + mean - belief.sigma
+        while index < count and jobs[index].deadline < hopeless:
+            index += 1
+        if index == count:
+            continue
+        job = jobs[index]
+        begin = max(free, job.release)
+        if begin - free > gap:
+            continue
+        gain = job.benefit * chance(belief, job.deadline - begin) - job.loss
+        if gain > 0:
+            end = begin + mean
+            after = taken + (index + 1 - position << shift)
+            yield (merit + gain - price * (end - free), end, after, (chain, begin, lane, job))

@@ -1,0 +1,195 @@
+"""Plots of the lab: bars per scheduler, the timeline of one edge, queues and estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from heapq import heappop, heappush
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.patches import Patch
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.schedulers.analytics.base import Outcome, Place, Result
+from aerodaas.schedulers.lab.run import LabResult
+from aerodaas.schedulers.lab.sample import SamplePath
+from aerodaas.schedulers.lab.simulator import Trace
+
+__all__ = ["plot_bars", "plot_observations", "plot_timeline"]
+
+PALETTE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
+"""Okabe and Ito (2008): told apart with every kind of colour vision."""
+_STYLE: dict[str, Any] = {
+    "figure.dpi": 120,
+    "font.size": 9,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+}
+
+
+def plot_bars(result: LabResult, path: Path) -> None:
+    """Utility (with the clairvoyant bound), completion and QoE per scheduler, with intervals."""
+    names = list(result.scores)
+    figures = {name: result.figures(name) for name in names}
+    panels = {
+        "qos per s": "QoS utility per s",
+        "completion": "completed in time (%)",
+        "qoe per s": "QoE utility per s",
+    }
+    with plt.style.context(_STYLE):
+        fig, axes = plt.subplots(1, 3, figsize=(11, 0.9 + 0.32 * len(names)), sharey=True)
+        for axis, (key, label), colour in zip(axes, panels.items(), PALETTE, strict=False):
+            scale = 100 if key == "completion" else 1
+            values = [figures[name][key].value * scale for name in names]
+            margins = [figures[name][key].margin * scale for name in names]
+            axis.barh(names, values, xerr=margins, color=colour, height=0.7, capsize=2)
+            axis.set_xlabel(label)
+            axis.bar_label(
+                axis.containers[-1],
+                fmt="%.4g",
+                padding=6,
+                fontsize=8,
+                bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+            )
+            axis.margins(x=0.2)
+        if result.bounds:
+            bound = sum(result.bounds) / len(result.bounds) / (result.workload.duration / 1e9)
+            axes[0].axvline(bound, color="black", linestyle="--", linewidth=1)
+            axes[0].annotate(
+                "clairvoyant bound",
+                (bound, 1.0),
+                xycoords=("data", "axes fraction"),
+                ha="right",
+                va="bottom",
+                fontsize=8,
+            )
+        axes[0].invert_yaxis()
+        fig.suptitle(
+            f"{result.workload.name}, {result.network.name} network, {result.times.name} times, "
+            f"{len(result.seeds)} seeds (95 % intervals)",
+            fontsize=10,
+        )
+        fig.tight_layout()
+        fig.savefig(path)
+        plt.close(fig)
+
+
+def plot_timeline(trace: Trace, path: Path, title: str, begin: float, end: float) -> None:
+    """What ran where on one edge between two times in seconds, by model; misses are hatched."""
+    shown = [r for r in trace.results if r.finished / 1e9 >= begin and r.started / 1e9 <= end]
+    models = sorted({result.task.profile.model for result in trace.results})
+    colours = dict(zip(models, PALETTE, strict=False))
+    cloud = _rows([r for r in shown if r.place is Place.CLOUD])
+    height = max((row for _, row in cloud), default=0) + 1
+    with plt.style.context(_STYLE):
+        fig, axis = plt.subplots(figsize=(11, 1.8 + 0.14 * height))
+        for result in shown:
+            if result.place is Place.EDGE:
+                _bar(axis, result, -2.2, 1.8, colours)
+        for result, row in cloud:
+            _bar(axis, result, row, 0.85, colours)
+        for result in shown:
+            if result.place is Place.NOWHERE:
+                colour = colours[result.task.profile.model]
+                axis.plot(result.finished / 1e9, -3.2, "x", color=colour, markersize=6)
+        axis.set_yticks([-3.2, -1.3, height / 2], ["dropped", "edge", "cloud"])
+        axis.set_xlim(begin, end)
+        axis.set_ylim(-4, height + 0.5)
+        axis.set_xlabel("seconds")
+        handles = [Patch(color=colours[model], label=model) for model in models]
+        handles.append(Patch(facecolor="white", edgecolor="black", hatch="////", label="too late"))
+        axis.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.0, 1.0))
+        axis.set_title(title, fontsize=10)
+        fig.tight_layout()
+        fig.savefig(path)
+        plt.close(fig)
+
+
+def plot_observations(traces: Mapping[str, Trace], sample: SamplePath, path: Path) -> None:
+    """Queue lengths and estimates over time, one column per scheduler that lets itself be seen."""
+    seen = {name: trace for name, trace in traces.items() if _keys(trace)}
+    if not seen:
+        return
+    delay = sample.network.cloud_time
+    with plt.style.context(_STYLE):
+        fig, grid = plt.subplots(
+            2, len(seen), figsize=(5.5 * len(seen), 6), sharex=True, squeeze=False
+        )
+        for (name, trace), (top, bottom) in zip(seen.items(), grid.T, strict=True):
+            seconds = [one.at / NANOSECONDS for one in trace.observations]
+            for axis, estimates in ((top, False), (bottom, True)):
+                keys = [key for key in _keys(trace) if key.endswith("(ms)") == estimates]
+                for key, colour in zip(keys, PALETTE, strict=False):
+                    values = [one.figures.get(key, float("nan")) for one in trace.observations]
+                    axis.plot(seconds, values, color=colour, linewidth=1, label=key)
+                axis.set_ylabel("ms" if estimates else "tasks")
+            added = [((delay(10**9, one.at) or 0) - 10**9) / 1e6 for one in trace.observations]
+            lost = [delay(10**9, one.at) is None for one in trace.observations]
+            bottom.plot(
+                seconds,
+                [float("nan") if gone else ms for ms, gone in zip(added, lost, strict=True)],
+                color="black",
+                linestyle=":",
+                label="true network delay (ms)",
+            )
+            if any(lost):
+                bottom.fill_between(
+                    seconds,
+                    0,
+                    1,
+                    where=lost,
+                    transform=bottom.get_xaxis_transform(),
+                    color="grey",
+                    alpha=0.3,
+                    label="outage",
+                )
+            for axis in (top, bottom):
+                axis.set_ylim(bottom=0)
+                axis.legend(fontsize=7, loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+            top.set_title(name, fontsize=10, pad=34)
+            bottom.set_xlabel("seconds")
+        fig.tight_layout()
+        fig.savefig(path)
+        plt.close(fig)
+
+
+def _keys(trace: Trace) -> list[str]:
+    return list(dict.fromkeys(key for one in trace.observations for key in one.figures))
+
+
+def _bar(axis: Axes, result: Result, row: float, height: float, colours: Mapping[str, str]) -> None:
+    axis.barh(
+        row,
+        (result.finished - result.started) / 1e9,
+        height,
+        result.started / 1e9,
+        align="edge",
+        color=colours[result.task.profile.model],
+        edgecolor="white" if result.outcome is Outcome.DONE else "black",
+        linewidth=0.5,
+        hatch=None if result.outcome is Outcome.DONE else "////",
+    )
+
+
+def _rows(results: list[Result]) -> list[tuple[Result, int]]:
+    """Give executions that overlap different rows, the lowest that is free."""
+    free: list[int] = []
+    busy: list[tuple[int, int]] = []
+    placed: list[tuple[Result, int]] = []
+    rows = 0
+    for result in sorted(results, key=lambda r: r.started):
+        while busy and busy[0][0] <= result.started:
+            heappush(free, heappop(busy)[1])
+        if free:
+            row = heappop(free)
+        else:
+            row, rows = rows, rows + 1
+        heappush(busy, (result.finished, row))
+        placed.append((result, row))
+    return placed

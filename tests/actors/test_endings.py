@@ -1,0 +1,135 @@
+"""How `aerodaas run` ends: interrupted, or by an application that raises in mid-flight."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+from flying import FLAT
+
+from aerodaas.recording.flight import Flight
+from aerodaas.recording.reader import Recording
+
+_ROOT = Path(__file__).resolve().parents[2]
+_APP = """
+import time
+from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
+
+env = Environment("environment.json")
+drone = env.get_robot_by_id("drone")
+drone.navigate(AeroNavigation(NavigationType.DISTANCE_DRIVEN, [Waypoint("far", 900, 0, 2)]))
+drone.start_mission(wait=False)
+odometry = drone.get_sensor_by_id("odom_drone")
+while odometry.poll(10.0).height < 1.0:
+    time.sleep(0.05)
+print("in the air", flush=True)
+"""
+
+
+@contextmanager
+def running(folder: Path, ending: str) -> Iterator[subprocess.Popen[str]]:
+    """Run an application that is in the air when it comes to its `ending`, in real time."""
+    (folder / "environment.json").write_text(json.dumps(FLAT))
+    (folder / "app.py").write_text(_APP + ending)
+    words = ["run", str(folder / "app.py"), "--speed", "1", "--record", str(folder / "out")]
+    with subprocess.Popen(
+        [sys.executable, "-c", "from aerodaas.cli import main; main()", *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=_ROOT,
+        env={**os.environ, "PYTHONPATH": str(_ROOT)},
+        start_new_session=True,
+    ) as process:
+        yield process
+        process.kill()
+
+
+def landed(folder: Path) -> Flight:
+    """What was recorded, closed properly, of a drone that came down."""
+    with Recording.open(folder / "out" / "flight.mcap") as recording:
+        assert recording.complete
+        flight = Flight.read(recording)
+    robot = flight.robots["drone"]
+    assert robot.outcome.startswith("landed")
+    assert robot.position[:, 2].max() > 1.0
+    assert robot.position[-1, 2] < 0.2
+    return flight
+
+
+def airborne(process: subprocess.Popen[str]) -> None:
+    """Wait until the application says that it is in the air."""
+    assert process.stdout is not None
+    said = []
+    for line in process.stdout:
+        said.append(line)
+        if "in the air" in line:
+            return
+    raise AssertionError("".join(said) + process.communicate()[1])
+
+
+def everyone(process: subprocess.Popen[str]) -> list[psutil.Process]:
+    """The process and all that it has started."""
+    parent = psutil.Process(process.pid)
+    return [parent, *parent.children(recursive=True)]
+
+
+@pytest.mark.parametrize(
+    ("sent", "code", "reason"),
+    [
+        (signal.SIGINT, 130, "interrupted from the keyboard"),
+        (signal.SIGTERM, 143, "received SIGTERM"),
+        (signal.SIGHUP, 129, "received SIGHUP"),
+    ],
+    ids=["Ctrl-C", "terminated", "terminal closed"],
+)
+def test_an_interrupted_run_lands(
+    tmp_path: Path, sent: signal.Signals, code: int, reason: str
+) -> None:
+    """The drone lands, the recording is closed, and no process is left."""
+    with running(tmp_path, "drone.wait()") as process:
+        airborne(process)
+        processes = everyone(process)
+        assert len(processes) > 3
+        if sent is signal.SIGINT:
+            os.killpg(process.pid, sent)  # as a terminal does: to all of them
+        else:
+            process.send_signal(sent)
+        _, said = process.communicate(timeout=120)
+        assert process.returncode == code, said
+    assert "Traceback" not in said
+    flight = landed(tmp_path)
+    reasons = [band.reason for band in flight.robots["drone"].bands if band.state == "landing"]
+    assert reasons == [reason]
+    deadline = time.monotonic() + 20
+    while any(one.is_running() and one.status() != psutil.STATUS_ZOMBIE for one in processes):
+        assert time.monotonic() < deadline, [one for one in processes if one.is_running()]
+        time.sleep(0.2)
+
+
+@pytest.mark.parametrize(
+    ("ending", "message"),
+    [
+        ("raise KeyError('my own bug')", "app.py:13: KeyError: 'my own bug'"),
+        ("drone.get_sensor_by_id('nose')", "no sensor of drone is called 'nose'"),
+    ],
+    ids=["any exception", "an error of ours"],
+)
+def test_an_application_that_raises_in_flight(tmp_path: Path, ending: str, message: str) -> None:
+    """The drone lands, the recording is closed, and one message tells where it was raised."""
+    with running(tmp_path, ending) as process:
+        _, said = process.communicate(timeout=120)
+    assert message in said
+    assert said.count("error:") == 1
+    assert "Traceback" not in said
+    assert process.returncode in {1, 2}
+    landed(tmp_path)

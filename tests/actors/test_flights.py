@@ -1,0 +1,233 @@
+"""Whole flights in real time: what an application does in flight, and what goes wrong there."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+
+import pytest
+from analyses import Above, Broken, Jitter, ProcessId, Ticker
+from flying import FLAT, Flyer, hop, recorded, robot
+
+from aerodaas import AeroListData, Environment, Odometry, Robot, Waypoint
+from aerodaas.errors import GraphError, MissionError
+from aerodaas.graph import AeroStreamData
+from aerodaas.status import MissionState
+
+SPEED = 5.0
+
+
+def drone_of(env: Environment) -> Robot:
+    """The only drone."""
+    return env.get_robot_by_id("drone")
+
+
+def odometry_of(env: Environment) -> AeroStreamData[Odometry]:
+    """Its odometry."""
+    return drone_of(env).get_sensor_by_id("odom_drone").get_data_stream()
+
+
+def short(env: Environment) -> None:
+    """One waypoint."""
+    drone_of(env).navigate(hop((3, 0)))
+
+
+def long(env: Environment) -> None:
+    """A waypoint to stay at until told otherwise."""
+    drone_of(env).navigate(hop((1, 0), hover=600))
+
+
+def eventually(condition: Callable[[], bool], seconds: float = 30.0) -> None:
+    """Wait until `condition` holds."""
+    deadline = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < deadline, "it never happened"
+        time.sleep(0.05)
+
+
+def state_of(env: Environment) -> MissionState:
+    """The mission's state."""
+    return env.launch().look().robots["drone"].status.state
+
+
+def test_a_flight_in_scaled_time(flyer: Flyer) -> None:
+    """At five times the wall's speed the drone visits its waypoint, returns and lands."""
+    run = flyer.fly(short, speed=SPEED)
+    assert not run.lockstep
+    flight = recorded(run)
+    assert flight.robots["drone"].outcome.startswith("landed")
+    assert flight.robots["drone"].visited == ("wp0",)
+    assert flight.alerts == []
+
+
+def test_a_slow_start_is_not_taken_for_a_dead_application(
+    flyer: Flyer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The drone listens for the application from its start on, not from its making."""
+    from aerodaas.actors import flight as module  # noqa: PLC0415 - loads ray
+
+    prepare = module.Flight._prepare
+
+    def slowly(self: object, *args: object) -> None:
+        prepare(self, *args)  # type: ignore[arg-type]
+        time.sleep(5.5)
+
+    monkeypatch.setattr(module.Flight, "_prepare", slowly)
+    flight = recorded(flyer.fly(short, speed=SPEED))
+    assert flight.robots["drone"].visited == ("wp0",)
+    assert flight.alerts == []
+
+
+def test_the_application_reads_streams_in_flight(flyer: Flyer) -> None:
+    """Push, pull and iteration give what is measured; all end with the mission."""
+    pushed: list[Odometry] = []
+    refused: list[str] = []
+
+    def build(env: Environment) -> None:
+        long(env)
+        sensor = drone_of(env).get_sensor_by_id("odom_drone")
+        sensor.subscribe(pushed.append)
+        for read in (sensor.poll, sensor.get_data_stream().get_data):
+            with pytest.raises(GraphError, match="before the mission starts") as error:
+                read()
+            refused.append(str(error.value))
+
+    with flyer.flying(build, speed=SPEED) as env:
+        assert "test_flights.py" in refused[0]
+        assert "read()" in refused[0]
+        sensor = drone_of(env).get_sensor_by_id("odom_drone")
+        eventually(lambda: sensor.poll(5.0).height > 1.0)
+        heights = [odometry.height for _, odometry in zip(range(5), odometry_of(env), strict=False)]
+        assert len(heights) == 5
+        with pytest.raises(TimeoutError, match="nothing arrived"):
+            odometry_of(env).get_data(timeout=0.0)
+        reader = odometry_of(env)
+        drone_of(env).end_mission()
+        landed = list(reader)
+        assert landed[-1].height < 0.2
+    assert len(pushed) > 10
+    assert max(item.height for item in pushed) > 1.0
+    with pytest.raises(MissionError, match="no longer flying"):
+        drone_of(env).end_mission()
+
+
+def test_poll_gives_the_newest(flyer: Flyer) -> None:
+    """However long nobody asked, the item is a fresh one; asked twice, there is still one."""
+    with flyer.flying(long, speed=SPEED) as env:
+        sensor = drone_of(env).get_sensor_by_id("odom_drone")
+        assert sensor.poll(5.0).height < 1.0
+        eventually(lambda: state_of(env) is MissionState.LOITERING)
+        time.sleep(1.0)
+        assert sensor.poll(0.0).height > 1.0
+        assert sensor.poll(0.0).height > 1.0
+        drone_of(env).end_mission()
+
+
+def test_pause_and_resume(flyer: Flyer) -> None:
+    """A paused drone hovers where it is; resumed, it goes on to its waypoint."""
+
+    def build(env: Environment) -> None:
+        drone_of(env).navigate(hop((30, 0)))
+
+    with flyer.flying(build, speed=SPEED) as env:
+        drone = drone_of(env)
+        eventually(lambda: state_of(env) is MissionState.ENROUTE)
+        drone.pauseMission()
+        eventually(lambda: state_of(env) is MissionState.PAUSED)
+        time.sleep(0.3)
+        assert state_of(env) is MissionState.PAUSED
+        drone.resumeMission()
+        eventually(lambda: state_of(env) is not MissionState.PAUSED)
+    flight = recorded(env.launch())
+    assert flight.robots["drone"].visited == ("wp0",)
+    assert "paused" in [band.state for band in flight.robots["drone"].bands]
+
+
+def test_waypoints_added_in_flight_are_flown(flyer: Flyer) -> None:
+    """`add_navigation` and `clear_navigation` work on a mission that runs."""
+    content = {**FLAT, "robots": [robot(mission={"on_complete": "hold"})]}
+    with flyer.flying(long, content, speed=SPEED) as env:
+        eventually(lambda: state_of(env) is MissionState.LOITERING)
+        scheduler = env.trajectory_scheduler()
+        scheduler.clearNavigation()
+        eventually(lambda: state_of(env) is MissionState.HOLDING)
+        scheduler.addNavigation(AeroListData([Waypoint("extra", 2, 2, 2)]))
+        eventually(lambda: "extra" in env.launch().look().robots["drone"].status.visited)
+        drone_of(env).end_mission()
+    assert recorded(env.launch()).robots["drone"].outcome.startswith("landed: ")
+
+
+def test_an_analysis_that_raises_does_not_end_the_mission(flyer: Flyer) -> None:
+    """The mission is flown to its end; then the run fails, naming the analysis and the line."""
+
+    def build(env: Environment) -> None:
+        short(env)
+        Broken().analyse(odometry_of(env))
+
+    with pytest.raises(MissionError) as error:
+        flyer.fly(build, speed=SPEED)
+    assert error.value.exit_code == 1
+    said = str(error.value)
+    assert "drone/broken: ZeroDivisionError: a bug of the user's own at analyses.py:" in said
+    from aerodaas.recording.flight import Flight  # noqa: PLC0415
+    from aerodaas.recording.reader import Recording  # noqa: PLC0415
+
+    with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
+        assert recording.complete
+        flight = Flight.read(recording)
+    assert flight.robots["drone"].visited == ("wp0",)
+    assert [kind for _, kind, _ in flight.alerts] == ["analysis_failed"]
+
+
+def test_a_trigger_ends_the_mission_and_wakes_an_analysis(flyer: Flyer) -> None:
+    """A result that satisfies `when` lands the drone; a target sleeps until it is woken."""
+    woken: list[float] = []
+
+    def build(env: Environment) -> None:
+        long(env)
+        sleeper, high, ticker = Jitter(), Above(1.0), Ticker()
+        jitter = sleeper.analyse(odometry_of(env))
+        high.analyse(odometry_of(env))
+        high.trigger(sleeper)
+        ticker.deploy(env.get_compute_resource_by_id("edge")).instantiate()
+        ticker.trigger(drone_of(env).end_mission, when=lambda count: count == 24)
+
+        def listen() -> None:
+            woken.extend(jitter)
+
+        env.graph.on_launch.append(lambda: threading.Thread(target=listen, daemon=True).start())
+
+    flight = recorded(flyer.fly(build, speed=SPEED))
+    assert flight.robots["drone"].outcome == "landed: an analysis asked to land"
+    assert woken
+    assert woken[0] > 1.0
+
+
+def test_an_analysis_that_dies_is_restarted(flyer: Flyer) -> None:
+    """SIGKILL of an analysis' process: it works again in a new one; the drone flies on, watched."""
+    results: dict[str, AeroStreamData[int]] = {}
+
+    def build(env: Environment) -> None:
+        long(env)
+        work = ProcessId(str(flyer.folder / "opened"))
+        results["pid"] = work.analyse(odometry_of(env))
+
+    with flyer.flying(build, {**FLAT, "robots": [robot()]}, speed=1.0) as env:
+        first = results["pid"].get_data(30.0)
+        os.kill(first, signal.SIGKILL)
+        eventually(lambda: state_of(env) is not None and newest(results["pid"]) not in {0, first})
+        drone_of(env).end_mission()
+    flight = recorded(env.launch())
+    assert flight.robots["drone"].outcome.startswith("landed: ")
+    assert [kind for _, kind, _ in flight.alerts] == []
+
+
+def newest(stream: AeroStreamData[int]) -> int:
+    """The next item, 0 if there is none at present."""
+    try:
+        return stream.get_data(0.2)
+    except TimeoutError:
+        return 0

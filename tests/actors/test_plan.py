@@ -1,0 +1,155 @@
+"""From a graph to actors: placement, acknowledgements, and who is waited for in lockstep."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from analyses import Above, Broken, Jitter, ProcessId, Ticker, Weave
+from flying import FLAT, Flyer, hop, robot
+
+from aerodaas import Environment
+from aerodaas.actors.cluster import Place
+from aerodaas.actors.plan import FlightPlan, make_plan
+from aerodaas.actors.session import Session
+from aerodaas.errors import GraphError
+from aerodaas.graph import AeroStreamData
+
+CAMERA = {"id": "cam", "type": "camera", "rate": 10, "settings": {"width": 64, "height": 36}}
+ODOMETRY = {"id": "odom", "type": "odometry", "rate": 10}
+CONTENT = {
+    **FLAT,
+    "robots": [robot(sensors=[ODOMETRY, CAMERA])],
+    "compute": [
+        {"id": "edge", "kind": "edge"},
+        {"id": "cloud", "kind": "cloud"},
+        {"id": "near", "kind": "edge", "node": "10.0.0.7"},
+    ],
+}
+
+
+@pytest.fixture
+def environment(tmp_path: Path) -> Environment:
+    """An environment with one drone, a camera and three places to compute at."""
+    return Environment(Flyer(tmp_path).write(CONTENT))
+
+
+def odometry(env: Environment) -> AeroStreamData[Any]:
+    """The drone's odometry."""
+    return env.get_robot_by_id("drone").get_sensor_by_id("odom").get_data_stream()
+
+
+def camera(env: Environment) -> AeroStreamData[Any]:
+    """The drone's camera."""
+    return env.get_robot_by_id("drone").get_sensor_by_id("cam").get_data_stream()
+
+
+def plan(env: Environment, speed: float | None = None) -> FlightPlan:
+    """The plan of what was built so far; None is lockstep."""
+    scheduler = env.trajectory_scheduler()
+    return make_plan(Session(env.config, speed), env.graph, env.compute(), scheduler)
+
+
+def test_nothing_flies_without_navigation(environment: Environment) -> None:
+    """The remedy is named."""
+    with pytest.raises(GraphError, match=r"drone\.navigate"):
+        plan(environment)
+
+
+def test_light_analyses_share_an_actor_by_place(environment: Environment) -> None:
+    """An isolated analysis has an actor of its own; the others share one at each place."""
+    env = environment
+    env.get_robot_by_id("drone").navigate(hop((1, 0)))
+    Jitter().analyse(odometry(env))
+    Above(1, "a").deploy(env.get_compute_resource_by_id("edge")).analyse(odometry(env))
+    Above(1, "b").deploy(env.get_compute_resource_by_id("cloud")).analyse(odometry(env))
+    Above(1, "c").deploy(env.get_compute_resource_by_id("near")).analyse(odometry(env))
+    ProcessId("").deploy(env.get_compute_resource_by_id("cloud")).analyse(odometry(env))
+    actors = {actor.name: actor for actor in plan(env).analyses}
+    streams = {name: [node.stream for node in actor.nodes] for name, actor in actors.items()}
+    assert streams == {
+        "analytics/drone/process_id": ["drone/process_id"],
+        "analytics/edge": ["drone/jitter", "drone/a"],
+        "analytics/cloud": ["drone/b"],
+        "analytics/10.0.0.7": ["drone/c"],
+    }
+    assert actors["analytics/cloud"].place == Place("cloud")
+    assert actors["analytics/10.0.0.7"].place == Place("edge", "10.0.0.7")
+
+
+def test_unread_sensors_of_a_flying_robot_run_all_the_same(environment: Environment) -> None:
+    """The camera is recorded, odometry can be polled, though no analysis reads them."""
+    environment.get_robot_by_id("drone").navigate(hop((1, 0)))
+    made = plan(environment)
+    assert [one.stream for one in made.cameras] == ["drone/cam"]
+    assert [sensor.id for sensor in made.drones[0][0].sensors] == ["odom"]
+    assert {"drone/cam", "drone/odom", "drone/state", "drone/status"} <= set(made.recorded)
+
+
+def test_what_steers_is_waited_for(environment: Environment) -> None:
+    """No measurement that can change a flight is under way while time goes on."""
+    env = environment
+    env.get_robot_by_id("drone").navigate(Weave().analyse(odometry(env)))
+    Broken().analyse(camera(env))
+    windows = plan(env).conduct.windows
+    assert windows["drone/odom"] == 0
+    assert windows["drone/cam"] > 0
+    assert windows["drone/state"] > 0
+
+
+def test_what_triggers_or_wakes_what_steers_is_waited_for(environment: Environment) -> None:
+    """A trigger's command steers, and so does waking an analysis that does."""
+    env = environment
+    drone = env.get_robot_by_id("drone")
+    drone.navigate(hop((1, 0)))
+    sleeper, waker, ticker = Above(1, "sleeper"), Broken(), Ticker()
+    sleeper.analyse(odometry(env))
+    waker.analyse(camera(env))
+    waker.trigger(sleeper)
+    assert plan(env).conduct.windows["drone/cam"] > 0
+    sleeper.trigger(drone.end_mission)
+    ticker.deploy(env.get_compute_resource_by_id("edge")).instantiate()
+    ticker.trigger(drone.pause_mission)
+    windows = plan(env).conduct.windows
+    assert windows["drone/cam"] == windows["drone/odom"] == windows["ticker"] == 0
+
+
+def test_analyses_that_wake_each_other_are_no_endless_question(environment: Environment) -> None:
+    """A circle of wakes ends."""
+    env = environment
+    env.get_robot_by_id("drone").navigate(hop((1, 0)))
+    one, other = Above(1, "one"), Above(2, "other")
+    one.analyse(odometry(env))
+    other.analyse(odometry(env))
+    one.trigger(other)
+    other.trigger(one)
+    assert plan(env).conduct.windows["drone/odom"] > 0
+
+
+@pytest.mark.parametrize("recording", [True, False])
+def test_every_measurement_is_acknowledged_by_its_readers(tmp_path: Path, recording: bool) -> None:  # noqa: FBT001
+    """Each end of each way acknowledges once; the recorder does for every message."""
+    content = {**CONTENT, "recording": {"enabled": recording}}
+    env = Environment(Flyer(tmp_path).write(content))
+    follow = Weave().analyse(odometry(env))
+    env.get_robot_by_id("drone").navigate(follow)
+    Jitter().analyse(odometry(env))
+    counts = plan(env).conduct.acknowledgements
+    # The drone for what Weave says, and Jitter itself; or the recorder for each of the streams.
+    assert counts["drone/odom"] == (4 if recording else 2)
+    assert counts["drone/state"] == (1 if recording else 0)
+    (actor,) = plan(env).analyses
+    silent = {node.stream: node.acknowledges for node in actor.nodes}
+    assert silent == {"drone/weave": False, "drone/jitter": not recording}
+
+
+def test_in_real_time_each_drone_has_its_own_actor(tmp_path: Path) -> None:
+    """In lockstep one actor flies them all and conducts the time."""
+    content = {**FLAT, "robots": [robot("one"), robot("two", start=[0, 5, 0])]}
+    env = Environment(Flyer(tmp_path).write(content))
+    for name in ("one", "two"):
+        env.get_robot_by_id(name).navigate(hop((1, 0)))
+    assert [len(group) for group in plan(env, speed=1.0).drones] == [1, 1]
+    assert [len(group) for group in plan(env).drones] == [2]
+    assert plan(env, speed=1.0).conduct.windows == {}

@@ -1,0 +1,38 @@
+"""The schedulers' benchmarks are commands that explain themselves and write their figures."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments", "cases"),
+    [
+        ("schedulers", "--workload 2D-P --case nominal --seeds 2 --duration 4", 16),
+        ("decision", "--scheduler edf,margin --waiting 5,20 --rounds 10", 4),
+        ("lab", "--scheduler edf --edges 1 --duration 2", 2),
+    ],
+)
+def test_it_prints_a_table_and_writes_the_same_figures(
+    name: str, arguments: str, cases: int, tmp_path: Path
+) -> None:
+    """With units, machine, versions and revision."""
+    out = tmp_path / "out.json"
+    command = [sys.executable, f"benchmarks/{name}.py", *arguments.split(), "--json", str(out)]
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "160"}
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(out.read_text())
+    assert len(found["rows"]) == cases
+    assert found["rows"][0]["case"] in done.stdout
+    assert set(found["units"]) <= set(found["rows"][0])
+    assert found["machine"]["cores"] >= 1

@@ -1,0 +1,130 @@
+"""Dead reckoning knows where it is about as well as it says."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aerodaas.drivers.tello.commands import Motion, Sticks, StickScale
+from aerodaas.drivers.tello.reckoning import DeadReckoning
+from aerodaas.drivers.tello.state import parse_state
+from aerodaas.geometry import wrap_angle
+from aerodaas.testing.tello.flight import TelloFlight
+from aerodaas.testing.tello.options import TelloOptions
+
+SCALE = StickScale(speed=1.0, climb=1.0, turn=math.radians(100))
+TICK = 0.05
+
+
+class Dryrun:
+    """A flight without sockets and without waiting."""
+
+    def __init__(self, options: TelloOptions) -> None:
+        self.flight = TelloFlight(options)
+        self.reckoning = DeadReckoning(
+            np.array(options.start, np.float64), math.radians(options.start_yaw)
+        )
+        self.ticks = 0
+
+    def fly(self, sticks: Sticks | None, duration: float, *, packets: bool = True) -> None:
+        """Fly by `sticks` (None: its own take-off or landing) with a packet every 0.1 s."""
+        motion = SCALE.motion(sticks or Sticks())
+        for _ in range(round(duration / TICK)):
+            if sticks is not None:
+                self.flight.steer(sticks.right, sticks.ahead, sticks.up, sticks.clockwise)
+            self.flight.advance(TICK)
+            self.ticks += 1
+            now = self.ticks * TICK
+            self.reckoning.predict(now, motion)
+            state = parse_state(self.flight.state().encode())
+            assert state is not None
+            if packets and self.ticks % 2 == 0:
+                self.reckoning.correct(state, now, standing=not self.flight.flying)
+
+    def error(self) -> float:
+        """Metres between the belief and the truth, level."""
+        off = self.reckoning.odometry.position - self.flight.truth.position
+        return math.hypot(off[0], off[1])
+
+
+def _wander(seed: int, options: TelloOptions, legs: int = 20) -> Dryrun:
+    run = Dryrun(options)
+    draw = random.Random(seed).randint
+    run.fly(None, 0.2)
+    run.flight.take_off()
+    run.fly(None, 4.0)
+    for _ in range(legs):
+        run.fly(Sticks(draw(-60, 60), draw(-60, 60), draw(-10, 15), draw(-50, 50)), 1.5)
+    return run
+
+
+def test_the_error_stays_within_the_stated_uncertainty() -> None:
+    """Over many flights of half a minute, nearly all errors lie within two sigma of a Rayleigh."""
+    shares = []
+    for seed in range(12):
+        options = TelloOptions(
+            seed=seed, wind=(0.8, -0.4, 0.0), gust=0.3, stick_speed=0.9, switched_on_yaw=37.0 * seed
+        )
+        run = _wander(seed, options)
+        assert run.reckoning.sigma < 2.0, "and the statement means something"
+        shares.append(run.error() / run.reckoning.sigma)
+    assert sum(share > 2.0 for share in shares) <= 1, shares
+    assert max(shares) < 3.5
+
+
+def test_height_and_yaw_do_not_drift() -> None:
+    """Both are measured, so that half a minute leaves them within a step of their figures."""
+    run = _wander(3, TelloOptions(start=(1.0, 2.0, 0.5), start_yaw=120.0, switched_on_yaw=-80.0))
+    odometry, truth = run.reckoning.odometry, run.flight.truth
+    assert abs(odometry.position[2] - truth.position[2]) < 0.16
+    assert abs(wrap_angle(odometry.yaw - truth.yaw)) < math.radians(6)
+
+
+def test_slow_motion_is_not_lost_in_rounding() -> None:
+    """At 4 cm/s every packet says 0.0 m/s; the model of the sticks tells that it moves."""
+    run = Dryrun(TelloOptions())
+    run.fly(None, 0.2)
+    run.flight.take_off()
+    run.fly(None, 4.0)
+    run.fly(Sticks(ahead=4), 25.0)
+    assert run.flight.truth.position[0] > 0.8
+    assert run.reckoning.odometry.position[0] == pytest.approx(
+        run.flight.truth.position[0], abs=0.15
+    )
+
+
+def test_without_packets_the_uncertainty_grows_quickly() -> None:
+    """Half a metre per second, as nobody says where it drifts."""
+    run = _wander(1, TelloOptions(), legs=2)
+    before = run.reckoning.sigma
+    run.fly(Sticks(), 4.0, packets=False)
+    assert run.reckoning.sigma > before + 1.0
+
+
+@settings(max_examples=50)
+@given(st.lists(st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-2, 2)), max_size=20))
+def test_sticks_and_motions_undo_each_other_within_a_percent(
+    asked: list[tuple[float, float, float]],
+) -> None:
+    """What is sent is what was asked, clamped to 100 % and rounded to one."""
+    for ahead, left, rate in asked:
+        sticks = SCALE.sticks(Motion(np.array([ahead, left, 0.0]), rate))
+        assert max(abs(sticks.ahead), abs(sticks.right), abs(sticks.clockwise)) <= 100
+        back = SCALE.motion(sticks)
+        for given_, flown, full in (
+            (ahead, back.velocity[0], SCALE.speed),
+            (left, back.velocity[1], SCALE.speed),
+            (rate, back.yaw_rate, SCALE.turn),
+        ):
+            assert flown == pytest.approx(min(max(given_, -full), full), abs=0.0051 * full)
+
+
+@given(st.sampled_from([math.nan, math.inf, -math.inf]))
+def test_sticks_of_nonsense_are_centred(value: float) -> None:
+    """No number that is not finite reaches the wire."""
+    assert SCALE.sticks(Motion(np.array([value, value, value]), value)) == Sticks()

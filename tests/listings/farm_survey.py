@@ -1,0 +1,21 @@
+from aerodaas import *
+
+env: IEnvironment = Environment("environment.json")
+edge_compute: ICompute = env.getComputeResourceById("edge")
+drone: IRobot = env.getRobotById("quadrotor_base")
+scheduler = NearestNeighborScheduler(env)
+env.setTrajectoryScheduler(scheduler)
+odometry: IPushSensor = drone.getSensorById("odom")
+odometry_data_stream: AeroStreamData[Odom] = odometry.getDataStream()
+# Drone odometry monitoring
+odometry_analytics: IAnalyse = MonitoringAnalytics(["battery", "height", "gps"])
+odometry_analytics.deploy(edge_compute)
+_: AeroStreamData[Odom] = odometry_analytics.analyse(odometry_data_stream)
+wp1: Waypoint = Waypoint(id="wp1", x=20, y=20, z=10, hover_duration=5, waypoint_type="relative")
+wp2: Waypoint = Waypoint(id="wp2", x=20, y=100, z=10, hover_duration=5, waypoint_type="relative")
+wp3: Waypoint = Waypoint(id="wp3", x=60, y=100, z=10, hover_duration=5, waypoint_type="relative")
+wp4: Waypoint = Waypoint(id="wp4", x=60, y=20, z=10, hover_duration=5, waypoint_type="relative")
+waypoints_list: AeroNavigation = AeroNavigation(NavigationType.DISTANCE_DRIVEN, [wp1, wp2, wp3, wp4], SchedulingType.UNORDERED)
+drone_nav_data: IAeroData[AeroNavigation] = scheduler.generateNavigation(waypoints_list)
+drone.navigate(drone_nav_data)
+drone.start_mission()

@@ -1,0 +1,248 @@
+"""Whatever fails around the drone's actor, the drone comes down safely and says why."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import psutil
+import pytest
+from faulty import DyingScheduler, HangingScheduler, Mortal, RaisingScheduler, Stuck
+from flying import FLAT, Flyer, hop, recorded, robot
+from ray.cluster_utils import Cluster
+from scripted import RemoteUser, free_port
+
+from aerodaas import AeroNavigation, Environment, NavigationType, TrajectoryScheduler
+from aerodaas.analytics import RemoteAnalytics
+from aerodaas.analytics.remote.client import RemoteClient
+from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.recording.flight import Flight
+from aerodaas.recording.reader import Recording
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).resolve().parent
+
+
+def environment(silence_return: float = 40.0, **more: Any) -> dict[str, Any]:  # noqa: ANN401
+    """A drone that waits `silence_return` seconds for silent navigation."""
+    limits = {"cruise_speed": 3.0, "takeoff_height": 2.0, "silence_return": silence_return}
+    sensors = [{"id": "odom", "type": "odometry", "rate": 10}]
+    drone = robot(limits=limits, sensors=sensors, mission={"plan_timeout": 2.0})
+    return {**FLAT, "robots": [drone], **more}
+
+
+def states(flight: Flight) -> list[str]:
+    """The states that the mission went through."""
+    return [state for state, _ in groupby(band.state for band in flight.robots["drone"].bands)]
+
+
+def landed_at_home(flight: Flight) -> bool:
+    """Whether the drone ended on the ground within two metres of its take-off."""
+    mission = flight.robots["drone"]
+    near = bool(np.linalg.norm(mission.position[-1]) < 2.0)
+    return mission.outcome.startswith("landed") and near
+
+
+def alerts(flight: Flight) -> dict[str, str]:
+    """The alerts recorded, by kind, one a line."""
+    found: dict[str, str] = defaultdict(str)
+    for _, kind, text in flight.alerts:
+        found[kind] += f"{text}\n"
+    return found
+
+
+@pytest.mark.slow
+def test_hung_analysis(flyer: Flyer) -> None:
+    """The drone holds, returns after the configured silence, and the recording names who hung."""
+
+    def build(env: Environment) -> None:
+        drone = env.get_robot_by_id("drone")
+        stream = Stuck().analyse(drone.get_sensor_by_id("odom").get_data_stream())
+        drone.navigate(AeroNavigation(NavigationType.ANALYTICS_DRIVEN, stream))
+
+    flight = recorded(flyer.fly(build, environment(), speed=5.0))
+    assert landed_at_home(flight)
+    assert states(flight)[-5:] == ["following", "holding", "returning", "landing", "landed"]
+    assert "navigation has been silent" in flight.robots["drone"].outcome
+    assert "drone/stuck has been at one item" in alerts(flight)["analysis_hung"]
+
+
+@pytest.mark.slow
+def test_killed_analysis_is_restarted(flyer: Flyer) -> None:
+    """The drone holds until the analysis is back, then follows it again until it says land."""
+    marker = flyer.folder / "died"
+
+    def build(env: Environment) -> None:
+        drone = env.get_robot_by_id("drone")
+        analysis = Mortal(marker).trigger(drone.end_mission, when=lambda steps: not len(steps))
+        stream = analysis.analyse(drone.get_sensor_by_id("odom").get_data_stream())
+        drone.navigate(AeroNavigation(NavigationType.ANALYTICS_DRIVEN, stream))
+
+    flight = recorded(flyer.fly(build, environment(silence_return=100.0), speed=5.0))
+    assert marker.exists()
+    assert flight.robots["drone"].outcome == "landed: an analysis asked to land"
+    assert states(flight)[-5:] == ["following", "holding", "following", "landing", "landed"]
+    assert "analytics/drone/mortal died" in alerts(flight)["actor_lost"]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scheduler", "reason"),
+    [
+        (RaisingScheduler, "ZeroDivisionError: a bug of the user's own"),
+        (HangingScheduler, "no plan within 2 s: flying the order given"),
+        (DyingScheduler, "the scheduler's actor died"),
+    ],
+)
+def test_scheduler_fails(flyer: Flyer, scheduler: type[TrajectoryScheduler], reason: str) -> None:
+    """Without a plan the order given is flown; the setpoints never stop coming."""
+
+    def build(env: Environment) -> None:
+        env.set_trajectory_scheduler(scheduler(env))
+        env.get_robot_by_id("drone").navigate(hop((20, 0), (20, 20), (0, 20)))
+
+    flight = recorded(flyer.fly(build, environment(), speed=5.0))
+    assert landed_at_home(flight)
+    assert flight.robots["drone"].visited == ("wp0", "wp1", "wp2")
+    assert reason in alerts(flight)["scheduler"]
+    # Mission time between the drone's states: one late turn is the host's, a stop is the plan's.
+    assert np.diff(flight.robots["drone"].time).max() < 2.0
+
+
+@pytest.mark.slow
+def test_remote_service_dies(flyer: Flyer) -> None:
+    """The drone flies on; the service is started anew and commands the same mission."""
+    port = free_port()
+    with flyer.options(speed=5.0):
+        env = Environment(flyer.write(environment(remote={"port": port})))
+        drone = env.get_robot_by_id("drone")
+        edge = env.get_compute_resource_by_id("edge")
+        odometry = drone.get_sensor_by_id("odom").get_data_stream()
+        stream = RemoteAnalytics(env.env_data).deploy(edge).analyse(odometry)
+        env.trajectory_scheduler().add_navigation(stream)
+        drone.navigate(hop((300, 0)))
+        run = env.launch()
+
+        def stop_early(user: RemoteUser) -> None:
+            user.until(lambda status: status["state"] == "enroute")
+            assert run._flight is not None
+            os.kill(run._flight.infos()["analytics/drone/remote"].pid, signal.SIGKILL)
+            before = user.until(lambda _: True)
+            assert before["state"] == "enroute"
+            user.client.command("return-home")
+
+        with RemoteUser(port, stop_early):
+            run.wait()
+    flight = recorded(run)
+    assert landed_at_home(flight)
+    assert "analytics/drone/remote died" in alerts(flight)["actor_lost"]
+    assert "return-home: accepted" in alerts(flight)["remote_command"]
+
+
+def test_drone_actor_dies(flyer: Flyer) -> None:
+    """Nobody can fly any more: the application ends with the reason, and nothing is left over."""
+    with flyer.options(speed=5.0):
+        env = Environment(flyer.write(environment()))
+        env.get_robot_by_id("drone").navigate(hop((300, 0)))
+        run = env.launch()
+        run.look()
+        assert run._flight is not None
+        os.kill(run._flight.infos()["drone/drone"].pid, signal.SIGKILL)
+        with pytest.raises(MissionError, match="died"):
+            run.wait()
+
+
+@pytest.fixture
+def cluster(runtime: None) -> Iterator[Cluster]:  # noqa: ARG001 - its PYTHONPATH goes to the actors
+    """A Ray that outlives its applications, started by somebody else."""
+    arguments = {
+        "num_cpus": 2,
+        "resources": {"edge": 1, "cloud": 1},
+        "include_dashboard": False,
+        "object_store_memory": 128 * 2**20,
+    }
+    cluster = Cluster(initialize_head=True, connect=False, head_node_args=arguments)
+    yield cluster
+    cluster.shutdown()
+
+
+def start_application(flyer: Flyer, port: int, *arguments: str) -> subprocess.Popen[bytes]:
+    """Start the long mission in a process of its own."""
+    path = flyer.write(environment(remote={"port": port}))
+    command = [sys.executable, "-m", "aerodaas", "run", str(HERE / "remote_app.py")]
+    command += ["--env", str(path), "--speed", "5", "--no-view"]
+    command += ["--record", str(flyer.folder / "flight"), *arguments]
+    return subprocess.Popen(command, cwd=ROOT)
+
+
+def actors_of_ray() -> set[int]:
+    """Process ids of all drone and recorder actors on this machine."""
+    names = ("ray::DroneActor", "ray::RecorderActor", "ray::Caretaker", "ray::AnalyticsActor")
+    return {
+        process.pid
+        for process in psutil.process_iter(["cmdline"])
+        if " ".join(process.info["cmdline"] or []).startswith(names)
+    }
+
+
+def wait_for(happened: Callable[[], bool], seconds: float) -> bool:
+    """Wait up to `seconds` for something to happen."""
+    end = time.monotonic() + seconds
+    while not happened() and time.monotonic() < end:
+        time.sleep(0.2)
+    return happened()
+
+
+@pytest.mark.slow
+def test_application_killed_in_a_cluster(flyer: Flyer, cluster: Cluster) -> None:
+    """The drone comes home by itself, the recording is closed, and no actor is left over."""
+    port = free_port()
+    before = actors_of_ray()
+    application = start_application(flyer, port, "--address", str(cluster.address))
+
+    def kill_and_watch(user: RemoteUser) -> None:
+        user.until(lambda status: status["distance"] > 20.0)
+        application.kill()
+        application.wait()
+        status = user.until(lambda status: status["state"] == "returning")
+        assert status["reason"] == "the application's process is gone"
+
+    with RemoteUser(port, kill_and_watch):
+        pass
+    assert wait_for(lambda: actors_of_ray() <= before, 60.0)
+    with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
+        assert recording.complete
+        flight = Flight.read(recording)
+    assert landed_at_home(flight)
+    assert "the application's process is gone" in alerts(flight)["application_lost"]
+
+
+@pytest.mark.slow
+def test_application_killed_with_its_own_ray(flyer: Flyer) -> None:
+    """All actors end with it, the vehicle has its own failsafe, the recording can be read."""
+    port = free_port()
+    before = actors_of_ray()
+    application = start_application(flyer, port)
+
+    def kill(user: RemoteUser) -> None:
+        user.until(lambda status: status["distance"] > 20.0)
+        application.kill()
+        application.wait()
+
+    with RemoteUser(port, kill):
+        pass
+    assert wait_for(lambda: actors_of_ray() <= before, 30.0)
+    with pytest.raises(AeroDaaSError):
+        RemoteClient(f"http://127.0.0.1:{port}").status()
+    with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
+        flight = Flight.read(recording)
+    assert flight.robots["drone"].position[:, 0].max() > 10.0

@@ -1,0 +1,67 @@
+"""docs/missions.md says what the code does."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from scripted import ScriptedDetector
+
+from aerodaas import Environment, Robot
+from aerodaas.analytics.remote.app import _COMMANDS
+from aerodaas.config import LimitsConfig
+from aerodaas.navigation.state_machine import mermaid
+from aerodaas.plugins import plugin_names
+from aerodaas.run import Run
+from aerodaas.status import MissionState
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = (ROOT / "docs" / "missions.md").read_text(encoding="utf-8")
+
+
+def blocks(kind: str) -> list[str]:
+    """The code blocks of a kind."""
+    return re.findall(rf"```{kind}\n(.*?)```", PAGE, re.DOTALL)
+
+
+def test_diagram_is_the_codes() -> None:
+    """The page's diagram is the one that the state machine draws."""
+    assert blocks("mermaid") == [mermaid() + "\n"]
+
+
+def test_every_state_limit_scheduler_and_command_is_explained() -> None:
+    """Tables name all states, limits with their defaults, schedulers and requests."""
+    for state in MissionState:
+        assert f"| `{state.value}` |" in PAGE
+    limits = LimitsConfig()
+    for name, value in re.findall(r"`limits\.(\w+)` ([0-9.]+)", PAGE):
+        assert getattr(limits, name) == float(value), name
+    for name in plugin_names("waypoint_schedulers"):
+        assert f"| `{name}` |" in PAGE
+    for name in _COMMANDS:
+        assert f"/{name}`" in PAGE
+
+
+@pytest.fixture
+def started(monkeypatch: pytest.MonkeyPatch) -> list[Robot]:
+    """The drones that are started from here on, in the folder with the environments."""
+    drones: list[Robot] = []
+    monkeypatch.chdir(ROOT / "apps")
+    monkeypatch.setattr(Robot, "start_mission", lambda drone: drones.append(drone))  # noqa: PLW0108
+    return drones
+
+
+@pytest.mark.parametrize("example", blocks("python")[:5])
+def test_examples_build(example: str, started: list[Robot]) -> None:
+    """Each example gives a graph that can be flown."""
+    names: dict[str, object] = {}
+    exec(blocks("python preamble")[0], names)  # noqa: S102 - our own page
+    frames = names["frames"]
+    names["detections"] = ScriptedDetector("person", 0.0, 1.0, (0, 0, 1, 1)).analyse(frames)  # type: ignore[arg-type]
+    exec(example, names)  # noqa: S102 - our own page
+    env = names["env"]
+    assert isinstance(env, Environment)
+    assert started == [names["drone"]]
+    env._place_entries()
+    assert Run(env)._plan().drones

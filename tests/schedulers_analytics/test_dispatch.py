@@ -1,0 +1,203 @@
+"""The rules between schedulers and executors, which the lab and the dispatcher share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pytest
+
+from aerodaas.errors import SchedulerError
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    AnalyticsScheduler,
+    Decision,
+    Drop,
+    Outcome,
+    Place,
+    Profile,
+    Resources,
+    Result,
+    RunOnEdge,
+    SendToCloud,
+    Task,
+    WakeAt,
+)
+from aerodaas.schedulers.analytics.dispatch import Dispatch
+from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
+
+MODEL = Profile("m", 10, 100 * MILLISECOND, 10 * MILLISECOND, 20 * MILLISECOND, 1, 2)
+
+
+class _RecordingHost:
+    """Starts nothing; remembers what it was asked for."""
+
+    def __init__(self) -> None:
+        self.asked: list[tuple[str, int, int]] = []
+        self.results: list[Result] = []
+        self.decisions: list[Decision] = []
+
+    def run_edge(self, task: Task, now: int) -> None:
+        self.asked.append(("edge", task.id, now))
+
+    def run_cloud(self, task: Task, now: int) -> None:
+        self.asked.append(("cloud", task.id, now))
+
+    def wake_at(self, at: int) -> None:
+        self.asked.append(("wake", -1, at))
+
+    def decided(self, decision: Decision, now: int) -> None:  # noqa: ARG002 - the host protocol
+        self.decisions.append(decision)
+
+    def closed(self, result: Result) -> None:
+        self.results.append(result)
+
+
+class _Scripted(AnalyticsScheduler):
+    """Answers each arrival with what the test says; runs waiting tasks when idle on demand."""
+
+    def __init__(self, *answers: object, idle: bool = False) -> None:
+        self.answers = list(answers)
+        self.idle = idle
+        self.waiting: list[Task] = []
+        self.heard: list[Result] = []
+
+    def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
+        self.waiting.append(task)
+        answer = self.answers.pop(0) if self.answers else None
+        if answer is None:
+            return ()
+        return [answer(task, now)]  # type: ignore[operator]
+
+    def executor_idle(self, now: int) -> Iterable[Decision]:  # noqa: ARG002
+        return [RunOnEdge(self.waiting.pop(0))] if self.idle and self.waiting else ()
+
+    def task_finished(self, result: Result, now: int) -> Iterable[Decision]:  # noqa: ARG002
+        self.heard.append(result)
+        return ()
+
+
+def _task(number: int, at: int = 0) -> Task:
+    return Task(number, MODEL, at, at + MODEL.deadline)
+
+
+def _dispatch_of(scheduler: AnalyticsScheduler, slots: int = 1) -> tuple[Dispatch, _RecordingHost]:
+    host = _RecordingHost()
+    dispatch = Dispatch(scheduler, Resources(cloud_slots=slots), host)
+    dispatch.start(0)
+    return dispatch, host
+
+
+def test_an_idle_executor_is_offered_after_every_event() -> None:
+    """The second task starts when the first is back, without a decision in between."""
+    dispatch, host = _dispatch_of(_Scripted(idle=True))
+    dispatch.arrived(_task(0), 0)
+    dispatch.arrived(_task(1), 1)
+    assert host.asked == [("edge", 0, 0)]
+    running = dispatch.running
+    assert running is not None
+    dispatch.finished(running, 30)
+    assert host.asked == [("edge", 0, 0), ("edge", 1, 30)]
+    assert host.results[0].place is Place.EDGE
+    assert host.results[0].outcome is Outcome.DONE
+
+
+def test_the_cloud_queue_keeps_order_and_gives_up_at_the_latest_start() -> None:
+    """With one slot, the second task waits and starts; the third one's time has passed."""
+    send = lambda t, _: SendToCloud(t, "", 50 + 10 * (1 - t.id))  # noqa: E731
+    scheduler = _Scripted(send, send, send)
+    dispatch, host = _dispatch_of(scheduler)
+    tasks = [_task(number) for number in range(3)]
+    for one in tasks:
+        dispatch.arrived(one, 0)
+    assert dispatch.cloud_waiting == 2
+    dispatch.finished(tasks[0], 45)
+    dispatch.finished(tasks[1], 60)
+    assert host.asked == [("cloud", 0, 0), ("cloud", 1, 45)]
+    assert [r.outcome for r in host.results] == [Outcome.DONE, Outcome.DROPPED, Outcome.DONE]
+    assert [r.task.id for r in scheduler.heard] == [0, 2, 1]
+
+
+def test_results_after_the_deadline_are_late_and_cost_their_price() -> None:
+    """A late result earns nothing; its cost stays."""
+    dispatch, host = _dispatch_of(_Scripted(lambda t, _: SendToCloud(t)))
+    one = _task(0)
+    dispatch.arrived(one, 0)
+    dispatch.finished(one, one.deadline + 1)
+    assert host.results[0].outcome is Outcome.LATE
+    assert host.results[0].utility == -2
+
+
+def test_lost_executions_are_reported_as_such() -> None:
+    """The host's verdict stands, whatever the time."""
+    dispatch, host = _dispatch_of(_Scripted(lambda t, _: SendToCloud(t)))
+    one = _task(0)
+    dispatch.arrived(one, 0)
+    dispatch.finished(one, 5, Outcome.FAILED)
+    assert host.results[0].outcome is Outcome.FAILED
+    assert dispatch.in_cloud == 0
+
+
+@pytest.mark.parametrize(
+    ("answer", "slots", "words"),
+    [
+        (lambda _, now: WakeAt(now - 1), 1, "past"),
+        (lambda _, __: RunOnEdge(_task(99)), 1, "never arrived"),
+        (lambda t, _: SendToCloud(t), 0, "no cloud"),
+        (lambda _, __: "edge", 1, "none of the decisions"),
+    ],
+)
+def test_impossible_decisions_are_refused(answer: object, slots: int, words: str) -> None:
+    """The message names the scheduler and what is wrong."""
+    dispatch, _ = _dispatch_of(_Scripted(answer), slots)
+    with pytest.raises(SchedulerError, match=f"_Scripted decided .*{words}"):
+        dispatch.arrived(_task(0, 10), 10)
+
+
+def test_a_task_is_decided_once() -> None:
+    """Dropping a task that is already in the cloud is refused."""
+    kept: list[Task] = []
+
+    def twice(one: Task, _: int) -> Decision:
+        kept.append(one)
+        return SendToCloud(one) if len(kept) == 1 else Drop(kept[0])
+
+    dispatch, _ = _dispatch_of(_Scripted(twice, twice))
+    dispatch.arrived(_task(0), 0)
+    with pytest.raises(SchedulerError, match="decided before"):
+        dispatch.arrived(_task(1), 0)
+
+
+def test_a_busy_executor_is_not_given_a_second_task() -> None:
+    """Whatever the scheduler wishes."""
+    dispatch, _ = _dispatch_of(_Scripted(lambda t, _: RunOnEdge(t), lambda t, _: RunOnEdge(t)))
+    dispatch.arrived(_task(0), 0)
+    with pytest.raises(SchedulerError, match="busy with task 0"):
+        dispatch.arrived(_task(1), 1)
+
+
+def test_another_scheduler_takes_over_what_is_undecided() -> None:
+    """Nothing is lost when a scheduler is replaced, and what runs goes on."""
+    dispatch, host = _dispatch_of(_Scripted(idle=True))
+    for number in range(3):
+        dispatch.arrived(_task(number), 0)
+    dispatch.replace(_Scripted(lambda t, _: SendToCloud(t), lambda t, _: Drop(t)), 5)
+    assert host.asked == [("edge", 0, 0), ("cloud", 1, 5)]
+    assert not dispatch.undecided
+    assert [r.task.id for r in host.results] == [2]
+
+
+@pytest.mark.parametrize("name", scheduler_names())
+def test_every_scheduler_can_take_over_in_flight(name: str) -> None:
+    """It is told the ends of tasks that it never saw start."""
+    scheduler = _Scripted(lambda t, _: SendToCloud(t), lambda t, _: RunOnEdge(t))
+    dispatch, host = _dispatch_of(scheduler, slots=4)
+    tasks = [_task(number) for number in range(3)]
+    for one in tasks:
+        dispatch.arrived(one, 0)
+    dispatch.replace(load_scheduler(name), 1)
+    dispatch.finished(tasks[0], 2)
+    dispatch.finished(tasks[1], 3, Outcome.FAILED)
+    dispatch.arrived(_task(7, 4), 4)
+    ends = {result.task.id: result.outcome for result in host.results}
+    assert (ends[0], ends[1]) == (Outcome.DONE, Outcome.FAILED)
+    assert dispatch.running is not tasks[1]
