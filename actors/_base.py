@@ -20,7 +20,7 @@ import ray
 
 from aerodaas.actors.session import Session
 from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteReader
-from aerodaas.clock import host_time_ns
+from aerodaas.clock import LockstepClock, host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError
 from aerodaas.vitals import Vitals, read_vitals
@@ -90,6 +90,17 @@ def failure_line(error: BaseException) -> str:
     return f"{type(error).__name__}: {error}{place}"
 
 
+class _AlertHandler(logging.Handler):
+    """What the project's own modules warn of is told to the people who watch."""
+
+    def __init__(self, actor: StreamActor) -> None:
+        super().__init__(logging.WARNING)
+        self._actor = actor
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._actor.alert("warning", record.getMessage())
+
+
 class StreamActor:
     """Base of the actors; subclasses implement `_open`, `_run` and `_close`."""
 
@@ -111,6 +122,7 @@ class StreamActor:
     def prepare(self) -> ActorInfo:
         """Open everything; raises the project's errors for what cannot be opened."""
         logging.captureWarnings(capture=True)
+        logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
         self.inbox = Inbox(self.scope, self.name, self._reads)
         self.alerts = self.outlet(f"alerts/{self.name}")
         self._open()
@@ -191,6 +203,12 @@ class StreamActor:
             alert = Alert(header, kind, text, values)
             self._newest_alerts.append(alert)
             self.alerts.measure(alert, header, host_time_ns())
+
+    def follow(self, stamp: int) -> None:
+        """In lockstep mission time is what the newest message says, but for who conducts it."""
+        with self._alerting:
+            if isinstance(self.clock, LockstepClock) and stamp > self.clock.now():
+                self.clock.advance_to(stamp)
 
     def reads(self) -> list[str]:
         """Streams that this actor reads."""

@@ -156,10 +156,12 @@ class _Worker:
     def __init__(self, actor: AnalyticsActor, node: NodeSpec) -> None:
         self.node = node
         states = MESSAGE_DEPTH if actor.session.lockstep else 1
+        # States come last: each is published before what is measured in it, so that whoever
+        # has an item in hand finds its state, too.
         self.depths = {
-            node.state: states,
             **node.inputs,
             **dict.fromkeys(node.wakes, _WAKE_DEPTH),
+            node.state: states,
         }
         self._link: StreamLink | None = None
         if isinstance(node.work, CommandingAnalytics):
@@ -247,6 +249,7 @@ class _Worker:
             # A state is published before what was measured in it, but may arrive in between.
             messages += self.inbox.receive(0.0)
         for message in messages:
+            self._actor.follow(message.stamp)
             if self._link is not None:
                 self._link.note(message)
             if message.stream == self.node.state and message.item is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
+import socket
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -25,6 +26,7 @@ __all__ = [
 _KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
 _SHARE = 0.001
 """Share of a node's `edge` or `cloud` resource that an actor takes: it says where, not how much."""
+_PROBE_SECONDS = 5.0
 _STORE_BYTES = 128 * 2**20
 """Object store of a one-machine run; its streams travel in shared memory of their own."""
 
@@ -53,20 +55,21 @@ def connect(address: str | None) -> None:
     _ours = False
     address = address or os.environ.get("RAY_ADDRESS")
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    # The first error is told; Ray would print the tracebacks of those that followed.
+    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
     common: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
     if address:
+        _require_listener(address)
         try:
             ray.init(address=address, **common)
         except (ConnectionError, RuntimeError, ValueError) as error:
             reason = str(error).strip().splitlines()[0]
-            raise AeroDaaSError(
-                f"cannot join the Ray cluster at {address}: {reason}; "
-                "check the address and that the head runs the same Ray and Python versions"
-            ) from None
+            raise _unreachable(address, reason) from None
         _require_edge(address)
         return
+    # "local": else Ray joins whatever cluster someone has started on this machine.
     ray.init(
-        address="local",  # else Ray would join whatever cluster runs on this machine
+        address="local",
         num_cpus=os.cpu_count(),
         include_dashboard=False,
         object_store_memory=_STORE_BYTES,
@@ -75,6 +78,24 @@ def connect(address: str | None) -> None:
     )
     _ours = True
     _trim()
+
+
+def _unreachable(address: str, reason: str) -> AeroDaaSError:
+    return AeroDaaSError(
+        f"cannot join the Ray cluster at {address}: {reason}; "
+        "check the address and that the head runs the same Ray and Python versions"
+    )
+
+
+def _require_listener(address: str) -> None:
+    """Ray takes minutes to give an address up at which nobody listens; this takes seconds."""
+    host, _, port = address.removeprefix("ray://").rpartition(":")
+    if not host or not port.isdigit():
+        return  # "auto", or something else that Ray understands
+    try:
+        socket.create_connection((host.strip("[]"), int(port)), timeout=_PROBE_SECONDS).close()
+    except (OSError, OverflowError) as error:
+        raise _unreachable(address, str(error)) from None
 
 
 def _trim() -> None:

@@ -73,9 +73,16 @@ class Flight:
     """The actors of one run. Use as a context manager: leaving it stops them all."""
 
     def __init__(
-        self, plan: FlightPlan, recording: Path | None = None, provenance: Provenance | None = None
+        self,
+        plan: FlightPlan,
+        recording: Path | None = None,
+        provenance: Provenance | None = None,
+        live: str | None = None,
     ) -> None:
-        """Create the actors of `plan`, all at once; `recording` is where the MCAP file goes."""
+        """Create the actors of `plan`, all at once; `recording` is where the MCAP file goes.
+
+        With `live`, `host:port`, what is recorded is served there, too.
+        """
         self.plan = plan
         self.recording = recording if plan.recorded else None
         self._drones: dict[str, str] = {}
@@ -112,7 +119,7 @@ class Flight:
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch)
         if self.recording is not None and provenance is not None:
-            recorder = (session, self.recording, plan.recorded, provenance)
+            recorder = (session, self.recording, plan.recorded, provenance, live)
             self._create("recorder", RecorderActor, edge, recorder)
         if self._detached:
             self._appoint_caretaker()

@@ -21,6 +21,7 @@ from aerodaas.errors import GraphError
 from aerodaas.graph import Graph, NavigationEdge, Node
 from aerodaas.handles import SENSOR_ITEMS
 from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
+from aerodaas.plugins import require_plugin
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     AnalyticsScheduler,
@@ -118,6 +119,13 @@ class _Planner:
                     continue
                 item = SENSOR_ITEMS[sensor.type]
                 self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
+
+    def require_plugins(self) -> None:
+        for robot in self.robots:
+            require_plugin("drivers", robot.driver)
+        for sensor in (node.work for node in self.sensors()):
+            if sensor.type == "camera":
+                require_plugin("cameras", self.session.environment.camera_driver(sensor))
 
     def sensors(self) -> list[Node]:
         return [node for node in self.graph.nodes.values() if node.kind == "sensor"]
@@ -317,13 +325,15 @@ def make_plan(
     scheduler: TrajectoryScheduler,
     dispatch_with: AnalyticsScheduler | None = None,
 ) -> FlightPlan:
-    """Decide which actors a graph becomes; raises GraphError if nothing flies.
+    """Decide which actors a graph becomes.
 
     With an analytics scheduler to `dispatch_with`, heavy analyses run when and where it says.
+    Raises GraphError if nothing flies, UnknownIdError for a driver that there is not.
     """
     planner = _Planner(session, graph, compute, scheduler, dispatch_with)
     if not planner.robots:
         raise GraphError("no robot navigates: call drone.navigate(…) before start_mission()")
+    planner.require_plugins()
     specs = tuple(planner.robot_spec(robot) for robot in planner.robots)
     cameras = planner.cameras()
     analyses = planner.analyses_by_actor()

@@ -13,6 +13,7 @@ from aerodaas.clock import host_time_ns
 from aerodaas.data import Header
 from aerodaas.errors import RecordingError
 from aerodaas.geometry import GeodeticOrigin
+from aerodaas.recording.live import LiveServer
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.status import Message
@@ -25,36 +26,44 @@ class RecorderActor(StreamActor):
     """Reads all `streams` and writes them; on a full disk it stops writing, not the flight."""
 
     def __init__(
-        self, session: Session, path: Path, streams: dict[str, int], provenance: Provenance
+        self,
+        session: Session,
+        path: Path,
+        streams: dict[str, int],
+        provenance: Provenance,
+        live: str | None = None,
     ) -> None:
-        """Write the recording at `path`.
+        """Write the recording at `path`, and serve it at `live` (`host:port`) meanwhile.
 
         So many messages of each of the `streams` may wait; more are dropped and counted, for the
         flight never waits.
         """
         super().__init__(session, "recorder", streams)
         self._path = path
+        self._address = live
         self._provenance = provenance
         self._failure = ""
         self._lost: Counter[str] = Counter()
-        self._newest = 0
         self._readings = 0
 
     def _open(self) -> None:
         environment = self.session.environment
         home = environment.home
+        name = self._provenance.name
+        self._live = LiveServer(self._address, name) if self._address else None
         self._recorder = FlightRecorder(
             self._path,
             config=environment.recording,
             provenance=self._provenance,
             home=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
             fences={robot.id: robot.limits.geofence for robot in environment.robots},
+            live=self._live,
         )
         self._acks = self.outlet(f"{ACKS}/recorder") if self.session.lockstep else None
 
     def vitals(self, readings: dict[str, Vitals]) -> None:
         """Record what the run's processes take, by `actor@machine`."""
-        stamp = self._newest if self.session.lockstep else self.clock.now()
+        stamp = self.clock.now()
         self._readings += 1
         for source, reading in readings.items():
             stream = f"vitals/{source.partition('@')[0]}"
@@ -67,7 +76,7 @@ class RecorderActor(StreamActor):
         while True:
             messages = self.inbox.receive(0.2)
             for message in messages:
-                self._newest = max(self._newest, message.stamp)
+                self.follow(message.stamp)
                 self._write(message)
             self._note_drops()
             if self._acks is not None and messages:
@@ -95,6 +104,8 @@ class RecorderActor(StreamActor):
 
     def _close(self) -> None:
         self._summary = self._recorder.close()
+        if self._live is not None:
+            self._live.close()
 
     def _values(self) -> dict[str, Any]:
         return {"path": str(self._path), "failure": self._failure}

@@ -67,6 +67,7 @@ class SensorActor(StreamActor):
         return {}
 
     def _take(self, message: Message[Any]) -> None:
+        self.follow(message.stamp)
         if isinstance(message.item, VehicleState):
             self._vehicle = message.item
 

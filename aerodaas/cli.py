@@ -14,11 +14,19 @@ from aerodaas.commands.application import run_application, speed_option
 from aerodaas.commands.export import export
 from aerodaas.commands.replay import replay
 from aerodaas.commands.report import compare, report
-from aerodaas.errors import AeroDaaSError
-from aerodaas.options import RunOptions
+from aerodaas.errors import (
+    AeroDaaSError,
+    GraphError,
+    InvalidWaypointError,
+    UnknownIdError,
+)
+from aerodaas.options import RunOptions, current_options
 from aerodaas.overrides import parse_setting
 
 __all__ = ["app", "main"]
+
+_CAUSED_BY_A_LINE = (GraphError, InvalidWaypointError, UnknownIdError)
+"""Errors of which the application's own line is the place."""
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -64,6 +72,12 @@ def run(
         typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
     ] = None,
     view: Annotated[bool, typer.Option(help="Show the live view.")] = True,  # noqa: FBT002
+    live: Annotated[  # noqa: FBT002
+        bool, typer.Option("--live", help="Serve the flight to Foxglove while it goes on.")
+    ] = False,
+    live_address: Annotated[
+        str, typer.Option(help="Where --live listens; on 0.0.0.0 anyone on the network may watch.")
+    ] = "127.0.0.1:8765",
 ) -> None:
     """Fly an application.
 
@@ -84,8 +98,11 @@ def run(
         address=address,
         overrides=dict(parse_setting(text) for text in setting or ()),
         view=view,
+        live=live_address if live else None,
         application=application.resolve(),
     )
+    if live:
+        typer.echo(f"live: open ws://{live_address} in Foxglove")
     run_application(application, context.args, options)
 
 
@@ -126,13 +143,28 @@ def main() -> None:
     try:
         app(standalone_mode=True)
     except AeroDaaSError as error:
-        _say(str(error))
+        line = _application_line(error) if isinstance(error, _CAUSED_BY_A_LINE) else ""
+        _say(str(error) + (f"\n  at {line}" if line and "\n  at " not in str(error) else ""))
         sys.exit(error.exit_code)
-    except Exception as error:  # noqa: BLE001 - the application may raise anything
-        frames = [f for f in traceback.extract_tb(error.__traceback__) if "aerodaas" not in f.name]
-        place = f"{frames[-1].filename}:{frames[-1].lineno}: " if frames else ""
-        _say(f"{place}{type(error).__name__}: {error}")
+    except SyntaxError as error:
+        _say(f"{error.filename}:{error.lineno}: {error.msg}: {(error.text or '').strip()}")
         sys.exit(1)
+    except Exception as error:  # noqa: BLE001 - the application may raise anything
+        line = _application_line(error)
+        _say(f"{type(error).__name__}: {error}" + (f"\n  at {line}" if line else ""))
+        sys.exit(1)
+
+
+def _application_line(error: Exception) -> str:
+    """The application's own last line on the way to an error, as `file:line: code`, or empty."""
+    application = current_options.get().application
+    if application is None:
+        return ""
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        path = Path(frame.filename)
+        if path.is_file() and path.resolve().is_relative_to(application.parent):
+            return f"{path.name}:{frame.lineno}: {frame.line}"
+    return ""
 
 
 def _say(text: str) -> None:

@@ -27,6 +27,7 @@ _PACKAGES = {
     "panda3d": "panda3d.core",
     "onnxruntime": "onnxruntime",
     "opencv-python-headless": "cv2",
+    "av": "av",
     "pymavlink": "pymavlink",
     "foxglove-sdk": "foxglove",
     "mcap": "mcap",
@@ -34,7 +35,12 @@ _PACKAGES = {
 }
 _MEMORY_NEEDED = 1.0
 _SHARED_MEMORY_NEEDED = 256
-_PORTS = {14540: "PX4 offboard", 14550: "ground station, ArduPilot", 8889: "Tello commands"}
+_PORTS = {
+    14540: "PX4 offboard",
+    14550: "ground station, ArduPilot",
+    8890: "Tello state",
+    11111: "Tello video",
+}
 
 
 @dataclass(frozen=True)

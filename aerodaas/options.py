@@ -29,6 +29,8 @@ class RunOptions:
     """Settings by `id.setting`, such as `camera.rate`."""
     view: bool = True
     """Show the live terminal view."""
+    live: str | None = None
+    """Serve Foxglove's WebSocket at this `host:port` while flying."""
     replay: Path | None = None
     """Recording to be flown again: its environment takes the place of the application's."""
     scheduler: str | None = None

@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from aerodaas.errors import AeroDaaSError, ConfigError, UnknownIdError
 
-__all__ = ["PluginKind", "load_plugin", "plugin_names"]
+__all__ = ["PluginKind", "load_plugin", "plugin_names", "require_plugin"]
 
 PluginKind = Literal["drivers", "cameras", "waypoint_schedulers", "analytics_schedulers"]
 
@@ -67,21 +67,17 @@ def plugin_names(kind: PluginKind) -> list[str]:
     return sorted(found | set(_BUILT_IN[kind]))
 
 
+def require_plugin(kind: PluginKind, name: str) -> None:
+    """Import nothing, but raise UnknownIdError if nothing is called `name`."""
+    _target(kind, name)
+
+
 def load_plugin(kind: PluginKind, name: str) -> Any:  # noqa: ANN401 - a class of the caller's kind
     """Import the class called `name`.
 
     Raises UnknownIdError for an unknown name, ConfigError for one that cannot be imported.
     """
-    target = _BUILT_IN[kind].get(name)
-    if target is None:
-        for point in entry_points(group=f"aerodaas.{kind}"):
-            if point.name == name:
-                target = point.value
-    if target is None and ":" in name:
-        target = name
-    if target is None:
-        label = kind.replace("_", " ").removesuffix("s")
-        raise UnknownIdError(label, name, plugin_names(kind))
+    target = _target(kind, name)
     module, _, attribute = target.partition(":")
     try:
         return getattr(importlib.import_module(module), attribute)
@@ -89,3 +85,15 @@ def load_plugin(kind: PluginKind, name: str) -> Any:  # noqa: ANN401 - a class o
         raise
     except (ImportError, AttributeError) as error:
         raise ConfigError(f"cannot load {name!r} ({target}): {error}") from error
+
+
+def _target(kind: PluginKind, name: str) -> str:
+    if name in _BUILT_IN[kind]:
+        return _BUILT_IN[kind][name]
+    for point in entry_points(group=f"aerodaas.{kind}"):
+        if point.name == name:
+            return point.value
+    if ":" in name:
+        return name
+    label = kind.replace("_", " ").removesuffix("s")
+    raise UnknownIdError(label, name, plugin_names(kind))

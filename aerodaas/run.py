@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING
 
 from aerodaas.clock import seconds
 from aerodaas.config import EnvironmentConfig
-from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, MissionError
+from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, MissionError, RecordingError
 from aerodaas.navigation.commands import Answer, Command, End
 from aerodaas.options import RunOptions, current_options
 from aerodaas.signals import Terminated, raise_on_termination
 from aerodaas.status import MissionState
 
 if TYPE_CHECKING:
+    from aerodaas.actors._base import ActorReport
     from aerodaas.actors.flight import Flight, FlightState
     from aerodaas.actors.plan import FlightPlan
     from aerodaas.environment import Environment
@@ -70,15 +71,23 @@ class Run:
         from aerodaas.console import Starting  # noqa: PLC0415
         from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
 
+        # Before Ray, which takes seconds: what is wrong with the graph should be told at once.
+        plan = self._plan()
+        if self.recording is not None and self.recording.exists():
+            raise RecordingError(
+                f"{self.recording} already exists and is not overwritten; "
+                "give --record another path or move the file away"
+            )
+        if self.options.live and self.recording is None:
+            raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
         with Starting(self.options) as starting:
             starting.step("starting Ray")
             cluster.connect(self.options.address)
             raise_on_termination()
-            plan = self._plan()
             provenance = Provenance.collect(
                 app=self.options.application, config=self.config, speed=self._speed_text()
             )
-            flight = Flight(plan, self.recording, provenance)
+            flight = Flight(plan, self.recording, provenance, self.options.live)
             try:
                 flight.launch(starting.step)
             except BaseException:
@@ -121,6 +130,11 @@ class Run:
             # Whoever waits for the run meets the same error and deals with it.
             with contextlib.suppress(AeroDaaSError):
                 self.look()
+
+    def reports(self) -> dict[str, ActorReport]:
+        """The newest report of each actor, by its name."""
+        assert self._flight is not None  # noqa: S101 - launched
+        return self._flight.reports()
 
     def wait(self) -> None:
         """Watch until every mission has ended; raises what they ended with.

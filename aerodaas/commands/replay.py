@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from datetime import datetime
+from itertools import islice
 from pathlib import Path
 from typing import Annotated
 
@@ -44,10 +45,12 @@ def replay(
         aerodaas replay flight.mcap --app follow.py --scheduler gems
     """
     from aerodaas.recording.difference import difference  # noqa: PLC0415 - slow to load
+    from aerodaas.recording.pictures import shots  # noqa: PLC0415
     from aerodaas.recording.reader import Recording  # noqa: PLC0415
 
     with Recording.open(recording) as opened:
         duration = opened.duration
+        lossy = any(shot.record.value.format == "jpeg" for shot in islice(shots(opened), 1))
     now = datetime.now().astimezone()
     folder = out or Path("runs") / f"replay-{app.stem}-{now:%Y%m%d-%H%M%S}"
     factor, lockstep = speed_option(speed)
@@ -71,4 +74,7 @@ def replay(
     took = time.monotonic() - began
     found = difference(recording, folder / "flight.mcap")
     (folder / "difference.json").write_text(json.dumps(found.as_dict(), indent=2) + "\n")
+    if not found.agrees and lossy:
+        typer.echo("the pictures were recorded as JPEG, from which a detector sees a little else;")
+        typer.echo('record with "images": "png" for a replay that is exact')
     typer.echo(f"replayed {duration:.1f} s in {took:.1f} s, start included; compared:\n{found}")

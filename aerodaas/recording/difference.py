@@ -12,9 +12,13 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from aerodaas.recording.box_shift import BoxShift, box_shift
 from aerodaas.recording.reader import Record, Recording
 
 __all__ = ["Difference", "StreamDifference", "difference"]
+
+_TURN = 50_000_000
+"""Nanoseconds between turns of the setpoint loop."""
 
 Key = Hashable
 Content = Any
@@ -33,8 +37,8 @@ class StreamDifference:
     only_second: int
     example: str = ""
     """The first difference, in words."""
-    box_pixels: float = 0.0
-    """Largest difference of a box's edge, of detections that otherwise agree."""
+    boxes: BoxShift | None = None
+    """How far boxes moved, of detections that differ."""
 
     @property
     def agrees(self) -> bool:
@@ -48,8 +52,8 @@ class StreamDifference:
         text = f"{self.what}: {self.same} the same, {self.differing} differ"
         if self.only_first or self.only_second:
             text += f", {self.only_first} only in the first, {self.only_second} only in the second"
-        if self.box_pixels:
-            text += f"; boxes move by up to {self.box_pixels:.2g} pixels"
+        if self.boxes is not None:
+            return f"{text}; {self.boxes}"
         return f"{text}; first: {self.example}" if self.example else text
 
 
@@ -88,14 +92,14 @@ def difference(first: str | Path, second: str | Path) -> Difference:
 def _contents(path: str | Path) -> dict[str, dict[Key, Content]]:
     """What is compared, by stream, and within by what it is paired by."""
     found: dict[str, dict[Key, Content]] = defaultdict(dict)
-    states: dict[str, str] = {}
+    states: dict[str, list[str]] = defaultdict(list)
     with Recording.open(path) as recording:
         for record in recording.records(schemas=_READERS):
             if record.schema == "aerodaas.MissionStatus":
                 robot, state = record.value["robot"], record.value["state"]
-                if states.get(robot) == state:
+                if states[robot][-1:] == [state]:
                     continue
-                states[robot] = state
+                states[robot].append(state)
             what, key, content = _READERS[record.schema](record)
             entries = found[what]
             if key in entries:
@@ -120,7 +124,7 @@ def _compare(what: str, one: dict[Key, Content], other: dict[Key, Content]) -> S
         extra = [key for key in other if key not in one]
         example = f"{_words(one[missing[0]])} is missing" if missing else ""
         example = example or (f"{_words(other[extra[0]])} is new" if extra else "")
-    moved = [_box_pixels(one[key], other[key]) for key in apart if what.endswith("detections")]
+    pairs = [(one[key], other[key]) for key in apart]
     return StreamDifference(
         what,
         same=len(common) - len(apart),
@@ -128,20 +132,8 @@ def _compare(what: str, one: dict[Key, Content], other: dict[Key, Content]) -> S
         only_first=len(one) - len(common),
         only_second=len(other) - len(common),
         example=example,
-        box_pixels=max(moved, default=0.0),
+        boxes=box_shift(pairs) if pairs and what.endswith("detections") else None,
     )
-
-
-def _box_pixels(one: list[dict[str, Any]], other: list[dict[str, Any]]) -> float:
-    """How far boxes have moved, where the same labels were found in the same order."""
-    if [item["label"] for item in one] != [item["label"] for item in other]:
-        return 0.0
-    edges = [
-        abs(a - b)
-        for mine, theirs in zip(one, other, strict=True)
-        for a, b in zip(mine["box"], theirs["box"], strict=True)
-    ]
-    return max(edges, default=0.0)
 
 
 def _words(content: Content) -> str:
@@ -182,7 +174,9 @@ def _mission(record: Record) -> tuple[str, Key, Content]:
 
 def _setpoint(record: Record) -> tuple[str, Key, Content]:
     value = record.value
-    return f"{value['robot']} setpoints asked for", (value["stamp"],), value["asked"]
+    # In real time the loop's turns come a few milliseconds early or late.
+    turn = round(value["stamp"] / _TURN)
+    return f"{value['robot']} setpoints asked for", (turn,), value["asked"]
 
 
 def _alert(record: Record) -> tuple[str, Key, Content]:

@@ -55,11 +55,12 @@ class Provenance:
 
         Passwords in URLs of the configuration are left out.
         """
+        environment = config.model_dump_json(indent=2, by_alias=True) if config else ""
         return cls(
             name=app.stem if app else "",
             seed=seed if seed is not None or config is None else config.simulation.seed,
             speed=speed,
-            config=_without_passwords(config) if config else "",
+            config=_PASSWORD.sub("***@", environment),
             app=app.name if app else "",
             app_source=app.read_text(encoding="utf-8", errors="replace") if app else "",
             revision=_revision(app.parent if app else Path.cwd()),
@@ -107,7 +108,3 @@ def _revision(folder: Path) -> str:
         return git("rev-parse", "HEAD") + ("+" if changed else "")
     except (OSError, subprocess.SubprocessError):
         return ""
-
-
-def _without_passwords(config: EnvironmentConfig) -> str:
-    return _PASSWORD.sub("***@", config.model_dump_json(indent=2, by_alias=True))

@@ -28,6 +28,7 @@ from aerodaas.recording.converters import Session, convert
 from aerodaas.recording.converters.notes import log_entry
 from aerodaas.recording.converters.plan import fence_entries
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema
+from aerodaas.recording.live import LiveServer
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.output import Output
 from aerodaas.recording.provenance import Provenance
@@ -68,13 +69,15 @@ class FlightRecorder:
         provenance: Provenance,
         home: GeodeticOrigin | None = None,
         fences: Mapping[str, GeofenceConfig] | None = None,
+        live: LiveServer | None = None,
     ) -> None:
-        """Create the file `path`; `fences` are by robot.
+        """Create the file `path`; `fences` are by robot; `live` gets everything, too.
 
         Raises RecordingError if the file exists already or cannot be written.
         """
         self.path = Path(path)
         self._session = Session(config, provenance.started_ns, home)
+        self._live = live
         self._output = Output(self.path)
         self._writer = Writer(self._output, chunk_size=_CHUNK)  # type: ignore[arg-type]
         self._schemas: dict[str, int] = {}
@@ -220,6 +223,8 @@ class FlightRecorder:
             sequence=sequence,
         )
         self._counts[entry.topic] += 1
+        if self._live is not None:
+            self._live.put(entry, epoch + recorded)
 
     def _register(self, topic: str, schema: Schema) -> int:
         name = schema.name

@@ -1,0 +1,184 @@
+"""A recorded flight, flown again: the same decisions from the same sensors, and no vehicle."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+from analyses import Ticker, Weave
+from flying import FLAT, Flyer, hop, robot
+from mcap.writer import Writer
+
+from aerodaas import (
+    AeroNavigation,
+    Analytics,
+    Detections,
+    Environment,
+    Frame,
+    NavigableAnalytics,
+    NavigationType,
+    VelocityCommand,
+)
+from aerodaas.analytics.base import Context
+from aerodaas.data import Detection
+from aerodaas.errors import RecordingError
+from aerodaas.recording.difference import difference
+from aerodaas.recording.reader import Recording
+from aerodaas.run import Run
+
+CAMERA = {"id": "cam", "type": "camera", "rate": 7, "settings": {"width": 64, "height": 36}}
+
+
+class Brightest(Analytics[Detections]):
+    """Finds the brightest pixel: any loss in the pictures shows."""
+
+    accepts: ClassVar[tuple[type, ...]] = (Frame,)
+    produces: ClassVar[type] = Detections
+    isolated = True
+    scheduled = True
+
+    def process(self, item: Frame, context: Context) -> Detections:  # noqa: ARG002
+        """Return a box of one pixel, its score made of all pixels."""
+        light = item.image.sum(axis=2)
+        row, column = np.unravel_index(int(light.argmax()), light.shape)
+        box = (float(column), float(row), float(column + 1), float(row + 1))
+        return Detections.of(item, [Detection(box, "light", float(light.mean()) / 1000)])
+
+
+class Chase(NavigableAnalytics):
+    """Flies by what was found and by where the drone was when it was seen."""
+
+    accepts: ClassVar[tuple[type, ...]] = (Detections,)
+
+    def process(self, item: Detections, context: Context) -> AeroNavigation | None:  # noqa: ARG002
+        """Turn towards the box; nothing above four metres."""
+        height = item.odometry.height if item.odometry else 0.0
+        aside = item.items[0].centre[0] / item.width - 0.5
+        command = VelocityCommand(0.5 + item.items[0].score, 0.0, 0.2 * (2 - height), aside)
+        return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
+
+
+def chase(env: Environment) -> None:
+    """Camera to detector to follower, for five seconds."""
+    drone = env.get_robot_by_id("drone")
+    found = Brightest().analyse(drone.get_sensor_by_id("cam").get_data_stream())
+    drone.navigate(Chase().analyse(found))
+    end_after(env, 20)
+
+
+def end_after(env: Environment, quarters: int) -> None:
+    """End the mission after so many quarters of a second."""
+    stop = Ticker().deploy(env.get_compute_resource_by_id("edge"))
+    drone = env.get_robot_by_id("drone")
+    stop.trigger(drone.end_mission, when=lambda count: count > quarters)
+    stop.instantiate()
+
+
+def with_camera(images: str) -> dict[str, Any]:
+    """An environment with a rendered camera, recorded as `images`."""
+    drone = robot(sensors=[CAMERA])
+    world = {**FLAT["simulation"], "world": "field"}
+    return {**FLAT, "robots": [drone], "simulation": world, "recording": {"images": images}}
+
+
+def again(flyer: Flyer, run: Run, build: Callable[[Environment], object], **words: Any) -> Path:  # noqa: ANN401
+    """Replay a run's recording; returns the new one."""
+    assert run.recording is not None
+    folder = flyer.folder / f"replay-{len(list(flyer.folder.glob('replay-*')))}"
+    replayed = flyer.fly(build, replay=run.recording, record=folder, **words)
+    assert replayed.recording is not None
+    return replayed.recording
+
+
+def test_a_survey_repeats_every_decision(flyer: Flyer) -> None:
+    """Waypoints, wind and two drones: states, setpoints and times are the same."""
+    sensors = [{"id": "odom", "type": "odometry", "rate": 15}]
+    two = [robot("one", sensors=sensors), robot("two", start=[0, 6, 0])]
+
+    def build(env: Environment) -> None:
+        env.get_robot_by_id("one").navigate(hop((3, 0), (3, 2), hover=0.5))
+        env.get_robot_by_id("two").navigate(hop((3, 6)))
+
+    first = flyer.fly(build, {**FLAT, "robots": two}, record=flyer.folder / "first")
+    assert first.recording is not None
+    second = again(flyer, first, build)
+    found = difference(first.recording, second)
+    assert found.agrees, str(found)
+    counted = {stream.what: stream.same for stream in found.streams}
+    assert counted["one mission states"] >= 5
+    assert counted["two setpoints asked for"] > 50
+    with Recording.open(second) as recording:
+        content = json.loads(recording.attachment("environment.json"))
+    assert [one["driver"] for one in content["robots"]] == ["replayed"] * 2
+
+
+def test_analytics_in_the_loop_repeat(flyer: Flyer) -> None:
+    """What is made from odometry and steers the drone comes out the same."""
+
+    def build(env: Environment) -> None:
+        drone = env.get_robot_by_id("drone")
+        drone.navigate(Weave().analyse(drone.get_sensor_by_id("odom_drone").get_data_stream()))
+        end_after(env, 40)
+
+    first = flyer.fly(build, FLAT, record=flyer.folder / "first")
+    assert first.recording is not None
+    found = difference(first.recording, again(flyer, first, build))
+    assert found.agrees, str(found)
+
+
+def test_pictures_without_loss_repeat_exactly(flyer: Flyer) -> None:
+    """From PNG, detections and what was flown by them are the same to the last bit."""
+    first = flyer.fly(chase, with_camera("png"), record=flyer.folder / "first")
+    assert first.recording is not None
+    found = difference(first.recording, again(flyer, first, chase))
+    assert found.agrees, str(found)
+    (seen,) = [stream for stream in found.streams if stream.what.endswith("detections")]
+    assert seen.same > 20
+
+
+def test_another_scheduler_and_lossy_pictures_differ(flyer: Flyer) -> None:
+    """JPEG changes scores by a little; what differs is told with an example."""
+    first = flyer.fly(chase, with_camera("jpeg"), record=flyer.folder / "first")
+    assert first.recording is not None
+    second = again(flyer, first, chase, scheduler="edf")
+    found = difference(first.recording, second)
+    assert not found.agrees
+    by_name = {stream.what: stream for stream in found.streams}
+    seen = by_name["drone/brightest detections"]
+    assert seen.differing > 0
+    assert seen.only_first == 0
+    assert " became " in seen.example
+    assert by_name["scheduler decisions"].only_second > 0
+    json.dumps(found.as_dict())
+
+
+def test_a_mission_that_goes_elsewhere_ends_with_the_recording(flyer: Flyer) -> None:
+    """Other waypoints than those recorded are never reached; the replay ends all the same."""
+
+    def build(env: Environment) -> None:
+        env.get_robot_by_id("drone").navigate(hop((3, 0)))
+
+    def elsewhere(env: Environment) -> None:
+        env.get_robot_by_id("drone").navigate(hop((-40, -40)))
+
+    first = flyer.fly(build, FLAT, record=flyer.folder / "first")
+    assert first.recording is not None
+    second = again(flyer, first, elsewhere)
+    assert not difference(first.recording, second).agrees
+    with Recording.open(first.recording) as one, Recording.open(second) as other:
+        assert other.duration == pytest.approx(one.duration, abs=0.2)
+
+
+def test_a_recording_of_others_cannot_be_replayed(tmp_path: Path, flyer: Flyer) -> None:
+    """It is told what to do with it instead."""
+    path = tmp_path / "theirs.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.finish()
+    with flyer.options(replay=path), pytest.raises(RecordingError, match='driver "mcap"'):
+        Environment("environment.json")

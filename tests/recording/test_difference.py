@@ -1,0 +1,124 @@
+"""What counts as the same decision, and how a difference is told."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from synthetic_flight import PROVENANCE, SyntheticFlight
+
+from aerodaas.config import RecordingConfig
+from aerodaas.data import Detections
+from aerodaas.recording.box_shift import box_shift
+from aerodaas.recording.difference import difference
+from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.status import Decision, Message
+
+
+def write(path: Path, messages: list[Message[Any]]) -> Path:
+    """Record messages."""
+    with FlightRecorder(
+        path, config=RecordingConfig(images="none"), provenance=PROVENANCE
+    ) as recorder:
+        for message in messages:
+            recorder.write(message)
+    return path
+
+
+@pytest.fixture(scope="module")
+def messages() -> list[Message[Any]]:
+    """A flight with detections, navigation and decisions."""
+    return list(SyntheticFlight(frames=1, rate=5, hover=1).messages())
+
+
+def test_the_same_flight_agrees(messages: list[Message[Any]], tmp_path: Path) -> None:
+    """Whatever the latency, results of the same measurement are paired."""
+    slow = [replace(m, stamp=m.stamp + 5_000_000, captured=m.captured - 10**9) for m in messages]
+    found = difference(write(tmp_path / "a.mcap", messages), write(tmp_path / "b.mcap", slow))
+    assert found.agrees
+    assert {stream.what for stream in found.streams} == {
+        "tello mission states",
+        "tello setpoints asked for",
+        "tello/detector detections",
+        "tello/follow navigation",
+        "scheduler decisions",
+        "alerts",
+    }
+    assert str(found).endswith("every decision is the same")
+
+
+def test_each_difference_is_counted(messages: list[Message[Any]], tmp_path: Path) -> None:
+    """A moved box, a missing result and another action are told apart."""
+    changed: list[Message[Any]] = []
+    for message in messages:
+        item = message.item
+        if isinstance(item, Detections) and message.header.id == 3:
+            left, top, right, bottom = item.items[0].box
+            moved = replace(item.items[0], box=(left + 4, top, right, bottom))
+            item = replace(item, items=(moved,))
+        if message.stream == "tello/follow" and message.header.id == 5:
+            continue
+        if isinstance(item, Decision) and item.task == "detector#7":
+            item = replace(item, action="cloud")
+        changed.append(replace(message, item=item))
+    found = difference(write(tmp_path / "a.mcap", messages), write(tmp_path / "b.mcap", changed))
+    by_name = {stream.what: stream for stream in found.streams}
+    seen = by_name["tello/detector detections"]
+    assert (seen.differing, seen.only_first, seen.only_second) == (1, 0, 0)
+    assert seen.boxes is not None
+    assert (seen.boxes.paired, seen.boxes.lost, seen.boxes.new) == (1, 0, 0)
+    assert seen.boxes.median_pixels == pytest.approx(4.0)
+    follow = by_name["tello/follow navigation"]
+    assert (follow.differing, follow.only_first) == (0, 1)
+    decided = by_name["scheduler decisions"]
+    assert decided.differing == 1
+    assert "edge of detector#7 became cloud of detector#7" in str(decided)
+    assert not found.agrees
+
+
+boxes = st.lists(
+    st.tuples(
+        st.sampled_from(["person", "car"]),
+        st.floats(0, 500),
+        st.floats(0, 300),
+        st.floats(5, 100),
+        st.floats(5, 100),
+        st.floats(0, 1),
+    ),
+    max_size=6,
+)
+
+
+@given(boxes, st.randoms())
+def test_order_of_boxes_does_not_matter(items: list[tuple[Any, ...]], random: Any) -> None:  # noqa: ANN401
+    """The same objects in another order have not moved."""
+    found = [
+        {"label": label, "score": score, "box": [x, y, x + w, y + h]}
+        for label, x, y, w, h, score in items
+    ]
+    shuffled = list(found)
+    random.shuffle(shuffled)
+    shift = box_shift([(found, shuffled)])
+    assert shift.paired == len(found)
+    assert (shift.lost, shift.new, shift.most_pixels) == (0, 0, 0.0)
+
+
+@given(boxes, boxes)
+def test_every_object_is_accounted_for(
+    one: list[tuple[Any, ...]], other: list[tuple[Any, ...]]
+) -> None:
+    """Each is paired, lost or new."""
+    first, second = (
+        [
+            {"label": label, "score": score, "box": [x, y, x + w, y + h]}
+            for label, x, y, w, h, score in items
+        ]
+        for items in (one, other)
+    )
+    shift = box_shift([(first, second)])
+    assert shift.paired + shift.lost == len(first)
+    assert shift.paired + shift.new == len(second)
