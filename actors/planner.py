@@ -60,7 +60,8 @@ class PlannerExecutor(Executor):
             else:
                 result.set_result(done.result())
 
-        watchdog.start()
+        # An actor that is starting anew is waited for; its patience counts from when it is there.
+        self._actor.call.remote(bool).future().add_done_callback(lambda _: watchdog.start())
         self._actor.call.remote(function, *args).future().add_done_callback(finish)
         return result
 

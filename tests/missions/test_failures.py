@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -184,14 +185,20 @@ def start_application(flyer: Flyer, port: int, *arguments: str) -> subprocess.Po
     return subprocess.Popen(command, cwd=ROOT)
 
 
-def actors_of_ray() -> set[int]:
-    """Process ids of all drone and recorder actors on this machine."""
+def actors_below(pid: int) -> set[psutil.Process]:
+    """The drone's, recorder's, analytics' and caretaker's actors among a process' descendants."""
     names = ("ray::DroneActor", "ray::RecorderActor", "ray::Caretaker", "ray::AnalyticsActor")
-    return {
-        process.pid
-        for process in psutil.process_iter(["cmdline"])
-        if " ".join(process.info["cmdline"] or []).startswith(names)
-    }
+    found = set()
+    for process in psutil.Process(pid).children(recursive=True):
+        with contextlib.suppress(psutil.Error):
+            if " ".join(process.cmdline()).startswith(names):
+                found.add(process)
+    return found
+
+
+def gone(processes: set[psutil.Process]) -> bool:
+    """Whether none of them runs any more."""
+    return not any(process.is_running() for process in processes)
 
 
 def wait_for(happened: Callable[[], bool], seconds: float) -> bool:
@@ -206,11 +213,13 @@ def wait_for(happened: Callable[[], bool], seconds: float) -> bool:
 def test_application_killed_in_a_cluster(flyer: Flyer, cluster: Cluster) -> None:
     """The drone comes home by itself, the recording is closed, and no actor is left over."""
     port = free_port()
-    before = actors_of_ray()
+    before = actors_below(os.getpid())
     application = start_application(flyer, port, "--address", str(cluster.address))
+    actors: set[psutil.Process] = set()
 
     def kill_and_watch(user: RemoteUser) -> None:
         user.until(lambda status: status["distance"] > 20.0)
+        actors.update(actors_below(os.getpid()) - before)
         application.kill()
         application.wait()
         status = user.until(lambda status: status["state"] == "returning")
@@ -218,7 +227,8 @@ def test_application_killed_in_a_cluster(flyer: Flyer, cluster: Cluster) -> None
 
     with RemoteUser(port, kill_and_watch):
         pass
-    assert wait_for(lambda: actors_of_ray() <= before, 60.0)
+    assert len(actors) == 4
+    assert wait_for(lambda: gone(actors), 60.0)
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
         assert recording.complete
         flight = Flight.read(recording)
@@ -230,17 +240,19 @@ def test_application_killed_in_a_cluster(flyer: Flyer, cluster: Cluster) -> None
 def test_application_killed_with_its_own_ray(flyer: Flyer) -> None:
     """All actors end with it, the vehicle has its own failsafe, the recording can be read."""
     port = free_port()
-    before = actors_of_ray()
     application = start_application(flyer, port)
+    actors: set[psutil.Process] = set()
 
     def kill(user: RemoteUser) -> None:
         user.until(lambda status: status["distance"] > 20.0)
+        actors.update(actors_below(application.pid))
         application.kill()
         application.wait()
 
     with RemoteUser(port, kill):
         pass
-    assert wait_for(lambda: actors_of_ray() <= before, 30.0)
+    assert len(actors) == 3
+    assert wait_for(lambda: gone(actors), 30.0)
     with pytest.raises(AeroDaaSError):
         RemoteClient(f"http://127.0.0.1:{port}").status()
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
