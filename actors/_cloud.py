@@ -27,7 +27,7 @@ class Cloud:
         self._executor = executor
         self._timeout = timeout_ns
         self._wake = wake
-        self._started: dict[int, tuple[Task, int]] = {}
+        self._started: dict[int, tuple[Task, int, Any]] = {}
         self._answered: deque[tuple[Task, Future[bytes]]] = deque()
         self._frames: dict[tuple[str, int], Any] = {}
 
@@ -38,7 +38,7 @@ class Cloud:
             self._frames = dict(list(self._frames.items())[-_FRAMES_KEPT:])
             self._frames[key] = ray.put(encode_message(message))
         reference = self._executor.execute.remote(task.profile.model, self._frames[key])
-        self._started[task.id] = (task, now)
+        self._started[task.id] = (task, now, reference)
 
         def answered(future: Future[bytes]) -> None:
             self._answered.append((task, future))
@@ -59,7 +59,13 @@ class Cloud:
                 yield task, decode_message(memoryview(future.result())), False
             except RayError:
                 yield task, None, False
-        for task, started in list(self._started.values()):
+        for task, started, _ in list(self._started.values()):
             if now - started > self._timeout:
                 del self._started[task.id]
                 yield task, None, True
+
+    def finish(self, timeout: float) -> None:
+        """Wait up to `timeout` seconds for what is under way, so that its executor may be ended."""
+        references = [reference for _, _, reference in self._started.values()]
+        if references:
+            ray.wait(references, num_returns=len(references), timeout=timeout)

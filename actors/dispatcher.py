@@ -42,6 +42,8 @@ __all__ = ["DECISIONS", "DispatcherActor", "Managed", "done_stream", "task_strea
 
 DECISIONS = "decisions"
 """Stream of the scheduler's decisions and their outcomes."""
+_LAST_ANSWERS = 2.0
+"""Seconds given to the cloud at the end of a run."""
 _EDGE_PATIENCE = 10
 """An execution on the edge that takes so many times its expected time has failed."""
 _SLOW_DECISION = 0.05
@@ -272,6 +274,10 @@ class DispatcherActor(StreamActor):
         if self._timers and not self.session.lockstep:
             return min(0.2, max(0.0, self.session.host_seconds(self._timers[0] - self._time())))
         return 0.2
+
+    def _close(self) -> None:
+        if self._cloud is not None:
+            self._cloud.finish(_LAST_ANSWERS)
 
     def _values(self) -> dict[str, Any]:
         return {"outcomes": dict(self._outcomes), "utility": self._utility}

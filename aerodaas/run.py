@@ -20,6 +20,7 @@ from aerodaas.signals import Terminated, raise_on_termination
 from aerodaas.status import MissionState
 
 if TYPE_CHECKING:
+    from aerodaas.actors._base import ActorReport
     from aerodaas.actors.flight import Flight, FlightState
     from aerodaas.actors.plan import FlightPlan
     from aerodaas.environment import Environment
@@ -129,6 +130,11 @@ class Run:
             # Whoever waits for the run meets the same error and deals with it.
             with contextlib.suppress(AeroDaaSError):
                 self.look()
+
+    def reports(self) -> dict[str, ActorReport]:
+        """The newest report of each actor, by its name."""
+        assert self._flight is not None  # noqa: S101 - launched
+        return self._flight.reports()
 
     def wait(self) -> None:
         """Watch until every mission has ended; raises what they ended with.

@@ -47,6 +47,13 @@ _BLIND_AFTER = 0.5
 """Seconds without a state packet after which a setpoint is answered by hovering."""
 _GREET_AGAIN = 2.0
 """Seconds between greetings of a Tello that stands on the ground and has fallen silent."""
+_LAND_AGAIN = 3.0
+"""Seconds after which a landing is asked for again where no packet shows a descent: replies carry
+no id, so that another one's may have been taken for this one's."""
+_DESCENDING = 0.1
+"""m/s."""
+_DOWN = 0.2
+"""Metres above the ground at which it stands, or is about to."""
 _HOT = 85.0
 """Degrees Celsius inside at which people should know; it switches itself off a little above."""
 _BRAKING = 1.0
@@ -102,6 +109,7 @@ class TelloVehicle:
         self._latest: TelloState | None = None
         self._heard_at = -math.inf
         self._greeted_at = 0.0
+        self._landing_seen_at = 0.0
         self._climb_to = 0.0
         self._climb_until: float | None = None
 
@@ -274,12 +282,15 @@ class TelloVehicle:
         """Land here; does nothing on the ground."""
         link = self._connected()
         with self._lock:
-            if not self._phase.airborne:
-                return
-            self._phase.to(VehicleMode.LANDING, time.monotonic())
-            link.release()
-            # That it stands is judged by its packets: the reply may be lost.
-            link.request(LAND, lambda _: None, urgent=True)
+            if self._phase.airborne:
+                self._phase.to(VehicleMode.LANDING, time.monotonic())
+                link.release()
+                self._ask_to_land(link)
+
+    def _ask_to_land(self, link: TelloLink) -> None:
+        """That it descends and stands is judged by its packets: the reply means little."""
+        self._landing_seen_at = time.monotonic()
+        link.request(LAND, lambda _: None, urgent=True)
 
     def _take(self, state: TelloState, now: float) -> None:
         """A state packet has come; in the link's thread."""
@@ -299,11 +310,23 @@ class TelloVehicle:
             self._predict(now)
             if self._phase.mode is VehicleMode.TAKING_OFF and self._phase.risen:
                 self._climb_on(link, now)
+            if self._phase.mode is VehicleMode.LANDING:
+                self._see_landing_through(link, now)
             silent = self._latest is not None and now - self._heard_at > _GREET_AGAIN
             if silent and not self._phase.airborne and now - self._greeted_at > _GREET_AGAIN:
                 # It was switched off and on again, perhaps, and waits for its greeting.
                 self._greeted_at = now
                 link.request(ENTER, lambda _: None)
+
+    def _see_landing_through(self, link: TelloLink, now: float) -> None:
+        """Ask again for a landing that no packet shows to be under way."""
+        latest = self._latest if now - self._heard_at < _BLIND_AFTER else None
+        if latest is not None and (
+            latest.velocity[2] >= _DESCENDING or latest.ground_distance < _DOWN
+        ):
+            self._landing_seen_at = now
+        elif now - self._landing_seen_at > _LAND_AGAIN:
+            self._ask_to_land(link)
 
     def _climb_on(self, link: TelloLink, now: float) -> None:
         """The rest of a take-off; it flies without setpoints, but never for longer than its way."""

@@ -6,7 +6,7 @@ Written from the SDK 2.0 and 3.0 user guides, on its own: the driver shares noth
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from aerodaas.testing.tello.flight import TelloFlight
@@ -191,7 +191,7 @@ class TelloSdk:
         return self._fly(lambda: self._flight.move(x / 100, y / 100, z / 100, speed / 100))
 
     def _curve(self, _: str, numbers: list[int]) -> Outcome:
-        if not _within(numbers, [_PLACE] * 6 + [_CURVE_SPEED]):
+        if not _within(numbers, [*([_PLACE] * 6), _CURVE_SPEED]):
             return Outcome(OUT_OF_RANGE)
         radius = _radius(numbers[:3], numbers[3:6])
         if not _RADIUS[0] <= radius <= _RADIUS[1]:
@@ -209,7 +209,7 @@ class TelloSdk:
         return Outcome(moves=True)
 
 
-def _within(numbers: list[int], ranges: list[tuple[int, int]]) -> bool:
+def _within(numbers: list[int], ranges: Sequence[tuple[int, int]]) -> bool:
     return len(numbers) == len(ranges) and all(
         lowest <= number <= highest
         for number, (lowest, highest) in zip(numbers, ranges, strict=True)

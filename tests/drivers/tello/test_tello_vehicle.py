@@ -199,6 +199,22 @@ def test_a_lost_reply_to_take_off_or_landing_does_not_matter() -> None:
         vehicle.close()
 
 
+@pytest.mark.slow
+def test_a_landing_is_asked_for_until_it_descends() -> None:
+    """The request is lost, and a stray reply looks like its answer: it lands all the same."""
+    with flight() as pair:
+        pair.take_off()
+        pair.tello.spoil(commands=Impairment(loss=1.0))
+        pair.vehicle.land()
+        time.sleep(0.2)
+        assert pair.tello._client is not None
+        pair.tello._transmit(b"ok", pair.tello._client)
+        time.sleep(0.3)
+        pair.tello.spoil(commands=Impairment())
+        pair.until(VehicleMode.GROUNDED)
+        assert pair.tello.mode is VehicleMode.GROUNDED
+
+
 def test_silence_of_the_tello_is_loss_of_the_link() -> None:
     """Without state packets it is lost, its stamp stands still, and nothing is flown blind."""
     with flight() as pair:
