@@ -36,7 +36,7 @@ app = typer.Typer(
     help="""Program drones as a service.
 
 An application of some 20 lines becomes a dataflow of sensing, analytics and navigation, and
-flies a simulated drone, PX4, ArduPilot or a Tello.
+flies a simulated drone or a Tello.
 
     aerodaas run apps/farm_survey.py --speed max
 """,
