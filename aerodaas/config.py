@@ -298,12 +298,10 @@ class EnvironmentConfig(_Strict):
     def load(cls, path: str | Path) -> EnvironmentConfig:
         """Read an environment file; raises ConfigError that names the file and the place."""
         try:
-            text = Path(path).read_text(encoding="utf-8")
+            content = json.loads(Path(path).read_text(encoding="utf-8"))
         except OSError as error:
             message = f"cannot read the environment file {path}: {error.strerror}"
             raise ConfigError(message) from None
-        try:
-            content = json.loads(text)
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
             message = f"{path} is not JSON: {error}"
             raise ConfigError(message) from None

@@ -15,7 +15,7 @@ from aerodaas.interfaces import IAeroData, IEnvironment, INavigate, IRobot, ISen
 from aerodaas.names import PaperNames
 from aerodaas.navigation.commands import AddNavigation, Command, End, Pause, Resume
 from aerodaas.options import current_options
-from aerodaas.overrides import overridden
+from aerodaas.overrides import located, overridden
 from aerodaas.plugins import load_plugin
 from aerodaas.replay import replay_environment
 from aerodaas.run import Run
@@ -45,11 +45,12 @@ class Environment(PaperNames, IEnvironment):
         settings = {**(overrides or {}), **options.overrides}
         if options.seed is not None:
             settings["simulation.seed"] = options.seed
-        self.config: EnvironmentConfig = (
+        config = (
             overridden(EnvironmentConfig.load(self.path), settings)
             if options.replay is None
             else overridden(replay_environment(options.replay), options.overrides)
         )
+        self.config: EnvironmentConfig = located(config, self.path.parent)
         self.env_data = self.config.model_dump(by_alias=True)
         """The environment file's content, for analyses that want it."""
         self.graph = Graph()

@@ -5,12 +5,13 @@ from __future__ import annotations
 import copy
 import json
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 from aerodaas.config import EnvironmentConfig, SensorConfig, validated
 from aerodaas.errors import ConfigError
 
-__all__ = ["overridden", "parse_setting"]
+__all__ = ["located", "overridden", "parse_setting"]
 
 
 def parse_setting(text: str) -> tuple[str, Any]:
@@ -37,6 +38,28 @@ def overridden(config: EnvironmentConfig, settings: Mapping[str, Any]) -> Enviro
         owner, _, path = name.partition(".")
         _assign(_find(content, owner), path.split("."), copy.deepcopy(value))
     return validated(content, "environment with overrides")
+
+
+def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
+    """Return `config` with the relative paths in its settings made absolute.
+
+    What lies in `folder`, or else in the working directory, is meant; a path that leads nowhere
+    stays as it is. Actors have other working directories than the application.
+    """
+    content = config.model_dump(by_alias=True)
+    places: list[dict[str, Any]] = [*content["robots"], *content["sensors"]]
+    places += [sensor for robot in content["robots"] for sensor in robot["sensors"]]
+    for settings in (place["settings"] for place in places):
+        if isinstance(settings.get("path"), str):
+            settings["path"] = _absolute(settings["path"], folder)
+    if content["simulation"]["world"].endswith(".json"):
+        content["simulation"]["world"] = _absolute(content["simulation"]["world"], folder)
+    return validated(content, "environment")
+
+
+def _absolute(path: str, folder: Path) -> str:
+    found = (place.resolve() for place in (folder / path, Path(path)) if place.exists())
+    return str(next(found, path))
 
 
 def _find(content: dict[str, Any], owner: str) -> dict[str, Any]:
