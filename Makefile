@@ -8,8 +8,9 @@ BIN := $(VENV)/bin
 fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
 
+# Slow tests run where CI is set, as continuous integration does.
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest $(if $(CI),,-m "not slow")
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
