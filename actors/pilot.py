@@ -22,7 +22,7 @@ from aerodaas.geometry import GeodeticOrigin
 from aerodaas.navigation.commands import Answer, Command, Reply, Request, Start, StreamItem
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
-from aerodaas.navigation.planner import BackgroundPlanner, InlinePlanner
+from aerodaas.navigation.planner import BackgroundPlanner, InlinePlanner, solve
 from aerodaas.navigation.safety import Neighbour
 from aerodaas.plugins import load_plugin
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
@@ -119,7 +119,7 @@ class Pilot:
             return BackgroundPlanner(scheduler)
         patience = _PLANS_PATIENCE * self.spec.robot.mission.plan_timeout
         wall = self._session.host_seconds(round(patience * NANOSECONDS))
-        return BackgroundPlanner(scheduler, PlannerExecutor(max(_LEAST_PATIENCE, wall)))
+        return BackgroundPlanner(scheduler, PlannerExecutor(max(_LEAST_PATIENCE, wall), solve, scheduler))
 
     @staticmethod
     def streams(spec: RobotSpec) -> list[str]:

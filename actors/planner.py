@@ -17,6 +17,10 @@ __all__ = ["PlannerExecutor"]
 T = TypeVar("T")
 
 
+def _load(*_: object) -> None:
+    """Arrive with one's arguments."""
+
+
 class _PlannerActor:
     """Calls what it is given; holds no state, so that a restart loses nothing."""
 
@@ -27,8 +31,11 @@ class _PlannerActor:
 class PlannerExecutor(Executor):
     """Runs calls in an actor on this node, which is killed and started anew where it hangs."""
 
-    def __init__(self, patience: float) -> None:
-        """Give each call `patience` wall seconds; returns when the actor is there."""
+    def __init__(self, patience: float, *used: object) -> None:
+        """Give each call `patience` wall seconds; returns when the actor is there.
+
+        The modules of what is `used` later are loaded at once, for it takes seconds.
+        """
         here = ray.get_runtime_context().get_node_id()
         remote: Any = ray.remote(_PlannerActor)
         self._actor = remote.options(
@@ -37,7 +44,7 @@ class PlannerExecutor(Executor):
             scheduling_strategy=NodeAffinitySchedulingStrategy(here, soft=False),
         ).remote()
         self._patience = patience
-        ray.get(self._actor.call.remote(bool))
+        ray.get(self._actor.call.remote(_load, *used))
 
     def submit(self, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:  # noqa: ANN401
         """Call `function` in the actor; the future raises RuntimeError if the actor dies."""

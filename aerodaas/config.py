@@ -43,7 +43,8 @@ Finite = Annotated[float, Field(allow_inf_nan=False)]
 class _Strict(BaseModel):
     """Unknown keys are mistakes, not wishes."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    # The docstrings of settings become descriptions in the JSON schema.
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
 
 
 class HomeConfig(_Strict):

@@ -14,14 +14,23 @@ _ROOT = Path(__file__).resolve().parents[1]
 
 
 @pytest.fixture(scope="session")
-def runtime() -> Iterator[None]:
+def plugin_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A folder from which actors import, too, for plug-ins that tests write."""
+    folder = tmp_path_factory.mktemp("plugins")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(folder)
+        yield folder
+
+
+@pytest.fixture(scope="session")
+def runtime(plugin_folder: Path) -> Iterator[None]:
     """Ray on this machine, as a run of an application starts it."""
     from aerodaas.actors import cluster  # noqa: PLC0415 - only where actors are tested
 
     # Actors import the project and the tests' own analyses from where this process does.
     ours = [path for path in sys.path if path and Path(path).resolve().is_relative_to(_ROOT)]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("PYTHONPATH", os.pathsep.join(ours))
+        patch.setenv("PYTHONPATH", os.pathsep.join([*ours, str(plugin_folder)]))
         cluster.connect(None)
         yield
         cluster.disconnect()

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from aerodaas.schedulers.waypoint.base import Situation, TrajectoryScheduler
@@ -138,8 +138,9 @@ class BackgroundPlanner:
             return None
         self._running = None
         error = running.exception()
+        # A plan made in another process comes with a copy of the request.
         plan = (
-            running.result()
+            replace(running.result(), request=request)
             if error is None
             else Plan(request, request.pending, f"planning failed: {error}")
         )
