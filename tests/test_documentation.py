@@ -12,10 +12,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flying import Flyer, recorded
+from flying import Flyer
 from pydantic import BaseModel
 
-from aerodaas import Environment
 from aerodaas import config as module
 from aerodaas.config import EnvironmentConfig
 from aerodaas.recording.flight import Flight
