@@ -119,7 +119,7 @@ def test_an_interrupted_run_lands(
 @pytest.mark.parametrize(
     ("ending", "message"),
     [
-        ("raise KeyError('my own bug')", "app.py:13: KeyError: 'my own bug'"),
+        ("raise KeyError('my own bug')", "KeyError: 'my own bug'\n  at app.py:13"),
         ("drone.get_sensor_by_id('nose')", "no sensor of drone is called 'nose'"),
     ],
     ids=["any exception", "an error of ours"],
