@@ -8,9 +8,10 @@ BIN := $(VENV)/bin
 fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
 
-# Slow tests run where CI is set, as continuous integration does.
+# Slow tests run where CI is set, as continuous integration does; there a test that flies by the
+# wall clock and met a busy machine is run once more, and counted as such.
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest $(if $(CI),,-m "not slow")
+	$(BIN)/python -m pytest $(if $(CI),--reruns 1,-m "not slow")
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
