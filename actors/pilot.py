@@ -119,7 +119,9 @@ class Pilot:
             return BackgroundPlanner(scheduler)
         patience = _PLANS_PATIENCE * self.spec.robot.mission.plan_timeout
         wall = self._session.host_seconds(round(patience * NANOSECONDS))
-        return BackgroundPlanner(scheduler, PlannerExecutor(max(_LEAST_PATIENCE, wall), solve, scheduler))
+        return BackgroundPlanner(
+            scheduler, PlannerExecutor(max(_LEAST_PATIENCE, wall), solve, scheduler)
+        )
 
     @staticmethod
     def streams(spec: RobotSpec) -> list[str]:
