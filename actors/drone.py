@@ -197,7 +197,7 @@ class DroneActor(StreamActor):
                 self._barrier.forget()
         now = self.clock.now()
         # Arrival depends on the host's scheduler; the order in which they count must not.
-        for message in sorted(arrived, key=lambda one: (one.stream, one.seq)):
+        for message in sorted(arrived, key=_order):
             self._take(message, now)
 
     def _acknowledge(self, message: Message[Any]) -> None:
@@ -248,6 +248,11 @@ class DroneActor(StreamActor):
     def _close(self) -> None:
         for pilot in self._pilots.values():
             pilot.vehicle.close()
+
+
+def _order(message: Message[Any]) -> tuple[bool, str, int]:
+    """What was made of a camera's last picture counts before the word that it was the last."""
+    return message.stream.endswith("/commands"), message.stream, message.seq
 
 
 def _neighbour(state: VehicleState) -> Neighbour:

@@ -86,8 +86,6 @@ def test_the_example_plug_ins_fly_together(flyer: Flyer, plugin_folder: Path) ->
     assert flight.robots["bot"].outcome.startswith("landed")
     assert flight.frames["bot/board"] > 10
     assert [kind for _, kind, _ in flight.alerts] == ["dark"]
-    for block in plugins:
-        assert block.count("\n") <= 50
 
 
 def models() -> dict[str, type[BaseModel]]:

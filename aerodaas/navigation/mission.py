@@ -196,8 +196,10 @@ class Mission:
     def _leave(self, state: MissionState, reason: str) -> Answer:
         if self.state in _ON_GROUND:
             self._to(MissionState.ABORTED, f"{reason} before take-off")
-        elif self.state is MissionState.LANDING and state is MissionState.RETURNING:
-            return Answer(accepted=False, text="the drone is already landing")
+        elif self.state is MissionState.LANDING:
+            # Why it lands stays what it was.
+            asked = state is MissionState.LANDING
+            return Answer(accepted=asked, text="the drone is already landing")
         else:
             self._to(state, reason)
         return DONE

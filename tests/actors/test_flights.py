@@ -63,6 +63,7 @@ def test_a_flight_in_scaled_time(flyer: Flyer) -> None:
     assert flight.alerts == []
 
 
+@pytest.mark.slow
 def test_a_slow_start_is_not_taken_for_a_dead_application(
     flyer: Flyer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -206,6 +207,7 @@ def test_a_trigger_ends_the_mission_and_wakes_an_analysis(flyer: Flyer) -> None:
     assert woken[0] > 1.0
 
 
+@pytest.mark.slow
 def test_an_analysis_that_dies_is_restarted(flyer: Flyer) -> None:
     """SIGKILL of an analysis' process: it works again in a new one; the drone flies on, watched."""
     results: dict[str, AeroStreamData[int]] = {}

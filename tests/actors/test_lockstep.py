@@ -68,6 +68,7 @@ def test_an_analysis_that_steers_is_waited_for(flyer: Flyer) -> None:
     assert same(first, fly(flyer, weave))
 
 
+@pytest.mark.slow
 def test_wakes_and_external_sources_are_waited_for(flyer: Flyer) -> None:
     """An analysis woken by another one, and navigation from outside, repeat to the last bit."""
 
@@ -94,6 +95,7 @@ def test_wakes_and_external_sources_are_waited_for(flyer: Flyer) -> None:
         assert same(first, fly(flyer, build))
 
 
+@pytest.mark.slow
 def test_several_robots_and_a_camera_share_one_time(flyer: Flyer) -> None:
     """Two drones and a rendered camera repeat to the last bit."""
     camera = {

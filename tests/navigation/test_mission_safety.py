@@ -254,6 +254,19 @@ def test_end_lands_here_and_return_lands_at_home(command: End | ReturnHome, at_h
     assert "asked" in survey.status.reason
 
 
+def test_why_a_drone_lands_stays_what_it_was() -> None:
+    """Told to end twice, it lands for the first reason; it does not return any more."""
+    survey = flight(add(*square()[1:]))
+    survey.run(8.0)
+    assert survey.tell(End("enough seen")).accepted
+    survey.run(0.5)
+    survey.expect(S.LANDING)
+    assert survey.tell(End("no more pictures")).accepted
+    assert not survey.tell(ReturnHome("come back")).accepted
+    survey.run()
+    assert survey.status.reason == "enough seen"
+
+
 @pytest.mark.parametrize(("on_complete", "state"), [("land", S.LANDED), ("hold", S.HOLDING)])
 def test_what_follows_the_last_waypoint(on_complete: Any, state: S) -> None:  # noqa: ANN401
     """Land on the spot, or hold for what a remote user may add."""
