@@ -17,7 +17,6 @@ from aerodaas.navigation.commands import AddNavigation, Command, End, Pause, Res
 from aerodaas.options import current_options
 from aerodaas.overrides import located, overridden
 from aerodaas.plugins import load_plugin
-from aerodaas.replay import replay_environment
 from aerodaas.run import Run
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
 from aerodaas.schedulers.analytics.registry import load_scheduler
@@ -45,11 +44,12 @@ class Environment(PaperNames, IEnvironment):
         settings = {**(overrides or {}), **options.overrides}
         if options.seed is not None:
             settings["simulation.seed"] = options.seed
-        config = (
-            overridden(EnvironmentConfig.load(self.path), settings)
-            if options.replay is None
-            else overridden(replay_environment(options.replay), options.overrides)
-        )
+        if options.replay is None:
+            config = overridden(EnvironmentConfig.load(self.path), settings)
+        else:
+            from aerodaas.replay import replay_environment  # noqa: PLC0415 - only for a replay
+
+            config = overridden(replay_environment(options.replay), options.overrides)
         self.config: EnvironmentConfig = located(config, self.path.parent)
         self.env_data = self.config.model_dump(by_alias=True)
         """The environment file's content, for analyses that want it."""

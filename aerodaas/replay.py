@@ -14,8 +14,8 @@ from aerodaas.recording.reader import Recording
 
 __all__ = ["frame_stamps", "replay_environment"]
 
-_ENDLESS = frozenset({"simulated", "tello"})
-"""Cameras that never run out of pictures."""
+_FINITE = frozenset({"folder", "recorded", "video", "mcap"})
+"""Cameras that may run out of pictures, which ends a mission that flies by them."""
 
 
 def replay_environment(path: str | Path) -> EnvironmentConfig:
@@ -59,7 +59,7 @@ def _play(sensor: dict[str, Any], stream: str, path: Path) -> None:
     if sensor["type"] != "camera":
         return
     lens = {key: it for key, it in sensor["settings"].items() if key in CameraConfig.model_fields}
-    endless = sensor["driver"] in _ENDLESS or lens.get("loop", False)
+    endless = sensor["driver"] not in _FINITE or lens.get("loop", False)
     played = {"path": str(path), "topic": topic(stream, "image"), "loop": endless}
     sensor["settings"] = lens | played
     sensor["driver"] = "replayed"

@@ -258,7 +258,7 @@ def _drops(flight: Flight, record: Record) -> None:
 def _vitals(flight: Flight, record: Record) -> None:
     value = record.value
     now = seconds(value["stamp"])
-    if value["cpu_cores"] is not None:
+    if "cpu_cores" in value:
         load = flight.loads[value["actor"]]
         load.time.append(now)
         load.cpu.append(value["cpu_cores"])

@@ -65,7 +65,8 @@ class Letterbox:
         # Per axis, because rounding to whole pixels stretches the two a little differently.
         scale = np.array([width / self.inner[1], height / self.inner[0]], np.float32)
         moved = (points - np.array([self.left, self.top], np.float32)) * scale
-        return np.clip(moved, 0, np.array([width, height], np.float32))
+        clipped: NDArray[np.float32] = np.clip(moved, 0, np.array([width, height], np.float32))
+        return clipped
 
 
 def _round_up(length: int) -> int:

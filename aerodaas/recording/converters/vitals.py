@@ -39,11 +39,12 @@ def vitals(item: Vitals, message: Message[Any], session: Session) -> Iterator[En
         "stamp": message.stamp,
         "actor": actor,
         "machine": machine,
-        # An actor that was restarted begins to count anew.
-        "cpu_cores": used / took if took > 0 and used >= 0 else None,
         "cpu_seconds": item.cpu_seconds,
         "memory_mb": item.memory / 1e6,
         "machine_cpu": item.machine_cpu,
         "machine_memory": item.machine_memory,
     }
+    # An actor that was restarted begins to count anew.
+    if took > 0 and used >= 0:
+        value["cpu_cores"] = used / took
     yield Entry("/" + message.stream, VITALS, json_bytes(value), message.stamp)

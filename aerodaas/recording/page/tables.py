@@ -47,7 +47,7 @@ def sections(summary: FlightSummary) -> Iterator[str]:
             for stream, it in summary.latencies.items()
         ]
         head = ["stream", "messages", "median (ms)", "99th perc. (ms)", "overhead (ms)"]
-        yield section("Latency since capture", table(head, rows))
+        yield section("Latency since capture", table(head, rows), wide=True)
     if summary.alerts:
         yield section("Alerts", table(["at (s)", "kind", "text"], _alerts(summary)))
     if summary.drops:

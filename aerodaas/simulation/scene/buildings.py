@@ -182,7 +182,7 @@ def beam(start: ArrayLike, end: ArrayLike, radius: float, sides: int = 4) -> Mes
     up = (b - a) / length
     side = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
     side /= np.linalg.norm(side)
-    basis = np.stack([side, np.cross(up, side), up])
+    basis = np.asarray(np.stack([side, np.cross(up, side), up]), dtype=np.float64)
     bar = tube([radius, radius], [0.0, length], sides=sides)
     return Mesh(bar.points @ basis + a, bar.uv, bar.normals @ basis, bar.colours, bar.triangles)
 

@@ -66,7 +66,7 @@ def _clock(video: VideoOptions) -> PictureSource:
 
     def film(seconds: float, _: Odometry) -> Image:
         shift = int(seconds * 60) % video.width
-        image = wall[:, shift : shift + video.width].copy()
+        image: Image = wall[:, shift : shift + video.width].copy()
         write_stamp(image, host_time_ns() // 1_000_000)
         return image
 
