@@ -119,7 +119,11 @@ def test_an_interrupted_run_lands(
 @pytest.mark.parametrize(
     ("ending", "message"),
     [
+<<<<<<< HEAD
         ("raise KeyError('my own bug')", "KeyError: 'my own bug'\n  at app.py:13"),
+=======
+        ("raise KeyError('my own bug')", "KeyError: 'my own bug'\n  at app.py:13: raise"),
+>>>>>>> api
         ("drone.get_sensor_by_id('nose')", "no sensor of drone is called 'nose'"),
     ],
     ids=["any exception", "an error of ours"],
