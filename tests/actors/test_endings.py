@@ -19,6 +19,8 @@ from flying import FLAT
 from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
 
+pytestmark = pytest.mark.slow
+
 _ROOT = Path(__file__).resolve().parents[2]
 _APP = """
 import time
@@ -119,11 +121,7 @@ def test_an_interrupted_run_lands(
 @pytest.mark.parametrize(
     ("ending", "message"),
     [
-<<<<<<< HEAD
-        ("raise KeyError('my own bug')", "KeyError: 'my own bug'\n  at app.py:13"),
-=======
         ("raise KeyError('my own bug')", "KeyError: 'my own bug'\n  at app.py:13: raise"),
->>>>>>> api
         ("drone.get_sensor_by_id('nose')", "no sensor of drone is called 'nose'"),
     ],
     ids=["any exception", "an error of ours"],
