@@ -105,7 +105,7 @@ def _aims(results: dict[tuple[str, str], LabResult], names: set[str]) -> list[st
         notes.append(
             f"{kind}: margin reaches {share:.1f} % of the clairvoyant bound, "
             f"{utility[0] / max(utility[1:]):.2f} x the better of DEMS and DEMS-A over all "
-            f"workloads (least {least:.2f} x), QoE at least GEMS' {qoe:+.1f} per s"
+            f"workloads (least {least:.2f} x); its QoE less GEMS' is {qoe:+.1f} per s at the least"
         )
     return notes
 
