@@ -73,7 +73,8 @@ def plan(
                 if free >= until:
                     if merit > best_merit:
                         best_merit, best = merit, chain
-                elif taken not in grown or grown[taken][0] < merit:
+                # Of two ways to the same merit, the one that is done earlier leaves more room.
+                elif taken not in grown or (grown[taken][0], -grown[taken][1]) < (merit, -free):
                     grown[taken] = successor
             if ended:
                 merit = state[0] - price * _IDLE_SHARE * (until - state[1])
