@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -84,6 +85,8 @@ def _await_ready(
     while True:
         now = time.monotonic()
         places = telemetry.knows_place(now) and telemetry.place is not None
+        # Whether it is armed decides what follows.
+        places = places and telemetry.beat_at > -math.inf
         if places and (telemetry.armed or not autopilot.objections(telemetry, now)):
             return
         if now - began > settings.ready_timeout:
