@@ -59,6 +59,7 @@ class ArduPilot(Autopilot):
     name: ClassVar[str] = "ArduPilot"
     family: ClassVar[int] = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     stream_before: ClassVar[float] = 0.0
+    stops_short: ClassVar[bool] = False
     failsafes: ClassVar[tuple[Failsafe, ...]] = (
         Failsafe(
             "BATT_FS_LOW_ACT",

@@ -41,6 +41,8 @@ class Autopilot(ABC):
     """MAV_AUTOPILOT of its HEARTBEAT."""
     stream_before: ClassVar[float]
     """Seconds of setpoints before it may be asked for guided flight."""
+    stops_short: ClassVar[bool]
+    """Whether it holds before it has reached the height of a take-off."""
     failsafes: ClassVar[tuple[Failsafe, ...]]
     rates: ClassVar[dict[int, float]] = {
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20.0,

@@ -44,11 +44,13 @@ class Climb:
         self._over = False
         self._next()
 
-    def turn(self, now: float, up: float, rise: float, *, holds: bool) -> bool:
-        """Look how far it is: `up` metres, rising at `rise` m/s; True once it is done.
+    @property
+    def ordered(self) -> bool:
+        """True once the last order is given."""
+        return not self._orders
 
-        `holds`: the autopilot itself says that its take-off is over.
-        """
+    def turn(self, now: float, up: float, rise: float) -> bool:
+        """Look how far it is: `up` metres, rising at `rise` m/s; True once it is done."""
         self._now = now
         if self._over:
             return True
@@ -56,8 +58,7 @@ class Climb:
             if now - self._started > _PATIENCE:
                 self.fail("it did not start its motors")
             return False
-        risen = self.goal - up < self._near
-        self._over = (risen and abs(rise) < _CALM) or (holds and not self._orders)
+        self._over = self.goal - up < self._near and abs(rise) < _CALM
         return self._over
 
     def cancel(self) -> None:

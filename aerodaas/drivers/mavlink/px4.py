@@ -62,6 +62,7 @@ class PX4(Autopilot):
     name: ClassVar[str] = "PX4"
     family: ClassVar[int] = mavlink.MAV_AUTOPILOT_PX4
     stream_before: ClassVar[float] = 1.2
+    stops_short: ClassVar[bool] = True
     failsafes: ClassVar[tuple[Failsafe, ...]] = (
         Failsafe(
             "COM_LOW_BAT_ACT",

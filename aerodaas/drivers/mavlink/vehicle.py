@@ -98,6 +98,7 @@ class MavlinkVehicle:
         self._commander: Commander | None = None
         self._rates: RateKeeper | None = None
         self._climb: Climb | None = None
+        self._climb_place: Vector | None = None
         self._refusal = ""
         self._stream_since = self._streamed_at = -math.inf
         self._guided_asked_at = -math.inf
@@ -271,6 +272,7 @@ class MavlinkVehicle:
                 raise VehicleError(f"{self._name} refuses to take off: {'; '.join(reasons)}")
             telemetry, autopilot = self._telemetry, connection.autopilot
             assert telemetry.position is not None  # noqa: S101 - preflight has seen to it
+            self._climb_place = None
             self._climb = Climb(
                 connection.commander,
                 autopilot.take_off(height, telemetry),
@@ -304,20 +306,22 @@ class MavlinkVehicle:
         self._watchdog.feed()
         with self._lock:
             connection = self._require_flight("follow a setpoint")
-            now = time.monotonic()
-            if now - self._streamed_at > _STREAM_GAP:
-                self._stream_since = now
-                self._target.forget()
-            self._streamed_at = now
-            if not self._telemetry.knows_place(now):
-                setpoint = VelocitySetpoint(np.zeros(3))
-            if isinstance(setpoint, PositionSetpoint):
-                message, sent = self._position(setpoint, connection, now)
-            else:
-                message, sent = self._velocity(setpoint, connection)
-            connection.link.send(message)
-            self._guide(connection, now)
-            return sent
+            return self._steer(setpoint, connection, time.monotonic())
+
+    def _steer(self, setpoint: Setpoint, connection: Connection, now: float) -> Setpoint:
+        if now - self._streamed_at > _STREAM_GAP:
+            self._stream_since = now
+            self._target.forget()
+        self._streamed_at = now
+        if not self._telemetry.knows_place(now):
+            setpoint = VelocitySetpoint(np.zeros(3))
+        if isinstance(setpoint, PositionSetpoint):
+            message, sent = self._position(setpoint, connection, now)
+        else:
+            message, sent = self._velocity(setpoint, connection, now)
+        connection.link.send(message)
+        self._guide(connection, now)
+        return sent
 
     def _position(
         self, setpoint: PositionSetpoint, connection: Connection, now: float
@@ -339,14 +343,14 @@ class MavlinkVehicle:
         return message, PositionSetpoint(setpoint.position, setpoint.yaw, speed)
 
     def _velocity(
-        self, setpoint: VelocitySetpoint, connection: Connection
+        self, setpoint: VelocitySetpoint, connection: Connection, now: float
     ) -> tuple[Message, Setpoint]:
         self._target.forget()
         across = limit_length(setpoint.velocity[:2], self._speed)
         up = float(np.clip(setpoint.velocity[2], -self._climb_rate, self._climb_rate))
         rate = float(np.clip(setpoint.yaw_rate, -self._turn_rate, self._turn_rate))
         sent = VelocitySetpoint(np.array([across[0], across[1], up]), rate)
-        return velocity_message(sent, connection.target, time.monotonic()), sent
+        return velocity_message(sent, connection.target, now), sent
 
     def _guide(self, connection: Connection, now: float) -> None:
         """See that the autopilot follows what is being streamed."""
@@ -384,7 +388,7 @@ class MavlinkVehicle:
 
     def _change(self, wish: FlightMode) -> None:
         connection = self._connected()
-        if self._climb is not None:
+        if self._climb is not None and wish is not FlightMode.GUIDED:
             self._climb.cancel()
             self._climb = None
         now = time.monotonic()
@@ -461,10 +465,24 @@ class MavlinkVehicle:
             self._rates.turn(self._telemetry, now)
             if self._climb is not None and self._telemetry.position is not None:
                 up, rise = -self._telemetry.position[2], -self._telemetry.velocity[2]
-                holds = self._phase.seen and self._phase.shown is FlightMode.HOLD
-                if self._climb.turn(now, float(up), float(rise), holds=holds):
+                if self._climb.turn(now, float(up), float(rise)):
                     self._climb = None
+                elif self._climb.ordered:
+                    self._climb_on(now)
             self._mind_the_loop(now)
+
+    def _climb_on(self, now: float) -> None:
+        """Fly the rest ourselves: PX4 calls its take-off done up to 0.8 m below its height."""
+        connection, climb = self._connection, self._climb
+        done = self._phase.seen and self._phase.shown in {FlightMode.HOLD, FlightMode.GUIDED}
+        done &= self._finder.found is not None and self._finder.found.autopilot.stops_short
+        if connection is None or climb is None or not done or not self._watchdog.healthy(now):
+            return
+        if self._climb_place is None:
+            self._climb_place = self._odometry(connection.frame, known=True).position
+        rest = connection.frame.position(np.array([0.0, 0.0, -climb.goal]))[2]
+        place = np.array([*self._climb_place[:2], rest])
+        self._steer(PositionSetpoint(place, None, self._climb_rate), connection, now)
 
     def _mind_the_loop(self, now: float) -> None:
         """If the loop above hangs, hold; if it does not come back, return.

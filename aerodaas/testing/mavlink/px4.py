@@ -21,6 +21,8 @@ _AUTO, _POSITION, _OFFBOARD = 4, 3, 6
 _TAKE_OFF, _HOLD, _RETURN, _LAND = 2, 3, 5, 6
 _LOSS = 1.0
 """COM_OF_LOSS_T: seconds without setpoints after which it leaves offboard."""
+_NEAR = 0.7
+"""Metres below its altitude at which a take-off counts as done, about NAV_MC_ALT_RAD."""
 _RETURN_ACTION, _HOLD_ACTION = 3.0, 5.0
 
 
@@ -123,8 +125,9 @@ class EmulatedPX4(Firmware):
         taking_off = (self._main, self._sub) == (_AUTO, _TAKE_OFF)
         if taking_off and not self._lifted:
             self.lift(max(0.5, self.flight.rise_to(self._altitude)))
-        elif taking_off and self.flight.mode is VehicleMode.HOLDING:
+        elif taking_off and self.flight.rise_to(self._altitude) < _NEAR:
             self._sub = _HOLD
+            self.flight.hold()
         if self.guided and self.flight.flying and self.now - self._setpoint_at > _LOSS:
             action = self.parameters.values["COM_OBL_RC_ACT"]
             sub = {_RETURN_ACTION: _RETURN, _HOLD_ACTION: _HOLD}.get(action, _LAND)

@@ -120,7 +120,9 @@ def test_reconnecting_in_flight_takes_off_no_second_time(family: str) -> None:
     )
     with flight(options) as pair:
         pair.guide()
-        pair.fly_to(np.array([3.0, 0.0, 2.0]))
+        there = np.array([3.0, 0.0, 2.0])
+        pair.fly_to(there)
+        pair.stream(PositionSetpoint(there), 1.5)
         port = int(pair.robot.settings["url"].rpartition(":")[2])
         # As when our process is killed: the wire is cut, nobody says goodbye.
         assert pair.vehicle._link is not None
