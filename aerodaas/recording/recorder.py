@@ -190,7 +190,8 @@ class FlightRecorder:
                 entries = [
                     log_entry(self._session, message.stamp, LogLevel.Error, message.stream, text)
                 ]
-        if len(message.hops) > 1:
+        # Of one hop, only what is recorded nowhere else: that an analysis had nothing to say.
+        if len(message.hops) > (message.item is not None):
             entries.append(_latency(message))
         return entries
 
@@ -273,13 +274,14 @@ def _latency(message: Message[Any]) -> Entry:
     hops = []
     before = message.captured
     for hop in message.hops:
-        hops.append(
-            {
-                "node": hop.node,
-                "wait_ms": (hop.received - before) / _MILLISECOND,
-                "work_ms": (hop.published - hop.received) / _MILLISECOND,
-            }
-        )
+        entry: dict[str, Any] = {
+            "node": hop.node,
+            "wait_ms": (hop.received - before) / _MILLISECOND,
+            "work_ms": (hop.published - hop.received) / _MILLISECOND,
+        }
+        if hop.state is not None:
+            entry["state"] = hop.state
+        hops.append(entry)
         before = hop.published
     value = {
         "stream": message.stream,
