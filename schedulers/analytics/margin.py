@@ -190,6 +190,13 @@ class Margin(AnalyticsScheduler):
             self.cloud.finished(result, now)
         return ()
 
+    def resources_changed(self, resources: Resources, now: int) -> Iterable[Decision]:
+        """Plan for a cloud that is gone, or back: then what is known of it is no longer true."""
+        self.cloud.resources = resources
+        self.cloud.silent_since = None
+        self._stale = True
+        return super().resources_changed(resources, now)
+
     def observe(self) -> Mapping[str, float]:
         """Tasks waiting, the network's delay, and whether the cloud is silent."""
         return {
