@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import random
-from collections import defaultdict
-from collections.abc import Iterable
+from bisect import bisect_left
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from aerodaas.clock import NANOSECONDS
@@ -40,9 +40,10 @@ class _Flown:
 def flown_workload(path: str | Path) -> tuple[Workload, Resources]:
     """Make a workload of the tasks that a recorded flight's analytics scheduler decided on.
 
-    Each task arrives when it did. Its time where it ran is the one observed; its time where it
-    did not run is drawn, with a seed of its own, from those observed there of the same model, or
-    the expected one if there are none. Benefits, deadlines and costs are the environment's.
+    Each task arrives when it did. Its time where it ran is the one observed. Where it did not
+    run, it is what its model usually took there, plus what the execution there that was nearest
+    in time took beyond its own model's usual time: so a slow network is slow for every
+    scheduler. Benefits, deadlines and costs are the environment's.
     Raises RecordingError for a recording without decisions or without its environment.
     """
     with Recording.open(path) as recording:
@@ -62,7 +63,7 @@ def flown_workload(path: str | Path) -> tuple[Workload, Resources]:
         Path(path).stem,
         dict(sorted(models.items())),
         duration=end + NANOSECONDS,
-        arrivals=tuple(_arrivals(tasks)),
+        arrivals=tuple(_arrivals(tasks, models)),
     )
     return workload, Resources(cloud_slots=_cloud_slots(environment))
 
@@ -86,30 +87,50 @@ def _tasks(decisions: Iterable[dict[str, Any]]) -> list[_Flown]:
     return sorted(found.values(), key=lambda task: task.arrival)
 
 
-def _arrivals(tasks: list[_Flown]) -> list[Arrival]:
-    observed: dict[tuple[str, str], list[int]] = defaultdict(list)
+class _Observed:
+    """Execution times in one place: what each model takes, and how that changed in the flight."""
+
+    def __init__(self, tasks: list[_Flown], place: str, models: Mapping[str, Profile]) -> None:
+        seen = [
+            (task.began[1], task.model, task.took[1])
+            for task in tasks
+            if task.began is not None and task.took is not None and task.took[0] == place
+        ]
+        self._typical = {
+            name: profile.edge_time if place == "edge" else profile.cloud_time
+            for name, profile in models.items()
+        }
+        for name in models:
+            if mine := [took for _, model, took in seen if model == name]:
+                self._typical[name] = round(median(mine))
+        seen.sort()
+        self._stamps = [stamp for stamp, _, _ in seen]
+        self._beyond = [took - self._typical[model] for _, model, took in seen]
+
+    def estimate(self, task: _Flown) -> int | None:
+        """What the task would have taken at about its arrival; None if nothing ran here."""
+        if not self._stamps:
+            return None
+        right = bisect_left(self._stamps, task.arrival)
+        near = [one for one in (right - 1, right) if 0 <= one < len(self._stamps)]
+        nearest = min(near, key=lambda one: abs(self._stamps[one] - task.arrival))
+        return max(1, self._typical[task.model] + self._beyond[nearest])
+
+
+def _arrivals(tasks: list[_Flown], models: Mapping[str, Profile]) -> Iterator[Arrival]:
+    observed = {place: _Observed(tasks, place, models) for place in ("edge", "cloud")}
     for task in tasks:
+        times = {place: one.estimate(task) for place, one in observed.items()}
         if task.took is not None:
-            observed[task.model, task.took[0]].append(task.took[1])
-    draw = random.Random(0)
-
-    def time(task: _Flown, place: str) -> int | None:
-        if task.took is not None and task.took[0] == place:
-            return task.took[1]
-        known = observed[task.model, place]
-        return draw.choice(known) if known else None
-
-    return [
-        Arrival(
+            times[task.took[0]] = task.took[1]
+        yield Arrival(
             task.arrival,
             task.model,
             task.source,
-            edge_time=time(task, "edge"),
-            cloud_time=time(task, "cloud"),
+            edge_time=times["edge"],
+            cloud_time=times["cloud"],
             reserve=task.reserve,
         )
-        for task in tasks
-    ]
 
 
 def _profile(environment: EnvironmentConfig, model: str) -> Profile:
