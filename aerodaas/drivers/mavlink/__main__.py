@@ -45,7 +45,7 @@ def main(
 def _tell(vehicle: MavlinkVehicle) -> None:
     connection, state = vehicle.connection, vehicle.read()
     typer.echo(
-        f"{connection.autopilot.name} {vehicle.software}, system {connection.target[0]}: "
+        f"{connection.autopilot.name} {vehicle.telemetry.software}, system {connection.target[0]}: "
         f"{state.mode.value}, battery {state.battery.fraction:.0%}"
     )
     if state.gps is not None:

@@ -419,9 +419,14 @@ class MavlinkVehicle:
         return self._connected()
 
     @property
-    def software(self) -> str:
-        """The version that the autopilot told; empty if it has not."""
-        return self._telemetry.software
+    def connected(self) -> bool:
+        """Whether there is a connected vehicle."""
+        return self._connection is not None and self._link is not None
+
+    @property
+    def telemetry(self) -> Telemetry:
+        """The newest of everything that the vehicle has said, in its own frames."""
+        return self._telemetry
 
     @property
     def parameters(self) -> Parameters:
