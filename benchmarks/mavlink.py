@@ -54,6 +54,7 @@ _STREAM = "benchmark/commands"
 def main(
     seconds: Annotated[float, typer.Option(help="Time measured.", min=2.0)] = 15.0,
     family: Annotated[str, typer.Option(help="px4 or ardupilot.")] = "px4",
+    *,
     load: Annotated[bool, typer.Option(help="Analyse a 720p stream meanwhile.")] = True,
     json: Annotated[Path | None, typer.Option(help="Write the figures to this file.")] = None,
 ) -> None:
@@ -213,8 +214,7 @@ def _listen(
             continue
         whole, nanoseconds = struct.unpack("qq", ancillary[0][2][:16])
         stamp = whole + nanoseconds / NANOSECONDS
-        for message in framer.feed(content):
-            arrivals.append((stamp, float(getattr(message, "vy", 0.0))))
+        arrivals += [(stamp, float(getattr(one, "vy", 0.0))) for one in framer.feed(content)]
 
 
 def _emulate(family: str, port: int, stop: Event) -> None:

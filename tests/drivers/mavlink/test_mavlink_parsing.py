@@ -21,7 +21,7 @@ WANTED = frozenset({0, 30, 32, 77, 253, 410})
 
 
 def decoder() -> Any:  # noqa: ANN401
-    """pymavlink's decoding, with None for what is none."""
+    """Decoding by pymavlink, with None for what is none."""
     mav = mavlink.MAVLink(None, 1, 1)
 
     def decode(frame: bytearray) -> object | None:
