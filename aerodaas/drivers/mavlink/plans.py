@@ -110,7 +110,7 @@ def download(
 
 
 def _is_item(index: int, message: Any) -> bool:  # noqa: ANN401 - pymavlink has no types
-    return message.get_type() == "MISSION_ITEM_INT" and message.seq == index
+    return bool(message.get_type() == "MISSION_ITEM_INT" and message.seq == index)
 
 
 def _ask(

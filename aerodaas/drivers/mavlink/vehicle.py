@@ -74,7 +74,7 @@ class MavlinkVehicle:
         self._name = robot.id
         self._settings = settings = mavlink_settings(robot)
         home = environment.home
-        self._home = home and GeodeticOrigin(home.latitude, home.longitude, home.altitude)
+        self._home = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
         if settings.frame == "home" and self._home is None:
             raise ConfigError(f'{robot.id}: "frame": "home" needs a home in the environment file')
         limits = robot.limits

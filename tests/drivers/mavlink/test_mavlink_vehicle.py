@@ -316,6 +316,16 @@ def test_settings_are_checked_by_name(settings: dict[str, object], complaint: st
         MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
 
 
+def test_a_camera_without_a_stream_is_none() -> None:
+    """MAVLink has no pictures of its own, so that such a camera can only be left out."""
+    sensors = [{"id": "bare"}, {"id": "rtsp", "settings": {"path": "rtsp://10.0.0.2/eye"}}]
+    robot = RobotConfig.model_validate({"id": "m", "driver": "mavlink", "sensors": sensors})
+    environment = EnvironmentConfig(robots=[robot])
+    assert [environment.has_pictures(sensor) for sensor in robot.sensors] == [False, True]
+    simulated = EnvironmentConfig(robots=[robot.model_copy(update={"driver": "simulated"})])
+    assert all(simulated.has_pictures(sensor) for sensor in robot.sensors)
+
+
 def test_home_frame_needs_a_home() -> None:
     """Said when the vehicle is built, not in flight."""
     with pytest.raises(ConfigError, match="needs a home"):
