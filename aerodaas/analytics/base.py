@@ -16,7 +16,7 @@ only what is cheap to send and checks only what the user could have got wrong.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar
+from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 from typing_extensions import Self
 
@@ -28,7 +28,7 @@ from aerodaas.names import PaperNames, snake_case
 from aerodaas.vehicle import VehicleState
 from aerodaas.waypoints import AeroNavigation
 
-__all__ = ["Analytics", "ComputeKind", "Context", "NavigableAnalytics"]
+__all__ = ["Analytics", "ComputeKind", "Context", "NavigableAnalytics", "TimedContext"]
 
 ComputeKind: TypeAlias = Literal["edge", "cloud"]
 O_co = TypeVar("O_co", covariant=True)
@@ -55,6 +55,15 @@ class Context(Protocol):
         ...
 
 
+@runtime_checkable
+class TimedContext(Protocol):
+    """A context that knows how long the result is of use."""
+
+    def time_left(self) -> float | None:
+        """Wall seconds until then; None where nothing says."""
+        ...
+
+
 class Analytics(PaperNames, IAnalyse[O_co]):
     """An analysis; subclasses say what they accept and produce, and implement `process`.
 
@@ -70,6 +79,8 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     """True for an analysis that needs a process of its own, such as a neural network."""
     scheduled: bool = False
     """True for an analysis of frames whose every run the analytics scheduler decides on."""
+    concurrent: bool = False
+    """True if several threads may call `process` at once, as executors in the cloud do."""
     rate: float = 1.0
     """How often an external source (`instantiate`) is asked, in Hz."""
     name: str = ""
