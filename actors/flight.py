@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,10 +17,11 @@ from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors._ending import end_actors
 from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.caretaker import Caretaker
-from aerodaas.actors.cluster import Place, options_for, outlives_application
+from aerodaas.actors.cluster import Place, nodes_at, options_for, outlives_application
 from aerodaas.actors.dispatcher import DispatcherActor
 from aerodaas.actors.drone import DroneActor, RobotReport
 from aerodaas.actors.executor import CloudExecutor
+from aerodaas.actors.isolation import isolation_options
 from aerodaas.actors.plan import Dispatching, FlightPlan
 from aerodaas.actors.recorder import RecorderActor
 from aerodaas.actors.sensor import SensorActor
@@ -93,7 +94,8 @@ class Flight:
         self._caretaker: Any = None
         self._opening: list[Any] = []
         session, edge = plan.session, Place()
-        for specs in plan.drones:
+        environments = _environments(plan)
+        for specs, place in zip(plan.drones, plan.edges, strict=True):
             name = f"drone/{'+'.join(spec.robot.id for spec in specs)}"
             self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
             mine = {spec.robot.id for spec in specs}
@@ -103,10 +105,11 @@ class Flight:
                 for spec in group
                 if spec.robot.id not in mine
             )
-            self._create(name, DroneActor, edge, (session, name, specs, plan.conduct, others))
+            self._create(name, DroneActor, place, (session, name, specs, plan.conduct, others))
         for camera in plan.cameras:
             args = (session, camera.stream, camera.sensor, camera.state)
-            self._create(f"sensor/{camera.stream}", SensorActor, edge, args, ends=camera.ends)
+            name = f"sensor/{camera.stream}"
+            self._create(name, SensorActor, camera.place, args, ends=camera.ends)
         for actor in plan.analyses:
             self._create(
                 actor.name,
@@ -115,6 +118,7 @@ class Flight:
                 (session, actor.name),
                 setup=actor.nodes,
                 restarts=_ANALYTICS_RESTARTS,
+                options=environments[actor.name],
             )
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch)
@@ -221,9 +225,11 @@ class Flight:
         *,
         restarts: int = 0,
         setup: tuple[Any, ...] = (),
+        options: Mapping[str, Any] | None = None,
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
-        remote = ray.remote(kind).options(**self._options(name, place, restarts=restarts))
+        placed = {**self._options(name, place, restarts=restarts), **(options or {})}
+        remote = ray.remote(kind).options(**placed)
         self._members[name] = _Member(name, remote.remote(*args, **kwargs), setup)
 
     def _options(self, name: str, place: Place, *, restarts: int) -> dict[str, Any]:
@@ -345,6 +351,21 @@ class Flight:
             raise MissionError(f"an actor died: {reason}") from None
         except ray.exceptions.GetTimeoutError:
             raise MissionError(f"an actor did not answer within {_ANSWER_TIMEOUT:.0f} s") from None
+
+
+def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
+    """Ray's options for the environment of each analytics actor.
+
+    Before any actor is there, so that what cannot be provided leaves nothing behind. Raises
+    ConfigError for that, and for a place that no node offers.
+    """
+    clouds = [plan.dispatch.cloud] if plan.dispatch and plan.dispatch.cloud else []
+    for place in {*plan.edges, *(actor.place for actor in plan.analyses), *clouds}:
+        nodes_at(place)
+    return {
+        actor.name: isolation_options(actor.runtime_env, actor.place, actor.name)
+        for actor in plan.analyses
+    }
 
 
 def _share_memory(one: ActorInfo, other: ActorInfo) -> bool:

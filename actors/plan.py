@@ -15,9 +15,16 @@ from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
-from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig, TaskConfig
+from aerodaas.analytics.endpoint.analysis import endpoint_analysis
+from aerodaas.config import (
+    ComputeConfig,
+    RobotConfig,
+    RuntimeEnvConfig,
+    SensorConfig,
+    TaskConfig,
+)
 from aerodaas.data import Frame
-from aerodaas.errors import GraphError
+from aerodaas.errors import GraphError, UnknownIdError
 from aerodaas.graph import Graph, NavigationEdge, Node
 from aerodaas.handles import SENSOR_ITEMS
 from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
@@ -49,6 +56,7 @@ class Cameras:
     sensor: SensorConfig
     state: str
     ends: bool
+    place: Place = Place()
 
 
 @dataclass(frozen=True)
@@ -58,6 +66,7 @@ class Analyses:
     name: str
     place: Place
     nodes: tuple[NodeSpec, ...]
+    runtime_env: RuntimeEnvConfig | None = None
 
 
 @dataclass(frozen=True)
@@ -79,6 +88,8 @@ class FlightPlan:
     session: Session
     drones: tuple[tuple[RobotSpec, ...], ...]
     """One actor for each group."""
+    edges: tuple[Place, ...]
+    """Where the drones of each group are flown from."""
     cameras: tuple[Cameras, ...]
     analyses: tuple[Analyses, ...]
     dispatch: Dispatching | None
@@ -160,7 +171,13 @@ class _Planner:
 
     def cameras(self) -> tuple[Cameras, ...]:
         return tuple(
-            Cameras(node.id, node.work, self.state_of(node), self.reaches_a_drone(node.id))
+            Cameras(
+                node.id,
+                node.work,
+                self.state_of(node),
+                self.reaches_a_drone(node.id),
+                self.edge_of(node.robot),
+            )
             for node in self.sensors()
             if node.work.type == "camera"
         )
@@ -197,13 +214,13 @@ class _Planner:
     def profile(self, node: Node) -> Profile:
         """The analysis' figures from the environment file, by its name without the robot."""
         known = self.session.environment.schedulers.tasks
-        told = known.get(node.id.rpartition("/")[2], TaskConfig())
+        told = known.get(_name(node), TaskConfig())
         return Profile(
             model=node.id,
             benefit=told.benefit,
             deadline=int(told.deadline * MILLISECOND),
-            edge_time=int(told.edge_time * MILLISECOND),
-            cloud_time=int(told.cloud_time * MILLISECOND),
+            edge_time=int((told.edge_time or 100.0) * MILLISECOND),
+            cloud_time=int((told.cloud_time or 300.0) * MILLISECOND),
             edge_cost=told.edge_cost,
             cloud_cost=told.cloud_cost,
         )
@@ -221,7 +238,7 @@ class _Planner:
         wakers = [n for n in self.analyses() if any(t.target == node.id for t in n.triggers)]
         return NodeSpec(
             stream=done_stream(node.id) if managed else node.id,
-            work=node.work,
+            work=self.work_of(node),
             inputs={
                 name: self.depth(name) if self.session.lockstep else 1
                 for name in ([task_stream(node.id)] if managed else node.inputs)
@@ -243,20 +260,46 @@ class _Planner:
         frames = stream.endswith(task_stream("")) or (node is not None and node.item is Frame)
         return FRAME_DEPTH if frames else MESSAGE_DEPTH
 
+    def edge_of(self, robot: str | None) -> Place:
+        """The edge beside a robot; that of all drones for what no robot carries."""
+        named = next((r.edge for r in self.robots if r.id == robot), None)
+        return Place("edge", self.compute[named].node) if named is not None else Place()
+
     def place_of(self, node: Node) -> Place:
-        if node.compute is None:
-            return Place()
-        resource = self.compute[node.compute]
-        # Under a dispatcher, an analysis has an executor on the edge wherever it is deployed.
-        return Place() if self.is_managed(node) else Place(resource.kind, resource.node)
+        resource = self.compute[node.compute] if node.compute is not None else None
+        # Under a dispatcher, an analysis has an executor on the edge wherever it is deployed; an
+        # endpoint is called from there.
+        if resource is None or resource.kind == "http" or self.is_managed(node):
+            return self.edge_of(node.robot)
+        return Place(resource.kind, resource.node)
+
+    def work_of(self, node: Node) -> Analytics[Any]:
+        """The analysis itself, or before the endpoint that it is deployed on."""
+        resource = self.compute[node.compute] if node.compute is not None else None
+        work: Analytics[Any] = node.work
+        if resource is None or resource.kind != "http" or self.is_managed(node):
+            return work
+        return endpoint_analysis(work, _name(node), resource, strict=False)
+
+    def runtime_env_of(self, node: Node) -> RuntimeEnvConfig | None:
+        """What an analysis has for itself: the environment file's word comes last."""
+        return self.session.environment.runtime_env.get(_name(node), node.runtime_env)
+
+    def require_runtime_envs(self) -> None:
+        known = {_name(node) for node in self.analyses()}
+        for name in self.session.environment.runtime_env:
+            if name not in known:
+                raise UnknownIdError("analysis (under runtime_env)", name, sorted(known))
 
     def analyses_by_actor(self) -> tuple[Analyses, ...]:
         shared: dict[Place, list[NodeSpec]] = {}
         actors = []
         for node in self.analyses():
-            if node.work.isolated:
+            env = self.runtime_env_of(node)
+            if node.work.isolated or env is not None:
                 name = f"analytics/{node.id}"
-                actors.append(Analyses(name, self.place_of(node), (self.node_spec(node),)))
+                spec = self.node_spec(node)
+                actors.append(Analyses(name, self.place_of(node), (spec,), env))
             else:
                 shared.setdefault(self.place_of(node), []).append(self.node_spec(node))
         for place, nodes in shared.items():
@@ -334,6 +377,7 @@ def make_plan(
     if not planner.robots:
         raise GraphError("no robot navigates: call drone.navigate(…) before start_mission()")
     planner.require_plugins()
+    planner.require_runtime_envs()
     specs = tuple(planner.robot_spec(robot) for robot in planner.robots)
     cameras = planner.cameras()
     analyses = planner.analyses_by_actor()
@@ -352,6 +396,7 @@ def make_plan(
     return FlightPlan(
         session=session,
         drones=drones,
+        edges=tuple(planner.edge_of(group[0].robot.id) for group in drones),
         cameras=cameras,
         analyses=analyses,
         dispatch=dispatch,
@@ -363,6 +408,11 @@ def make_plan(
 def _streams_of(edge: NavigationEdge) -> list[str]:
     names = [edge.navigation.stream.name] if edge.navigation.stream is not None else []
     return [*names, edge.clear_on] if edge.clear_on else names
+
+
+def _name(node: Node) -> str:
+    """An analysis' name without its robot's."""
+    return node.id.rpartition("/")[2]
 
 
 def _trigger_stream(target: str, source: Node) -> str:

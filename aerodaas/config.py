@@ -34,6 +34,7 @@ __all__ = [
     "SensorConfig",
     "SimulationConfig",
     "TaskConfig",
+    "as_runtime_env",
     "validated",
 ]
 
@@ -176,6 +177,8 @@ class RobotConfig(_Strict):
     sensors: list[SensorConfig] = Field(default_factory=list)
     limits: LimitsConfig = LimitsConfig()
     mission: MissionConfig = MissionConfig()
+    edge: Identifier | None = None
+    """Compute resource, of the kind `edge`, that flies it; None: the edge beside all drones."""
     start: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
     """Where it stands before take-off, ENU metres."""
     start_yaw: Finite = 0.0
@@ -362,6 +365,19 @@ class EnvironmentConfig(_Strict):
                 raise ValueError(message)
         return self
 
+    @model_validator(mode="after")
+    def _known_edges(self) -> Self:
+        known = {
+            resource.id
+            for resource in (() if self.compute == "auto" else self.compute)
+            if resource.kind == "edge"
+        }
+        for robot in self.robots:
+            if robot.edge is not None and robot.edge not in known:
+                message = f"{robot.id}.edge: no edge under compute is called {robot.edge!r}"
+                raise ValueError(message)
+        return self
+
     def camera_driver(self, sensor: SensorConfig) -> str:
         """The driver of a camera: its own, else its robot's, else the simulated one.
 
@@ -392,6 +408,14 @@ def validated(content: object, place: str) -> EnvironmentConfig:
         return EnvironmentConfig.model_validate(content)
     except ValidationError as error:
         raise ConfigError(f"{place}: {_explain(error)}") from None
+
+
+def as_runtime_env(content: object, place: str) -> RuntimeEnvConfig:
+    """Check what an application says of a runtime_env; raises ConfigError that names `place`."""
+    try:
+        return RuntimeEnvConfig.model_validate(content)
+    except ValidationError as error:
+        raise ConfigError(f"{place}: runtime_env: {_explain(error)}") from None
 
 
 def _explain(error: ValidationError) -> str:

@@ -52,7 +52,7 @@ class Serving:
             self.mood = ""
             return Response("later", 503)
         if self.mood == "garbage":
-            return Response(b"{\"outputs\": [" * 100, media_type="application/json")
+            return Response(b'{"outputs": [' * 100, media_type="application/json")
         if self.mood == "redirect":
             return Response(status_code=307, headers={"location": "/elsewhere"})
         if self.mood.isdigit():

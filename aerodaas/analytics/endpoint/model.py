@@ -65,9 +65,7 @@ class EndpointModel:
                 if there is None or not kinds or not there.fits(spec.shape):
                     raise self._misfit(f"no {kind[:-1]} {spec}", told[kind])
 
-    def rehearse(
-        self, inputs: Mapping[str, NDArray[Any]], outputs: Sequence[TensorSpec]
-    ) -> None:
+    def rehearse(self, inputs: Mapping[str, NDArray[Any]], outputs: Sequence[TensorSpec]) -> None:
         """Infer once before the mission: learns whether the server takes binary tensors.
 
         Raises ModelError if it takes neither these nor JSON or answers with something else,

@@ -106,7 +106,14 @@ def decode_reply(body: bytes, header_length: str | None) -> dict[str, NDArray[An
                 array = np.frombuffer(body[end : end + size], kind)
                 end += size
             found[str(output["name"])] = array.reshape(output["shape"])
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError) as error:
+    except (
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+        OverflowError,
+    ) as error:
         text = str(error).partition("\n")[0]
         raise EndpointError(f"no reply of the inference protocol: {text}") from None
     return found

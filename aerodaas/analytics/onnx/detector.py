@@ -203,9 +203,7 @@ class OnnxDetector(Analytics[Detections]):
             message = f"{self.path}: preprocess the frames first"
             raise ModelError(message)
         return [
-            self._gather(
-                frame, letterbox, [np.asarray(o[index], np.float32) for o in outputs]
-            )
+            self._gather(frame, letterbox, [np.asarray(o[index], np.float32) for o in outputs])
             for index, frame in enumerate(frames)
         ]
 

@@ -130,9 +130,7 @@ def test_threads_share_one_analysis_and_its_connections(
     assert 1 <= len(served.connections) <= 4
 
 
-def test_a_function_takes_jpeg_and_tells_detections(
-    model: Path, served: Serving, url: str
-) -> None:
+def test_a_function_takes_jpeg_and_tells_detections(model: Path, served: Serving, url: str) -> None:
     """Boxes are clipped, classes and scores are those that the analysis asks for."""
     detector = OnnxDetector(model, names=["lamp", *(f"other{i}" for i in range(79))])
     detector.classes = ["lamp"]
