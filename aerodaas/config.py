@@ -284,6 +284,12 @@ class TaskConfig(_Strict):
     """
     edge_cost: NotNegative = 0.0
     cloud_cost: NotNegative = 0.0
+    qoe_bonus: NotNegative = 0.0
+    """Worth of a window in which enough results come in time; 0 for none."""
+    qoe_share: Annotated[float, Field(gt=0, le=1)] = 0.9
+    """Results in time over frames, for the bonus."""
+    qoe_window: Positive = 20.0
+    """Length of the windows, seconds."""
 
 
 class SchedulersConfig(_Strict):
