@@ -15,10 +15,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.data import Frame, Header
+from aerodaas.data import Frame, Header, Odometry
 from aerodaas.errors import SourceError
 from aerodaas.geometry import CameraModel
-from aerodaas.data import Odometry
 from aerodaas.records import travels
 
 __all__ = ["CODINGS", "CodedFrame", "Coder", "Coding", "CodingCost", "decoded", "fastest"]

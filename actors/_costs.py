@@ -12,6 +12,7 @@ from collections.abc import Sequence
 __all__ = ["Executions", "Link", "quantile"]
 
 _KEPT = 11
+_BANDWIDTHS_KEPT = 5
 _LARGE = 16384
 """Bytes from which a transfer tells about the bandwidth, below which about the latency."""
 _SURE = 0.9
@@ -26,11 +27,11 @@ def quantile(values: Sequence[float], share: float) -> float:
 
 
 class Link:
-    """The way to a node and back: `seconds = latency + size / bandwidth`."""
+    """The way to a node and back: `seconds = latency + size / bandwidth`. Threads may share it."""
 
     def __init__(self) -> None:
         self._latencies: deque[float] = deque(maxlen=_KEPT)
-        self._bandwidths: deque[float] = deque(maxlen=_KEPT)
+        self._bandwidths: deque[float] = deque(maxlen=_BANDWIDTHS_KEPT)
 
     def observe(self, size: int, seconds: float) -> None:
         """Learn from `size` bytes that were there and answered after `seconds`."""
@@ -42,12 +43,12 @@ class Link:
     @property
     def latency(self) -> float:
         """Seconds that an empty message takes there and back; 0 before the first one did."""
-        return quantile(self._latencies, 0.5) if self._latencies else 0.0
+        return quantile(tuple(self._latencies), 0.5) if self._latencies else 0.0
 
     @property
     def bandwidth(self) -> float:
         """Bytes per second; infinite before anything large was sent."""
-        return quantile(self._bandwidths, 0.5) if self._bandwidths else float("inf")
+        return quantile(tuple(self._bandwidths), 0.5) if self._bandwidths else float("inf")
 
     def seconds(self, size: float) -> float:
         """Expected seconds from sending `size` bytes until a small answer, without any work."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from aerodaas.actors._barrier import ACKS, paths
 from aerodaas.actors._names import state_stream
+from aerodaas.actors._offload import CloudProcess, allowed, cloud_processes, priced, short_name
 from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
 from aerodaas.actors.cluster import Place
 from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
@@ -16,7 +17,13 @@ from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.analytics.endpoint.analysis import endpoint_analysis
-from aerodaas.config import ComputeConfig, RobotConfig, RuntimeEnvConfig, SensorConfig
+from aerodaas.config import (
+    ComputeConfig,
+    RobotConfig,
+    RuntimeEnvConfig,
+    SensorConfig,
+    TaskConfig,
+)
 from aerodaas.data import Frame
 from aerodaas.errors import GraphError, UnknownIdError
 from aerodaas.graph import Graph, NavigationEdge, Node
@@ -49,7 +56,7 @@ class Cameras:
     sensor: SensorConfig
     state: str
     ends: bool
-    place: Place = Place()
+    place: Place
 
 
 @dataclass(frozen=True)
@@ -64,14 +71,12 @@ class Analyses:
 
 @dataclass(frozen=True)
 class Dispatching:
-    """The dispatcher's actor, and the cloud's executor if there is one."""
+    """The dispatcher's actor, and the executors in the cloud."""
 
     scheduler: AnalyticsScheduler
     managed: tuple[Managed, ...]
     resources: Resources
-    cloud: Place | None
-    works: dict[str, Analytics[Any]]
-    """The managed analyses, by stream, for the cloud."""
+    cloud: tuple[CloudProcess, ...]
 
 
 @dataclass(frozen=True)
@@ -188,26 +193,29 @@ class _Planner:
         nodes = self.managed()
         if self.dispatch_with is None or not nodes:
             return None
-        clouds = [resource for resource in self.compute.values() if resource.kind == "cloud"]
-        slots = sum(resource.executors for resource in clouds)
-        if self.session.lockstep:
-            # Simulated time stands still while an analysis runs, so there is nothing to offload.
-            clouds, slots = [], 0
-        told = self.session.environment.schedulers.tasks
+        # In lockstep time stands still while an analysis runs, so there is nothing to offload.
+        compute = {} if self.session.lockstep else self.compute
+        envs = {node.id: self.runtime_env_of(node) for node in nodes}
+        processes = cloud_processes(nodes, compute, envs)
+        slots = {process.site: process.slots for process in processes}
         return Dispatching(
             scheduler=self.dispatch_with,
-            managed=tuple(
-                Managed(
-                    n.id,
-                    tuple(n.inputs),
-                    told_profile(n.id, told),
-                    self.acknowledgements(n.id) == 0,
-                )
-                for n in nodes
-            ),
-            resources=Resources(cloud_slots=slots),
-            cloud=Place(clouds[0].kind, clouds[0].node) if clouds else None,
-            works={node.id: node.work for node in nodes},
+            managed=tuple(self.managed_one(node) for node in nodes),
+            resources=Resources(cloud_slots=sum(slots.values())),
+            cloud=processes,
+        )
+
+    def managed_one(self, node: Node) -> Managed:
+        tasks = self.session.environment.schedulers.tasks
+        told = tasks.get(short_name(node), TaskConfig())
+        times = ("edge_time", "cloud_time")
+        profile = told_profile(node.id, tasks)
+        return Managed(
+            stream=node.id,
+            inputs=tuple(node.inputs),
+            profile=priced(profile, allowed(node, self.compute)),
+            acknowledges=self.acknowledgements(node.id) == 0,
+            open_times=frozenset(time for time in times if getattr(told, time) is None),
         )
 
     def node_spec(self, node: Node) -> NodeSpec:
@@ -264,14 +272,14 @@ class _Planner:
         work: Analytics[Any] = node.work
         if resource is None or resource.kind != "http" or self.is_managed(node):
             return work
-        return endpoint_analysis(work, _name(node), resource, strict=False)
+        return endpoint_analysis(work, short_name(node), resource, strict=False)
 
     def runtime_env_of(self, node: Node) -> RuntimeEnvConfig | None:
         """What an analysis has for itself: the environment file's word comes last."""
-        return self.session.environment.runtime_env.get(_name(node), node.runtime_env)
+        return self.session.environment.runtime_env.get(short_name(node), node.runtime_env)
 
     def require_runtime_envs(self) -> None:
-        known = {_name(node) for node in self.analyses()}
+        known = {short_name(node) for node in self.analyses()}
         for name in self.session.environment.runtime_env:
             if name not in known:
                 raise UnknownIdError("analysis (under runtime_env)", name, sorted(known))
@@ -393,11 +401,6 @@ def make_plan(
 def _streams_of(edge: NavigationEdge) -> list[str]:
     names = [edge.navigation.stream.name] if edge.navigation.stream is not None else []
     return [*names, edge.clear_on] if edge.clear_on else names
-
-
-def _name(node: Node) -> str:
-    """An analysis' name without its robot's."""
-    return node.id.rpartition("/")[2]
 
 
 def _trigger_stream(target: str, source: Node) -> str:

@@ -202,7 +202,7 @@ class EndpointConfig(_Strict):
     """Utility that a call costs; None: the analysis' `cloud_cost`."""
     token_env: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = None
     """Environment variable of the edge node that holds the secret to send along."""
-    token_header: Annotated[str, Field(pattern=r"^[A-Za-z0-9\-]+$")] = "Authorization"
+    token_header: Annotated[str, Field(pattern=r"^[A-Za-z0-9\-]+$")] = "Authorization"  # noqa: S105
     """As `Bearer …` where it is `Authorization`, else the bare secret."""
 
 

@@ -1,4 +1,4 @@
-"""HTTP to one endpoint: kept-alive connections, one budget of time, bounded replies, few retries."""
+"""HTTP to one endpoint: kept connections, a budget of time, bounded replies, few retries."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from http import HTTPStatus
 
 import urllib3
-from urllib3.exceptions import HTTPError, NewConnectionError, ProtocolError, TimeoutError
+from urllib3.exceptions import HTTPError, NewConnectionError, ProtocolError
+from urllib3.exceptions import TimeoutError as NoTimeLeft
 
 from aerodaas.config import EndpointConfig
 from aerodaas.errors import ConfigError, EndpointError
@@ -48,7 +49,7 @@ class Reply:
         return shown or "an empty reply"
 
 
-class _Failure(Exception):
+class _AttemptError(Exception):
     """One attempt has failed; `again` if another may succeed."""
 
     def __init__(self, kind: str, text: str, *, again: bool) -> None:
@@ -92,7 +93,7 @@ class Connection:
         for attempt in range(self._config.retries + 1):
             try:
                 return self._attempt(method, url, body, {**(headers or {}), **self._secret}, until)
-            except _Failure as failure:
+            except _AttemptError as failure:
                 self.failures[failure.kind] += 1
                 last = attempt == self._config.retries
                 late = time.monotonic() + pause + _LEAST_ATTEMPT > until
@@ -112,7 +113,7 @@ class Connection:
     ) -> Reply:
         left = until - time.monotonic()
         if left <= 0:
-            raise _Failure("timeout", "no time left to ask", again=False)
+            raise _AttemptError("timeout", "no time left to ask", again=False)
         try:
             response = self._pool.request(
                 method,
@@ -133,18 +134,18 @@ class Connection:
             response.release_conn()
         except NewConnectionError as error:
             reason = str(error).rpartition(": ")[2]
-            raise _Failure("refused", f"cannot be reached: {reason}", again=True) from None
-        except TimeoutError:
-            raise _Failure("timeout", "did not answer in time", again=False) from None
+            raise _AttemptError("refused", f"cannot be reached: {reason}", again=True) from None
+        except NoTimeLeft:
+            raise _AttemptError("timeout", "did not answer in time", again=False) from None
         except ProtocolError as error:
-            raise _Failure("broken", f"broke off: {error.args[0]}", again=True) from None
+            raise _AttemptError("broken", f"broke off: {error.args[0]}", again=True) from None
         except HTTPError as error:
-            raise _Failure("broken", f"does not speak HTTP: {error}", again=False) from None
+            raise _AttemptError("broken", f"does not speak HTTP: {error}", again=False) from None
         if response.status in _BUSY:
-            raise _Failure("busy", f"is busy (status {response.status})", again=True)
+            raise _AttemptError("busy", f"is busy (status {response.status})", again=True)
         if response.get_redirect_location():
             text = "redirects elsewhere; give the address that it redirects to as endpoint.url"
-            raise _Failure("redirect", text, again=False)
+            raise _AttemptError("redirect", text, again=False)
         return Reply(response.status, response.headers, content)
 
 
@@ -154,9 +155,9 @@ def _read(response: urllib3.BaseHTTPResponse, until: float) -> bytes:
         content += chunk
         if len(content) > _MOST_BYTES:
             text = f"sent more than {_MOST_BYTES >> 20} MiB; is this the address of a model?"
-            raise _Failure("huge", text, again=False)
+            raise _AttemptError("huge", text, again=False)
         if time.monotonic() > until:
-            raise _Failure("timeout", "did not answer in time", again=False)
+            raise _AttemptError("timeout", "did not answer in time", again=False)
     return bytes(content)
 
 

@@ -8,7 +8,6 @@ from http import HTTPStatus
 from typing import Any
 from urllib.parse import quote
 
-import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.endpoint.connection import Connection, Reply
@@ -112,22 +111,25 @@ class EndpointModel:
     def _outputs(self, reply: Reply, wanted: Sequence[TensorSpec]) -> list[NDArray[Any]]:
         try:
             found = decode_reply(reply.body, reply.headers.get(HEADER_LENGTH))
-            for spec in wanted:
-                if spec.name not in found:
-                    raise EndpointError(f"the reply lacks {spec.name}")
-                if not spec.fits(found[spec.name].shape):
-                    shape = list(found[spec.name].shape)
-                    raise EndpointError(f"the reply has a wrong shape: {shape} for {spec}")
+            return [_picked(found, spec) for spec in wanted]
         except EndpointError as error:
             self._connection.failures["garbage"] += 1
             raise EndpointError(f"{self._connection.url}: {error}") from None
-        return [found[spec.name] for spec in wanted]
 
     def _misfit(self, problem: str, told: Sequence[TensorSpec]) -> ModelError:
         return ModelError(
             f"the model {self.name!r} at {self._connection.url} has {problem}; "
             f"it has {', '.join(map(str, told)) or 'none'}: serve the same file as on the edge"
         )
+
+
+def _picked(found: Mapping[str, NDArray[Any]], spec: TensorSpec) -> NDArray[Any]:
+    if spec.name not in found:
+        raise EndpointError(f"the reply lacks {spec.name}")
+    if not spec.fits(found[spec.name].shape):
+        shape = list(found[spec.name].shape)
+        raise EndpointError(f"the reply has a wrong shape: {shape} for {spec}")
+    return found[spec.name]
 
 
 def _metadata(reply: Reply, place: str) -> dict[str, list[TensorSpec]]:
