@@ -26,6 +26,8 @@ __all__ = [
 _KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
 _SHARE = 0.001
 """Share of a node's `edge` or `cloud` resource that an actor takes: it says where, not how much."""
+_NAMESPACE = "aerodaas"
+"""Ray's, for the names of actors that outlive their application."""
 _STORE_BYTES = 128 * 2**20
 """Object store of a one-machine run; its streams travel in shared memory of their own."""
 
@@ -62,7 +64,7 @@ def connect(address: str | None) -> None:
     if address:
         greet(address)
         try:
-            ray.init(address=address, **common)
+            ray.init(address=address, namespace=_NAMESPACE, **common)
         except (ConnectionError, RuntimeError, ValueError) as error:
             reason = str(error).strip().splitlines()[0]
             raise _unreachable(address, reason) from None

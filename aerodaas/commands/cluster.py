@@ -94,3 +94,23 @@ def _show(cluster: EdgeCloud) -> None:
     _console.print(f"\nfly on it:  aerodaas run apps/farm_survey.py --address {cluster.address}")
     _console.print(f"look at it: aerodaas cluster check {cluster.address}")
     _console.print("Ctrl-C takes it down.")
+
+
+@app.command()
+def check(
+    address: Annotated[
+        str, typer.Argument(help="The head's `host:port`.", envvar="RAY_ADDRESS", show_envvar=True)
+    ],
+) -> None:
+    """Say what a cluster offers and what to mend: versions, resources, clocks, links.
+
+    Measures round trip, bandwidth and the clocks' offset from every edge to every other node;
+    takes some seconds. Ends with 1 if something needs mending.
+
+        aerodaas cluster check 10.77.0.1:6379
+    """
+    from aerodaas.cluster.check import check_cluster  # noqa: PLC0415 - loads ray
+    from aerodaas.doctor import show_findings  # noqa: PLC0415
+
+    good = show_findings("aerodaas cluster check", check_cluster(address))
+    raise typer.Exit(0 if good else 1)
