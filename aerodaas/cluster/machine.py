@@ -96,6 +96,14 @@ class Machine:
         home = Path(f"/proc/{self.pid}/ns/pid").readlink()
         return [one for one in psutil.process_iter() if _namespace(one.pid) == home]
 
+    def find(self, pid: int) -> psutil.Process:
+        """The process that has this number on the machine; raises AeroDaaSError without one."""
+        for process in self.processes():
+            status = Path(f"/proc/{process.pid}/status").read_text(encoding="utf-8")
+            if f"NSpid:\t{process.pid}\t{pid}\n" in status:
+                return process
+        raise AeroDaaSError(f"no process of {self.name} has the number {pid}")
+
     def power_off(self) -> None:
         """End everything on it at once."""
         left = self.processes()
