@@ -10,7 +10,7 @@ from typing import Any, Literal
 
 import ray
 
-from aerodaas.actors._greeting import greet
+from aerodaas.actors.greeting import greet
 from aerodaas.config import ComputeConfig
 from aerodaas.errors import AeroDaaSError, ConfigError
 

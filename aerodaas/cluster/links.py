@@ -17,7 +17,10 @@ from aerodaas.cluster.machine import Machine, run
 from aerodaas.cluster.shape import Shape
 from aerodaas.errors import AeroDaaSError
 
-__all__ = ["Link", "NetemLink", "RelayLink", "has_netem"]
+__all__ = ["BRIDGE", "Link", "NetemLink", "RelayLink", "has_netem", "plug"]
+
+BRIDGE = "bridge"
+"""Name of the bridge inside a switch."""
 
 _UNLIMITED = 40e9
 """Bits per second for want of a limit: a bucket that never runs dry."""
@@ -46,15 +49,19 @@ def has_netem() -> bool:
 
 
 class Link(ABC):
-    """From a bridge on this machine to another machine, where it has the address `address`."""
+    """From the bridge of a switch to another machine, where it has the address `address`.
 
-    def __init__(self, name: str, bridge: str, machine: Machine, address: str) -> None:
+    Its devices live in those machines' namespaces, and go with them at the latest.
+    """
+
+    def __init__(self, name: str, switch: Machine, machine: Machine, address: str) -> None:
         self.near = f"{name}n"
         self.far = f"{name}f"
+        self._switch = switch
         self._machine = machine
         self._connect()
         run("ip", "link", "set", self.far, "netns", str(machine.pid))
-        run("ip", "link", "set", self.near, "master", bridge, "up")
+        plug(self.near, switch)
         machine.run("ip", "address", "add", address, "dev", self.far)
         machine.run("ip", "link", "set", self.far, "up")
 
@@ -63,17 +70,17 @@ class Link(ABC):
         rate = shape.bandwidth or _UNLIMITED
         burst = max(_LEAST_BURST, round(rate / 8 * _BURST_SECONDS))
         bucket = ["tbf", "rate", f"{rate:.0f}bit", "burst", f"{burst}b", "latency", _QUEUE]
-        run("tc", *_replace(self.near, "root", "handle", "1:"), *bucket)
+        self._switch.run("tc", *_replace(self.near, "root", "handle", "1:"), *bucket)
         self._machine.run("tc", *_replace(self.far, "root", "handle", "1:"), *bucket)
         self._delay(shape.rtt / 2, shape.loss)
 
     def cut(self) -> None:
         """Lose everything from now on, both ways."""
-        run("ip", "link", "set", self.near, "down")
+        self._switch.run("ip", "link", "set", self.near, "down")
 
     def mend(self) -> None:
         """Undo `cut`."""
-        run("ip", "link", "set", self.near, "up")
+        self._switch.run("ip", "link", "set", self.near, "up")
 
     @abstractmethod
     def close(self) -> None:
@@ -126,14 +133,17 @@ class NetemLink(Link):
 
     def _delay(self, delay: float, loss: float) -> None:
         words = ["netem", "delay", f"{delay * 1e6:.0f}us", "loss", f"{loss * 100:g}%"]
-        run("tc", *_replace(self.near, "parent", "1:1", "handle", "2:"), *words)
+        self._switch.run("tc", *_replace(self.near, "parent", "1:1", "handle", "2:"), *words)
         self._machine.run("tc", *_replace(self.far, "parent", "1:1", "handle", "2:"), *words)
 
     def close(self) -> None:
-        """Remove the devices; the far one goes with the near one."""
-        # They may have gone with the machine.
-        with contextlib.suppress(AeroDaaSError):
-            run("ip", "link", "del", self.near)
+        """Nothing: the devices go with the machines."""
+
+
+def plug(device: str, switch: Machine) -> None:
+    """Attach a device of this machine to the bridge of a switch."""
+    run("ip", "link", "set", device, "netns", str(switch.pid))
+    switch.run("ip", "link", "set", device, "master", BRIDGE, "up")
 
 
 def _replace(device: str, *place: str) -> list[str]:

@@ -85,7 +85,7 @@ def restart_control_service(machine: Machine) -> psutil.Process:
     words, env = old.cmdline(), old.environ()
     old.kill()
     old.wait()
-    machine.run("setsid", "--fork", "sh", "-c", '"$@" >/dev/null 2>&1', "sh", *words, env=env)
+    machine.run("setsid", "--fork", "sh", "-c", 'exec "$@" >/dev/null 2>&1', "sh", *words, env=env)
     return old
 
 

@@ -114,3 +114,16 @@ def check(
 
     good = show_findings("aerodaas cluster check", check_cluster(address))
     raise typer.Exit(0 if good else 1)
+
+
+@app.command()
+def greet(address: Annotated[str, typer.Argument(help="The head's `host:port`.")]) -> None:
+    """Ask a head who it is, without joining: does it answer, with our versions, to our token?
+
+    Silent if all is well. For scripts that join, such as `clusters/edge-join.sh`.
+
+        aerodaas cluster greet 10.8.0.1:6379
+    """
+    from aerodaas.actors.greeting import greet as ask  # noqa: PLC0415 - loads ray
+
+    ask(address)

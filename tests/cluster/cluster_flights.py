@@ -158,7 +158,8 @@ class Told:
         assert self.ends
         twice = {task: ends for task, ends in self.ends.items() if len(ends) > 1}
         assert not twice
-        assert not self.missing()
+        missing = self.missing()
+        assert not missing, missing
 
     def missing(self) -> list[str]:
         """Tasks of which nobody has told an end, the last second's aside."""

@@ -14,6 +14,7 @@ from cluster_flights import ENVIRONMENT, Told, Watched, eventually
 from flying import Flyer
 
 from aerodaas.cluster import EdgeCloud, Shape
+from aerodaas.status import MissionState
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(240)]
 
@@ -187,8 +188,8 @@ def test_the_edges_disk_is_full(edge_cloud: EdgeCloud, tmp_path: Path) -> None:
         with watched.flying(settle=0.0):
             eventually(lambda: bool(watched.run.look().reports["recorder"].values["failure"]))
             watched.goes_on()
-        outcome = watched.run.look if watched.run.state is None else watched.run.state
-        assert "landed" in str(outcome.robots["drone"].status.state)  # type: ignore[union-attr]
+        assert watched.run.state is not None
+        assert watched.run.state.robots["drone"].status.state is MissionState.LANDED
         assert "No space left" in watched.run.reports()["recorder"].values["failure"]
     finally:
         subprocess.run(["umount", str(disk)], check=True)  # noqa: S607
@@ -197,8 +198,7 @@ def test_the_edges_disk_is_full(edge_cloud: EdgeCloud, tmp_path: Path) -> None:
 def test_a_cloud_node_is_killed(watched: Watched) -> None:
     """Its work goes to the edge at once, and to another cloud node when Ray has noticed."""
     with watched.flying():
-        (used,) = (node["NodeManagerAddress"] for node in _nodes_of("CloudExecutor"))
-        (name,) = (n for n, far in watched.cluster.far.items() if far.address == used)
+        (name,) = (n for n in watched.cluster.clouds() if _has_executor(watched.cluster, n))
         watched.broke()
         watched.cluster.kill(name)
         watched.goes_on()
@@ -224,9 +224,6 @@ def test_the_cloud_is_cut_off_for_good(watched: Watched) -> None:
     told.each_counted_once()
 
 
-def _nodes_of(kind: str) -> list[dict[str, object]]:
-    from ray.util.state import list_actors  # noqa: PLC0415 - needs a running Ray
-
-    actors = list_actors(filters=[("class_name", "=", kind), ("state", "=", "ALIVE")])
-    ids = {actor.node_id for actor in actors}
-    return [node for node in ray.nodes() if node["NodeID"] in ids]
+def _has_executor(cluster: EdgeCloud, name: str) -> bool:
+    commands = (process.cmdline() for process in cluster.far[name].machine.processes())
+    return any("CloudExecutor" in word for command in commands for word in command)
