@@ -62,21 +62,17 @@ def connect(address: str | None) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     # The first error is told; Ray would print the tracebacks of those that followed.
     os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
-<<<<<<< HEAD
+    # Ray would refuse a node whose Python differs in its patch level; a Jetson's always does.
+    os.environ.setdefault("RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL", "minor")
     common: dict[str, Any] = {
         "logging_level": logging.ERROR,
         "log_to_driver": False,
-        "namespace": "aerodaas",
+        "namespace": _NAMESPACE,
     }
-=======
-    # Ray would refuse a node whose Python differs in its patch level; a Jetson's always does.
-    os.environ.setdefault("RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL", "minor")
-    common: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
->>>>>>> cluster
     if address:
         greet(address)
         try:
-            ray.init(address=address, namespace=_NAMESPACE, **common)
+            ray.init(address=address, **common)
         except (ConnectionError, RuntimeError, ValueError) as error:
             reason = str(error).strip().splitlines()[0]
             raise _unreachable(address, reason) from None

@@ -39,15 +39,11 @@ __all__ = ["Flight", "FlightState"]
 _PREPARE_TIMEOUT = 90.0
 _ANSWER_TIMEOUT = 5.0
 _REPORT_INTERVAL = 0.5
-<<<<<<< HEAD
-_ANALYTICS_RESTARTS = 3
+_RESTARTS = 3
 _LOOKS = 2
 """Calls of an executor in the cloud that only look whether and how far away it is."""
-=======
-_RESTARTS = 3
 _CLOCKS_APART = 1.0
 """Seconds by which clocks may differ; missions are timed by them, and latencies measured."""
->>>>>>> cluster
 
 
 @dataclass(frozen=True)
@@ -130,12 +126,8 @@ class Flight:
                 actor.place,
                 (session, actor.name),
                 setup=actor.nodes,
-<<<<<<< HEAD
-                restarts=_ANALYTICS_RESTARTS,
-                options=environments[actor.name],
-=======
                 restarts=_RESTARTS,
->>>>>>> cluster
+                options=environments[actor.name],
             )
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch, environments)
@@ -259,7 +251,6 @@ class Flight:
             options |= {"lifetime": "detached", "name": f"{self.plan.session.id}/{name}"}
         return options
 
-<<<<<<< HEAD
     def _create_dispatcher(
         self, dispatch: Dispatching, environments: Mapping[str, Mapping[str, Any]]
     ) -> None:
@@ -274,7 +265,8 @@ class Flight:
         }
         edge = {one.stream: hosts[done_stream(one.stream)] for one in dispatch.managed}
         args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
-        self._create("dispatcher", DispatcherActor, Place(), args, setup=(edge, executors))
+        setup = (edge, executors)
+        self._create("dispatcher", DispatcherActor, Place(), args, restarts=_RESTARTS, setup=setup)
 
     def _create_executor(
         self, name: str, process: CloudProcess, environments: Mapping[str, Mapping[str, Any]]
@@ -289,20 +281,6 @@ class Flight:
         self._opening.append(handle.prepare.remote(works))
         models = frozenset(process.works)
         return Executor(process.site, handle, [works], models, process.slots, process.compression)
-=======
-    def _create_dispatcher(self, dispatch: Dispatching) -> None:
-        executor = None
-        if dispatch.cloud is not None:
-            options = self._options("cloud", dispatch.cloud, restarts=_RESTARTS)
-            slots = dispatch.resources.cloud_slots
-            remote: Any = ray.remote(CloudExecutor)
-            executor = remote.options(**options, max_concurrency=slots).remote()
-            self._helpers.append(executor)
-            self._opening.append(executor.prepare.remote(dispatch.works))
-        args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
-        setup = (executor,)
-        self._create("dispatcher", DispatcherActor, Place(), args, restarts=_RESTARTS, setup=setup)
->>>>>>> cluster
 
     def _prepare(self, members: list[_Member], progress: Callable[[str], None]) -> None:
         waiting = {member.handle.prepare.remote(*member.setup): member for member in members}
@@ -415,7 +393,6 @@ class Flight:
             raise MissionError(f"an actor did not answer within {_ANSWER_TIMEOUT:.0f} s") from None
 
 
-<<<<<<< HEAD
 def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
     """Ray's options for the environment of each process that runs analyses.
 
@@ -430,7 +407,8 @@ def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
     return {
         name: isolation_options(one.runtime_env, one.place, name) for name, one in processes.items()
     }
-=======
+
+
 def _require_clock(name: str, info: ActorInfo, began: int) -> None:
     """A clock that reads what it cannot have read while `prepare` was under way is wrong."""
     ahead = max(info.clock - host_time_ns(), 0) - max(began - info.clock, 0)
@@ -440,7 +418,6 @@ def _require_clock(name: str, info: ActorInfo, began: int) -> None:
             f"the clock of the machine that runs {name} is {abs(ahead) / NANOSECONDS:.0f} s {side} "
             "this one's; set both by NTP (`timedatectl set-ntp true`) before flying"
         )
->>>>>>> cluster
 
 
 def _share_memory(one: ActorInfo, other: ActorInfo) -> bool:
