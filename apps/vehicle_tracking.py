@@ -3,6 +3,8 @@
 from aerodaas import AeroNavigation, Environment, PriorityQueue, Waypoint
 from aerodaas.analytics import CarFollowAnalytics, OnnxDetector
 
+AREA = [(-8, -13), (50, -13), (50, 18), (-8, 18)]
+
 
 def main() -> None:
     """Build the dataflow and fly it."""
@@ -13,7 +15,7 @@ def main() -> None:
 
     camera = drone.get_sensor_by_id("cam1").get_data_stream()
     cars = OnnxDetector(classes=["car"]).deploy(edge).analyse(camera)
-    follow = CarFollowAnalytics(distance=6, height=2.5).deploy(edge).analyse(cars)
+    follow = CarFollowAnalytics(distance=6, height=2.5, area=AREA).deploy(edge).analyse(cars)
 
     places = [(0, 12), (12, 0), (30, 8)]
     survey = [Waypoint(f"wp{i}", x, y, 4, hover_duration=5) for i, (x, y) in enumerate(places, 1)]

@@ -13,8 +13,8 @@ from aerodaas.config import EnvironmentConfig, RobotConfig
 from aerodaas.recording.flight import Band, Flight, RobotFlight
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.states import vehicle_states
-from aerodaas.simulation.scenario import Gesture
-from aerodaas.simulation.world import World
+from aerodaas.simulation.scenario import Car, Gesture
+from aerodaas.simulation.world import CAR_SIZE, World
 
 __all__ = ["Evidence"]
 
@@ -95,10 +95,20 @@ class Evidence:
         return inside
 
     def to_thing(self, name: str) -> NDArray[np.float64]:
-        """Level metres from the drone to a thing of the world, at all times, shape (N,)."""
+        """Level metres from the drone to a thing of the world, at all times, shape (N,).
+
+        To the middle of a person or a tower, and to the nearest point of a car.
+        """
         thing = self.world.thing(name)
-        places = [(state.x, state.y) for state in map(thing.state, self.time)]
-        return np.asarray(np.linalg.norm(self.position[:, :2] - np.array(places), axis=1))
+        states = [thing.state(float(time)) for time in self.time]
+        way = self.position[:, :2] - np.array([(state.x, state.y) for state in states])
+        if not isinstance(thing.spec, Car):
+            return np.asarray(np.linalg.norm(way, axis=1))
+        yaw = np.array([state.yaw for state in states])
+        along = np.cos(yaw) * way[:, 0] + np.sin(yaw) * way[:, 1]
+        across = np.cos(yaw) * way[:, 1] - np.sin(yaw) * way[:, 0]
+        beyond = np.abs(np.stack([along, across], -1)) - np.array(CAR_SIZE[:2]) / 2
+        return np.asarray(np.linalg.norm(np.clip(beyond, 0.0, None), axis=1))
 
     def gesture(self, name: str, kind: str) -> Gesture:
         """The person's gesture of this kind; raises StopIteration if there is none."""
