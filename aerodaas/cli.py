@@ -71,7 +71,17 @@ def run(
         list[str] | None,
         typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
     ] = None,
-    view: Annotated[bool, typer.Option(help="Show the live view.")] = True,  # noqa: FBT002
+    view: Annotated[
+        bool | None,
+        typer.Option(
+            "--view/--no-view",
+            help="Show the cameras in a browser, too. By default the terminal shows the flight; "
+            "with --no-view nothing does.",
+        ),
+    ] = None,
+    view_address: Annotated[
+        str, typer.Option(help="Where --view listens; on 0.0.0.0 anyone on the network may watch.")
+    ] = "127.0.0.1:8360",
     live: Annotated[  # noqa: FBT002
         bool, typer.Option("--live", help="Serve the flight to Foxglove while it goes on.")
     ] = False,
@@ -97,10 +107,13 @@ def run(
         record=record,
         address=address,
         overrides=dict(parse_setting(text) for text in setting or ()),
-        view=view,
+        view=view is not False,
         live=live_address if live else None,
+        page=view_address if view else None,
         application=application.resolve(),
     )
+    if view:
+        typer.echo(f"view: open http://{view_address} in a browser")
     if live:
         typer.echo(f"live: open ws://{live_address} in Foxglove")
     run_application(application, context.args, options)

@@ -31,6 +31,8 @@ class RunOptions:
     """Show the live terminal view."""
     live: str | None = None
     """Serve Foxglove's WebSocket at this `host:port` while flying."""
+    page: str | None = None
+    """Show the cameras to browsers at this `host:port` while flying."""
     replay: Path | None = None
     """Recording to be flown again: its environment takes the place of the application's."""
     scheduler: str | None = None

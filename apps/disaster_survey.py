@@ -1,6 +1,6 @@
 """Disaster Survey: survey an area to which a remote user adds in flight (paper, section 6).
 
-    aerodaas remote add-waypoint 10 30 1.5
+aerodaas remote add-waypoint 10 30 1.5
 """
 
 from aerodaas import AeroNavigation, Environment, NavigationType, SchedulingType, Waypoint
@@ -21,7 +21,9 @@ def main() -> None:
     watch.analyse(camera)
 
     corners = [(0, 0), (10, 0), (10, 10), (0, 10)]
-    survey = [Waypoint(f"wp{i}", x, y, 1.5, hover_duration=3) for i, (x, y) in enumerate(corners)]
+    survey = [
+        Waypoint(f"wp{i}", x, y, 1.5, hover_duration=3) for i, (x, y) in enumerate(corners, 1)
+    ]
     planned = AeroNavigation(NavigationType.DISTANCE_DRIVEN, survey, SchedulingType.UNORDERED)
     remote = RemoteAnalytics(env.env_data).deploy(edge).analyse(camera)
     added = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, remote, SchedulingType.UNORDERED)

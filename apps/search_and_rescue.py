@@ -4,8 +4,15 @@ from math import dist
 
 from aerodaas import AeroNavigation, Environment, MonitoringAnalytics, Waypoint
 from aerodaas.analytics import VipDetectionAnalytics, VipFollowAnalytics
+from aerodaas.data import Readings
 
-SAFE = (57, 6)
+SAFE, NEAR = (57, 6), 3
+
+
+def is_safe(readings: Readings) -> bool:
+    """Tell whether the drone has come near the safe place."""
+    at = readings.values
+    return dist((at["position.east"], at["position.north"]), SAFE) < NEAR
 
 
 def main() -> None:
@@ -16,13 +23,11 @@ def main() -> None:
     scheduler = env.trajectory_scheduler()
 
     camera = drone.get_sensor_by_id("cam1").get_data_stream()
-    vest = VipDetectionAnalytics().deploy(edge).analyse(camera)
-    follow = VipFollowAnalytics(distance=2).deploy(edge).analyse(vest)
-    place = MonitoringAnalytics(["position"]).deploy(edge)
-    place.trigger(
-        drone.end_mission, lambda at: dist((at.values["position.east"], at.values["position.north"]), SAFE) < 3
-    )
-    place.analyse(drone.get_sensor_by_id("odom").get_data_stream())
+    vests = VipDetectionAnalytics().deploy(edge).analyse(camera)
+    follow = VipFollowAnalytics(distance=2).deploy(edge).analyse(vests)
+    odometry = drone.get_sensor_by_id("odom").get_data_stream()
+    watch = MonitoringAnalytics(["position"]).deploy(edge)
+    watch.trigger(drone.end_mission, when=is_safe).analyse(odometry)
 
     places = [(0, 12), (14, 13), (24, 26), (0, 26)]
     search = [Waypoint(f"wp{i}", x, y, 1.5, hover_duration=3) for i, (x, y) in enumerate(places, 1)]

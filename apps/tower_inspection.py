@@ -1,4 +1,4 @@
-"""Tower Inspection: search for a radio tower, drop the search, and inspect it (paper, section 6)."""
+"""Tower Inspection: a search that ends at a radio tower, which is inspected (paper, section 6)."""
 
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.analytics import OnnxDetector, TowerInspectionAnalytics

@@ -57,7 +57,7 @@ class Result:
         return not self.failures and self.flown.code == 0
 
 
-def main(  # noqa: PLR0913 - each is an option of the command
+def main(
     seeds: Annotated[int, typer.Option(help="Flights of each application.", min=1)] = 20,
     first: Annotated[int, typer.Option(help="The first seed.", min=0)] = 0,
     only: Annotated[list[str] | None, typer.Option(help="An application; repeat it.")] = None,
@@ -203,7 +203,11 @@ def _content(results: list[Result], saved: float, speed: str) -> dict[str, objec
             "checks": {check.what: [check.holds, check.found] for check in one.checks},
             "memory": one.flown.memory,
             "rate": _rate(one),
-            **({name: getattr(one.figures, name) for name in Figures.__slots__} if one.figures else {}),
+            **(
+                {name: getattr(one.figures, name) for name in Figures.__slots__}
+                if one.figures
+                else {}
+            ),
         }
         for one in results
     ]

@@ -74,7 +74,7 @@ class Mission:
 
 
 SAFE = (hit_nothing, fence_kept)
-START = "taking_off holding?"
+START, HOME = "taking_off holding?", "returning landing landed"
 SURVEY = ("wp1", "wp2", "wp3", "wp4")
 REMOTE = ("remote1", "remote2", "remote3")
 
@@ -96,7 +96,7 @@ MISSIONS = {
             "disaster_survey",
             Paper(142, None, "1.5", None, None),
             (
-                states(f"{START} (holding? enroute? loitering holding?){{7}} returning landing landed"),
+                states(f"{START} (holding? enroute? loitering holding?){{7}} {HOME}"),
                 reached(*SURVEY, *REMOTE),
                 landed(at_home=1.0),
                 *SAFE,
@@ -139,7 +139,10 @@ MISSIONS = {
             "search_and_rescue",
             Paper(360, 50, "1.5", 73, 17),
             (
-                states(f"{START} (enroute? loitering){{1,2}} enroute? (following holding?)+ landing landed"),
+                states(
+                    f"{START} (enroute? loitering){{1,2}} enroute? (following holding?)+ "
+                    "landing landed"
+                ),
                 reached("wp1", never=("wp3", "wp4")),
                 followed("lost", 35, reach=4.0),
                 distance_held("lost", 2.0, within=0.5, share=0.9, nearest=1.0),
@@ -152,7 +155,9 @@ MISSIONS = {
             "tower_inspection",
             Paper(360, 130, "2-35", 35, 13),
             (
-                states(f"{START} (enroute? loitering){{2}} enroute (following holding?)+ landing landed"),
+                states(
+                    f"{START} (enroute? loitering){{2}} enroute (following holding?)+ landing landed"
+                ),
                 reached("wp1", "wp2", never=("wp3", "wp4")),
                 found_between("wp2", "wp3"),
                 climbed("mast", 3.0, 34.5, clearance=4.0),

@@ -80,7 +80,7 @@ def reached(*ids: str, never: tuple[str, ...] = (), within: float = 0.5) -> Crit
     return check
 
 
-def distance_held(  # noqa: PLR0913 - each bound is a criterion's own
+def distance_held(
     thing: str,
     metres: float,
     *,

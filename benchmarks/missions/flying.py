@@ -44,7 +44,7 @@ class Flown:
     """Seconds on the wall from the mission's begin to the recording's end."""
 
 
-def fly(  # noqa: PLR0913 - what a user may choose
+def fly(
     mission: Mission,
     seed: int,
     folder: Path,

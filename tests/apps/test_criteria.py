@@ -16,7 +16,7 @@ from aerodaas.simulation.world import World
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
-from missions.criteria import (  # noqa: E402 - benchmarks are no package
+from missions.criteria import (
     alerted_of,
     climbed,
     distance_held,
@@ -29,7 +29,7 @@ from missions.criteria import (  # noqa: E402 - benchmarks are no package
     reached,
     states,
 )
-from missions.evidence import Evidence  # noqa: E402
+from missions.evidence import Evidence
 
 WORLD = World(
     Scenario.model_validate(
@@ -129,7 +129,11 @@ def test_a_resumed_plan_is_seen() -> None:
 def test_alarms_must_neither_fail_nor_be_false() -> None:
     """None, one too late, and one before there was a reason."""
     evidence = flight()
-    for alerts in ([], [(64.0, "hand_raised", "")], [(20.0, "hand_raised", ""), (60.0, "hand", "")]):
+    for alerts in (
+        [],
+        [(64.0, "hand_raised", "")],
+        [(20.0, "hand_raised", ""), (60.0, "hand", "")],
+    ):
         log = Flight(alerts=alerts)
         assert not GOOD["alerted"](replace(evidence, flight=log)).holds
 
