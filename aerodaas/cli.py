@@ -67,6 +67,12 @@ def run(
     address: Annotated[
         str | None, typer.Option(help="Ray cluster to join. Default: RAY_ADDRESS, or none.")
     ] = None,
+    guest: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Another application that shares the sensors and compute, but may not navigate."
+        ),
+    ] = None,
     setting: Annotated[
         list[str] | None,
         typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
@@ -96,6 +102,7 @@ def run(
         aerodaas run apps/farm_survey.py
         aerodaas run apps/farm_survey.py --speed 5 --seed 7 --record /tmp/farm
         aerodaas run apps/farm_survey.py --set quadrotor_base.limits.cruise_speed=1
+        aerodaas run apps/disaster_survey.py --guest apps/crowd_watch.py
         aerodaas run apps/watch_frames.py -- pictures/ yolov8n.onnx --rate 5
     """
     factor, lockstep = speed_option(speed)
@@ -110,6 +117,7 @@ def run(
         view=view is not False,
         live=live_address if live else None,
         page=view_address if view else None,
+        guests=tuple(path.resolve() for path in guest or ()),
         application=application.resolve(),
     )
     if view:

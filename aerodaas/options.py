@@ -39,6 +39,8 @@ class RunOptions:
     """Analytics scheduler instead of the application's own."""
     model: Path | None = None
     """ONNX model for every detector, instead of its own."""
+    guests: tuple[Path, ...] = ()
+    """Applications that share the drone's sensors and compute, but not its navigation."""
     application: Path | None = None
     """The application's file, for relative paths and the recording's provenance."""
 

@@ -156,7 +156,8 @@ MISSIONS = {
             Paper(360, 130, "2-35", 35, 13),
             (
                 states(
-                    f"{START} (enroute? loitering){{2}} enroute (following holding?)+ landing landed"
+                    f"{START} (enroute? loitering){{2}} enroute (following holding?)+ "
+                    "landing landed"
                 ),
                 reached("wp1", "wp2", never=("wp3", "wp4")),
                 found_between("wp2", "wp3"),
