@@ -15,10 +15,11 @@ from typing_extensions import Self
 
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors._ending import end_actors
+from aerodaas.actors._lifeline import LIFE
 from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.caretaker import Caretaker
 from aerodaas.actors.cluster import Place, options_for, outlives_application
-from aerodaas.actors.dispatcher import DispatcherActor
+from aerodaas.actors.dispatcher import DispatcherActor, done_stream
 from aerodaas.actors.drone import DroneActor, RobotReport
 from aerodaas.actors.executor import CloudExecutor
 from aerodaas.actors.plan import Dispatching, FlightPlan
@@ -225,7 +226,10 @@ class Flight:
         setup: tuple[Any, ...] = (),
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
-        remote = ray.remote(kind).options(**self._options(name, place, restarts=restarts))
+        # Calls that wait for an analysis' life to end must not keep others waiting.
+        groups = {"concurrency_groups": {LIFE: 1}} if kind is AnalyticsActor else {}
+        made: Any = ray.remote(**groups)(kind) if groups else ray.remote(kind)
+        remote = made.options(**self._options(name, place, restarts=restarts))
         self._members[name] = _Member(name, remote.remote(*args, **kwargs), setup)
 
     def _options(self, name: str, place: Place, *, restarts: int) -> dict[str, Any]:
@@ -236,16 +240,26 @@ class Flight:
         return options
 
     def _create_dispatcher(self, dispatch: Dispatching) -> None:
-        executor = None
+        executor = works = None
         if dispatch.cloud is not None:
-            options = self._options("cloud", dispatch.cloud, restarts=_ANALYTICS_RESTARTS)
+            # A node that comes and goes must not use restarts up: without one there is no cloud.
+            options = self._options("cloud", dispatch.cloud, restarts=-1)
             slots = dispatch.resources.cloud_slots
             remote: Any = ray.remote(CloudExecutor)
             executor = remote.options(**options, max_concurrency=slots).remote()
             self._helpers.append(executor)
-            self._opening.append(executor.prepare.remote(dispatch.works))
+            works = ray.put(dispatch.works)
+            self._opening.append(executor.prepare.remote(works))
+        hosts = {
+            node.stream: self._members[actor.name].handle
+            for actor in self.plan.analyses
+            for node in actor.nodes
+        }
+        edge = {one.stream: hosts[done_stream(one.stream)] for one in dispatch.managed}
         args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
-        self._create("dispatcher", DispatcherActor, Place(), args, setup=(executor,))
+        # A reference by itself would be replaced by what it refers to.
+        setup = (edge, executor, [works])
+        self._create("dispatcher", DispatcherActor, Place(), args, setup=setup)
 
     def _prepare(self, members: list[_Member], progress: Callable[[str], None]) -> None:
         waiting = {member.handle.prepare.remote(*member.setup): member for member in members}

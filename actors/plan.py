@@ -15,7 +15,7 @@ from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
-from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig, TaskConfig
+from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig
 from aerodaas.data import Frame
 from aerodaas.errors import GraphError
 from aerodaas.graph import Graph, NavigationEdge, Node
@@ -23,11 +23,10 @@ from aerodaas.handles import SENSOR_ITEMS
 from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
 from aerodaas.plugins import require_plugin
 from aerodaas.schedulers.analytics.base import (
-    MILLISECOND,
     AnalyticsScheduler,
-    Profile,
     Resources,
 )
+from aerodaas.schedulers.analytics.profiles import told_profile
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 
 __all__ = ["Analyses", "Cameras", "Dispatching", "FlightPlan", "make_plan"]
@@ -183,29 +182,21 @@ class _Planner:
         if self.session.lockstep:
             # Simulated time stands still while an analysis runs, so there is nothing to offload.
             clouds, slots = [], 0
+        told = self.session.environment.schedulers.tasks
         return Dispatching(
             scheduler=self.dispatch_with,
             managed=tuple(
-                Managed(n.id, tuple(n.inputs), self.profile(n), self.acknowledgements(n.id) == 0)
+                Managed(
+                    n.id,
+                    tuple(n.inputs),
+                    told_profile(n.id, told),
+                    self.acknowledgements(n.id) == 0,
+                )
                 for n in nodes
             ),
             resources=Resources(cloud_slots=slots),
             cloud=Place(clouds[0].kind, clouds[0].node) if clouds else None,
             works={node.id: node.work for node in nodes},
-        )
-
-    def profile(self, node: Node) -> Profile:
-        """The analysis' figures from the environment file, by its name without the robot."""
-        known = self.session.environment.schedulers.tasks
-        told = known.get(node.id.rpartition("/")[2], TaskConfig())
-        return Profile(
-            model=node.id,
-            benefit=told.benefit,
-            deadline=int(told.deadline * MILLISECOND),
-            edge_time=int(told.edge_time * MILLISECOND),
-            cloud_time=int(told.cloud_time * MILLISECOND),
-            edge_cost=told.edge_cost,
-            cloud_cost=told.cloud_cost,
         )
 
     def node_spec(self, node: Node) -> NodeSpec:

@@ -197,9 +197,9 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         if controller.phase is InspectionPhase.APPROACHING:
             text = f"A {what} was found; its inspection begins."
             context.alert(Alert(boxes.header, "inspection_began", text))
-        elif controller.phase is InspectionPhase.DESCENDING and controller.reason:
+        if controller.reason and before in {InspectionPhase.APPROACHING, InspectionPhase.CLIMBING}:
             text = f"The inspection ends early: {controller.reason}."
             context.alert(Alert(boxes.header, "inspection_cut_short", text))
-        elif controller.phase is InspectionPhase.DONE:
+        if controller.phase is InspectionPhase.DONE:
             text = f"The inspection is over: {len(self.taken)} pictures."
             context.alert(Alert(boxes.header, "inspection_over", text))
