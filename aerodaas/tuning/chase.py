@@ -160,9 +160,7 @@ class Chase:
                 "limits": {"takeoff_height": height, "max_speed": 3.0, "cruise_speed": 1.0},
             }
         )
-        simulation = SimulationConfig(
-            world="empty", seed=self.seed, wind=self.wind, gust=self.gust
-        )
+        simulation = SimulationConfig(world="empty", seed=self.seed, wind=self.wind, gust=self.gust)
         environment = EnvironmentConfig(robots=[robot], simulation=simulation)
         vehicle = SimulatedVehicle(robot, environment)
         vehicle.connect()
