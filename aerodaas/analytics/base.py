@@ -122,6 +122,12 @@ class Analytics(PaperNames, IAnalyse[O_co]):
             self.node.runtime_env = self._runtime_env
         return self
 
+    def beside(self, other: Analytics[Any]) -> Self:
+        """Run where `other` runs; returns itself."""
+        self._compute, self._graph = other._compute, other._graph
+        self._runtime_env = other._runtime_env
+        return self
+
     def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co]:
         """Analyse a stream; called again, the same analysis reads a further stream.
 
