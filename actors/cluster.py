@@ -19,6 +19,7 @@ __all__ = [
     "connect",
     "disconnect",
     "discover",
+    "join",
     "options_for",
     "outlives_application",
 ]
@@ -54,19 +55,11 @@ def connect(address: str | None) -> None:
         return
     _ours = False
     address = address or os.environ.get("RAY_ADDRESS")
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    # The first error is told; Ray would print the tracebacks of those that followed.
-    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
-    common: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
     if address:
-        _require_listener(address)
-        try:
-            ray.init(address=address, **common)
-        except (ConnectionError, RuntimeError, ValueError) as error:
-            reason = str(error).strip().splitlines()[0]
-            raise _unreachable(address, reason) from None
+        join(address)
         _require_edge(address)
         return
+    common = _settings()
     # "local": else Ray joins whatever cluster someone has started on this machine.
     ray.init(
         address="local",
@@ -78,6 +71,27 @@ def connect(address: str | None) -> None:
     )
     _ours = True
     _trim()
+
+
+def join(address: str) -> None:
+    """Join the cluster at `address`, whatever its nodes offer; AeroDaaSError if that fails."""
+    if ray.is_initialized():
+        return
+    common = _settings()
+    _require_listener(address)
+    try:
+        ray.init(address=address, **common)
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        reason = str(error).strip().splitlines()[0]
+        raise _unreachable(address, reason) from None
+
+
+def _settings() -> dict[str, Any]:
+    """How quiet Ray is to be."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    # The first error is told; Ray would print the tracebacks of those that followed.
+    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
+    return {"logging_level": logging.ERROR, "log_to_driver": False}
 
 
 def _unreachable(address: str, reason: str) -> AeroDaaSError:

@@ -396,9 +396,12 @@ class DispatcherActor(StreamActor):
         why = self._why.pop(task.id, None)
         if result.outcome is not Outcome.DROPPED:
             reason = f"{result.place.value}: {why}" if why else result.place.value
-            self._note(task, result.outcome.value, reason, result.finished)
         elif why is None:
-            self._note(task, "dropped", "no room in the cloud in time", result.finished)
+            reason = "no room in the cloud in time"
+        else:
+            return
+        totals = {"utility": result.utility, **self._counts.totals}
+        self._note(task, result.outcome.value, reason, result.finished, totals)
 
     def _publish(self, node: str, origin: Message[Any], item: Any) -> None:  # noqa: ANN401
         if item is not None or self.session.lockstep:
@@ -413,11 +416,19 @@ class DispatcherActor(StreamActor):
         source = f"{task.source}:" if model in self._many else ""
         return f"{model}#{source}{task.segment}"
 
-    def _note(self, task: Task, action: str, reason: str, now: int) -> None:
+    def _note(
+        self,
+        task: Task,
+        action: str,
+        reason: str,
+        now: int,
+        totals: Mapping[str, float] | None = None,
+    ) -> None:
         slack = task.deadline + task.reserve - now
         values = {"slack_ms": slack / 1e6, "waited_ms": (now - task.arrival) / 1e6}
         if task.reserve:
             values["reserve_ms"] = task.reserve / 1e6
+        values |= totals or {}
         header = Header(self._decisions.sent, now, DECISIONS)
         record = DecisionRecord(now, self._label(task), action, reason, values)
         self._decisions.measure(record, header, host_time_ns())
@@ -468,12 +479,16 @@ class _Counts:
         if result.outcome is Outcome.DONE:
             self._windows.done(result.task)
 
+    @property
+    def totals(self) -> dict[str, float]:
+        """Utility so far."""
+        return {"qos_total": self._utility, "qoe_total": self._windows.utility}
+
     def values(self) -> dict[str, Any]:
         return {
             "tasks": self._tasks,
             "outcomes": dict(self._outcomes),
             "retried": self.retried,
-            "utility": self._utility,
-            "qoe": self._windows.utility,
+            **self.totals,
             "qoe_windows": self._windows.won,
         }

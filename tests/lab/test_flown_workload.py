@@ -13,6 +13,9 @@ from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.commands.flown_workload import flown_workload
 from aerodaas.commands.lab import app
 from aerodaas.errors import RecordingError
+from aerodaas.recording.flight import Flight
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.summary import FlightSummary
 from aerodaas.schedulers.analytics.base import MILLISECOND
 from aerodaas.schedulers.lab import run_lab
 
@@ -64,6 +67,11 @@ def test_a_recorded_flight_becomes_a_workload(flyer: Flyer) -> None:
     assert any(one.cloud_time and one.cloud_time >= 400 * MILLISECOND for one in tasks)
     figures = run_lab(workload, ["ec_edf", "margin"], [0], jobs=1).scores["ec_edf"][0]
     assert figures.tasks == len(workload.arrivals)
+    with Recording.open(run.recording) as recording:
+        summary = FlightSummary.of(recording, Flight.read(recording))
+    assert summary.utility == {"QoS": values["qos_total"], "QoE": values["qoe_total"]}
+    why = [count for said, count in summary.reasons.items() if said.startswith("cloud: ")]
+    assert sum(why) == summary.decisions["cloud"] > 0
     arguments = ["run", "--from", str(run.recording), "-s", "ec_edf,dems", "--seeds", "1"]
     outcome = CliRunner().invoke(app, [*arguments, "--jobs", "1"], env={"COLUMNS": "220"})
     assert outcome.exit_code == 0, outcome.output
