@@ -20,6 +20,7 @@ from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar
 
 from typing_extensions import Self
 
+from aerodaas.config import TaskConfig
 from aerodaas.data import Alert
 from aerodaas.errors import GraphError
 from aerodaas.graph import AeroStreamData, Graph, Node, Trigger
@@ -70,6 +71,8 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     """True for an analysis that needs a process of its own, such as a neural network."""
     scheduled: bool = False
     """True for an analysis of frames whose every run the analytics scheduler decides on."""
+    task: TaskConfig | None = None
+    """What the scheduler is told of it, unless the environment file's `schedulers.tasks` do."""
     rate: float = 1.0
     """How often an external source (`instantiate`) is asked, in Hz."""
     name: str = ""
