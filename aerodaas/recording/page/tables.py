@@ -46,8 +46,8 @@ def sections(summary: FlightSummary) -> Iterator[str]:
             (stream, it.count, it.median_ms, it.p99_ms, it.overhead_ms)
             for stream, it in summary.latencies.items()
         ]
-        head = ["stream", "messages", "median (ms)", "99th perc. (ms)", "overhead (ms)"]
-        yield section("Latency since capture", table(head, rows), wide=True)
+        head = ["stream", "count", "median (ms)", "99th perc.", "overhead"]
+        yield section("Latency since capture", table(head, rows))
     if summary.alerts:
         yield section("Alerts", table(["at (s)", "kind", "text"], _alerts(summary)))
     if summary.drops:
