@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import socket
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import ray
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
+from aerodaas.actors.greeting import greet
 from aerodaas.config import ComputeConfig
 from aerodaas.errors import AeroDaaSError, ConfigError
 
@@ -30,7 +30,8 @@ __all__ = [
 _KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
 _SHARE = 0.001
 """Share of a node's `edge` or `cloud` resource that an actor takes: it says where, not how much."""
-_PROBE_SECONDS = 5.0
+_NAMESPACE = "aerodaas"
+"""Ray's, for the names of actors that outlive their application."""
 _STORE_BYTES = 128 * 2**20
 """Object store of a one-machine run; its streams travel in shared memory of their own."""
 
@@ -61,13 +62,15 @@ def connect(address: str | None) -> None:
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
     # The first error is told; Ray would print the tracebacks of those that followed.
     os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
+    # Ray would refuse a node whose Python differs in its patch level; a Jetson's always does.
+    os.environ.setdefault("RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL", "minor")
     common: dict[str, Any] = {
         "logging_level": logging.ERROR,
         "log_to_driver": False,
-        "namespace": "aerodaas",
+        "namespace": _NAMESPACE,
     }
     if address:
-        _require_listener(address)
+        greet(address)
         try:
             ray.init(address=address, **common)
         except (ConnectionError, RuntimeError, ValueError) as error:
@@ -93,17 +96,6 @@ def _unreachable(address: str, reason: str) -> AeroDaaSError:
         f"cannot join the Ray cluster at {address}: {reason}; "
         "check the address and that the head runs the same Ray and Python versions"
     )
-
-
-def _require_listener(address: str) -> None:
-    """Ray takes minutes to give an address up at which nobody listens; this takes seconds."""
-    host, _, port = address.removeprefix("ray://").rpartition(":")
-    if not host or not port.isdigit():
-        return  # "auto", or something else that Ray understands
-    try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=_PROBE_SECONDS).close()
-    except (OSError, OverflowError) as error:
-        raise _unreachable(address, str(error)) from None
 
 
 def _trim() -> None:

@@ -28,7 +28,7 @@ from aerodaas.actors.isolation import isolation_options
 from aerodaas.actors.plan import Analyses, Dispatching, FlightPlan
 from aerodaas.actors.recorder import RecorderActor
 from aerodaas.actors.sensor import SensorActor
-from aerodaas.clock import host_time_ns
+from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.data import Alert
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.navigation.commands import Answer, Command
@@ -39,9 +39,11 @@ __all__ = ["Flight", "FlightState"]
 _PREPARE_TIMEOUT = 90.0
 _ANSWER_TIMEOUT = 5.0
 _REPORT_INTERVAL = 0.5
-_ANALYTICS_RESTARTS = 3
+_RESTARTS = 3
 _LOOKS = 2
 """Calls of an executor in the cloud that only look whether and how far away it is."""
+_CLOCKS_APART = 1.0
+"""Seconds by which clocks may differ; missions are timed by them, and latencies measured."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,8 @@ class _Member:
     pending: ray.ObjectRef[ActorReport] | None = None
     reviving: ray.ObjectRef[ActorInfo] | None = None
     """Under way after a restart."""
+    lost_at: float | None = None
+    """Host's monotonic seconds at which it was found dead; None while it lives."""
 
 
 class Flight:
@@ -122,14 +126,14 @@ class Flight:
                 actor.place,
                 (session, actor.name),
                 setup=actor.nodes,
-                restarts=_ANALYTICS_RESTARTS,
+                restarts=_RESTARTS,
                 options=environments[actor.name],
             )
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch, environments)
         if self.recording is not None and provenance is not None:
             recorder = (session, self.recording, plan.recorded, provenance, live)
-            self._create("recorder", RecorderActor, edge, recorder)
+            self._create("recorder", RecorderActor, edge, recorder, restarts=_RESTARTS)
         if self._detached:
             self._appoint_caretaker()
         self._origin = 0
@@ -261,7 +265,8 @@ class Flight:
         }
         edge = {one.stream: hosts[done_stream(one.stream)] for one in dispatch.managed}
         args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
-        self._create("dispatcher", DispatcherActor, Place(), args, setup=(edge, executors))
+        setup = (edge, executors)
+        self._create("dispatcher", DispatcherActor, Place(), args, restarts=_RESTARTS, setup=setup)
 
     def _create_executor(
         self, name: str, process: CloudProcess, environments: Mapping[str, Mapping[str, Any]]
@@ -279,7 +284,7 @@ class Flight:
 
     def _prepare(self, members: list[_Member], progress: Callable[[str], None]) -> None:
         waiting = {member.handle.prepare.remote(*member.setup): member for member in members}
-        deadline = time.monotonic() + _PREPARE_TIMEOUT
+        deadline, began = time.monotonic() + _PREPARE_TIMEOUT, host_time_ns()
         while waiting:
             ready, _ = ray.wait(list(waiting), timeout=max(0.0, deadline - time.monotonic()))
             if not ready:
@@ -287,6 +292,7 @@ class Flight:
                 raise MissionError(f"{names} not ready within {_PREPARE_TIMEOUT:.0f} s")
             member = waiting.pop(ready[0])
             member.info = self._ask(ready[0])
+            _require_clock(member.name, member.info, began)
             progress(member.name)
         self._connect(members)
 
@@ -344,10 +350,14 @@ class Flight:
         error = MissionError(f"the actor {member.name} died")
         if member.name in self._ids():
             raise error
-        if member.report.phase != "failed":
-            for name in self._ids():
-                self._members[name].handle.note.remote("actor_lost", str(error))
+        if member.lost_at is None:
+            member.lost_at = time.monotonic()
+            self._note("actor_lost", str(error))
         member.report = ActorReport("failed", error)
+
+    def _note(self, kind: str, text: str) -> None:
+        for name in self._ids():
+            self._members[name].handle.note.remote(kind, text)
 
     def _revive(self, member: _Member) -> None:
         """Set an actor up that Ray has restarted, without waiting: the drones need our word."""
@@ -361,6 +371,10 @@ class Flight:
                 self._connect([member])
                 member.handle.start.remote(self._origin)
                 member.report = ActorReport("running")
+                if member.lost_at is not None:
+                    absence = time.monotonic() - member.lost_at
+                    member.lost_at = None
+                    self._note("actor_back", f"{member.name} is back after {absence:.1f} s")
 
     @staticmethod
     def _ask(reference: Any) -> Any:  # noqa: ANN401 - whatever the actor returns
@@ -393,6 +407,17 @@ def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
     return {
         name: isolation_options(one.runtime_env, one.place, name) for name, one in processes.items()
     }
+
+
+def _require_clock(name: str, info: ActorInfo, began: int) -> None:
+    """A clock that reads what it cannot have read while `prepare` was under way is wrong."""
+    ahead = max(info.clock - host_time_ns(), 0) - max(began - info.clock, 0)
+    if abs(ahead) > _CLOCKS_APART * NANOSECONDS:
+        side = "ahead of" if ahead > 0 else "behind"
+        raise MissionError(
+            f"the clock of the machine that runs {name} is {abs(ahead) / NANOSECONDS:.0f} s {side} "
+            "this one's; set both by NTP (`timedatectl set-ntp true`) before flying"
+        )
 
 
 def _share_memory(one: ActorInfo, other: ActorInfo) -> bool:

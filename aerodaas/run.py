@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from aerodaas.actors.flight import Flight, FlightState
     from aerodaas.actors.plan import FlightPlan
     from aerodaas.environment import Environment
+    from aerodaas.recording.pace import Pace
 
 __all__ = ["Run"]
 
@@ -164,17 +165,17 @@ class Run:
         from aerodaas.actors.session import Session  # noqa: PLC0415
 
         speed = None if self.lockstep else (self.options.speed or 1.0)
-        session = Session(self.config, speed, frame_stamps=self._frame_stamps())
+        session = Session(self.config, speed, pace=self._pace())
         scheduler = self._environment.trajectory_scheduler()
         dispatch_with = self._environment.analytics_scheduler()
         self._change_models()
         compute = self._environment.compute()
         return make_plan(session, self.graph, compute, scheduler, dispatch_with)
 
-    def _frame_stamps(self) -> dict[str, tuple[int, ...]]:
-        from aerodaas.replay import frame_stamps  # noqa: PLC0415 - only for a replay
+    def _pace(self) -> Pace:
+        from aerodaas.recording.pace import Pace, read_pace  # noqa: PLC0415 - loads readers
 
-        return frame_stamps(self.options.replay) if self.options.replay else {}
+        return read_pace(self.options.replay) if self.options.replay else Pace()
 
     def _change_models(self) -> None:
         """Give every detector the model that the command line asks for."""

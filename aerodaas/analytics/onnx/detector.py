@@ -16,6 +16,7 @@ from typing_extensions import Self
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.endpoint.tensors import TensorSpec
+from aerodaas.analytics.models import DETECTOR
 from aerodaas.analytics.onnx.coco import COCO_NAMES
 from aerodaas.analytics.onnx.families import FAMILIES
 from aerodaas.analytics.onnx.families.base import Candidates, Decoder, ModelFamily
@@ -60,7 +61,7 @@ class OnnxDetector(Analytics[Detections]):
 
     def __init__(
         self,
-        path: str | Path,
+        path: str | Path = DETECTOR,
         *,
         classes: Sequence[str] | None = None,
         min_score: float = 0.3,
@@ -71,7 +72,7 @@ class OnnxDetector(Analytics[Detections]):
         threads: int | None = None,
         families: Sequence[ModelFamily] = FAMILIES,
     ) -> None:
-        """Read the model at `path` and make sure that it is a detector.
+        """Read the model at `path`, by default the one that ships, and make sure that it detects.
 
         `classes` keeps these class names only. `min_score` (0 to 1) is the least confidence of a
         detection; of two boxes of one class that overlap by more than `iou`, the better one
