@@ -88,10 +88,12 @@ class Flight:
         recording: Path | None = None,
         provenance: Provenance | None = None,
         live: str | None = None,
+        page: str | None = None,
     ) -> None:
         """Create the actors of `plan`, all at once; `recording` is where the MCAP file goes.
 
-        With `live`, `host:port`, what is recorded is served there, too.
+        With `live`, `host:port`, what is recorded is served there, too; with `page`, the cameras
+        are shown there to browsers.
         """
         self.plan = plan
         self.recording = recording if plan.recorded else None
@@ -132,7 +134,7 @@ class Flight:
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch, environments)
         if self.recording is not None and provenance is not None:
-            recorder = (session, self.recording, plan.recorded, provenance, live)
+            recorder = (session, self.recording, plan.recorded, provenance, live, page)
             self._create("recorder", RecorderActor, edge, recorder, restarts=_RESTARTS)
         if self._detached:
             self._appoint_caretaker()

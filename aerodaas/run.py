@@ -79,8 +79,10 @@ class Run:
                 f"{self.recording} already exists and is not overwritten; "
                 "give --record another path or move the file away"
             )
-        if self.options.live and self.recording is None:
-            raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
+        if (self.options.live or self.options.page) and self.recording is None:
+            raise ConfigError(
+                '--live and --view serve what is recorded; set "recording.enabled" to true'
+            )
         with Starting(self.options) as starting:
             starting.step("starting Ray")
             cluster.connect(self.options.address)
@@ -88,7 +90,8 @@ class Run:
             provenance = Provenance.collect(
                 app=self.options.application, config=self.config, speed=self._speed_text()
             )
-            flight = Flight(plan, self.recording, provenance, self.options.live)
+            options = self.options
+            flight = Flight(plan, self.recording, provenance, options.live, options.page)
             try:
                 flight.launch(starting.step)
             except BaseException:
@@ -164,6 +167,7 @@ class Run:
         from aerodaas.actors.plan import make_plan  # noqa: PLC0415
         from aerodaas.actors.session import Session  # noqa: PLC0415
 
+        self._check_world()
         speed = None if self.lockstep else (self.options.speed or 1.0)
         session = Session(self.config, speed, pace=self._pace())
         scheduler = self._environment.trajectory_scheduler()
