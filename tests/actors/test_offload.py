@@ -153,7 +153,7 @@ def test_a_frame_is_sent_once_for_two_analyses_and_the_way_is_recorded(flyer: Fl
     """As many frames sent as there were, half as many as tasks; each result says how it came."""
     content = environment({"id": "cloud", "kind": "cloud", "executors": 4})
     with flyer.flying(build("edge"), content, speed=1.0) as env:
-        found = until(env, lambda v: v["outcomes"].get("done", 0) >= 20)
+        found = until(env, lambda v: v.get("outcomes", {}).get("done", 0) >= 20)
         env.get_robot_by_id("drone").end_mission()
     site = found["sites"]["cloud"]
     frames = sum(site["frames"].values())
@@ -179,12 +179,12 @@ def test_a_function_url_is_a_cloud_that_may_fail(flyer: Flyer) -> None:
     with serving(served) as url:
         content = environment(endpoint(url=f"{url}/detect", timeout=20.0, cost=3.0))
         with flyer.flying(build("fn"), content, speed=1.0) as env:
-            until(env, lambda v: v["outcomes"].get("done", 0) >= 6)
+            until(env, lambda v: v.get("outcomes", {}).get("done", 0) >= 6)
             served.mood = "500"
-            until(env, lambda v: v["outcomes"].get("failed", 0) >= 4)
+            until(env, lambda v: v.get("outcomes", {}).get("failed", 0) >= 4)
             served.mood = ""
             done = values(env)["outcomes"]["done"]
-            until(env, lambda v: v["outcomes"]["done"] >= done + 4)
+            until(env, lambda v: v.get("outcomes", {})["done"] >= done + 4)
             env.get_robot_by_id("drone").end_mission()
     run = env.launch()
     told = [a["text"] for a in recorded(run, "aerodaas.Alert") if a["kind"] == "cloud_failed"]
