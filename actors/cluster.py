@@ -133,7 +133,9 @@ def discover() -> list[ComputeConfig]:
 def options_for(place: Place, *, restarts: int) -> dict[str, Any]:
     """Ray's options for an actor at `place`.
 
-    Raises ConfigError if no node of the cluster fits.
+    Of several edges, the one where the application was started is meant: the drone is beside it,
+    and an actor that Ray restarts must not wander off to another. Raises ConfigError if no node
+    of the cluster fits.
     """
     resource = f"node:{place.node}" if place.node else place.kind
     if resource not in ray.cluster_resources():
@@ -141,4 +143,17 @@ def options_for(place: Place, *, restarts: int) -> dict[str, Any]:
         raise ConfigError(
             f"no node of the cluster offers {resource!r}; of edge and cloud it has: {offered}"
         )
-    return {"num_cpus": 0, "resources": {resource: _SHARE}, "max_restarts": restarts}
+    resources = {resource: _SHARE}
+    if resource == "edge":
+        resources |= dict.fromkeys(_own_edge(), _SHARE)
+    return {"num_cpus": 0, "resources": resources, "max_restarts": restarts}
+
+
+def _own_edge() -> list[str]:
+    """The resource that only this process's node offers, if that node is an edge."""
+    own = ray.get_runtime_context().get_node_id()
+    return [
+        f"node:{node['NodeManagerAddress']}"
+        for node in ray.nodes()
+        if node["NodeID"] == own and "edge" in node["Resources"]
+    ]

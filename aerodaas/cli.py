@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `remote`, `lab`, `cluster`, `schema`, `doctor`, and for recordings."""
+"""The command line: `aerodaas run`, `remote`, `lab`, `cluster`, ..., and for recordings."""
 
 from __future__ import annotations
 

@@ -47,7 +47,7 @@ class EdgeCloud:
         Ray's processes.
         """
         if cloud < 0 or edges < 1 or cloud + edges > _MOST:
-            raise ConfigError(f"an edge–cloud here has 1 edge and up to {_MOST - 1} other nodes")
+            raise ConfigError(f"an edge-cloud here has 1 edge and up to {_MOST - 1} other nodes")
         self._shape = shape or Shape()
         self._kinds = {f"cloud{number}": "cloud" for number in range(1, cloud + 1)}
         self._kinds |= {f"edge{number}": "edge" for number in range(2, edges + 1)}

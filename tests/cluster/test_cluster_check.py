@@ -1,4 +1,4 @@
-"""What `aerodaas cluster check` and an application say of clusters that are not as they should be."""
+"""What is said of clusters that are not as they should be, and that nothing is left of them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,10 @@ def aerodaas(*words: str, **env: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "aerodaas", *words],
         env={**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "240", **env},
-        capture_output=True, text=True, timeout=200, check=False,
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
     )
 
 
@@ -58,7 +61,7 @@ def test_the_clocks_offset_is_taken_from_the_shortest_round_trip() -> None:
     """A slow one, of which nobody knows which way it was slow, does not count."""
     quick = (1_000_000_000, 3_010_000_000, 1_020_000_000)
     slow = (2_000_000_000, 4_900_000_000, 3_000_000_000)
-    assert clock_offset([slow, quick]) == (pytest.approx(2.0), pytest.approx(0.01))
+    assert clock_offset([slow, quick]) == pytest.approx((2.0, 0.01))
 
 
 class TestGood:
@@ -105,8 +108,14 @@ class TestGood:
         )
         path = os.pathsep.join([str(ROOT), str(ROOT / "tests/actors")])
         ended = aerodaas(
-            "run", str(tmp_path / "app.py"), "--address", small.address, "--no-view",
-            "--record", str(tmp_path / "out"), PYTHONPATH=path,
+            "run",
+            str(tmp_path / "app.py"),
+            "--address",
+            small.address,
+            "--no-view",
+            "--record",
+            str(tmp_path / "out"),
+            PYTHONPATH=path,
         )
         assert ended.returncode == 2
         assert "no node of the cluster offers 'node:10.1.2.3'" in ended.stderr
@@ -133,7 +142,10 @@ class TestBad:
         token.write_text("the-clusters-own-token-the-clusters-own-token")
         variables = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN_PATH": str(token)}
         with EdgeCloud(0, variables=variables) as cluster:
-            for env in ({**variables, "RAY_AUTH_TOKEN": "another-token"}, {"RAY_AUTH_MODE": "disabled"}):
+            for env in (
+                {**variables, "RAY_AUTH_TOKEN": "another-token"},
+                {"RAY_AUTH_MODE": "disabled"},
+            ):
                 told = aerodaas("cluster", "check", cluster.address, **env)
                 assert told.returncode == 1
                 assert "refuses our token" in told.stderr
@@ -181,12 +193,13 @@ class TestBad:
 @pytest.mark.slow
 def test_nothing_is_left() -> None:
     """Neither a process nor a device, even if the command is killed."""
-    devices = set(os.listdir("/sys/class/net"))
+    devices = _devices()
     words = ["cluster", "local", "--cloud", "1", "--rtt", "5ms"]
     with subprocess.Popen(
         [sys.executable, "-m", "aerodaas", *words],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE, text=True,
+        stdout=subprocess.PIPE,
+        text=True,
     ) as process:
         assert process.stdout is not None
         assert any("Ctrl-C" in line for line in process.stdout)
@@ -196,7 +209,7 @@ def test_nothing_is_left() -> None:
     _, left = psutil.wait_procs(below, timeout=20)
     assert left == []
     deadline = time.monotonic() + 20
-    while set(os.listdir("/sys/class/net")) - devices:
+    while _devices() - devices:
         assert time.monotonic() < deadline
         time.sleep(0.2)
 
@@ -206,6 +219,10 @@ def test_without_root() -> None:
     """Said at once, with what to do instead."""
     with pytest.raises(ConfigError, match="need root"):
         EdgeCloud(1)
+
+
+def _devices() -> set[str]:
+    return {path.name for path in Path("/sys/class/net").iterdir()}
 
 
 _PRETEND = """
