@@ -63,6 +63,14 @@ def run(
             "the published ones.",
         ),
     ] = "3D-A",
+    flown: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            help="A recorded flight (`flight.mcap`) instead of a workload: its tasks as they "
+            "came, with the execution times observed.",
+        ),
+    ] = None,
     scheduler: Names = "ec_edf,dems,gems,margin",
     seeds: Annotated[int, typer.Option(help="Number of seeds, 0 to N-1.", min=1)] = 10,
     network: Annotated[
@@ -83,7 +91,10 @@ def run(
     duration: Annotated[
         float | None, typer.Option(help="Simulated seconds; default 300, or the file's.")
     ] = None,
-    cloud_slots: Annotated[int, typer.Option(help="Executions in the cloud at once.", min=0)] = 32,
+    cloud_slots: Annotated[
+        int | None,
+        typer.Option(help="Executions in the cloud at once; default 32, or the flight's.", min=0),
+    ] = None,
     bound: Annotated[
         bool | None,
         typer.Option(help="Compute the clairvoyant bound; by default for up to 10 edges."),
@@ -102,13 +113,16 @@ def run(
     QoS utility as a share of what a clairvoyant could reach at most on the very same paths.
 
         aerodaas lab run -w 2D-A,4D-A -s ec_edf,dems,margin --times lognormal:0.15 --plots out
+
+        aerodaas lab run --from runs/patrol/flight.mcap -s dems,margin,mine.py:Mine
     """
     try:
         results: list[LabResult] = []
-        resources = Resources(cloud_slots=cloud_slots)
         names = [name.strip() for name in scheduler.split(",")]
-        for name in SIX if workload == "six" else workload.split(","):
-            load = _workload(name.strip(), duration)
+        loads, resources = _loads(workload, flown, duration)
+        if cloud_slots is not None:
+            resources = Resources(cloud_slots=cloud_slots)
+        for load in loads:
             with_bound = load.edges <= 10 if bound is None else bound  # noqa: PLR2004 - see help
             with _progress() as progress:
                 bar = progress.add_task(load.name, total=seeds * load.edges)
@@ -187,6 +201,19 @@ def result_table(result: LabResult) -> Table:
 def _workload(name: str, duration: float | None) -> Workload:
     found = load_workload(name) if name.endswith(".json") else Workload.named(name)
     return found if duration is None else found.lasting(round(duration * NANOSECONDS))
+
+
+def _loads(
+    names: str, flown: Path | None, duration: float | None
+) -> tuple[list[Workload], Resources]:
+    if flown is None:
+        wanted = SIX if names == "six" else names.split(",")
+        return [_workload(name.strip(), duration) for name in wanted], Resources()
+    # Reading a recording takes libraries that simulating does not.
+    from aerodaas.commands.flown_workload import flown_workload  # noqa: PLC0415
+
+    workload, resources = flown_workload(flown)
+    return [workload], resources
 
 
 def _progress() -> Progress:

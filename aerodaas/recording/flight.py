@@ -217,6 +217,8 @@ def _setpoint(flight: Flight, record: Record) -> None:
 
 
 def _latency(flight: Flight, record: Record) -> None:
+    if len(record.value["hops"]) == 1:
+        return
     latency = flight.latencies[record.value["stream"]]
     latency.total.append(float(record.value["total_ms"]))
     for hop in record.value["hops"]:

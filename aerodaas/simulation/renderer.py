@@ -27,7 +27,7 @@ from aerodaas.data import Odometry
 from aerodaas.errors import SourceError
 from aerodaas.geometry import CameraModel, rotation_from_rpy
 from aerodaas.simulation.scene.light import HAZE
-from aerodaas.simulation.scene.scene import Scene
+from aerodaas.simulation.scene.scene import Looks, Scene
 from aerodaas.simulation.world import World
 
 __all__ = ["Renderer"]
@@ -54,7 +54,7 @@ class Renderer:
     Raises SourceError if the software renderer cannot be had.
     """
 
-    def __init__(self, world: World, camera: CameraModel) -> None:
+    def __init__(self, world: World, camera: CameraModel, looks: Looks | None = None) -> None:
         """Build the scene and an offscreen buffer of the camera's size."""
         load_prc_file_data("aerodaas", _SETTINGS)
         self._camera = camera
@@ -69,7 +69,7 @@ class Renderer:
             )
         # An engine of its own: rendering one camera must not render all others of the process.
         self._engine = GraphicsEngine(pipe)
-        self._scene = Scene(world)
+        self._scene = Scene(world, looks)
         self._eye = self._scene.root.attach_new_node(Camera("eye", _lens(camera)))
         self._buffer, self._pixels = self._open(pipe)
 

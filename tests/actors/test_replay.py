@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -21,12 +23,16 @@ from aerodaas import (
     Frame,
     NavigableAnalytics,
     NavigationType,
+    NearestNeighborScheduler,
+    SchedulingType,
     VelocityCommand,
+    Waypoint,
 )
 from aerodaas.analytics.base import Context
 from aerodaas.data import Detection
 from aerodaas.errors import RecordingError
 from aerodaas.recording.difference import difference
+from aerodaas.recording.pace import read_pace
 from aerodaas.recording.reader import Recording
 from aerodaas.run import Run
 
@@ -138,6 +144,52 @@ def test_pictures_without_loss_repeat_exactly(flyer: Flyer) -> None:
     assert found.agrees, str(found)
     (seen,) = [stream for stream in found.streams if stream.what.endswith("detections")]
     assert seen.same > 20
+
+
+class Tardy(Brightest):
+    """Takes longer than a frame lasts, so that in flight it misses some, and answers not all."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.seen = 0
+
+    def process(self, item: Frame, context: Context) -> Detections | None:  # type: ignore[override]
+        """Count what it saw, so that one frame more or less shows in all that follow."""
+        self.seen += 1
+        time.sleep(0.05 + 0.2 * (self.seen % 3 == 0))
+        state = context.vehicle()
+        assert state is not None
+        found = super().process(item, context)
+        height = float(state.odometry.position[2])
+        return None if self.seen % 5 == 0 else replace(
+            found, items=(replace(found.items[0], score=0.01 * self.seen + height),)
+        )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_flight_by_the_clock_repeats_every_decision(flyer: Flyer) -> None:
+    """In real time turns come when they can, frames are missed, answers and plans are late."""
+
+    def build(env: Environment) -> None:
+        drone = env.get_robot_by_id("drone")
+        scheduler = NearestNeighborScheduler(env)
+        env.set_trajectory_scheduler(scheduler)
+        places = [Waypoint(f"wp{x}{y}", x, y, 2.0) for x, y in ((4, 4), (1, 0), (0, 3))]
+        plan = AeroNavigation(NavigationType.DISTANCE_DRIVEN, places, SchedulingType.UNORDERED)
+        drone.navigate(scheduler.generate_navigation(plan))
+        found = Tardy().analyse(drone.get_sensor_by_id("cam").get_data_stream())
+        drone.navigate(Chase().analyse(found))
+        end_after(env, 24)
+
+    first = flyer.fly(build, with_camera("png"), record=flyer.folder / "first", lockstep=False)
+    assert first.recording is not None
+    found = difference(first.recording, again(flyer, first, build))
+    assert found.agrees, str(found)
+    counted = {stream.what: stream.same for stream in found.streams}
+    assert counted["drone/chase navigation"] == counted["drone/tardy detections"] > 10
+    pace = read_pace(first.recording)
+    assert len(pace.work["drone/tardy"]["drone/cam"]) < len(pace.readings["drone/cam"])
+    assert pace.plans["drone"]
 
 
 def test_another_scheduler_and_lossy_pictures_differ(flyer: Flyer) -> None:
