@@ -16,6 +16,7 @@ import pytest
 
 from aerodaas.cluster import EdgeCloud, Shape
 from aerodaas.cluster.probe import clock_offset
+from aerodaas.cluster.ray_node import environment
 from aerodaas.cluster.trace import TracePlayer
 from aerodaas.errors import ConfigError
 from aerodaas.schedulers.lab.network import Network
@@ -118,7 +119,7 @@ class TestGood:
             PYTHONPATH=path,
         )
         assert ended.returncode == 2
-        assert "no node of the cluster offers 'node:10.1.2.3'" in ended.stderr
+        assert "no node of the cluster is called '10.1.2.3'; known: 10." in ended.stderr
         assert ended.stderr.count("error:") == 1
 
 
@@ -187,6 +188,50 @@ class TestBad:
         assert "ray stop" in told.stdout
         assert "ms ahead → set both clocks by NTP" in told.stdout
         assert f"{useless.address} offers neither edge nor cloud" in told.stdout
+
+
+@needs_root
+@pytest.mark.slow
+def test_the_join_script(tmp_path: Path) -> None:
+    """An edge joins, stays, cannot join twice, and says what is wrong with the address."""
+    script = str(ROOT / "clusters/edge-join.sh")
+    (tmp_path / "bin").mkdir()
+    for name, module in (("python", ""), ("ray", "-m ray.scripts.scripts")):
+        program = tmp_path / "bin" / name
+        program.write_text(f'#!/bin/sh\nexec {sys.executable} {module} "$@"\n')
+        program.chmod(0o755)
+    with EdgeCloud(0) as cluster:
+        far = cluster.add("jetson", {})
+        env = environment(AERODAAS_VENV=str(tmp_path))
+        wrong = subprocess.run(
+            far.machine.words(script, f"{cluster.host}:1"),
+            env=env,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert wrong.returncode == 1
+        assert f"no Ray cluster answers at {cluster.host}:1" in wrong.stderr
+        with subprocess.Popen(
+            far.machine.words(script, cluster.address), env=env, stdout=subprocess.PIPE, text=True
+        ) as staying:
+            assert staying.stdout is not None
+            assert f"as {far.address} with" in staying.stdout.readline()
+            assert any("Ray runtime started" in line for line in staying.stdout)
+            twice = subprocess.run(
+                far.machine.words(script, cluster.address),
+                env=env,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert twice.returncode == 1
+            assert "runs on this machine already" in twice.stderr
+            told = aerodaas("cluster", "check", cluster.address)
+            assert any(
+                far.address in line and "edge," in line for line in told.stdout.splitlines()
+            ), told.stdout
+            far.machine.power_off()
 
 
 @needs_root

@@ -17,7 +17,7 @@ from aerodaas.cluster.network import Far, LocalNetwork
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.timeout(400),
+    pytest.mark.timeout(900),
     pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
     pytest.mark.skipif(
         not all(map(shutil.which, ("ssh", "ssh-keygen", "rsync", "/usr/sbin/sshd"))),
@@ -100,12 +100,12 @@ def test_workers_start_as_well_as_the_head(hosts: list[Far], tmp_path: Path) -> 
         env=env,
         capture_output=True,
         text=True,
-        timeout=200,
+        timeout=500,
         check=False,
     )
     assert up.returncode == 0, up.stdout + up.stderr
     address = f"{hosts[0].address}:6379"
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 240
     found = ""
     while found.count("10.") < 3:
         assert time.monotonic() < deadline, found + _monitor_log(hosts[0])
