@@ -70,7 +70,7 @@ class Probe:
         )
 
     def now(self) -> int:
-        """This node's clock, nanoseconds since the epoch."""
+        """The clock of this node, nanoseconds since the epoch."""
         return host_time_ns()
 
     def take(self, data: bytes) -> int:
