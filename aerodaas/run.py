@@ -176,6 +176,13 @@ class Run:
         compute = self._environment.compute()
         return make_plan(session, self.graph, compute, scheduler, dispatch_with)
 
+    def _check_world(self) -> None:
+        """Raise ConfigError for a broken scenario here rather than in some actor."""
+        from aerodaas.simulation.scenario import load_scenario  # noqa: PLC0415 - only here
+
+        if any(robot.driver == "simulated" for robot in self.config.robots):
+            load_scenario(self.config.simulation.world)
+
     def _pace(self) -> Pace:
         from aerodaas.recording.pace import Pace, read_pace  # noqa: PLC0415 - loads readers
 
