@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -58,6 +59,8 @@ class RecorderActor(StreamActor):
         home = environment.home
         name = self._provenance.name
         self._live = LiveServer(self._address, name) if self._address else None
+        # One that was restarted leaves what its predecessor wrote alone, and writes a second part.
+        self._path = _unwritten(self._path)
         self._page = _camera_page(self._page_address)
         self._recorder = FlightRecorder(
             self._path,
@@ -121,6 +124,15 @@ class RecorderActor(StreamActor):
 
     def _values(self) -> dict[str, Any]:
         return {"path": str(self._path), "failure": self._failure}
+
+
+def _unwritten(path: Path) -> Path:
+    """`path`, or the first of `flight.2.mcap`, `flight.3.mcap`, ... that is not there yet."""
+    parts = itertools.count(2)
+    part = path
+    while part.exists():
+        part = path.with_suffix(f".{next(parts)}{path.suffix}")
+    return part
 
 
 def _camera_page(address: str | None) -> CameraPage | None:
