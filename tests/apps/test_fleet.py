@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from flying import Flyer
 
-ROOT = Path(__file__).parents[2]
-sys.path.append(str(ROOT / "benchmarks"))
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
 from missions.evidence import Evidence
 
+APPLICATION = Path(__file__).parents[2] / "apps" / "fleet_survey.py"
 DRONES = ("left", "middle", "right")
 
 
@@ -23,9 +23,8 @@ DRONES = ("left", "middle", "right")
 @pytest.mark.timeout(600)
 def test_three_drones_share_an_area(flyer: Flyer) -> None:
     """Every waypoint is visited by one of them; all come home, and never near each other."""
-    application = ROOT / "apps" / "fleet_survey.py"
-    with flyer.options(application=application, seed=0):
-        runpy.run_path(str(application), run_name="__main__")
+    with flyer.options(application=APPLICATION, seed=0):
+        runpy.run_path(str(APPLICATION), run_name="__main__")
     recording = flyer.folder / "flight" / "flight.mcap"
     flights = {name: Evidence.read(recording, name) for name in DRONES}
     visits = Counter(place for flight in flights.values() for place in flight.robot.visited)
