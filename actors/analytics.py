@@ -18,7 +18,8 @@ from typing import Any
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
 from aerodaas.actors._link import StreamLink
-from aerodaas.actors.session import MESSAGE_DEPTH, Session, is_due, next_due
+from aerodaas.actors.replayed import RecordedWork
+from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
 from aerodaas.actors.streams import Inbox, Outlet
 from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.analytics.commanding import CommandingAnalytics
@@ -83,12 +84,26 @@ class AnalyticsActor(StreamActor):
         """Belong to `session` as `name`."""
         super().__init__(session, name, {})
         self._workers: list[_Worker] = []
+        self._started = threading.Event()
 
     def prepare(self, *nodes: NodeSpec) -> ActorInfo:
         """Open the analyses `nodes`; raises what their `open` raises."""
         # Not in the constructor: Ray would keep the models in its object store for restarts.
         self._workers = [_Worker(self, node) for node in nodes]
         return super().prepare()
+
+    def start(self, origin_ns: int) -> None:
+        """Run in threads; mission time is zero at host time `origin_ns`."""
+        super().start(origin_ns)
+        self._started.set()
+
+    def await_start(self) -> None:
+        """Return once the analyses run; for a lifeline."""
+        self._started.wait()
+
+    def await_stop(self) -> None:
+        """Return when the actor is stopped; for a lifeline."""
+        self._stopping.wait()
 
     def _open(self) -> None:
         for worker in self._workers:
@@ -178,6 +193,9 @@ class _Worker:
         """Stamp of the measurement that woke it; None while it sleeps."""
         self._states: deque[tuple[int, VehicleState]] = deque(maxlen=states)
         self._now = 0
+        self._asked: int | None = None
+        """Stamp of the state that the present item is worked on by."""
+        self._recorded = RecordedWork(actor.session, node.stream, node.robot)
 
     def open(self) -> None:
         session = self._actor.session
@@ -218,7 +236,8 @@ class _Worker:
     def _run_external(self) -> None:
         """In lockstep an external source ticks with the drone's states."""
         for message in self._receive(0.5):
-            if message.stream == self.node.state and is_due(self._rate, message.stamp):
+            due = self._actor.session.is_due(self.node.stream, self._rate, message.stamp)
+            if message.stream == self.node.state and due:
                 self._produce(message.stamp)
 
     def _run_paced(self) -> None:
@@ -235,11 +254,12 @@ class _Worker:
     def _produce(self, stamp: int) -> None:
         header = Header(self._results.sent, stamp, self.node.stream)
         captured = host_time_ns()
-        item = self._process(None, stamp) if self._awake(stamp) else None
+        awake = self._awake(stamp)
+        item = self._process(None, stamp) if awake else None
         if item is not None:
             origin = Message(self.node.stream, header.id, stamp, header, captured, (), item)
             self._fire(item, origin)
-        if item is not None or self._actor.session.lockstep:
+        if awake or self._actor.session.lockstep:
             self._acknowledge(self._results.measure(item, header, captured))
 
     def _receive(self, timeout: float) -> list[Message[Any]]:
@@ -265,20 +285,24 @@ class _Worker:
 
     def _work(self, message: Message[Any]) -> None:
         received = host_time_ns()
+        awake = self._awake(message.header.stamp)
         result = None
-        if message.item is not None and self._awake(message.header.stamp):
+        if message.item is not None and awake and self._recorded.includes(message.header):
+            self._recorded.turn_to(message.header)
             result = self._process(message.item, message.header.stamp)
         if result is not None:
             self._fire(result, message)
-        if result is not None or self._actor.session.lockstep or self.node.answers_always:
-            self._results.derive(result, message, received, self._stamp(message))
+        # An answer without a result tells a replay that this item was worked on.
+        if awake or self._actor.session.lockstep or self.node.answers_always:
+            stamp = self._stamp(message)
+            self._results.derive(result, message, received, stamp, self._asked)
         self._acknowledge(message)
 
     def _stamp(self, message: Message[Any]) -> int:
         return message.stamp if self._actor.session.lockstep else self._actor.clock.now()
 
     def _process(self, item: Any, now: int) -> Any:  # noqa: ANN401
-        self._now = now
+        self._now, self._asked = now, None
         began = self._at_work_since = time.perf_counter()
         try:
             return self.node.work.process(item, self)
@@ -340,10 +364,14 @@ class _Worker:
         return self._now
 
     def vehicle(self) -> VehicleState | None:
-        """In lockstep the state at the item's own time, however far the drone has flown since."""
+        """The newest state; in lockstep at the item's own time, however far we have flown since."""
+        recorded = self._recorded.vehicle()
+        if recorded is not None:
+            return recorded
         lockstep = self._actor.session.lockstep
-        known = (s for at, s in reversed(self._states) if at <= self._now or not lockstep)
-        return next(known, None)
+        known = (one for one in reversed(self._states) if one[0] <= self._now or not lockstep)
+        self._asked, state = next(known, (None, None))
+        return state
 
     def alert(self, alert: Alert) -> None:
         # In lockstep only the messages know the time, not the actor's clock.

@@ -16,17 +16,23 @@ from aerodaas.actors._barrier import ACKS, Barrier
 from aerodaas.actors._base import StreamActor
 from aerodaas.actors._names import reply_stream, request_stream, state_stream
 from aerodaas.actors.pilot import Pilot, RobotSpec
-from aerodaas.actors.session import CONTROL_PERIOD_NS, MESSAGE_DEPTH, Session, next_due
-from aerodaas.clock import NANOSECONDS, LockstepClock
+from aerodaas.actors.session import (
+    CONTROL_PERIOD_NS,
+    CONTROL_RATE,
+    MESSAGE_DEPTH,
+    Session,
+    next_due,
+)
+from aerodaas.clock import LockstepClock
 from aerodaas.errors import AeroDaaSError
 from aerodaas.navigation.commands import Answer, Command, ReturnHome
 from aerodaas.navigation.safety import Neighbour
+from aerodaas.recording.pace import NEVER
 from aerodaas.status import Message, MissionStatus
 from aerodaas.vehicle import VehicleState
 
 __all__ = ["Conduct", "DroneActor", "RobotReport"]
 
-_CONTROL_RATE = NANOSECONDS / CONTROL_PERIOD_NS
 _APPLICATION_TIMEOUT = 5.0
 """Seconds without a word from the application's process after which the drone comes home."""
 
@@ -140,27 +146,33 @@ class DroneActor(StreamActor):
             if now < due:
                 continue
             self._late += now - due > CONTROL_PERIOD_NS // 2
-            self._turn(now)
+            for pilot in self._pilots.values():
+                pilot.advance_to(now)
+                self._turn(pilot, now)
             for pilot in self._pilots.values():
                 pilot.observe(now)
             self._watch_application()
-            due = next_due(_CONTROL_RATE, now)
+            due = next_due(CONTROL_RATE, now)
 
     def _run_lockstep(self) -> None:
         assert isinstance(self.clock, LockstepClock)  # noqa: S101 - the session says so
         self._barrier = Barrier(self._conduct.windows)
         rates = self._conduct.rates
         due = {source: self.session.next_due(source, rates[source], -1) for source in rates}
-        control = 0
+        turns = {name: self.session.next_turn(name, -1) for name in self._pilots}
         while not self._over():
             readings = [pilot.next_reading for pilot in self._pilots.values()]
-            now = min([control, *due.values(), *(stamp for stamp in readings if stamp is not None)])
+            now = min([*turns.values(), *due.values(), *readings])
+            if now == NEVER:
+                break
             self.clock.advance_to(now)
-            for pilot in self._pilots.values():
+            for name, pilot in self._pilots.items():
                 pilot.advance_to(now)
-            if now == control:
-                self._turn(now)
-                control = next_due(_CONTROL_RATE, now)
+                with self._obeying:
+                    pilot.listen(now)
+                if now == turns[name]:
+                    self._turn(pilot, now)
+                    turns[name] = self.session.next_turn(name, now)
             self._measure(now, due)
             self._await(drain=False)
         self._await(drain=True)
@@ -207,18 +219,15 @@ class DroneActor(StreamActor):
         elif message.stream in self._steering:
             self._barrier.acknowledge(message.header.source, message.header.stamp)
 
-    def _turn(self, now: int) -> None:
-        for pilot in self._pilots.values():
-            if not self.session.lockstep:
-                pilot.advance_to(now)
-            others = [where for name, where in self._whereabouts.items() if name != pilot.id]
-            with self._obeying:
-                pilot.turn(now, others)
-            state = pilot.loop.state
-            if state is not None:
-                self._whereabouts[pilot.id] = _neighbour(state)
-            for alert in pilot.new_alerts():
-                self.alert(alert.kind, alert.text, **alert.values)
+    def _turn(self, pilot: Pilot, now: int) -> None:
+        others = [where for name, where in self._whereabouts.items() if name != pilot.id]
+        with self._obeying:
+            pilot.turn(now, others)
+        state = pilot.loop.state
+        if state is not None:
+            self._whereabouts[pilot.id] = _neighbour(state)
+        for alert in pilot.new_alerts():
+            self.alert(alert.kind, alert.text, **alert.values)
 
     def _take(self, message: Message[Any], now: int) -> None:
         if message.stream in self._neighbours and isinstance(message.item, VehicleState):

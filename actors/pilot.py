@@ -5,14 +5,15 @@ from __future__ import annotations
 import contextlib
 from collections import deque
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from aerodaas.actors._names import reply_stream, request_stream, state_stream, status_stream
 from aerodaas.actors.planner import PlannerExecutor
-from aerodaas.actors.session import Session, next_due
+from aerodaas.actors.replayed import Arrivals, WatchedPlanner, as_planned
+from aerodaas.actors.session import Session
 from aerodaas.actors.streams import Outlet
 from aerodaas.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.config import RobotConfig, SensorConfig
@@ -22,11 +23,12 @@ from aerodaas.geometry import GeodeticOrigin
 from aerodaas.navigation.commands import Answer, Command, Reply, Request, Start, StreamItem
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
-from aerodaas.navigation.planner import BackgroundPlanner, InlinePlanner, solve
+from aerodaas.navigation.planner import BackgroundPlanner, solve
 from aerodaas.navigation.safety import Neighbour
 from aerodaas.plugins import load_plugin
+from aerodaas.recording.pace import NEVER
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
-from aerodaas.status import Message, MissionStatus, SetpointRecord
+from aerodaas.status import Heard, Message, MissionStatus, SetpointRecord
 from aerodaas.vehicle import (
     ClockedVehicle,
     PlayedVehicle,
@@ -86,7 +88,10 @@ class Pilot:
         self._told = 0
         self._turned = -1
         self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
-        self._due = {sensor.id: next_due(sensor.rate, -1) for sensor in spec.sensors}
+        self._due = {sensor.id: self._next_due(sensor, -1) for sensor in spec.sensors}
+        self._arrivals = Arrivals(session.pace.heard.get(self.id, ()), spec.commands)
+        self._heard: list[Heard] = []
+        """Since the last turn."""
         plugin = load_plugin("drivers", spec.robot.driver)
         self.vehicle: Vehicle = plugin(spec.robot, session.environment)
 
@@ -99,9 +104,14 @@ class Pilot:
         home = environment.home
         # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
         inline = self._session.lockstep
+        self._planner = WatchedPlanner(
+            as_planned(self.spec.scheduler, self._session.pace.plans.get(self.id, ()))
+            if inline
+            else self._background()
+        )
         self.mission = Mission(
             robot,
-            InlinePlanner(self.spec.scheduler) if inline else self._background(),
+            self._planner,
             takeoff=takeoff,
             origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
             wind=np.array(environment.simulation.wind, dtype=np.float64),
@@ -149,21 +159,38 @@ class Pilot:
         return self.mission.handle(command, now)
 
     def take(self, message: Message[Any], now: int) -> None:
-        """Pass on what came by stream: navigation, or a command of a trigger."""
+        """Pass on what came by stream: navigation, or a command of a trigger.
+
+        In a replay, it counts when it did in the recorded flight: `listen` passes it on.
+        """
         if message.item is None:
             return
         if message.stream in self.spec.navigation:
             self.latencies.append((host_time_ns() - message.captured) / 1e6)
-            self.handle(StreamItem(message.stream, message.item, message.header), now)
-        elif message.stream in self.spec.commands:
-            self.handle(message.item, now)
+        if message.stream in (*self.spec.navigation, *self.spec.commands):
+            self._arrivals.add(message, now)
+            if not self._session.lockstep:
+                self.listen(now + 1)
         elif message.stream in self._replies and isinstance(message.item, Request):
             reply = Reply(message.item.number, self.handle(message.item.command, now))
             self._publish(self._replies[message.stream], reply, now)
 
+    def listen(self, now: int) -> None:
+        """Have the mission hear what counts before `now`."""
+        for message, at in self._arrivals.before(now):
+            header = message.header
+            self._heard.append(Heard(message.stream, header.source, header.stamp, at))
+            if message.stream in self.spec.navigation:
+                self.handle(StreamItem(message.stream, message.item, header), at)
+            else:
+                self.handle(message.item, at)
+
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
         """One turn of the setpoint loop; publishes what was decided."""
+        self._planner.turn(now)
         record = self.loop.turn(now, neighbours)
+        record = replace(record, heard=tuple(self._heard), planned=self._planner.answered)
+        self._heard.clear()
         self._turned = now
         self._publish(f"{self.id}/setpoints", record, now)
         self._publish(status_stream(self.id), self.mission.status, now)
@@ -180,15 +207,18 @@ class Pilot:
         published = [self._publish(state_stream(self.id), state, now)]
         for sensor in self.spec.sensors:
             if self._due[sensor.id] <= now:
-                self._due[sensor.id] = next_due(sensor.rate, now)
+                self._due[sensor.id] = self._next_due(sensor, now)
                 item = sensor_item(sensor, state, self.mission.status)
                 published.append(self._publish(f"{self.id}/{sensor.id}", item, now))
         return published
 
+    def _next_due(self, sensor: SensorConfig, after: int) -> int:
+        return self._session.next_due(f"{self.id}/{sensor.id}", sensor.rate, after)
+
     @property
-    def next_reading(self) -> int | None:
-        """When the next sensor is due; None without sensors."""
-        return min(self._due.values(), default=None)
+    def next_reading(self) -> int:
+        """When the next sensor is due; NEVER without sensors."""
+        return min(self._due.values(), default=NEVER)
 
     @property
     def over(self) -> bool:

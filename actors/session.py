@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import uuid
-from bisect import bisect_right
 from dataclasses import dataclass, field, replace
 
 from aerodaas.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
 from aerodaas.config import EnvironmentConfig
+from aerodaas.recording.pace import Pace, later
 
 __all__ = [
     "CONTROL_PERIOD_NS",
+    "CONTROL_RATE",
     "FRAME_DEPTH",
     "MESSAGE_DEPTH",
-    "NEVER",
     "Session",
     "is_due",
     "next_due",
@@ -23,10 +23,9 @@ FRAME_DEPTH = 8
 """Frames that may wait for a reader that wants them all; each is megabytes of shared memory."""
 MESSAGE_DEPTH = 32
 """Other messages that may wait for a reader that wants them all."""
-NEVER = 2**63 - 1
-"""A stamp that does not come."""
-CONTROL_PERIOD_NS = NANOSECONDS // 20
-"""Period of the setpoint loop: 20 Hz, ten times what PX4 asks for in offboard mode."""
+CONTROL_RATE = 20.0
+"""Turns of the setpoint loop in a second: ten times what PX4 asks for in offboard mode."""
+CONTROL_PERIOD_NS = int(NANOSECONDS / CONTROL_RATE)
 
 
 @dataclass(frozen=True)
@@ -40,17 +39,18 @@ class Session:
     """Prefix of the run's stream names; unique on a host."""
     origin_ns: int = field(default_factory=host_time_ns)
     """Host time at which mission time is zero."""
-
-    frame_stamps: dict[str, tuple[int, ...]] = field(default_factory=dict)
-    """In a replay, when each camera took its pictures, by stream."""
+    pace: Pace = field(default_factory=Pace)
+    """In a replay, what the recorded flight did when."""
 
     def next_due(self, source: str, rate: float, after: int) -> int:
         """The first stamp later than `after` at which `source`, of `rate` Hz, is due."""
-        stamps = self.frame_stamps.get(source)
-        if stamps is None:
-            return next_due(rate, after)
-        place = bisect_right(stamps, after)
-        return stamps[place] if place < len(stamps) else NEVER
+        stamps = self.pace.readings.get(source)
+        return next_due(rate, after) if stamps is None else later(stamps, after)
+
+    def next_turn(self, robot: str, after: int) -> int:
+        """The first stamp later than `after` at which the setpoint loop of `robot` turns."""
+        turns = self.pace.turns.get(robot)
+        return next_due(CONTROL_RATE, after) if turns is None else later(turns, after)
 
     def is_due(self, source: str, rate: float, stamp: int) -> bool:
         """Tell whether `source`, of `rate` Hz, is due at `stamp`."""

@@ -1,9 +1,8 @@
-"""What a run needs to fly a recording again: its environment, with players for its hardware."""
+"""The environment in which a recording is flown again, with players for its hardware."""
 
 from __future__ import annotations
 
 import json
-from collections import defaultdict
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ from aerodaas.errors import RecordingError
 from aerodaas.recording.encoding import topic
 from aerodaas.recording.reader import Recording
 
-__all__ = ["frame_stamps", "replay_environment"]
+__all__ = ["replay_environment"]
 
 _FINITE = frozenset({"folder", "recorded", "video", "mcap"})
 """Cameras that may run out of pictures, which ends a mission that flies by them."""
@@ -44,15 +43,6 @@ def replay_environment(path: str | Path) -> EnvironmentConfig:
         _play(sensor, sensor["id"], path)
     content["recording"] |= {"enabled": True, "path": None, "images": "none"}
     return validated(content, f"the environment in {path}")
-
-
-def frame_stamps(path: str | Path) -> dict[str, tuple[int, ...]]:
-    """Mission times of the recorded frames, in order, by camera."""
-    stamps: dict[str, list[int]] = defaultdict(list)
-    with Recording.open(path) as recording:
-        for record in recording.records(schemas=("aerodaas.Frame",)):
-            stamps[record.value["source"]].append(record.value["stamp"])
-    return {source: tuple(sorted(set(times))) for source, times in stamps.items()}
 
 
 def _play(sensor: dict[str, Any], stream: str, path: Path) -> None:

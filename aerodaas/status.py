@@ -11,7 +11,15 @@ from aerodaas.records import travels
 from aerodaas.vehicle import Setpoint
 from aerodaas.waypoints import Waypoint
 
-__all__ = ["Decision", "Hop", "Message", "MissionState", "MissionStatus", "SetpointRecord"]
+__all__ = [
+    "Decision",
+    "Heard",
+    "Hop",
+    "Message",
+    "MissionState",
+    "MissionStatus",
+    "SetpointRecord",
+]
 
 E = TypeVar("E")
 
@@ -73,6 +81,18 @@ class MissionStatus:
         return len(self.visited) / known if known else 0.0
 
 
+class Heard(NamedTuple):
+    """Something that reached a mission by stream."""
+
+    stream: str
+    source: str
+    """Of the measurement that it was made from."""
+    stamp: int
+    """Of that measurement."""
+    at: int
+    """Mission clock when it was heard."""
+
+
 @travels
 @dataclass(frozen=True, slots=True)
 class SetpointRecord:
@@ -85,6 +105,10 @@ class SetpointRecord:
     """Names of the limits that changed it, such as `max_speed` or `geofence`."""
     cause: Header | None = None
     """Measurement that the command behind this setpoint was made from, for latency."""
+    heard: tuple[Heard, ...] = ()
+    """Navigation and commands that came since the last turn, in the order in which they counted."""
+    planned: bool = False
+    """Whether a plan had come from the trajectory scheduler."""
 
 
 @travels
@@ -94,12 +118,13 @@ class Decision:
 
     stamp: int
     task: str
-    """Analysis and frame, `node#frame`."""
+    """Analysis and frame, `node#frame`; `node#camera:frame` where it watches several cameras."""
     action: str
-    """`edge`, `cloud`, `drop`, `late`, `done`."""
+    """`edge`, `cloud`, `drop` are decisions, `retry` is one of the dispatcher's; `done`, `late`,
+    `timeout`, `failed` and `dropped` (it never came to its turn) are how a task ended."""
     reason: str = ""
     values: dict[str, float] = field(default_factory=dict)
-    """Figures behind it: slack, expected times, utility; seconds or the table's own units."""
+    """Figures behind it: milliseconds, or utility in the environment file's own unit."""
 
 
 class Hop(NamedTuple):
@@ -108,6 +133,8 @@ class Hop(NamedTuple):
     node: str
     received: int
     published: int
+    state: int | None = None
+    """Mission clock of the vehicle's state that it went by; None if it asked for none."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,9 +41,13 @@ class Outlet:
         origin: Message[Any],
         received: int,
         stamp: int,
+        state: int | None = None,
     ) -> Message[Any]:
-        """Publish what was made from `origin`, which arrived at host time `received`."""
-        hops = (*origin.hops, Hop(self.stream, received, host_time_ns()))
+        """Publish what was made from `origin`, which arrived at host time `received`.
+
+        `state` is the mission time of the vehicle's state that it was made by.
+        """
+        hops = (*origin.hops, Hop(self.stream, received, host_time_ns(), state))
         return self._send(stamp, origin.header, origin.captured, hops, item)
 
     def _send(

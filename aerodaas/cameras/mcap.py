@@ -11,8 +11,7 @@ from aerodaas.config import EnvironmentConfig, SensorConfig
 from aerodaas.data import Odometry
 from aerodaas.errors import RecordingError, SourceError
 from aerodaas.geometry import CameraModel
-from aerodaas.recording.images import IMAGE_SCHEMAS
-from aerodaas.recording.pictures import Shot, shots
+from aerodaas.recording.pictures import PICTURE_SCHEMAS, Shot, decoded_ahead, shots
 from aerodaas.recording.reader import Recording
 
 __all__ = ["McapCamera", "ReplayedCamera"]
@@ -24,8 +23,8 @@ class McapCamera:
     """Plays a recording's pictures at the pace at which they were taken, from the first one on.
 
     Settings: `path` of the MCAP file, `topic` where it holds pictures of several cameras,
-    `loop`, and the lens and mount of `CameraConfig`. Reads Foxglove's CompressedImage and
-    RawImage, and ROS 2's sensor_msgs/CompressedImage and Image.
+    `loop`, and the lens and mount of `CameraConfig`. Reads Foxglove's CompressedImage,
+    CompressedVideo (H.264) and RawImage, and ROS 2's sensor_msgs/CompressedImage and Image.
     """
 
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
@@ -123,12 +122,15 @@ class McapCamera:
 
     def _rewind(self) -> None:
         if self._recording is not None:
-            self._shots = shots(self._recording, [self._topic])
+            self._shots = self._play(shots(self._recording, [self._topic]))
             self._next = next(self._shots, None)
+
+    def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:
+        return found
 
     def _choose(self, recording: Recording) -> str:
         topics = [
-            topic.name for topic in recording.topics.values() if topic.schema in IMAGE_SCHEMAS
+            topic.name for topic in recording.topics.values() if topic.schema in PICTURE_SCHEMAS
         ]
         if self._settings.topic in topics:
             return str(self._settings.topic)
@@ -152,6 +154,10 @@ class ReplayedCamera(McapCamera):
     def finished(self) -> bool:
         """True once the last picture was given, of a camera that came to an end in flight, too."""
         return super().finished and not self._settings.loop
+
+    def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:
+        # Every picture is shown, as fast as pictures can be had: decoding is what takes longest.
+        return decoded_ahead(found)
 
     def _due_at(self, shot: Shot, stamp: int) -> int:
         del stamp

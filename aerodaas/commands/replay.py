@@ -18,6 +18,8 @@ from aerodaas.options import RunOptions
 
 __all__ = ["replay"]
 
+_LOSSY = {"jpeg", "h264"}
+
 
 def replay(
     context: typer.Context,
@@ -50,7 +52,7 @@ def replay(
 
     with Recording.open(recording) as opened:
         duration = opened.duration
-        lossy = any(shot.record.value.format == "jpeg" for shot in islice(shots(opened), 1))
+        lossy = any(shot.format in _LOSSY for shot in islice(shots(opened), 1))
     now = datetime.now().astimezone()
     folder = out or Path("runs") / f"replay-{app.stem}-{now:%Y%m%d-%H%M%S}"
     factor, lockstep = speed_option(speed)
@@ -75,6 +77,6 @@ def replay(
     found = difference(recording, folder / "flight.mcap")
     (folder / "difference.json").write_text(json.dumps(found.as_dict(), indent=2) + "\n")
     if not found.agrees and lossy:
-        typer.echo("the pictures were recorded as JPEG, from which a detector sees a little else;")
+        typer.echo("the pictures were recorded with loss, so that a detector sees a little else;")
         typer.echo('record with "images": "png" for a replay that is exact')
     typer.echo(f"replayed {duration:.1f} s in {took:.1f} s, start included; compared:\n{found}")

@@ -79,8 +79,13 @@ class Difference:
 
 
 def difference(first: str | Path, second: str | Path) -> Difference:
-    """Compare two recordings; raises RecordingError if one cannot be read."""
-    one, other = _contents(first), _contents(second)
+    """Compare two recordings; raises RecordingError if one cannot be read.
+
+    What was made of measurements later than the first one's last setpoint is left out: nothing
+    was decided by it any more.
+    """
+    end = _last_turn(first)
+    one, other = _contents(first, end), _contents(second, end)
     return Difference(
         tuple(
             _compare(what, one.get(what, {}), other.get(what, {}))
@@ -89,12 +94,20 @@ def difference(first: str | Path, second: str | Path) -> Difference:
     )
 
 
-def _contents(path: str | Path) -> dict[str, dict[Key, Content]]:
-    """What is compared, by stream, and within by what it is paired by."""
+def _last_turn(path: str | Path) -> int | None:
+    with Recording.open(path) as recording:
+        turns = recording.records(schemas=("aerodaas.Setpoint",))
+        return max((record.value["stamp"] for record in turns), default=None)
+
+
+def _contents(path: str | Path, end: int | None) -> dict[str, dict[Key, Content]]:
+    """What is compared up to mission time `end`, by stream, and within by what it is paired by."""
     found: dict[str, dict[Key, Content]] = defaultdict(dict)
     states: dict[str, list[str]] = defaultdict(list)
     with Recording.open(path) as recording:
         for record in recording.records(schemas=_READERS):
+            if end is not None and record.value["stamp"] > end:
+                continue
             if record.schema == "aerodaas.MissionStatus":
                 robot, state = record.value["robot"], record.value["state"]
                 if states[robot][-1:] == [state]:

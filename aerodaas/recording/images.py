@@ -11,12 +11,14 @@ from numpy.typing import NDArray
 
 from aerodaas.errors import SourceError
 
-__all__ = ["IMAGE_SCHEMAS", "decode_image"]
+__all__ = ["IMAGE_SCHEMAS", "VIDEO_SCHEMAS", "decode_image", "picture_bytes", "picture_field"]
 
 _COMPRESSED = frozenset({"foxglove.CompressedImage", "sensor_msgs/msg/CompressedImage"})
 _RAW = frozenset({"foxglove.RawImage", "sensor_msgs/msg/Image"})
 IMAGE_SCHEMAS = _COMPRESSED | _RAW
 """Schemas whose messages `decode_image` knows."""
+VIDEO_SCHEMAS = frozenset({"foxglove.CompressedVideo", "foxglove_msgs/msg/CompressedVideo"})
+"""Schemas of messages that are decoded together with those before them."""
 
 
 class _Layout(NamedTuple):
@@ -56,7 +58,7 @@ def decode_image(schema: str, value: Any) -> NDArray[np.uint8] | None:  # noqa: 
 
     Returns None for a broken picture; raises SourceError for a pixel format that isn't known.
     """
-    data = np.frombuffer(_data(value), np.uint8)
+    data = np.frombuffer(picture_bytes(value), np.uint8)
     if schema in _COMPRESSED:
         image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
         return None if image is None else np.asarray(image, np.uint8)
@@ -64,20 +66,20 @@ def decode_image(schema: str, value: Any) -> NDArray[np.uint8] | None:  # noqa: 
 
 
 def _decode_raw(value: Any, data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:  # noqa: ANN401
-    encoding = str(_field(value, "encoding"))
+    encoding = str(picture_field(value, "encoding"))
     layout = _LAYOUTS.get(encoding)
     if layout is None:
         known = ", ".join(_LAYOUTS)
         raise SourceError(
             f"pictures in {encoding!r} cannot be decoded; record them in one of: {known}"
         )
-    width, height = int(_field(value, "width")), int(_field(value, "height"))
+    width, height = int(picture_field(value, "width")), int(picture_field(value, "height"))
     pixel = layout.channels * np.dtype(layout.kind).itemsize
-    step = int(_field(value, "step")) or width * pixel
+    step = int(picture_field(value, "step")) or width * pixel
     if not width or not height or step < width * pixel or data.size < step * height:
         return None
     rows = data[: step * height].reshape(height, step)[:, : width * pixel]
-    order = ">" if _field(value, "is_bigendian", default=0) else "<"
+    order = ">" if picture_field(value, "is_bigendian", default=0) else "<"
     pixels = np.ascontiguousarray(rows).view(f"{order}{layout.kind}")
     pixels = pixels.reshape(height, width, layout.channels)
     if layout.kind == "u2":
@@ -87,13 +89,15 @@ def _decode_raw(value: Any, data: NDArray[np.uint8]) -> NDArray[np.uint8] | None
     return np.asarray(cv2.cvtColor(pixels, layout.conversion), np.uint8)
 
 
-def _data(value: Any) -> bytes:  # noqa: ANN401
-    data = _field(value, "data")
+def picture_bytes(value: Any) -> bytes:  # noqa: ANN401
+    """The encoded picture in a message."""
+    data = picture_field(value, "data")
     # JSON carries bytes as Base64.
     return base64.b64decode(data) if isinstance(data, str) else bytes(data)
 
 
-def _field(value: Any, name: str, default: Any = None) -> Any:  # noqa: ANN401
+def picture_field(value: Any, name: str, default: Any = None) -> Any:  # noqa: ANN401
+    """A field of a message, whatever it was encoded as."""
     if isinstance(value, dict):
         return value.get(name, default)
     return getattr(value, name, default)

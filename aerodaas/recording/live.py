@@ -11,6 +11,7 @@ from typing_extensions import Self
 
 from aerodaas.errors import ConfigError
 from aerodaas.recording.encoding import Entry
+from aerodaas.recording.images import VIDEO_SCHEMAS
 
 __all__ = ["LiveServer"]
 
@@ -53,8 +54,10 @@ class LiveServer(ServerListener):
     def put(self, entry: Entry, log_time: int) -> None:
         """Send an entry, logged at Unix time `log_time` in nanoseconds."""
         channel = self._channels.get(entry.topic) or self._register(entry)
-        with self._lock:
-            self._last[entry.topic] = (entry.data, log_time)
+        if entry.schema.name not in VIDEO_SCHEMAS:
+            # Of a video, nothing can be seen before the next key frame.
+            with self._lock:
+                self._last[entry.topic] = (entry.data, log_time)
         channel.log(entry.data, log_time=log_time)
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:

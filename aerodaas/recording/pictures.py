@@ -2,20 +2,70 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
+from collections import defaultdict, deque
+from collections.abc import Callable, Collection, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.data import Detection, Detections, Frame, Header, Odometry
-from aerodaas.recording.images import IMAGE_SCHEMAS, decode_image
+from aerodaas.errors import SourceError
+from aerodaas.recording.h264 import H264Decoder, is_key_frame
+from aerodaas.recording.images import (
+    IMAGE_SCHEMAS,
+    VIDEO_SCHEMAS,
+    decode_image,
+    picture_bytes,
+    picture_field,
+)
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.states import odometry_of
 
-__all__ = ["Shot", "detections", "detections_by_frame", "frames", "shots"]
+__all__ = [
+    "PICTURE_SCHEMAS",
+    "Shot",
+    "decoded_ahead",
+    "detections",
+    "detections_by_frame",
+    "frames",
+    "shots",
+]
+
+PICTURE_SCHEMAS = IMAGE_SCHEMAS | VIDEO_SCHEMAS
+"""Schemas whose messages are pictures."""
+_AHEAD = 4
+"""Pictures decoded before they are asked for."""
+
+
+@dataclass
+class _Video:
+    """A video as far as it was read: the frames since the last key frame."""
+
+    decoder: H264Decoder = field(default_factory=H264Decoder)
+    group: list[bytes] = field(default_factory=list)
+
+    def add(self, value: Any) -> _VideoFrame:  # noqa: ANN401 - by the schema
+        data = picture_bytes(value)
+        if is_key_frame(data):
+            self.group = []
+        self.group.append(data)
+        return _VideoFrame(self.decoder, self.group, len(self.group) - 1)
+
+
+@dataclass(frozen=True, slots=True)
+class _VideoFrame:
+    """A frame of a video, with what it takes to decode it."""
+
+    decoder: H264Decoder
+    group: list[bytes]
+    place: int
+
+    def image(self) -> NDArray[np.uint8] | None:
+        return self.decoder.decode(self.group, self.place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,10 +76,32 @@ class Shot:
     odometry: Odometry | None
     """The vehicle's at capture, where it was recorded."""
     record: Record
+    video: _VideoFrame | None = None
+    size: tuple[int, int] | None = None
+    """Width and height in pixels, where they were recorded."""
+    decoded: Callable[[], NDArray[np.uint8] | None] | None = None
+    """Gives the picture where it is being decoded already."""
+
+    @property
+    def format(self) -> str:
+        """What the picture is encoded in, such as `jpeg`; empty for raw pixels."""
+        return str(picture_field(self.record.value, "format", ""))
 
     def image(self) -> NDArray[np.uint8] | None:
         """Decode the picture, BGR; None if it is broken, SourceError for an unknown format."""
-        return decode_image(self.record.schema, self.record.value)
+        if self.decoded is not None:
+            return self.decoded()
+        if self.video is None:
+            return decode_image(self.record.schema, self.record.value)
+        if self.format != "h264":
+            raise SourceError(
+                f"videos in {self.format!r} cannot be decoded; record them in h264, or as images"
+            )
+        image = self.video.image()
+        if image is None or self.size is None:
+            return image
+        width, height = self.size
+        return image[:height, :width]
 
 
 def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterator[Shot]:
@@ -38,20 +110,40 @@ def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterat
     A recording of others has no frame numbers: the message's sequence and frame id serve.
     """
     heads: dict[str, Record] = {}
-    schemas = ("aerodaas.Frame", *IMAGE_SCHEMAS)
+    videos: dict[str, _Video] = defaultdict(_Video)
+    schemas = ("aerodaas.Frame", *PICTURE_SCHEMAS)
     wanted = None if topics is None else {name for one in topics for name in (one, *_heads(one))}
     for record in recording.records(schemas=schemas, topics=wanted):
         if record.schema == "aerodaas.Frame":
             heads[record.topic] = record
             continue
+        is_video = record.schema in VIDEO_SCHEMAS
+        video = videos[record.topic].add(record.value) if is_video else None
         head = next((heads[name] for name in _heads(record.topic) if name in heads), None)
         if head is None or head.captured != record.captured:
             header = Header(record.sequence, record.captured, _frame_id(record.value))
-            yield Shot(header, None, record)
+            yield Shot(header, None, record, video)
         else:
             value = head.value
             header = Header(value["id"], value["stamp"], value["source"])
-            yield Shot(header, odometry_of(value.get("odometry")), record)
+            size = value["width"], value["height"]
+            yield Shot(header, odometry_of(value.get("odometry")), record, video, size)
+
+
+def decoded_ahead(found: Iterator[Shot]) -> Iterator[Shot]:
+    """The same shots, the next few of them being decoded meanwhile by threads of our own."""
+    first = next(found, None)
+    if first is None:
+        return
+    # The frames of a video need each other, pictures do not.
+    threads = 1 if first.video is not None else 2
+    waiting: deque[Shot] = deque()
+    with ThreadPoolExecutor(threads, "decoder") as pool:
+        for shot in chain([first], found):
+            waiting.append(replace(shot, decoded=pool.submit(shot.image).result))
+            if len(waiting) > _AHEAD:
+                yield waiting.popleft()
+        yield from waiting
 
 
 def frames(

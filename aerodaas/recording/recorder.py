@@ -28,6 +28,7 @@ from aerodaas.recording.converters import Session, convert
 from aerodaas.recording.converters.notes import log_entry
 from aerodaas.recording.converters.plan import fence_entries
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema
+from aerodaas.recording.h264 import require_encoder
 from aerodaas.recording.live import LiveServer
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.output import Output
@@ -73,8 +74,11 @@ class FlightRecorder:
     ) -> None:
         """Create the file `path`; `fences` are by robot; `live` gets everything, too.
 
-        Raises RecordingError if the file exists already or cannot be written.
+        Raises RecordingError if the file exists already or cannot be written, and for video that
+        cannot be encoded here.
         """
+        if config.images == "h264":
+            require_encoder()
         self.path = Path(path)
         self._session = Session(config, provenance.started_ns, home)
         self._live = live
@@ -186,7 +190,8 @@ class FlightRecorder:
                 entries = [
                     log_entry(self._session, message.stamp, LogLevel.Error, message.stream, text)
                 ]
-        if len(message.hops) > 1:
+        # Of one hop, only what is recorded nowhere else: that an analysis had nothing to say.
+        if len(message.hops) > (message.item is not None):
             entries.append(_latency(message))
         return entries
 
@@ -269,13 +274,14 @@ def _latency(message: Message[Any]) -> Entry:
     hops = []
     before = message.captured
     for hop in message.hops:
-        hops.append(
-            {
-                "node": hop.node,
-                "wait_ms": (hop.received - before) / _MILLISECOND,
-                "work_ms": (hop.published - hop.received) / _MILLISECOND,
-            }
-        )
+        entry: dict[str, Any] = {
+            "node": hop.node,
+            "wait_ms": (hop.received - before) / _MILLISECOND,
+            "work_ms": (hop.published - hop.received) / _MILLISECOND,
+        }
+        if hop.state is not None:
+            entry["state"] = hop.state
+        hops.append(entry)
         before = hop.published
     value = {
         "stream": message.stream,

@@ -205,14 +205,14 @@ def test_odometry_that_is_not_finite_is_not_believed() -> None:
 
 
 def test_the_graph_takes_boxes_and_refuses_bare_frames() -> None:
-    """Without a detector of its own; the message says what to do."""
+    """Where the detector that ships knows no such thing; the message says what to do."""
     graph = Graph()
     graph.add(Node("boxes", "analytics", Detections, None))
     graph.add(Node("frames", "sensor", Frame, None))
     follow = VipFollowAnalytics(distance=2.0)
     assert follow.analyse(AeroStreamData(graph, "boxes", Detections)).item is AeroNavigation
     with pytest.raises(GraphError, match="pass one as detector="):
-        PersonFollowAnalytics().analyse(AeroStreamData(graph, "frames", Frame))
+        FollowAnalytics(["dog"]).analyse(AeroStreamData(graph, "frames", Frame))
     assert pickle.loads(pickle.dumps(follow)).labels == ("vest", "hazard vest")  # noqa: S301
 
 

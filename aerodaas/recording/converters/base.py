@@ -13,6 +13,7 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.config import RecordingConfig
 from aerodaas.geometry import GeodeticOrigin, Vector
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, plain, topic
+from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.rotation import Rotation
 from aerodaas.status import Message
 
@@ -35,6 +36,8 @@ class Session:
     """Pins the local frame on the globe, for maps."""
     last: dict[tuple[str, str], Any] = field(default_factory=dict)
     """What a converter wrote last, by its own name and the stream's, to write changes only."""
+    videos: dict[str, H264Encoder] = field(default_factory=dict)
+    """By stream, where pictures are recorded as video."""
 
     def time(self, stamp: int) -> Timestamp:
         """Foxglove's timestamp of a mission time."""

@@ -1,4 +1,4 @@
-"""Frames and what was found in them: JPEG, calibration, mount, boxes and keypoints."""
+"""Frames and what was found in them: pictures, calibration, mount, boxes and keypoints."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from foxglove.messages import (
     CameraCalibration,
     Color,
     CompressedImage,
+    CompressedVideo,
     FrameTransform,
     ImageAnnotations,
     Point2,
@@ -24,6 +25,7 @@ from aerodaas.geometry import CameraModel
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector
 from aerodaas.recording.converters.vehicle import body_frame, odometry_json
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
+from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.palette import label_colour, rgb
 from aerodaas.recording.rotation import OPTICAL, compose, from_rpy
 from aerodaas.status import Message
@@ -31,6 +33,7 @@ from aerodaas.status import Message
 __all__: list[str] = []
 
 IMAGE = CompressedImage.get_schema()
+VIDEO = CompressedVideo.get_schema()
 CALIBRATION = CameraCalibration.get_schema()
 TRANSFORM = FrameTransform.get_schema()
 ANNOTATIONS = ImageAnnotations.get_schema()
@@ -68,17 +71,10 @@ def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entr
     if item.odometry is not None:
         value["odometry"] = odometry_json(item.odometry)
     yield Entry(topic(stream, "frame"), FRAME, json_bytes(value), header.stamp)
-    if session.config.images == "none":
-        return
-    kind = session.config.images
-    _, data = cv2.imencode(f".{kind}", item.image, _settings(session.config))
-    image = CompressedImage(
-        timestamp=session.time(header.stamp),
-        frame_id=header.source,
-        data=data.tobytes(),
-        format=kind,
-    )
-    yield Entry(topic(stream, "image"), IMAGE, image.encode(), header.stamp)
+    if session.config.images == "h264":
+        yield _video(item, stream, session)
+    elif session.config.images != "none":
+        yield _image(item, stream, session)
 
 
 @convert.register
@@ -101,6 +97,34 @@ def detections(item: Detections, message: Message[Any], session: Session) -> Ite
         "items": [_detection_json(found) for found in item.items],
     }
     yield Entry(topic(stream, "detections"), DETECTIONS, json_bytes(value), header.stamp)
+
+
+def _image(item: Frame, stream: str, session: Session) -> Entry:
+    kind = session.config.images
+    _, data = cv2.imencode(f".{kind}", item.image, _settings(session.config))
+    stamp = item.header.stamp
+    image = CompressedImage(
+        timestamp=session.time(stamp),
+        frame_id=item.header.source,
+        data=data.tobytes(),
+        format=kind,
+    )
+    return Entry(topic(stream, "image"), IMAGE, image.encode(), stamp)
+
+
+def _video(item: Frame, stream: str, session: Session) -> Entry:
+    encoder = session.videos.get(stream)
+    if encoder is None or encoder.size != (item.width, item.height):
+        encoder = H264Encoder(item.width, item.height, session.config.h264_quality)
+        session.videos[stream] = encoder
+    stamp = item.header.stamp
+    video = CompressedVideo(
+        timestamp=session.time(stamp),
+        frame_id=item.header.source,
+        data=encoder.encode(item.image, stamp),
+        format="h264",
+    )
+    return Entry(topic(stream, "image"), VIDEO, video.encode(), stamp)
 
 
 def _settings(config: RecordingConfig) -> list[int]:

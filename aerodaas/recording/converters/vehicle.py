@@ -53,7 +53,15 @@ BATTERY = json_schema(
     current="number",
 )
 SETPOINT = json_schema(
-    "Setpoint", stamp="integer", robot="string", asked={}, sent={}, clipped_by="array"
+    "Setpoint",
+    stamp="integer",
+    robot="string",
+    asked={},
+    sent={},
+    clipped_by="array",
+    cause={},
+    heard={"type": "array", "items": {"type": "object"}},
+    planned="boolean",
 )
 
 
@@ -135,6 +143,8 @@ def setpoint(item: SetpointRecord, message: Message[Any], session: Session) -> I
         "sent": _setpoint_json(item.sent),
         "clipped_by": item.clipped_by,
         "cause": item.cause._asdict() if item.cause else None,
+        "heard": [one._asdict() for one in item.heard],
+        "planned": item.planned,
     }
     yield Entry(topic(message.stream, "setpoint"), SETPOINT, json_bytes(value), item.stamp)
 

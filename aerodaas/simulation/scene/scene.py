@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from panda3d.core import NodePath
 
-from aerodaas.simulation.scenario import Building, Car, CropRows, Fence, Person, Road, Tower, Tree
+from aerodaas.simulation.scenario import (
+    Building,
+    Car,
+    CropRows,
+    Fence,
+    Person,
+    Road,
+    Rubble,
+    Tower,
+    Tree,
+)
 from aerodaas.simulation.scene.buildings import TowerLook, add_building, add_fence, add_tower
 from aerodaas.simulation.scene.cars import CarFigure, CarShape
 from aerodaas.simulation.scene.ground import add_field, add_ground, add_road, add_shadow
 from aerodaas.simulation.scene.light import Light, sky_dome
 from aerodaas.simulation.scene.people import Outfit, PersonFigure
 from aerodaas.simulation.scene.plants import add_crops, add_tree, rng_of
+from aerodaas.simulation.scene.rubble import add_rubble
 from aerodaas.simulation.scene.textures import Palette
 from aerodaas.simulation.world import Thing, World
 
@@ -73,6 +84,9 @@ class Scene:
         elif isinstance(spec, Building):
             add_shadow(root, thing, palette, light)
             add_building(root, thing, palette, light)
+        elif isinstance(spec, Rubble):
+            add_shadow(root, thing, palette, light)
+            add_rubble(root, thing, palette, light)
         elif isinstance(spec, Tower):
             add_shadow(root, thing, palette, light)
             add_tower(root, thing, palette, light, self.looks.tower(thing))

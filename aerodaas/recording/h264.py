@@ -1,0 +1,145 @@
+"""Pictures as H.264 the way Foxglove's CompressedVideo wants it, and back.
+
+One frame a message, Annex B, no B-frames, parameter sets before every key frame: a reader may
+begin at any of them. PyAV is loaded only where a video is.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.errors import RecordingError
+
+if TYPE_CHECKING:
+    from av.video.frame import VideoFrame
+
+__all__ = ["H264Decoder", "H264Encoder", "is_key_frame", "require_encoder"]
+
+KEY_FRAME_NS = NANOSECONDS
+"""Mission time between key frames: what seeking must decode at most."""
+_ENCODER = "libx264"
+_UNIT = re.compile(rb"\x00\x00\x01(.)", re.DOTALL)
+_PICTURE = frozenset({1, 5})
+"""Types of the NAL units that are slices of a picture (ITU-T H.264, table 7-1)."""
+_KEY = 5
+_TICKS = 90_000
+
+
+def require_encoder() -> None:
+    """Raise RecordingError where FFmpeg was built without the encoder that recordings need."""
+    import av.codec  # noqa: PLC0415 - 30 MB that other recordings do without
+
+    if _ENCODER not in av.codec.codecs_available:
+        raise RecordingError(
+            f'this PyAV has no {_ENCODER}; install a wheel of it ("pip install av"), '
+            'or record with "images": "jpeg"'
+        )
+
+
+class H264Encoder:
+    """One camera's pictures of one size, each encoded as it comes."""
+
+    def __init__(self, width: int, height: int, quality: int) -> None:
+        """Encode pictures of `width` x `height` at x264's constant rate factor `quality`.
+
+        Sizes that are odd grow by a pixel, for colours have half the resolution.
+        """
+        import av  # noqa: PLC0415 - as above
+
+        self.size = width, height
+        self._border = height % 2, width % 2
+        codec = av.CodecContext.create(_ENCODER, "w")
+        codec.width, codec.height = width + width % 2, height + height % 2
+        codec.pix_fmt = "yuv420p"
+        codec.time_base = Fraction(1, _TICKS)
+        # OpenCV's conversion is that of standard definition, whatever the size.
+        codec.colorspace, codec.color_range = 6, 1
+        codec.max_b_frames = 0
+        codec.thread_count = 1
+        # Key frames come by mission time, not by number.
+        codec.gop_size = 1 << 20
+        codec.options = {
+            "preset": "ultrafast",
+            "tune": "zerolatency",
+            "crf": str(quality),
+            "forced-idr": "1",
+            "sc_threshold": "0",
+        }
+        self._codec = codec
+        self._frame = av.VideoFrame
+        self._key_type = 1
+        self._error = av.error.FFmpegError
+        self._last = -1
+        self._next_key: int | None = None
+
+    def encode(self, image: NDArray[np.uint8], stamp: int) -> bytes:
+        """Encode a picture (BGR) taken at mission time `stamp`.
+
+        After an error the next picture is a key frame; raises ValueError for a picture that
+        cannot be encoded.
+        """
+        key = self._next_key is None or not self._next_key - KEY_FRAME_NS <= stamp < self._next_key
+        self._next_key = stamp + KEY_FRAME_NS if key else self._next_key
+        below, right = self._border
+        if below or right:
+            image = np.asarray(
+                cv2.copyMakeBorder(image, 0, below, 0, right, cv2.BORDER_REPLICATE), np.uint8
+            )
+        planes = np.asarray(cv2.cvtColor(image, cv2.COLOR_BGR2YUV_I420), np.uint8)
+        frame = self._frame.from_ndarray(planes, "yuv420p")
+        self._last = max(self._last + 1, stamp * _TICKS // NANOSECONDS)
+        frame.pts, frame.time_base = self._last, self._codec.time_base
+        frame.pict_type = self._key_type if key else 0
+        try:
+            packets = self._codec.encode(frame)
+        except self._error as error:
+            self._next_key = None
+            raise ValueError(f"H.264: {error}") from None
+        return b"".join(bytes(packet) for packet in packets)
+
+
+def is_key_frame(data: bytes) -> bool:
+    """Tell whether decoding may begin with the frame `data` (H.264, Annex B)."""
+    for unit in _UNIT.finditer(data):
+        kind = unit[1][0] & 0x1F
+        if kind in _PICTURE:
+            return kind == _KEY
+    return False
+
+
+class H264Decoder:
+    """Decodes any frame of a video, given those from its key frame on, each at most once in order.
+
+    A picture that was asked for out of order is decoded from its key frame again.
+    """
+
+    def __init__(self) -> None:
+        self._group: Sequence[bytes] | None = None
+        self._done = 0
+        """Frames of the group that were decoded."""
+        self._picture: VideoFrame | None = None
+
+    def decode(self, group: Sequence[bytes], place: int) -> NDArray[np.uint8] | None:
+        """Decode frame `place` of `group`, which begins with a key frame; BGR.
+
+        Returns None for one that is broken, or rests on a broken one.
+        """
+        from aerodaas.cameras.h264 import FrameDecoder, WholeFrame  # noqa: PLC0415 - loads PyAV
+
+        if group is not self._group or place < self._done - 1:
+            self._group, self._done = group, 0
+            self._decoder = FrameDecoder(only_whole=True)
+        for data in group[self._done : place + 1]:
+            self._picture = self._decoder.decode(WholeFrame(data, 0))
+            self._done += 1
+        if self._picture is None:
+            return None
+        return np.asarray(self._picture.to_ndarray(format="bgr24"), np.uint8)
