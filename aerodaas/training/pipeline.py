@@ -59,9 +59,7 @@ def make_detector(places: Places, recipe: Recipe) -> Card:
         f"{NOMINAL_SCORE} is the best threshold (F1) on rendered pictures.",
         _recipe_rows(places, recipe),
     )
-    card.figures["Held-out pictures"] = (
-        f"{len(test)}, of worlds not trained on; things of 8 pixels and more"
-    )
+    card.figures["Held-out pictures"] = f"{len(test)}, of other worlds; things of 8 pixels and more"
     for label, ranking in rankings(path, test).items():
         card.figures[f"mAP50, {label}"] = _precision(ranking)
     if places.photographs is not None and places.labels is not None:
