@@ -16,6 +16,9 @@ from aerodaas.errors import AeroDaaSError
 
 __all__ = ["environment", "restart_control_service", "start_head", "start_worker"]
 
+_ATTEMPTS = 3
+_TOO_SLOW = "timed out during startup"
+"""Ray gives a node half a minute to start, which a busy machine may not have to give."""
 STORE_BYTES = 128 * 2**20
 _TOKEN = Path.home() / ".ray" / "auth_token"
 _SLIM = {
@@ -96,16 +99,19 @@ def _start(
     env: Mapping[str, str],
     *words: str,
 ) -> None:
-    try:
-        machine.run(
-            sys.executable,
-            *("-m", "ray.scripts.scripts", "start", "--node-ip-address", address),
-            *("--num-cpus", "1", "--object-store-memory", str(STORE_BYTES)),
-            *("--resources", json.dumps(resources), "--disable-usage-stats", *words),
-            env=env,
-        )
-    except AeroDaaSError as error:
-        raise AeroDaaSError(f"Ray does not start on {machine.name}: {error}") from None
+    command = [
+        *(sys.executable, "-m", "ray.scripts.scripts", "start", "--node-ip-address", address),
+        *("--num-cpus", "1", "--object-store-memory", str(STORE_BYTES)),
+        *("--resources", json.dumps(resources), "--disable-usage-stats", *words),
+    ]
+    for left in reversed(range(_ATTEMPTS)):
+        try:
+            machine.run(*command, env=env)
+            return
+        except AeroDaaSError as error:
+            if not left or _TOO_SLOW not in str(error):
+                raise AeroDaaSError(f"Ray does not start on {machine.name}: {error}") from None
+            machine.clear()
 
 
 def _trim(machine: Machine) -> None:
