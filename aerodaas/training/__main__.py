@@ -35,7 +35,7 @@ _WORK, _OUT = Path("runs/training"), DETECTOR.parent
 
 
 @app.command()
-def render(work: _Work = _WORK, worlds: _Worlds = 600, held_out: int = 45) -> None:
+def render(work: _Work = _WORK, worlds: _Worlds = 600, held_out: int = 30) -> None:
     """Render the pictures, those to train on and those held out; resumes."""
     for name, first, count in (("train", 0, worlds), ("held-out", HELD_OUT, held_out)):
         with Progress(console=_console) as bar:

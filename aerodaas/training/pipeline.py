@@ -40,7 +40,6 @@ class Places:
 
 def trained(places: Places, recipe: Recipe) -> Iterator[Progress]:
     """Train both models' common network, unless it has been for that many steps already."""
-    torch.set_num_threads(max(1, torch.get_num_threads()))
     yield from train(Pictures(places.work / "train"), recipe, places.work / "run")
 
 
@@ -107,11 +106,13 @@ def _precision(ranking: Ranking) -> str:
 
 def _recipe_rows(places: Places, recipe: Recipe) -> dict[str, str]:
     kept = torch.load(places.work / "run" / "training.pt", weights_only=True, map_location="cpu")
-    where = "a GPU" if torch.cuda.is_available() else "one core"
+    halved = min(recipe.halved, kept["step"])
+    threads = torch.get_num_threads()
+    where = "a GPU" if torch.cuda.is_available() else f"a CPU, {threads} thread(s)"
     return {
         "Pictures": f"{len(Pictures(places.work / 'train'))}, rendered; no photograph",
         "Seed": str(recipe.seed),
-        "Steps": f"{kept['step']} of {recipe.batch} pictures at {recipe.size[1]} x {recipe.size[0]}",
+        "Steps": f"{kept['step']} of {recipe.batch} pictures, {halved} of them on halved ones",
         "Time": f"{kept['seconds'] / 60:.0f} min on {where}",
     }
 
