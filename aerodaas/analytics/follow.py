@@ -83,9 +83,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if item.camera is None:
             self.explain_once(item, context)
             return None
-        phase = self.controller.phase
         if self._has_left():
             self._let_go(item, context)
+        phase = self.controller.phase
         detection = self._target_in(self.tracker.update(item))
         sighting = None if detection is None else self._sight(detection, item)
         state = context.vehicle()

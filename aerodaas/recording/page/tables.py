@@ -47,8 +47,8 @@ def sections(summary: FlightSummary) -> Iterator[str]:
             (stream, it.count, it.median_ms, it.p99_ms, it.overhead_ms)
             for stream, it in summary.latencies.items()
         ]
-        head = ["stream", "messages", "median (ms)", "99th perc. (ms)", "overhead (ms)"]
-        yield section("Latency since capture", table(head, rows), wide=True)
+        head = ["stream", "count", "median (ms)", "99th perc.", "overhead"]
+        yield section("Latency since capture", table(head, rows))
     if summary.reasons:
         why = [(*said.split(": ", 1), count) for said, count in summary.reasons.items()]
         head = ["decision or outcome", "reason", "tasks"]
