@@ -59,7 +59,7 @@ def sample_keypoints(rng: np.random.Generator, gesture: str) -> NDArray[np.float
             found = found[_MIRRORED]
         kept = inside & (rng.random(POINTS) >= rng.uniform(0, 0.25))
         found[:, 2] = np.where(kept, rng.uniform(0.4, 1.0, POINTS), 0.1)
-        return np.nan_to_num(found).astype(np.float32)
+        return np.nan_to_num(found.astype(np.float32))
 
 
 def draw(seed: int, count: int) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
