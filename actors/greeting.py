@@ -16,7 +16,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import ray
-from ray._raylet import GcsClient
+from ray._raylet import GcsClient  # type: ignore[attr-defined]  # compiled
 from ray.exceptions import RayError, RpcError
 
 from aerodaas.errors import AeroDaaSError

@@ -87,4 +87,3 @@ def test_a_guest_has_what_the_owner_has(flyer: Flyer, guest: Path) -> None:
     guest.write_text(GUEST)
     with pytest.raises(ConfigError, match="never called start_mission"):
         flyer.fly(owner, guests=(guest,))
-

@@ -20,7 +20,7 @@ from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar, runtime
 
 from typing_extensions import Self
 
-from aerodaas.config import RuntimeEnvConfig, as_runtime_env
+from aerodaas.config import RuntimeEnvConfig, TaskConfig, as_runtime_env
 from aerodaas.data import Alert
 from aerodaas.errors import GraphError
 from aerodaas.graph import AeroStreamData, Graph, Node, Trigger
@@ -82,6 +82,8 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     """True for an analysis of frames whose every run the analytics scheduler decides on."""
     concurrent: bool = False
     """True if several threads may call `process` at once, as executors in the cloud do."""
+    task: TaskConfig | None = None
+    """What the scheduler is told of it, unless the environment file's `schedulers.tasks` do."""
     rate: float = 1.0
     """How often an external source (`instantiate`) is asked, in Hz."""
     name: str = ""

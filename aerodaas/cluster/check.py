@@ -96,9 +96,7 @@ def _node(node: dict[str, Any], probe: Any) -> Iterator[Finding]:  # noqa: ANN40
     yield Finding(_name(node), text, same, remedy)
 
 
-def _way(
-    here: dict[str, Any], there: dict[str, Any], probes: dict[str, Any]
-) -> Iterator[Finding]:
+def _way(here: dict[str, Any], there: dict[str, Any], probes: dict[str, Any]) -> Iterator[Finding]:
     names = f"{_name(here)} → {_name(there)}"
     try:
         reference = probes[here["NodeID"]].measure.remote(probes[there["NodeID"]])

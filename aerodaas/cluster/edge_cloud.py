@@ -47,7 +47,7 @@ class EdgeCloud:
         Ray's processes.
         """
         if cloud < 0 or edges < 1 or cloud + edges > _MOST:
-            raise ConfigError(f"an edge–cloud here has 1 edge and up to {_MOST - 1} other nodes")
+            raise ConfigError(f"an edge-cloud here has 1 edge and up to {_MOST - 1} other nodes")
         self._shape = shape or Shape()
         self._kinds = {f"cloud{number}": "cloud" for number in range(1, cloud + 1)}
         self._kinds |= {f"edge{number}": "edge" for number in range(2, edges + 1)}
@@ -91,10 +91,14 @@ class EdgeCloud:
         return [name for name in self.far if self._kinds[name] == "cloud"]
 
     def add(self, name: str, resources: Mapping[str, float], **variables: str) -> Far:
-        """One more machine, with a node that offers `resources`, behind an unshaped link."""
+        """One more machine behind an unshaped link, with a node that offers `resources`.
+
+        Without resources there is no node yet.
+        """
         far = self._network.add(name, [self._network.folder])
         self._kinds[name] = next(iter(resources), "")
-        self._join(far, resources, variables)
+        if resources:
+            self._join(far, resources, variables)
         return far
 
     def join_again(self, name: str) -> None:

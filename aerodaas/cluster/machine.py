@@ -74,7 +74,7 @@ class Machine:
     @property
     def pid(self) -> int:
         """Its first process, as seen from here."""
-        return self._init.pid
+        return int(self._init.pid)
 
     @property
     def alive(self) -> bool:

@@ -70,7 +70,7 @@ class Probe:
         )
 
     def now(self) -> int:
-        """This node's clock, nanoseconds since the epoch."""
+        """The clock of this node, nanoseconds since the epoch."""
         return host_time_ns()
 
     def take(self, data: bytes) -> int:
@@ -92,7 +92,9 @@ class Probe:
         offset, uncertainty = clock_offset(readings)
         rtt = statistics.median(back - sent for sent, _, back in readings) / 1e9
         data = self.give(_BYTES)
-        up = max(self._rate(rtt, lambda: other.take.remote(ray.put(data))) for _ in range(_TRANSFERS))
+        up = max(
+            self._rate(rtt, lambda: other.take.remote(ray.put(data))) for _ in range(_TRANSFERS)
+        )
         down = max(self._rate(rtt, lambda: other.give.remote(_BYTES)) for _ in range(_TRANSFERS))
         return Way(rtt, offset, uncertainty, up, down)
 

@@ -110,8 +110,7 @@ def _start(
 
 def _trim(machine: Machine) -> None:
     """Stop what such a node has no use for: autoscaler, log monitor and Ray's client server."""
-    unwanted = ("autoscaler/_private/monitor.py", "autoscaler/v2/monitor.py", "log_monitor.py")
-    unwanted += ("ray.util.client.server",)
+    unwanted = ("_private/monitor.py", "v2/monitor.py", "log_monitor.py", "ray.util.client.server")
     for process in machine.processes():
         if any(mark in word for mark in unwanted for word in process.cmdline()):
             process.kill()

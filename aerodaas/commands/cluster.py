@@ -1,4 +1,4 @@
-"""`aerodaas cluster`: an edge–cloud on this machine, and the examination of any cluster."""
+"""`aerodaas cluster`: an edge-cloud on this machine, and the examination of any cluster."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def check(
 
 @app.command()
 def greet(address: Annotated[str, typer.Argument(help="The head's `host:port`.")]) -> None:
-    """Ask a head who it is, without joining: does it answer, with our versions, to our token?
+    """Ask a head who it is, without joining: whether it answers, our versions, our token.
 
     Silent if all is well. For scripts that join, such as `clusters/edge-join.sh`.
 

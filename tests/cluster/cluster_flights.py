@@ -1,4 +1,4 @@
-"""A drone in flight on an edge–cloud, something that goes wrong, and what became of every task."""
+"""A drone in flight on an edge-cloud, something that goes wrong, and what became of every task."""
 
 from __future__ import annotations
 
@@ -149,7 +149,9 @@ class Told:
         states = [band.state for band in drone.bands]
         assert states[-2:] == ["landing", "landed"], states
         landing = drone.bands[-2].start
-        there = next(t for t, place in zip(drone.time, drone.position, strict=True) if place[2] > 1.8)
+        there = next(
+            t for t, place in zip(drone.time, drone.position, strict=True) if place[2] > 1.8
+        )
         hover = drone.position[(drone.time > there + 3.0) & (drone.time < landing)]
         assert abs(hover[:, 2] - 2.0).max() < 0.7
 
@@ -177,7 +179,9 @@ class Told:
     def recovery(self, after: float, where: str = "") -> float:
         """Seconds from `after` to the next result in time (of `where`) of a later frame."""
         times = [
-            t for ends in self.ends.values() for t, end, why in ends
+            t
+            for ends in self.ends.values()
+            for t, end, why in ends
             if end == "done" and t > after and why.startswith(where)
         ]
         return min(times) - after if times else float("inf")

@@ -1,4 +1,4 @@
-"""What `aerodaas cluster check` and an application say of clusters that are not as they should be."""
+"""What is said of clusters that are not as they should be, and that nothing is left of them."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ import pytest
 
 from aerodaas.cluster import EdgeCloud, Shape
 from aerodaas.cluster.probe import clock_offset
+from aerodaas.cluster.ray_node import environment
 from aerodaas.cluster.trace import TracePlayer
 from aerodaas.errors import ConfigError
 from aerodaas.schedulers.lab.network import Network
@@ -43,7 +44,10 @@ def aerodaas(*words: str, **env: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
         [sys.executable, "-m", "aerodaas", *words],
         env={**os.environ, "PYTHONPATH": str(ROOT), "COLUMNS": "240", **env},
-        capture_output=True, text=True, timeout=200, check=False,
+        capture_output=True,
+        text=True,
+        timeout=200,
+        check=False,
     )
 
 
@@ -58,7 +62,7 @@ def test_the_clocks_offset_is_taken_from_the_shortest_round_trip() -> None:
     """A slow one, of which nobody knows which way it was slow, does not count."""
     quick = (1_000_000_000, 3_010_000_000, 1_020_000_000)
     slow = (2_000_000_000, 4_900_000_000, 3_000_000_000)
-    assert clock_offset([slow, quick]) == (pytest.approx(2.0), pytest.approx(0.01))
+    assert clock_offset([slow, quick]) == pytest.approx((2.0, 0.01))
 
 
 class TestGood:
@@ -105,11 +109,17 @@ class TestGood:
         )
         path = os.pathsep.join([str(ROOT), str(ROOT / "tests/actors")])
         ended = aerodaas(
-            "run", str(tmp_path / "app.py"), "--address", small.address, "--no-view",
-            "--record", str(tmp_path / "out"), PYTHONPATH=path,
+            "run",
+            str(tmp_path / "app.py"),
+            "--address",
+            small.address,
+            "--no-view",
+            "--record",
+            str(tmp_path / "out"),
+            PYTHONPATH=path,
         )
         assert ended.returncode == 2
-        assert "no node of the cluster offers 'node:10.1.2.3'" in ended.stderr
+        assert "no node of the cluster is called '10.1.2.3'; known: 10." in ended.stderr
         assert ended.stderr.count("error:") == 1
 
 
@@ -133,7 +143,10 @@ class TestBad:
         token.write_text("the-clusters-own-token-the-clusters-own-token")
         variables = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN_PATH": str(token)}
         with EdgeCloud(0, variables=variables) as cluster:
-            for env in ({**variables, "RAY_AUTH_TOKEN": "another-token"}, {"RAY_AUTH_MODE": "disabled"}):
+            for env in (
+                {**variables, "RAY_AUTH_TOKEN": "another-token"},
+                {"RAY_AUTH_MODE": "disabled"},
+            ):
                 told = aerodaas("cluster", "check", cluster.address, **env)
                 assert told.returncode == 1
                 assert "refuses our token" in told.stderr
@@ -179,14 +192,59 @@ class TestBad:
 
 @needs_root
 @pytest.mark.slow
+def test_the_join_script(tmp_path: Path) -> None:
+    """An edge joins, stays, cannot join twice, and says what is wrong with the address."""
+    script = str(ROOT / "clusters/edge-join.sh")
+    (tmp_path / "bin").mkdir()
+    for name, module in (("python", ""), ("ray", "-m ray.scripts.scripts")):
+        program = tmp_path / "bin" / name
+        program.write_text(f'#!/bin/sh\nexec {sys.executable} {module} "$@"\n')
+        program.chmod(0o755)
+    with EdgeCloud(0) as cluster:
+        far = cluster.add("jetson", {})
+        env = environment(AERODAAS_VENV=str(tmp_path))
+        wrong = subprocess.run(
+            far.machine.words(script, f"{cluster.host}:1"),
+            env=env,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert wrong.returncode == 1
+        assert f"no Ray cluster answers at {cluster.host}:1" in wrong.stderr
+        with subprocess.Popen(
+            far.machine.words(script, cluster.address), env=env, stdout=subprocess.PIPE, text=True
+        ) as staying:
+            assert staying.stdout is not None
+            assert f"as {far.address} with" in staying.stdout.readline()
+            assert any("Ray runtime started" in line for line in staying.stdout)
+            twice = subprocess.run(
+                far.machine.words(script, cluster.address),
+                env=env,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
+            assert twice.returncode == 1
+            assert "runs on this machine already" in twice.stderr
+            told = aerodaas("cluster", "check", cluster.address)
+            assert any(
+                far.address in line and "edge," in line for line in told.stdout.splitlines()
+            ), told.stdout
+            far.machine.power_off()
+
+
+@needs_root
+@pytest.mark.slow
 def test_nothing_is_left() -> None:
     """Neither a process nor a device, even if the command is killed."""
-    devices = set(os.listdir("/sys/class/net"))
+    devices = _devices()
     words = ["cluster", "local", "--cloud", "1", "--rtt", "5ms"]
     with subprocess.Popen(
         [sys.executable, "-m", "aerodaas", *words],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
-        stdout=subprocess.PIPE, text=True,
+        stdout=subprocess.PIPE,
+        text=True,
     ) as process:
         assert process.stdout is not None
         assert any("Ctrl-C" in line for line in process.stdout)
@@ -196,7 +254,7 @@ def test_nothing_is_left() -> None:
     _, left = psutil.wait_procs(below, timeout=20)
     assert left == []
     deadline = time.monotonic() + 20
-    while set(os.listdir("/sys/class/net")) - devices:
+    while _devices() - devices:
         assert time.monotonic() < deadline
         time.sleep(0.2)
 
@@ -206,6 +264,10 @@ def test_without_root() -> None:
     """Said at once, with what to do instead."""
     with pytest.raises(ConfigError, match="need root"):
         EdgeCloud(1)
+
+
+def _devices() -> set[str]:
+    return {path.name for path in Path("/sys/class/net").iterdir()}
 
 
 _PRETEND = """

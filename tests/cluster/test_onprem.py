@@ -11,13 +11,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import yaml
+import yaml  # type: ignore[import-untyped]
 
 from aerodaas.cluster.network import Far, LocalNetwork
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.timeout(400),
+    pytest.mark.timeout(900),
     pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
     pytest.mark.skipif(
         not all(map(shutil.which, ("ssh", "ssh-keygen", "rsync", "/usr/sbin/sshd"))),
@@ -48,7 +48,9 @@ def start_sshd(far: Far, folder: Path) -> subprocess.Popen[bytes]:
     wrapper = home / "aerodaas/bin/ray"
     wrapper.write_text(WRAPPER)
     wrapper.chmod(0o755)
-    (home / "passwd").write_text(f"root:x:0:0:root:{home}:/bin/bash\nsshd:x:100:65534::/run/sshd:/usr/sbin/nologin\n")
+    (home / "passwd").write_text(
+        f"root:x:0:0:root:{home}:/bin/bash\nsshd:x:100:65534::/run/sshd:/usr/sbin/nologin\n"
+    )
     far.machine.run("mount", "--bind", str(home / "passwd"), "/etc/passwd")
     config = home / "sshd_config"
     config.write_text(SSHD.format(folder=folder))
@@ -95,11 +97,15 @@ def test_workers_start_as_well_as_the_head(hosts: list[Far], tmp_path: Path) -> 
     env["RAY_AUTH_TOKEN_PATH"] = str(tmp_path / "token")
     up = subprocess.run(
         [*RAY, "up", "-y", "--no-config-cache", str(path)],
-        env=env, capture_output=True, text=True, timeout=200, check=False,
+        env=env,
+        capture_output=True,
+        text=True,
+        timeout=500,
+        check=False,
     )
     assert up.returncode == 0, up.stdout + up.stderr
     address = f"{hosts[0].address}:6379"
-    deadline = time.monotonic() + 120
+    deadline = time.monotonic() + 240
     found = ""
     while found.count("10.") < 3:
         assert time.monotonic() < deadline, found + _monitor_log(hosts[0])

@@ -13,7 +13,6 @@ import numpy as np
 from aerodaas.clock import NANOSECONDS, Clock, ScaledClock
 from aerodaas.config import EnvironmentConfig, RobotConfig
 from aerodaas.data import Odometry
-from aerodaas.drivers.mavlink.autopilot import Autopilot
 from aerodaas.drivers.mavlink.climb import Climb
 from aerodaas.drivers.mavlink.commander import Commander, Outcome
 from aerodaas.drivers.mavlink.connecting import Connection, establish
@@ -415,9 +414,19 @@ class MavlinkVehicle:
         return download(self._connected().link, mavlink.MAV_MISSION_TYPE_MISSION, progress)
 
     @property
-    def autopilot(self) -> Autopilot:
-        """The family of the connected vehicle."""
-        return self._connected().autopilot
+    def connection(self) -> Connection:
+        """Link, autopilot and frame of the connected vehicle; raises VehicleError before."""
+        return self._connected()
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a connected vehicle."""
+        return self._connection is not None and self._link is not None
+
+    @property
+    def telemetry(self) -> Telemetry:
+        """The newest of everything that the vehicle has said, in its own frames."""
+        return self._telemetry
 
     @property
     def parameters(self) -> Parameters:

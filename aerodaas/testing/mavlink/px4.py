@@ -149,6 +149,4 @@ class EmulatedPX4(Firmware):
         boot = int(self.now * 1e3)
         arguments = [0] * 40
         levels = severity | severity << 4
-        self._say(
-            EventMessage(0, 0, event_number(name), boot, self._sequence, levels, arguments)
-        )
+        self._say(EventMessage(0, 0, event_number(name), boot, self._sequence, levels, arguments))
