@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from aerodaas.analytics.models import DETECTOR
+from aerodaas.training import gestures
 from aerodaas.training.rendering import HELD_OUT, render_shards
 from aerodaas.training.sheet import contact_sheet
 
@@ -96,6 +97,9 @@ def pose(
     recipe = train.Recipe(steps=steps, rate=1.5e-3, postures=True, seed=seed, start=begin)
     _watch(pipeline.trained(places, recipe, "pose"), steps)
     _console.print(pipeline.make_pose(places, recipe).figures)
+
+
+app.command("gestures")(gestures.main)
 
 
 def _require_torch() -> None:

@@ -303,3 +303,38 @@ def test_an_area_that_is_none_is_refused(area: list[tuple[float, float]]) -> Non
     """At build time."""
     with pytest.raises(ConfigError, match="three or more corners"):
         CarFollowAnalytics(area=area)
+
+
+class Shaken(World):
+    """A drone that pitches at random: the picture jumps, and the odometry says why."""
+
+    def look(self, random: np.random.Generator) -> Detections:
+        """Shift the box as the pitch does."""
+        seen = super().look(random)
+        pitch = float(random.uniform(-0.16, 0.16))
+        up = self.camera.fy * math.tan(pitch)
+        items = []
+        for item in seen:
+            left, top, right, bottom = item.box
+            top, bottom = np.clip([top - up, bottom - up], 0, 720).tolist()
+            items.append(replace(item, box=(left, top, right, bottom)))
+        assert seen.odometry is not None
+        pose = replace(seen.odometry, pitch=pitch)
+        return replace(seen, items=tuple(items), odometry=pose)
+
+
+def test_a_target_that_loses_its_track_is_found_where_it_stands() -> None:
+    """Boxes that jump more than a tracker of pictures can know still belong to one person."""
+    world = Shaken(
+        circle(0.5),
+        np.array([0.0, 0.0, 1.5]),
+        target_height=0.65,
+        target_width=0.42,
+        target_base=0.9,
+        label="vest",
+        rate=8.0,
+        noise=0.02,
+    )
+    distances = world.run(VipFollowAnalytics(), 30)
+    assert world.alerts == []
+    assert np.mean(np.abs(np.array(distances[80:]) - 2.0) < 0.4) > 0.9
