@@ -13,9 +13,7 @@ from aerodaas.clock import host_time_ns
 from aerodaas.data import Header
 from aerodaas.errors import RecordingError
 from aerodaas.geometry import GeodeticOrigin
-from aerodaas.recording.live import LiveServer
 from aerodaas.recording.provenance import Provenance
-from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.status import Message
 from aerodaas.vitals import Vitals
 
@@ -47,6 +45,10 @@ class RecorderActor(StreamActor):
         self._readings = 0
 
     def _open(self) -> None:
+        # The application's process knows this class, and does without the writers.
+        from aerodaas.recording.live import LiveServer  # noqa: PLC0415
+        from aerodaas.recording.recorder import FlightRecorder  # noqa: PLC0415
+
         environment = self.session.environment
         home = environment.home
         name = self._provenance.name

@@ -198,7 +198,9 @@ def test_a_camera_plays_it(filmed: Path) -> None:
     camera.close()
 
 
-@pytest.mark.parametrize(("form", "words"), [("h265", "'h265' cannot be decoded"), ("h264", "none of")])
+@pytest.mark.parametrize(
+    ("form", "words"), [("h265", "'h265' cannot be decoded"), ("h264", "none of")]
+)
 def test_videos_of_others_that_cannot_be_shown(tmp_path: Path, form: str, words: str) -> None:
     """Another codec is named; a video without a key frame has no picture."""
     path = tmp_path / "theirs.mcap"
