@@ -4,28 +4,39 @@ The scheduler is the very class that the lab studies, driven through the same `D
 frame becomes a task for each managed analysis. The edge executor is serial, as in the model that
 the schedulers were made for: whichever analysis it is, one runs at a time. The dispatcher alone
 publishes the analyses' results, so that a result that comes too late goes nowhere.
+
+An executor that dies is restarted (by Ray), and its task is tried once more if the deadline
+allows. A cloud that is gone has no slots until it answers again. A scheduler that raises, talks
+nonsense or is slow is replaced by edge-first EDF.
 """
 
 from __future__ import annotations
 
 import heapq
 import itertools
-import time
-from collections import Counter
-from dataclasses import dataclass
+from collections import Counter, deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor, failure_line
-from aerodaas.actors._cloud import Cloud
+from aerodaas.actors._cloud import CloudAnswer, Executor
+from aerodaas.actors._estimates import Estimates
+from aerodaas.actors._fence import FencedDispatch
+from aerodaas.actors._lifeline import Life, Lifelines
+from aerodaas.actors._sites import Sites
+from aerodaas.actors._way import Way
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
-from aerodaas.clock import host_time_ns
+from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.data import Header
 from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
     AnalyticsScheduler,
     Decision,
     Drop,
     Outcome,
+    Place,
     Profile,
     Resources,
     Result,
@@ -33,8 +44,8 @@ from aerodaas.schedulers.analytics.base import (
     Task,
     WakeAt,
 )
-from aerodaas.schedulers.analytics.dispatch import Dispatch
 from aerodaas.schedulers.analytics.edge_cloud import EdgeCloudEdf
+from aerodaas.schedulers.analytics.windows import QoeWindows
 from aerodaas.status import Decision as DecisionRecord
 from aerodaas.status import Message
 
@@ -44,10 +55,13 @@ DECISIONS = "decisions"
 """Stream of the scheduler's decisions and their outcomes."""
 _LAST_ANSWERS = 2.0
 """Seconds given to the cloud at the end of a run."""
+_COMPLAINTS_KEPT = 16
 _EDGE_PATIENCE = 10
 """An execution on the edge that takes so many times its expected time has failed."""
-_SLOW_DECISION = 0.05
-"""Seconds that the scheduler may think about one event before it is replaced."""
+_LEAST_PATIENCE = NANOSECONDS
+"""... but not before this: a first inference may take some."""
+_FORGOTTEN = NANOSECONDS
+"""A task still undecided so long after its deadline, the edge being idle, has been forgotten."""
 
 
 def task_stream(node: str) -> str:
@@ -70,6 +84,8 @@ class Managed:
     """Its model's name is the stream."""
     acknowledges: bool = False
     """True in lockstep for an analysis whose results nobody reads."""
+    open_times: frozenset[str] = frozenset()
+    """Times of the profile that the user left to be measured."""
 
 
 class DispatcherActor(StreamActor):
@@ -88,24 +104,51 @@ class DispatcherActor(StreamActor):
         super().__init__(session, "dispatcher", {**inputs, **answers})
         self._managed = managed
         self._by_done = {done_stream(one.stream): one for one in managed}
+        self._many = {one.stream for one in managed if len(one.inputs) > 1}
         self._resources = resources
-        self._dispatch = Dispatch(scheduler, resources, self)
+        self._dispatch = FencedDispatch(scheduler, resources, self)
         self._replaced = False
         self._numbers = itertools.count()
         self._frames: dict[int, Message[Any]] = {}
         self._results: dict[int, Message[Any]] = {}
         self._timers: list[int] = []
         self._edge_since = 0
+        self._way = Way()
+        self._estimates = Estimates(session.speed or 1.0, scheduler.learns)
         self._now = 0
-        self._outcomes: Counter[str] = Counter()
-        self._utility = 0.0
+        self._figures: dict[int, dict[str, float]] = {}
+        """What an execution in the cloud took, by task."""
+        self._why: dict[int, str] = {}
+        """Why an execution failed, by task."""
+        self._lost: set[int] = set()
+        """Tasks whose executor died under them."""
+        self._second: set[int] = set()
+        """Tasks that are tried for the second time."""
+        self._again: deque[Task] = deque()
+        """Tasks to be tried once more at once, ..."""
+        self._orphans: dict[str, list[Task]] = {}
+        """... and those that wait for their executor, by model."""
+        self._gone: set[str] = set()
+        """Models whose executor on the edge will not come back."""
+        self._complaints: deque[str] = deque(maxlen=_COMPLAINTS_KEPT)
+        """Failures in the cloud that people were told of."""
+        self._counts = _Counts()
 
-    def prepare(self, cloud: Any = None) -> Any:  # noqa: ANN401 - a Ray handle; the base's info
-        """Open the streams; `cloud` is the executor in the cloud, where there is one."""
+    def prepare(
+        self,
+        edge: Mapping[str, Any] | None = None,
+        cloud: Sequence[Executor] = (),
+    ) -> Any:  # noqa: ANN401 - the base's info
+        """Open the streams.
+
+        `edge` are the actors of the analyses, by stream; `cloud` are the executors in the cloud.
+        """
         info = super().prepare()
         assert self.inbox is not None  # noqa: S101 - prepared
         timeout = self._resources.cloud_timeout
-        self._cloud = Cloud(cloud, timeout, self.inbox.wake) if cloud is not None else None
+        wake = self.inbox.wake
+        self._cloud = Sites(cloud, timeout, wake) if cloud else None
+        self._lifelines = Lifelines(edge or {}, wake)
         return info
 
     def _open(self) -> None:
@@ -124,6 +167,8 @@ class DispatcherActor(StreamActor):
         while not self.stopping:
             for message in self.inbox.receive(self._patience()):
                 self._take(message)
+            for model, life in self._lifelines.news():
+                self._executor_is(model, life, self._time())
             if self.session.lockstep:
                 self._settle()
             else:
@@ -145,42 +190,122 @@ class DispatcherActor(StreamActor):
         if message.item is None:
             self._publish(managed.stream, message, None)
             return
-        profile = managed.profile
+        cloud = self._cloud.expected(managed.stream) if self._cloud is not None else None
+        profile = self._estimates.profile(managed.profile, managed.open_times, cloud)
+        reserve = 0 if self.session.lockstep else self._way.reserve(profile.deadline)
         task = Task(
             id=next(self._numbers),
             profile=profile,
             arrival=now,
-            deadline=now + profile.deadline,
+            deadline=now + profile.deadline - reserve,
             source=message.header.source,
             segment=message.header.id,
+            reserve=reserve,
         )
         self._frames[task.id] = message
+        self._counts.arrived(task)
         self._guarded("arrived", task, now)
 
     def _edge_answered(self, managed: Managed, message: Message[Any], now: int) -> None:
+        if managed.stream in self._dispatch.down and managed.stream not in self._gone:
+            self._executor_is(managed.stream, "serving", now)
         task = self._dispatch.running
         if task is None or task.profile.model != managed.stream:
             return
         if self._frames[task.id].header != message.header:
             return
         self._results[task.id] = message
+        if not self.session.lockstep:
+            self._way.travelled(message, now - self._edge_since)
+            taken = self.session.host_seconds(now - self._edge_since)
+            self._estimates.edge.observe(managed.stream, taken)
         self._guarded("finished", task, now)
+
+    def _executor_is(self, model: str, life: Life, now: int) -> None:
+        """Take note that an executor on the edge died, is back, or will not come back."""
+        down = self._dispatch.down
+        if life == "serving":
+            if model in down:
+                down.discard(model)
+                self.alert("executor_back", f"{model} is back on the edge")
+                self._again.extend(self._orphans.pop(model, ()))
+                self._try_again(now)
+            return
+        if life == "gone":
+            self._gone.add(model)
+        if model not in down:
+            down.add(model)
+            self.alert("executor_lost", f"{model} died on the edge: {life}")
+        for orphan in self._orphans.pop(model, ()) if life == "gone" else ():
+            self._end(Result(orphan, Outcome.FAILED, Place.EDGE, now, now))
+        running = self._dispatch.running
+        if running is not None and running.profile.model == model:
+            self._lose(running, "its executor on the edge died", now)
 
     def _catch_up(self) -> None:
         """Real time: timers that are due, answers from the cloud, executions that hang."""
         now = self._time()
         while self._timers and self._timers[0] <= now:
-            heapq.heappop(self._timers)
+            self._way.delayed(now - heapq.heappop(self._timers))
             self._guarded("timer", now)
-        for task, answer, timed_out in self._cloud.answers(now) if self._cloud else ():
-            if answer is not None:
-                self._results[task.id] = answer
-            failure = Outcome.TIMEOUT if timed_out else Outcome.FAILED
-            self._guarded("finished", task, now, None if answer is not None else failure)
+        if self._cloud is not None:
+            self._hear_from(self._cloud, now)
         running = self._dispatch.running
-        if running and now - self._edge_since > _EDGE_PATIENCE * running.profile.edge_time:
-            self.alert("executor_lost", f"{running.profile.model} does not answer on the edge")
+        if running and now - self._edge_since > self._patience_with(running.profile):
+            model = running.profile.model
+            self.alert("executor_lost", f"{model} does not answer on the edge")
+            self._dispatch.down.add(model)
+            self._why[running.id] = "it did not answer"
             self._guarded("finished", running, now, Outcome.FAILED)
+        elif running is None:
+            self._require_decisions(now)
+
+    def _patience_with(self, profile: Profile) -> int:
+        """How long an execution on the edge may take, nanoseconds."""
+        return max(_EDGE_PATIENCE * profile.edge_time, _LEAST_PATIENCE)
+
+    def _hear_from(self, cloud: Sites, now: int) -> None:
+        answers = list(cloud.answers(now))
+        cloud.probe(now)
+        # First of all, so that nothing is tried again in a cloud that is gone.
+        slots, before = cloud.slots, self._dispatch.resources.cloud_slots
+        if slots != before:
+            if not slots:
+                self.alert("cloud_lost", "the cloud is gone; work stays on the edge meanwhile")
+            elif slots < before:
+                self.alert("cloud_lost", f"a part of the cloud is gone; {slots} slots are left")
+            else:
+                self.alert("cloud_back", "the cloud answers again")
+            self._guarded("change_resources", replace(self._resources, cloud_slots=slots), now)
+        for answer in answers:
+            self._cloud_answered(answer, now)
+
+    def _cloud_answered(self, answer: CloudAnswer, now: int) -> None:
+        task = answer.task
+        if answer.way:
+            self._why[task.id] = answer.way
+        if answer.figures is not None:
+            self._figures[task.id] = answer.figures
+        if answer.lost:
+            self._lose(task, "its executor in the cloud is gone", now)
+        elif answer.timed_out:
+            self._why[task.id] = "the cloud did not answer"
+            self._guarded("finished", task, now, Outcome.TIMEOUT)
+        elif answer.message is None:
+            self._why[task.id] = answer.error
+            if answer.error not in self._complaints:
+                self._complaints.append(answer.error)
+                self.alert("cloud_failed", f"{task.profile.model} {answer.way}: {answer.error}")
+            self._guarded("finished", task, now, Outcome.FAILED)
+        else:
+            self._results[task.id] = answer.message
+            self._guarded("finished", task, now)
+
+    def _require_decisions(self, now: int) -> None:
+        oldest = next(iter(self._dispatch.undecided.values()), None)
+        if oldest is None or self._replaced or now <= oldest.deadline + _FORGOTTEN:
+            return
+        self._replace(f"left {self._label(oldest)} undecided beyond its deadline", now)
 
     def _settle(self) -> None:
         """Lockstep: let the scheduler's own time run on until every task is decided."""
@@ -195,15 +320,12 @@ class DispatcherActor(StreamActor):
 
     def _guarded(self, event: str, *args: Any) -> None:  # noqa: ANN401
         """Tell the scheduler; one that raises, talks nonsense or is slow is replaced."""
-        began = time.perf_counter()
         now = next(arg for arg in reversed(args) if isinstance(arg, int))
         try:
             getattr(self._dispatch, event)(*args)
         except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
             self._replace(failure_line(error), now)
-        else:
-            if time.perf_counter() - began > _SLOW_DECISION and not self.session.lockstep:
-                self._replace(f"took more than {_SLOW_DECISION * 1000:.0f} ms to decide", now)
+        self._try_again(now)
 
     def _replace(self, why: str, now: int) -> None:
         name = type(self._dispatch.scheduler).__name__
@@ -213,6 +335,44 @@ class DispatcherActor(StreamActor):
         self._replaced = True
         self.alert("scheduler_failed", f"{name}: {why}; going on with edge-first EDF")
         self._dispatch.replace(EdgeCloudEdf(), now)
+
+    # Tasks whose executor dies.
+
+    def _lose(self, task: Task, why: str, now: int) -> None:
+        self._lost.add(task.id)
+        self._why[task.id] = why
+        self._guarded("finished", task, now, Outcome.FAILED)
+
+    def _retried(self, task: Task, now: int) -> bool:
+        """Keep a lost task for a second try, if its deadline allows one."""
+        profile, resources = task.profile, self._dispatch.resources
+        room = task.deadline - now
+        if task.id in self._second:
+            return False
+        down = profile.model in self._dispatch.down
+        cloud = resources.cloud_slots and profile.cloud_gain > 0 and profile.cloud_time <= room
+        if cloud or (profile.edge_time <= room and not down):
+            self._again.append(task)
+            return True
+        if profile.edge_time <= room and profile.model not in self._gone:
+            self._orphans.setdefault(profile.model, []).append(task)
+            return True
+        return False
+
+    def _try_again(self, now: int) -> None:
+        """Hand lost tasks to the scheduler once more, as new ones with the deadline they had."""
+        while self._again:
+            lost = self._again.popleft()
+            why = self._why.pop(lost.id, "")
+            if lost.deadline < now:
+                self._end(Result(lost, Outcome.FAILED, Place.NOWHERE, now, now))
+                continue
+            task = replace(lost, id=next(self._numbers))
+            self._frames[task.id] = self._frames.pop(lost.id)
+            self._second.add(task.id)
+            self._counts.retried += 1
+            self._note(task, "retry", why, now)
+            self._guarded("arrived", task, now)
 
     # The host of `Dispatch`.
 
@@ -225,7 +385,8 @@ class DispatcherActor(StreamActor):
     def run_cloud(self, task: Task, now: int) -> None:
         """Send a task to the cloud."""
         if self._cloud is not None:
-            self._cloud.send(task, self._frames[task.id], now)
+            left = self.session.host_seconds(task.deadline + task.reserve - now)
+            self._cloud.send(task, self._frames[task.id], now, left)
 
     def wake_at(self, at: int) -> None:
         """Remember a time at which the scheduler wants to be woken."""
@@ -235,22 +396,40 @@ class DispatcherActor(StreamActor):
         """Publish a decision with its reason."""
         if isinstance(decision, WakeAt):
             return
-        kind = "drop" if isinstance(decision, Drop) else "cloud"
-        action = "edge" if isinstance(decision, RunOnEdge) else kind
-        self._note(decision.task, action, decision.reason, now)
+        task = decision.task
+        if isinstance(decision, Drop):
+            self._why[task.id] = decision.reason
+            self._note(task, "drop", decision.reason, now)
+        else:
+            action = "edge" if isinstance(decision, RunOnEdge) else "cloud"
+            self._note(task, action, decision.reason, now)
 
     def closed(self, result: Result) -> None:
         """Publish a task's result, if it came in time."""
+        lost = result.task.id in self._lost
+        self._lost.discard(result.task.id)
+        if not (lost and self._retried(result.task, result.finished)):
+            self._end(result)
+
+    def _end(self, result: Result) -> None:
         task = result.task
         frame = self._frames.pop(task.id)
         answer = self._results.pop(task.id, None)
+        self._second.discard(task.id)
         in_time = result.outcome is Outcome.DONE
         origin = answer if answer is not None else frame
         self._publish(task.profile.model, origin, origin.item if answer and in_time else None)
-        self._outcomes[result.outcome.value] += 1
-        self._utility += result.utility
+        self._counts.ended(result)
+        why = self._why.pop(task.id, None)
+        figures = self._figures.pop(task.id, None)
         if result.outcome is not Outcome.DROPPED:
-            self._note(task, result.outcome.value, result.place.value, result.finished)
+            reason = f"{result.place.value}: {why}" if why else result.place.value
+        elif why is None:
+            reason = "no room in the cloud in time"
+        else:
+            return
+        totals = {"utility": result.utility, **self._counts.totals, **(figures or {})}
+        self._note(task, result.outcome.value, reason, result.finished, totals)
 
     def _publish(self, node: str, origin: Message[Any], item: Any) -> None:  # noqa: ANN401
         if item is not None or self.session.lockstep:
@@ -259,11 +438,31 @@ class DispatcherActor(StreamActor):
             done = ((origin.header.source, origin.header.stamp),)
             self._acks[node].derive(done, origin, host_time_ns(), origin.stamp)
 
-    def _note(self, task: Task, action: str, reason: str, now: int) -> None:
-        name = f"{task.profile.model}#{task.segment}"
-        values = {"slack_ms": (task.deadline - now) / 1e6, "waited_ms": (now - task.arrival) / 1e6}
+    def _label(self, task: Task) -> str:
+        """The analysis and the frame; also the camera, where the analysis watches several."""
+        model = task.profile.model
+        source = f"{task.source}:" if model in self._many else ""
+        return f"{model}#{source}{task.segment}"
+
+    def _note(
+        self,
+        task: Task,
+        action: str,
+        reason: str,
+        now: int,
+        totals: Mapping[str, float] | None = None,
+    ) -> None:
+        slack = task.deadline + task.reserve - now
+        waited = (now - task.arrival) / 1e6
+        values = {"slack_ms": slack / 1e6, "waited_ms": waited}
+        if action in {"edge", "cloud"}:
+            values["edge_ms"] = task.profile.edge_time / MILLISECOND
+            values["cloud_ms"] = task.profile.cloud_time / MILLISECOND
+        if task.reserve:
+            values["reserve_ms"] = task.reserve / 1e6
+        values |= totals or {}
         header = Header(self._decisions.sent, now, DECISIONS)
-        record = DecisionRecord(now, name, action, reason, values)
+        record = DecisionRecord(now, self._label(task), action, reason, values)
         self._decisions.measure(record, header, host_time_ns())
 
     def _time(self, stamp: int = 0) -> int:
@@ -276,8 +475,53 @@ class DispatcherActor(StreamActor):
         return 0.2
 
     def _close(self) -> None:
+        self._lifelines.end()
         if self._cloud is not None:
             self._cloud.finish(_LAST_ANSWERS)
+        self._dispatch.close()
 
     def _values(self) -> dict[str, Any]:
-        return {"outcomes": dict(self._outcomes), "utility": self._utility}
+        return {
+            **self._counts.values(),
+            "scheduler": type(self._dispatch.scheduler).__name__,
+            "replaced": self._replaced,
+            "edge_down": sorted(self._dispatch.down),
+            "cloud_slots": self._dispatch.resources.cloud_slots,
+            "reserve_ms": self._way.reserve(1 << 62) / 1e6,
+            "sites": self._cloud.values() if self._cloud is not None else {},
+        }
+
+
+class _Counts:
+    """What a run is judged by, as in the lab."""
+
+    def __init__(self) -> None:
+        self.retried = 0
+        self._tasks = 0
+        self._outcomes: Counter[str] = Counter()
+        self._utility = 0.0
+        self._windows = QoeWindows()
+
+    def arrived(self, task: Task) -> None:
+        self._tasks += 1
+        self._windows.arrived(task)
+
+    def ended(self, result: Result) -> None:
+        self._outcomes[result.outcome.value] += 1
+        self._utility += result.utility
+        if result.outcome is Outcome.DONE:
+            self._windows.done(result.task)
+
+    @property
+    def totals(self) -> dict[str, float]:
+        """Utility so far."""
+        return {"qos_total": self._utility, "qoe_total": self._windows.utility}
+
+    def values(self) -> dict[str, Any]:
+        return {
+            "tasks": self._tasks,
+            "outcomes": dict(self._outcomes),
+            "retried": self.retried,
+            **self.totals,
+            "qoe_windows": self._windows.won,
+        }

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor
@@ -16,6 +17,9 @@ from aerodaas.geometry import GeodeticOrigin
 from aerodaas.recording.provenance import Provenance
 from aerodaas.status import Message
 from aerodaas.vitals import Vitals
+
+if TYPE_CHECKING:
+    from aerodaas.recording.camera_page import CameraPage
 
 __all__ = ["RecorderActor"]
 
@@ -30,8 +34,11 @@ class RecorderActor(StreamActor):
         streams: dict[str, int],
         provenance: Provenance,
         live: str | None = None,
+        page: str | None = None,
     ) -> None:
         """Write the recording at `path`, and serve it at `live` (`host:port`) meanwhile.
+
+        At `page`, likewise, the cameras are shown to browsers.
 
         So many messages of each of the `streams` may wait; more are dropped and counted, for the
         flight never waits.
@@ -39,6 +46,7 @@ class RecorderActor(StreamActor):
         super().__init__(session, "recorder", streams)
         self._path = path
         self._address = live
+        self._page_address = page
         self._provenance = provenance
         self._failure = ""
         self._lost: Counter[str] = Counter()
@@ -53,6 +61,9 @@ class RecorderActor(StreamActor):
         home = environment.home
         name = self._provenance.name
         self._live = LiveServer(self._address, name) if self._address else None
+        # One that was restarted leaves what its predecessor wrote alone, and writes a second part.
+        self._path = _unwritten(self._path)
+        self._page = _camera_page(self._page_address)
         self._recorder = FlightRecorder(
             self._path,
             config=environment.recording,
@@ -88,6 +99,8 @@ class RecorderActor(StreamActor):
                 return
 
     def _write(self, message: Message[Any]) -> None:
+        if self._page is not None:
+            self._page.put(message)
         if self._failure:
             return
         try:
@@ -108,6 +121,26 @@ class RecorderActor(StreamActor):
         self._summary = self._recorder.close()
         if self._live is not None:
             self._live.close()
+        if self._page is not None:
+            self._page.close()
 
     def _values(self) -> dict[str, Any]:
         return {"path": str(self._path), "failure": self._failure}
+
+
+def _unwritten(path: Path) -> Path:
+    """`path`, or the first of `flight.2.mcap`, `flight.3.mcap`, ... that is not there yet."""
+    parts = itertools.count(2)
+    part = path
+    while part.exists():
+        part = path.with_suffix(f".{next(parts)}{path.suffix}")
+    return part
+
+
+def _camera_page(address: str | None) -> CameraPage | None:
+    if address is None:
+        return None
+    # The web server takes its time to load, and memory, which only who watches should pay.
+    from aerodaas.recording.camera_page import CameraPage  # noqa: PLC0415
+
+    return CameraPage(address)

@@ -20,6 +20,7 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
     "drivers": {
         "simulated": "aerodaas.drivers.simulated:SimulatedVehicle",
         "tello": "aerodaas.drivers.tello.vehicle:TelloVehicle",
+        "mavlink": "aerodaas.drivers.mavlink.vehicle:MavlinkVehicle",
         "replayed": "aerodaas.drivers.replayed:ReplayedVehicle",
     },
     "cameras": {
@@ -28,6 +29,7 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
         "recorded": "aerodaas.cameras.recorded:recorded_camera",
         "folder": "aerodaas.cameras.folder:FolderCamera",
         "video": "aerodaas.cameras.video:VideoCamera",
+        "mavlink": "aerodaas.cameras.video:VideoCamera",
         "mcap": "aerodaas.cameras.mcap:McapCamera",
         "replayed": "aerodaas.cameras.mcap:ReplayedCamera",
     },

@@ -5,14 +5,15 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Sequence
-from typing import Any, ClassVar
 
-from aerodaas.analytics.base import Analytics, Context, NavigableAnalytics
+import numpy as np
+from shapely import Point, Polygon
+
+from aerodaas.analytics.base import Context, NavigableAnalytics
+from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.tracking import Tracker
-from aerodaas.data import Alert, Detection, Detections, Frame
-from aerodaas.errors import ConfigError, GraphError
-from aerodaas.graph import AeroStreamData
-from aerodaas.interfaces import IAeroData
+from aerodaas.data import Alert, Detection, Detections
+from aerodaas.errors import ConfigError
 from aerodaas.navigation.follow_controller import FollowController, FollowPhase, Observation
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
 from aerodaas.navigation.sighting import Sighting, TargetSize, sight
@@ -25,16 +26,13 @@ _WIDTH_MEMORY = 0.1
 """Weight of the newest look in the mean of the target's width: arms swing."""
 
 
-class FollowAnalytics(NavigableAnalytics):
+class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
     """Follows one object of known size at a distance, and stays with that one.
 
     It locks on the nearest trusted target of its labels and holds it by its track. Until a
     first target is seen, and after one was given up, it commands nothing, so that other
-    navigation goes on. The camera must be calibrated (`horizontal_fov` of the sensor). With a
-    `detector` of its own it analyses a camera's stream, without one a detector's.
+    navigation goes on. The camera must be calibrated (`horizontal_fov` of the sensor).
     """
-
-    accepts: ClassVar[tuple[type, ...]] = (Detections, Frame)
 
     def __init__(
         self,
@@ -48,12 +46,15 @@ class FollowAnalytics(NavigableAnalytics):
         gains: FollowGains | None = None,
         limits: FollowLimits | None = None,
         lost: LostPolicy | None = None,
-        detector: Analytics[Detections] | None = None,
+        area: Sequence[tuple[float, float]] | None = None,
+        detector: BoxAnalytics.Detector | None = None,
     ) -> None:
         """Follow what carries one of `labels` from `distance`, flying at `height`, in metres.
 
-        `target_height` and `target_width` are the size of the object itself, in metres. Raises
-        ConfigError for lengths that are not positive.
+        `target_height` and `target_width` are the size of the object itself, in metres. With an
+        `area`, the corners of a polygon in metres east and north of home, a target that leaves it
+        is given up at once. Raises ConfigError for lengths that are not positive, and for an
+        area that is none.
         """
         lengths = {
             "distance": distance,
@@ -65,8 +66,8 @@ class FollowAnalytics(NavigableAnalytics):
             if not 0.0 < length < math.inf:
                 message = f"{type(self).__name__}: {name} must be above 0 m, not {length}"
                 raise ConfigError(message)
-        self.detector = detector
-        self.labels = (labels,) if isinstance(labels, str) else tuple(labels)
+        super().__init__(labels, detector)
+        self.area = None if area is None else _polygon(area)
         self.size = TargetSize(target_height, target_width)
         self.controller = FollowController(
             distance, height, gains=gains, limits=limits, lost=lost, priority=priority
@@ -75,45 +76,15 @@ class FollowAnalytics(NavigableAnalytics):
         self.target: int | None = None
         """Track that is followed."""
         self._width = target_width
-        self._warned = False
 
-    def analyse(self, data: IAeroData[Any]) -> AeroStreamData[AeroNavigation]:
-        """Follow in a stream of boxes; in one of frames if there is a detector for them.
-
-        Raises GraphError for any other stream.
-        """
-        frames = isinstance(data, AeroStreamData) and issubclass(data.item, Frame)
-        if frames and self.detector is None:
-            message = (
-                f"{type(self).__name__} takes boxes, not frames: analyse the camera with an "
-                "OnnxDetector first, or pass one as detector="
-            )
-            raise GraphError(message)
-        return super().analyse(data)
-
-    def open(self) -> None:
-        """Start the detector, where there is one."""
-        if self.detector is not None:
-            self.detector.open()
-
-    def close(self) -> None:
-        """Release the detector, where there is one."""
-        if self.detector is not None:
-            self.detector.close()
-
-    def process(self, item: Detections | Frame, context: Context) -> AeroNavigation | None:
+    def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
         """Return one velocity command, or None where there is nobody to follow."""
-        if not isinstance(item, Frame):
-            return self._follow(item, context)
-        if self.detector is None:
-            return None
-        found = self.detector.process(item, context)
-        return None if found is None else self._follow(found, context)
-
-    def _follow(self, item: Detections, context: Context) -> AeroNavigation | None:
+        item = boxes
         if item.camera is None:
-            self._warn_uncalibrated(item, context)
+            self.explain_once(item, context)
             return None
+        if self._has_left():
+            self._let_go(item, context)
         phase = self.controller.phase
         detection = self._target_in(self.tracker.update(item))
         sighting = None if detection is None else self._sight(detection, item)
@@ -137,12 +108,37 @@ class FollowAnalytics(NavigableAnalytics):
         found = tracked.labelled(*self.labels)
         trusted = [item for item in found if item.track_id is not None]
         mine = next((item for item in trusted if item.track_id == self.target), None)
-        if mine is not None or not trusted or not self._may_choose():
+        if mine is not None or not self._may_choose():
             return mine
+        trusted = [item for item in trusted if self._is_inside(item, tracked)]
+        if not trusted:
+            return None
         chosen = max(trusted, key=lambda item: item.area * item.score)
         self.target = chosen.track_id
         self._width = self.size.width
         return chosen
+
+    def _has_left(self) -> bool:
+        place = self.controller.motion.place
+        return self.area is not None and place is not None and not self.area.covers(Point(place))
+
+    def _let_go(self, item: Detections, context: Context) -> None:
+        self.target = None
+        self.controller.give_up()
+        text = f"The {' or '.join(self.labels)} has left the area; following ends."
+        context.alert(Alert(item.header, "target_left_area", text))
+
+    def _is_inside(self, detection: Detection, item: Detections) -> bool:
+        """Tell whether it may be followed: it is in the area, if there is one."""
+        if self.area is None:
+            return True
+        sighting, odometry = sight(detection, item, self.size), item.odometry
+        if sighting is None or odometry is None:
+            return False
+        heading = odometry.yaw + sighting.bearing
+        towards = np.array([math.cos(heading), math.sin(heading)])
+        place = odometry.position[:2] + sighting.distance * towards
+        return bool(np.isfinite(place).all() and self.area.covers(Point(*place)))
 
     def _may_choose(self) -> bool:
         """Another target is taken only when the present one has been gone for a while."""
@@ -151,7 +147,7 @@ class FollowAnalytics(NavigableAnalytics):
 
     def _sight(self, detection: Detection, item: Detections) -> Sighting | None:
         sighting = sight(detection, item, self.size.with_width(self._width))
-        if sighting is not None and sighting.width is not None:
+        if sighting is not None and sighting.width is not None and self.size.widest is None:
             self._width += _WIDTH_MEMORY * (sighting.width - self._width)
         return sighting
 
@@ -168,12 +164,9 @@ class FollowAnalytics(NavigableAnalytics):
             text = f"The {what} was not found again; following ends."
             context.alert(Alert(item.header, "target_given_up", text))
 
-    def _warn_uncalibrated(self, item: Detections, context: Context) -> None:
-        if self._warned:
-            return
-        self._warned = True
-        text = (
-            f"{item.header.source} is not calibrated, so that distances are unknown; "
-            "give the sensor its horizontal_fov. Nothing is followed."
-        )
-        context.alert(Alert(item.header, "camera_uncalibrated", text))
+
+def _polygon(area: Sequence[tuple[float, float]]) -> Polygon:
+    corners = 3
+    if len(area) < corners or not np.isfinite(np.asarray(area, np.float64)).all():
+        raise ConfigError("an area is three or more corners (metres east, metres north)")
+    return Polygon(area)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.follow import FollowAnalytics
-from aerodaas.data import Detections
 from aerodaas.interfaces import IEnvironment
+from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
+from aerodaas.navigation.sighting import TargetSize
 from aerodaas.waypoints import DEFAULT_PRIORITY
 
 __all__ = ["CarFollowAnalytics", "PersonFollowAnalytics", "VipFollowAnalytics"]
@@ -32,8 +33,11 @@ class VipFollowAnalytics(FollowAnalytics):
         labels: Sequence[str] = ("vest", "hazard vest"),
         target_height: float = 0.65,
         target_width: float = 0.45,
+        gains: FollowGains | None = None,
+        limits: FollowLimits | None = None,
+        lost: LostPolicy | None = None,
         priority: int = DEFAULT_PRIORITY,
-        detector: Analytics[Detections] | None = None,
+        detector: BoxAnalytics.Detector | None = None,
     ) -> None:
         """Follow from `distance`, flying at `height`, in metres.
 
@@ -46,6 +50,9 @@ class VipFollowAnalytics(FollowAnalytics):
             height,
             target_height=target_height,
             target_width=target_width,
+            gains=gains,
+            limits=limits,
+            lost=lost,
             priority=priority,
             detector=detector,
         )
@@ -54,7 +61,8 @@ class VipFollowAnalytics(FollowAnalytics):
 class CarFollowAnalytics(FollowAnalytics):
     """Follows a car, 1.5 m tall, from 6 m at a height of 2.5 m, which has it all in the picture.
 
-    Its width is that of the rear: seen from the side a car then seems nearer, never farther.
+    It ends, so that an interrupted survey resumes, when the car leaves the `area`, or when it is
+    out of sight for some seconds, having turned away or driven off.
     """
 
     def __init__(
@@ -66,12 +74,18 @@ class CarFollowAnalytics(FollowAnalytics):
         labels: Sequence[str] = ("car",),
         target_height: float = 1.5,
         target_width: float = 1.8,
+        target_length: float = 4.2,
+        area: Sequence[tuple[float, float]] | None = None,
+        gains: FollowGains | None = None,
+        limits: FollowLimits | None = None,
+        lost: LostPolicy | None = None,
         priority: int = DEFAULT_PRIORITY,
-        detector: Analytics[Detections] | None = None,
+        detector: BoxAnalytics.Detector | None = None,
     ) -> None:
         """Follow from `distance`, flying at `height`, in metres.
 
-        The paper's listings pass the environment; the analysed stream knows its own.
+        `area` is a polygon of corners (metres east, north of home) beyond which no car is
+        followed. The paper's listings pass the environment; the analysed stream knows its own.
         """
         del environment
         super().__init__(
@@ -80,6 +94,15 @@ class CarFollowAnalytics(FollowAnalytics):
             height,
             target_height=target_height,
             target_width=target_width,
+            area=area,
+            gains=gains,
+            limits=limits,
+            lost=lost or _CAR_LOST,
             priority=priority,
             detector=detector,
         )
+        self.size = TargetSize(target_height, target_width, widest=target_length)
+
+
+_CAR_LOST = LostPolicy(hold=2.5, search=7.0)
+"""A car that has turned away is gone sooner than it is found."""

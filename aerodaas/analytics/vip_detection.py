@@ -2,36 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from aerodaas.analytics.models import DETECTOR
 from aerodaas.analytics.onnx.detector import OnnxDetector
-from aerodaas.errors import ModelError
 
 __all__ = ["VipDetectionAnalytics"]
 
-_SHIPPED = Path(__file__).parent / "models" / "vest.onnx"
-
 
 class VipDetectionAnalytics(OnnxDetector):
-    """An `OnnxDetector` whose model knows hazard vests."""
+    """An `OnnxDetector` that looks for hazard vests, by default with the model that ships."""
 
     def __init__(
         self,
         model: str | Path | None = None,
         *,
-        classes: list[str] | None = None,
+        classes: Sequence[str] | None = None,
         min_score: float = 0.3,
-        providers: list[str] | None = None,
+        providers: Sequence[str] | None = None,
         threads: int | None = None,
     ) -> None:
-        """Load `model`, or the one that ships with the package; raises ModelError."""
-        path = Path(model) if model is not None else _SHIPPED
-        if model is None and not path.exists():
-            message = (
-                "no vest model ships with this version; give one of your own, as in "
-                'VipDetectionAnalytics(model="vest.onnx")'
-            )
-            raise ModelError(message)
+        """Load `model`, or the one that ships; raises ModelError.
+
+        `classes` are the names to keep: by default `vest` of the shipped model, and every class
+        of a model of your own.
+        """
+        wanted = ["vest"] if model is None and classes is None else classes
         super().__init__(
-            path, classes=classes, min_score=min_score, providers=providers, threads=threads
+            DETECTOR if model is None else model,
+            classes=wanted,
+            min_score=min_score,
+            providers=providers,
+            threads=threads,
         )

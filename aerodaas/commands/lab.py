@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from math import isnan
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +15,7 @@ from rich.table import Table
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import AeroDaaSError
-from aerodaas.schedulers.analytics.base import MILLISECOND, Resources
+from aerodaas.schedulers.analytics.base import MILLISECOND, AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.profiles import PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 from aerodaas.schedulers.lab import (
@@ -25,6 +26,7 @@ from aerodaas.schedulers.lab import (
     load_workload,
     run_lab,
 )
+from aerodaas.schedulers.lab.run import Spread
 from aerodaas.schedulers.lab.workload import SIX
 
 __all__ = ["app", "result_table"]
@@ -63,6 +65,14 @@ def run(
             "the published ones.",
         ),
     ] = "3D-A",
+    flown: Annotated[
+        Path | None,
+        typer.Option(
+            "--from",
+            help="A recorded flight (`flight.mcap`) instead of a workload: its tasks as they "
+            "came, with the execution times observed.",
+        ),
+    ] = None,
     scheduler: Names = "ec_edf,dems,gems,margin",
     seeds: Annotated[int, typer.Option(help="Number of seeds, 0 to N-1.", min=1)] = 10,
     network: Annotated[
@@ -83,13 +93,20 @@ def run(
     duration: Annotated[
         float | None, typer.Option(help="Simulated seconds; default 300, or the file's.")
     ] = None,
-    cloud_slots: Annotated[int, typer.Option(help="Executions in the cloud at once.", min=0)] = 32,
+    cloud_slots: Annotated[
+        int | None,
+        typer.Option(help="Executions in the cloud at once; default 32, or the flight's.", min=0),
+    ] = None,
     bound: Annotated[
         bool | None,
         typer.Option(help="Compute the clairvoyant bound; by default for up to 10 edges."),
     ] = None,
     jobs: Annotated[
         int | None, typer.Option(help="Processes; default one per core.", min=1)
+    ] = None,
+    address: Annotated[
+        str | None,
+        typer.Option(help="Ray cluster (`host:port`, `auto`) whose cores share the seeds."),
     ] = None,
     plots: Annotated[Path | None, typer.Option(help="Folder for plots.")] = None,
     json_path: Annotated[
@@ -102,25 +119,30 @@ def run(
     QoS utility as a share of what a clairvoyant could reach at most on the very same paths.
 
         aerodaas lab run -w 2D-A,4D-A -s ec_edf,dems,margin --times lognormal:0.15 --plots out
+
+        aerodaas lab run --from runs/patrol/flight.mcap -s dems,margin,mine.py:Mine
     """
     try:
         results: list[LabResult] = []
-        resources = Resources(cloud_slots=cloud_slots)
         names = [name.strip() for name in scheduler.split(",")]
-        for name in SIX if workload == "six" else workload.split(","):
-            load = _workload(name.strip(), duration)
+        loads, resources = _loads(workload, flown, duration)
+        if cloud_slots is not None:
+            resources = Resources(cloud_slots=cloud_slots)
+        spread, wanted = _spread(address, names)
+        for load in loads:
             with_bound = load.edges <= 10 if bound is None else bound  # noqa: PLR2004 - see help
             with _progress() as progress:
                 bar = progress.add_task(load.name, total=seeds * load.edges)
                 result = run_lab(
                     load,
-                    names,
+                    wanted,
                     range(seeds),
                     network=Network.named(network, load.duration),
                     times=ExecutionTimes.named(times),
                     resources=resources,
                     bound=with_bound,
                     jobs=jobs,
+                    spread=spread,
                     progress=lambda done, _: progress.update(bar, completed=done),  # noqa: B023
                 )
             results.append(result)
@@ -187,6 +209,29 @@ def result_table(result: LabResult) -> Table:
 def _workload(name: str, duration: float | None) -> Workload:
     found = load_workload(name) if name.endswith(".json") else Workload.named(name)
     return found if duration is None else found.lasting(round(duration * NANOSECONDS))
+
+
+def _spread(
+    address: str | None, names: list[str]
+) -> tuple[Spread | None, Sequence[str | type[AnalyticsScheduler]]]:
+    if address is None:
+        return None, names
+    from aerodaas.actors.spread import shipped, spread_over  # noqa: PLC0415 - loads ray
+
+    return spread_over(address), [shipped(name) for name in names]
+
+
+def _loads(
+    names: str, flown: Path | None, duration: float | None
+) -> tuple[list[Workload], Resources]:
+    if flown is None:
+        wanted = SIX if names == "six" else names.split(",")
+        return [_workload(name.strip(), duration) for name in wanted], Resources()
+    # Reading a recording takes libraries that simulating does not.
+    from aerodaas.commands.flown_workload import flown_workload  # noqa: PLC0415
+
+    workload, resources = flown_workload(flown)
+    return [workload], resources
 
 
 def _progress() -> Progress:

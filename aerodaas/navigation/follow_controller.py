@@ -20,6 +20,7 @@ from simple_pid import PID
 
 from aerodaas.clock import seconds
 from aerodaas.data import Odometry
+from aerodaas.navigation.command_shaper import CommandShaper
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
 from aerodaas.navigation.sighting import Sighting
 from aerodaas.navigation.target_motion import TargetMotion
@@ -85,8 +86,7 @@ class FollowController:
         limits = self.limits
         self._distance_pid = _pid(self.gains.distance, -limits.backward, limits.forward)
         self._yaw_pid = _pid(self.gains.yaw, -limits.yaw_rate, limits.yaw_rate)
-        self._velocity: NDArray[np.float64] = np.zeros(3)
-        self._yaw_rate = 0.0
+        self._shaper = CommandShaper(limits)
         self._stamp: int | None = None
         self._seen: int | None = None
         self._last: Sighting | None = None
@@ -107,6 +107,11 @@ class FollowController:
         velocity, yaw_rate = self._wanted(seen, min(dt, _LONGEST_STEP))
         return self._command(velocity, yaw_rate, seen, min(dt, _LONGEST_STEP))
 
+    def give_up(self) -> None:
+        """Forget the target at once and wait for another."""
+        self.phase = FollowPhase.WAITING
+        self._forget()
+
     def _take_in(self, sighting: Sighting, seen: Observation) -> None:
         self._seen, self._last = seen.stamp, sighting
         if seen.at_capture is not None and not sighting.bound:
@@ -126,7 +131,7 @@ class FollowController:
 
     def _forget(self) -> None:
         self._seen = self._last = None
-        self._velocity, self._yaw_rate = np.zeros(3), 0.0
+        self._shaper.reset()
         self._reset()
 
     def _reset(self) -> None:
@@ -175,29 +180,15 @@ class FollowController:
     def _command(
         self, velocity: NDArray[np.float64], yaw_rate: float, seen: Observation, dt: float
     ) -> VelocityCommand:
-        """Clip to the limits of speed, then to those of acceleration."""
-        limits = self.limits
+        """Keep the height, within the limits of speed and acceleration."""
         odometry = seen.now or seen.at_capture
         climb = 0.0
         if odometry is not None:
             climb = self.gains.height * (self.height - odometry.height)
-        speed = float(np.hypot(*velocity))
-        fastest = limits.forward if velocity[0] >= 0 else limits.backward
-        if speed > fastest:
-            velocity = velocity * fastest / speed
-        wanted = np.array([*velocity, _clip(climb, limits.climb)])
-        change = wanted - self._velocity
-        largest = limits.acceleration * dt
-        if (size := float(np.linalg.norm(change))) > largest:
-            change = change * largest / size
-        turn = _clip(yaw_rate, limits.yaw_rate) - self._yaw_rate
-        self._velocity = self._velocity + change
-        self._yaw_rate += _clip(turn, limits.yaw_acceleration * dt)
-        if not np.isfinite([*self._velocity, self._yaw_rate]).all():
-            self._velocity, self._yaw_rate = np.zeros(3), 0.0
+        wanted = np.array([*velocity, climb])
+        if not np.isfinite([*wanted, yaw_rate]).all():
             self._reset()
-        forward, left, up = self._velocity.tolist()
-        return VelocityCommand(forward, left, up, self._yaw_rate, priority=self.priority)
+        return self._shaper.shape(wanted, yaw_rate, dt, self.priority)
 
 
 def _pid(gains: tuple[float, float, float], low: float, high: float) -> PID:
@@ -223,7 +214,3 @@ def _is_sane(odometry: Odometry | None) -> bool:
         and bool((np.abs(odometry.position) <= _FARTHEST_FROM_HOME).all())
         and math.isfinite(odometry.yaw)
     )
-
-
-def _clip(value: float, limit: float) -> float:
-    return min(max(value, -limit), limit)

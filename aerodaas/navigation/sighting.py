@@ -34,11 +34,13 @@ class TargetSize:
 
     height: float
     width: float
+    widest: float | None = None
+    """Where the width is another from another side, as a car's is: the greatest, in metres."""
 
     def with_width(self, width: float) -> TargetSize:
         """The same with a width that was measured, kept within reason of the one assumed here."""
         bounded = min(max(width, _NARROWEST * self.width), _WIDEST * self.width)
-        return TargetSize(self.height, bounded)
+        return TargetSize(self.height, bounded, self.widest)
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,10 +91,9 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
         return None
     by_height, breadth = size.height / slopes, 2 * math.tan(spread / 2)
     by_width = size.width / breadth
+    at_most = max(size.width, size.widest or 0.0) / breadth
     margin_u, margin_v = _MARGIN * detections.width, _MARGIN * detections.height
-    cut_v = (
-        top < margin_v or bottom > detections.height - margin_v or by_height > _HIDDEN * by_width
-    )
+    cut_v = top < margin_v or bottom > detections.height - margin_v or by_height > _HIDDEN * at_most
     cut_u = left < margin_u or right > detections.width - margin_u
     measured = by_height if not cut_v else min(by_height, by_width)
     direction = np.array([math.cos(bearing), math.sin(bearing)])

@@ -30,8 +30,12 @@ _FIRST_SPEED = 0.7
 class TargetMotion:
     """Position and velocity of the target, east and north."""
 
-    def __init__(self) -> None:
-        """Know nothing."""
+    def __init__(self, acceleration: float = _ACCELERATION, speed: float = _FIRST_SPEED) -> None:
+        """Know nothing of a target that accelerates (m/s²) and moves (m/s) so, at one sigma.
+
+        With both zero, the target is known to stand.
+        """
+        self._acceleration, self._speed = acceleration, speed
         self._state: NDArray[np.float64] | None = None
         self._covariance: NDArray[np.float64] = np.zeros((4, 4))
         self._stamp = 0
@@ -40,6 +44,11 @@ class TargetMotion:
     def known(self) -> bool:
         """Whether the target was ever observed since the last reset."""
         return self._state is not None
+
+    @property
+    def place(self) -> tuple[float, float] | None:
+        """East and north of home in metres where it was last believed; None before the first."""
+        return None if self._state is None else (float(self._state[0]), float(self._state[1]))
 
     def reset(self) -> None:
         """Forget the target."""
@@ -58,7 +67,7 @@ class TargetMotion:
             self._state = np.array([*place, 0.0, 0.0])
             self._covariance = np.zeros((4, 4))
             self._covariance[:2, :2] = noise
-            self._covariance[2:, 2:] = _FIRST_SPEED**2 * np.eye(2)
+            self._covariance[2:, 2:] = self._speed**2 * np.eye(2)
         else:
             self._advance(seconds(stamp - self._stamp))
             gain = self._covariance[:, :2] @ np.linalg.inv(self._covariance[:2, :2] + noise)
@@ -90,4 +99,4 @@ class TargetMotion:
         step[0, 2] = step[1, 3] = dt
         push = np.vstack([np.eye(2) * dt**2 / 2, np.eye(2) * dt])
         self._state = step @ self._state
-        self._covariance = step @ self._covariance @ step.T + _ACCELERATION**2 * push @ push.T
+        self._covariance = step @ self._covariance @ step.T + self._acceleration**2 * push @ push.T

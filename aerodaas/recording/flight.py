@@ -148,6 +148,10 @@ class Flight:
     decisions: Counter[str] = field(default_factory=Counter)
     """Scheduler decisions, by action."""
     outcomes: list[Outcome] = field(default_factory=list)
+    reasons: Counter[tuple[str, str]] = field(default_factory=Counter)
+    """Scheduler decisions and outcomes, by action and reason."""
+    utility: dict[str, float] = field(default_factory=dict)
+    """What the analytics scheduler gained: `QoS`, and `QoE`, the bonuses of its windows."""
     loads: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
     """By actor."""
     machines: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
@@ -246,6 +250,10 @@ def _detections(flight: Flight, record: Record) -> None:
 def _decision(flight: Flight, record: Record) -> None:
     value = record.value
     flight.decisions[value["action"]] += 1
+    flight.reasons[value["action"], value["reason"]] += 1
+    totals = {"QoS": "qos_total", "QoE": "qoe_total"}
+    values = value["values"]
+    flight.utility |= {name: values[key] for name, key in totals.items() if key in values}
     analysis = value["task"].rpartition("#")[0]
     flight.outcomes.append(Outcome(seconds(value["stamp"]), analysis, value["action"]))
 

@@ -75,6 +75,10 @@ class FlightSummary:
     """Objects found in single frames, by label."""
     decisions: dict[str, int] = field(default_factory=dict)
     """Scheduler decisions, by action."""
+    reasons: dict[str, int] = field(default_factory=dict)
+    """Scheduler decisions and outcomes, by `action: reason`."""
+    utility: dict[str, float] = field(default_factory=dict)
+    """What the analytics scheduler gained: `QoS` and `QoE`."""
     alerts: list[dict[str, Any]] = field(default_factory=list)
     drops: dict[str, int] = field(default_factory=dict)
     """Messages that did not reach the recorder, by stream."""
@@ -92,6 +96,8 @@ class FlightSummary:
             latencies={name: _latency(it) for name, it in flight.latencies.items()},
             detections=dict(flight.detections),
             decisions=dict(flight.decisions),
+            reasons={f"{did}: {why}": n for (did, why), n in flight.reasons.most_common()},
+            utility={name: round(value, 3) for name, value in flight.utility.items()},
             alerts=[{"time_s": at, "kind": kind, "text": t} for at, kind, t in flight.alerts],
             drops=dict(flight.drops),
             provenance=dict(recording.provenance),
@@ -126,9 +132,17 @@ class FlightSummary:
                 f"  {stream}: {latency.median_ms:.1f} ms median, {latency.p99_ms:.1f} ms "
                 "99th percentile since capture"
             )
+        if self.decisions:
+            lines.append(f"  {_scheduler_text(self)}")
         lines += [f"  alert at {it['time_s']:.1f} s: {it['text']}" for it in self.alerts]
         lines += [f"  dropped {count} of {stream}" for stream, count in self.drops.items()]
         return "\n".join(lines)
+
+
+def _scheduler_text(summary: FlightSummary) -> str:
+    counts = ", ".join(f"{count} {action}" for action, count in summary.decisions.items())
+    gained = ", ".join(f"{name} utility {value:.0f}" for name, value in summary.utility.items())
+    return f"analytics scheduler: {counts}{'; ' if gained else ''}{gained}"
 
 
 def _latency(latency: StreamLatency) -> LatencyFigures:

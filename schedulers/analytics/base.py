@@ -129,6 +129,9 @@ class Task:
     """Whose data it is: a drone, a stream."""
     segment: int = 0
     """Number of the frame or segment of video."""
+    reserve: int = 0
+    """What the way to an executor and back may take. A scheduler plans for `deadline`; a result
+    is judged by `deadline + reserve`."""
 
 
 class Place(str, enum.Enum):
@@ -238,6 +241,11 @@ class AnalyticsScheduler:
     """
 
     resources: Resources = Resources()
+    learns: frozenset[str] = frozenset()
+    """Times of a profile, `edge_time` or `cloud_time`, that it learns from results by itself.
+
+    In flight, those that it does not learn follow what is measured, where the user told none.
+    """
 
     def start(self, resources: Resources, now: int) -> None:  # noqa: ARG002 - for overriding
         """Begin a run; tasks follow."""
@@ -261,6 +269,15 @@ class AnalyticsScheduler:
 
     def timer(self, now: int) -> Iterable[Decision]:  # noqa: ARG002 - for overriding
         """Act at a time asked for with `WakeAt`."""
+        return ()
+
+    def resources_changed(
+        self,
+        resources: Resources,
+        now: int,  # noqa: ARG002 - for overriding
+    ) -> Iterable[Decision]:
+        """The cloud is gone (no slots) or back; only in flight."""
+        self.resources = resources
         return ()
 
     def observe(self) -> Mapping[str, float]:

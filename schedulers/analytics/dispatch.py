@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable
-from typing import Protocol
+from collections.abc import Callable, Iterable
+from typing import Any, Protocol
 
 from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import (
@@ -21,7 +21,10 @@ from aerodaas.schedulers.analytics.base import (
     WakeAt,
 )
 
-__all__ = ["Dispatch", "Host"]
+__all__ = ["EXECUTOR_DOWN", "Dispatch", "Host"]
+
+EXECUTOR_DOWN = "its executor on the edge is down"
+"""Reason of sending or dropping a task that the scheduler wanted to run there."""
 
 
 class Host(Protocol):
@@ -67,9 +70,14 @@ class Dispatch:
         self.running: Task | None = None
         """Task on the edge executor."""
         self.in_cloud = 0
+        self.down: set[str] = set()
+        """Models whose executor on the edge is down; their tasks go to the cloud or nowhere."""
         self._edge_started = 0
         self._cloud_queue: deque[SendToCloud] = deque()
         self._cloud_started: dict[int, int] = {}
+        self._ended: deque[Result] = deque()
+        """Ends that the scheduler has not been told of yet."""
+        self._has_cloud = resources.cloud_slots > 0
         self._host = host
 
     @property
@@ -79,24 +87,29 @@ class Dispatch:
 
     def start(self, now: int) -> None:
         """Begin a run."""
-        self.scheduler.start(self.resources, now)
+        self.ask(self.scheduler.start, self.resources, now)
+
+    def ask(self, event: Callable[..., Any], *args: Any) -> Any:  # noqa: ANN401
+        """Tell the scheduler; a host that does not trust it overrides this."""
+        return event(*args)
 
     def arrived(self, task: Task, now: int) -> None:
         """A task has reached the edge."""
         self.undecided[task.id] = task
-        self._carry_out(self.scheduler.task_arrived(task, now), now)
+        self._carry_out(self.ask(self.scheduler.task_arrived, task, now), now)
         if self.running is None:
             self._offer_edge(now)
 
     def timer(self, now: int) -> None:
         """A time asked for with `Host.wake_at` has come."""
-        self._carry_out(self.scheduler.timer(now), now)
+        self._carry_out(self.ask(self.scheduler.timer, now), now)
         if self.running is None:
             self._offer_edge(now)
 
     def finished(self, task: Task, now: int, failure: Outcome | None = None) -> None:
         """An execution has ended: with a result, or with TIMEOUT or FAILED as its `failure`."""
-        outcome = failure or (Outcome.DONE if now <= task.deadline else Outcome.LATE)
+        in_time = now <= task.deadline + task.reserve
+        outcome = failure or (Outcome.DONE if in_time else Outcome.LATE)
         if task is self.running:
             self.running = None
             result = Result(task, outcome, Place.EDGE, self._edge_started, now)
@@ -104,18 +117,31 @@ class Dispatch:
             started = self._cloud_started.pop(task.id)
             self.in_cloud -= 1
             result = Result(task, outcome, Place.CLOUD, started, now)
-            if self._cloud_queue:
-                self._fill_cloud(now)
-        self._close(result, now)
+        self._host.closed(result)
+        if self._cloud_queue:
+            self._fill_cloud(now)
+        self._ended.append(result)
+        self._tell_ends(now)
+        if self.running is None:
+            self._offer_edge(now)
+
+    def change_resources(self, resources: Resources, now: int) -> None:
+        """The cloud is gone, which gives up what waits for it, or back."""
+        self.resources = resources
+        while self._cloud_queue and not resources.cloud_slots:
+            self._give_up(self._cloud_queue.popleft().task, now)
+        self._carry_out(self.ask(self.scheduler.resources_changed, resources, now), now)
         if self.running is None:
             self._offer_edge(now)
 
     def replace(self, scheduler: AnalyticsScheduler, now: int) -> None:
         """Go on with another scheduler, which is told of the undecided tasks as new ones."""
         self.scheduler = scheduler
+        self._ended.clear()
         self.start(now)
+        self._fill_cloud(now)
         for task in list(self.undecided.values()):
-            self._carry_out(scheduler.task_arrived(task, now), now)
+            self._carry_out(self.ask(scheduler.task_arrived, task, now), now)
         if self.running is None:
             self._offer_edge(now)
 
@@ -123,11 +149,16 @@ class Dispatch:
         undecided = self.undecided
         while undecided and self.running is None:
             before = len(undecided)
-            self._carry_out(self.scheduler.executor_idle(now), now)
+            self._carry_out(self.ask(self.scheduler.executor_idle, now), now)
             if len(undecided) == before:
                 return
 
-    def _carry_out(self, decisions: Iterable[Decision], now: int) -> None:
+    def _carry_out(self, decisions: Iterable[Decision] | None, now: int) -> None:
+        if decisions is None:
+            name = type(self.scheduler).__name__
+            raise SchedulerError(
+                f"{name} answered an event with None; return a list of decisions, or yield them"
+            )
         for decision in decisions:
             if isinstance(decision, WakeAt):
                 if decision.at < now:
@@ -147,24 +178,41 @@ class Dispatch:
                 del self.undecided[task.id]
                 self._host.decided(decision, now)
                 self._host.closed(Result(task, Outcome.DROPPED, Place.NOWHERE, now, now))
+        self._tell_ends(now)
 
     def _run_edge(self, decision: RunOnEdge, now: int) -> None:
         task = decision.task
         if self.running is not None:
             raise self._refusal(decision, f"the edge executor is busy with task {self.running.id}")
+        if task.profile.model in self.down:
+            self._divert(task, now)
+            return
         del self.undecided[task.id]
         self.running = task
         self._edge_started = now
         self._host.decided(decision, now)
         self._host.run_edge(task, now)
 
+    def _divert(self, task: Task, now: int) -> None:
+        """What was to run on an executor that is down goes to the cloud, if it pays and fits."""
+        profile = task.profile
+        latest = task.deadline - profile.cloud_time
+        if self.resources.cloud_slots and profile.cloud_gain > 0 and now <= latest:
+            self._send(SendToCloud(task, EXECUTOR_DOWN, latest), now)
+        else:
+            del self.undecided[task.id]
+            self._host.decided(Drop(task, EXECUTOR_DOWN), now)
+            self._give_up(task, now)
+
     def _send(self, decision: SendToCloud, now: int) -> None:
-        if not self.resources.cloud_slots:
+        if not self._has_cloud:
             raise self._refusal(decision, "there is no cloud")
         task = decision.task
         del self.undecided[task.id]
         self._host.decided(decision, now)
-        if self.in_cloud < self.resources.cloud_slots:
+        if not self.resources.cloud_slots:
+            self._give_up(task, now)
+        elif self.in_cloud < self.resources.cloud_slots:
             self._start_cloud(task, now)
         else:
             self._cloud_queue.append(decision)
@@ -181,11 +229,18 @@ class Dispatch:
             if waiting.latest_start is None or now <= waiting.latest_start:
                 self._start_cloud(waiting.task, now)
             else:
-                self._close(Result(waiting.task, Outcome.DROPPED, Place.NOWHERE, now, now), now)
+                self._give_up(waiting.task, now)
 
-    def _close(self, result: Result, now: int) -> None:
+    def _give_up(self, task: Task, now: int) -> None:
+        """End a task that the scheduler believes to have started; it is told as soon as may be."""
+        result = Result(task, Outcome.DROPPED, Place.NOWHERE, now, now)
         self._host.closed(result)
-        self._carry_out(self.scheduler.task_finished(result, now), now)
+        self._ended.append(result)
+
+    def _tell_ends(self, now: int) -> None:
+        while self._ended:
+            result = self._ended.popleft()
+            self._carry_out(self.ask(self.scheduler.task_finished, result, now), now)
 
     def _refusal(self, decision: object, why: str) -> SchedulerError:
         name = type(self.scheduler).__name__

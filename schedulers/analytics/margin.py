@@ -22,6 +22,7 @@ Python, twice a second or when surprised; every other event takes O(log n) in th
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
@@ -61,8 +62,6 @@ GAP = 250 * MILLISECOND
 WIDTH = 4
 SURPRISE = 3 * MILLISECOND
 """Departure from the expected end of an execution that calls for a new plan."""
-RETRY = 20 * MILLISECOND
-"""Between two looks for a free slot in a crowded cloud."""
 _MEMORY = 5 * NANOSECONDS
 _LOOK = 5
 """Tasks of one model that the planner considers."""
@@ -85,12 +84,16 @@ class _Model:
 class Margin(AnalyticsScheduler):
     """Plans the edge a second ahead by expected gain over the cloud, with the risk priced in."""
 
+    learns = frozenset({"edge_time", "cloud_time"})
+
     def __init__(self) -> None:
         self.cloud = CloudOutlook()
         self.edge = ExecutionBeliefs(shared=False)
         self._models: dict[str, _Model] = {}
         self._due: list[tuple[int, int, Task]] = []
         """When each waiting task needs a decision, a heap; entries of others are stale."""
+        self._hopeful: dict[str, deque[Task]] = {}
+        """Per model, tasks that would go to the cloud if it were not crowded; some are stale."""
         self._wakes: list[int] = []
         """Timers asked for that have not come yet, a heap."""
         self._free_at = 0.0
@@ -124,13 +127,16 @@ class Margin(AnalyticsScheduler):
             return [SendToCloud(task, "probe of the cloud")]
         model.waiting[task] = False
         heappush(self._due, (self._due_at(model, task, now, value), task.id, task))
-        return self._wake_up(now)
+        return self._decide(now)
 
     def timer(self, now: int) -> Iterable[Decision]:
         """Decide about the tasks for which waiting no longer pays."""
         while self._wakes and self._wakes[0] <= now:
             heappop(self._wakes)
         self.cloud.listen(now)
+        return self._decide(now)
+
+    def _decide(self, now: int) -> list[Decision]:
         decisions: list[Decision] = []
         while self._due and self._due[0][0] <= now:
             task = heappop(self._due)[2]
@@ -188,7 +194,16 @@ class Margin(AnalyticsScheduler):
                 self.edge.observe(task.profile, result.finished - result.started, now)
         else:
             self.cloud.finished(result, now)
+            if self._hopeful and not self.cloud.crowded:
+                return self._fill_slots(now)
         return ()
+
+    def resources_changed(self, resources: Resources, now: int) -> Iterable[Decision]:
+        """Plan for a cloud that is gone, or back: then what is known of it is no longer true."""
+        self.cloud.resources = resources
+        self.cloud.silent_since = None
+        self._stale = True
+        return super().resources_changed(resources, now)
 
     def observe(self) -> Mapping[str, float]:
         """Tasks waiting, the network's delay, and whether the cloud is silent."""
@@ -221,11 +236,26 @@ class Margin(AnalyticsScheduler):
             worth = max(model.profile.edge_gain - value, 0.0)
             rate = model.on_edge / model.waited
             return int(task.deadline - self.cloud.patience(model.profile, worth, rate))
-        belief = self.edge.belief(model.profile)
-        last = int(task.deadline - belief.mean + belief.sigma)
         if self.cloud.crowded and not model.waiting.get(task) and model.profile.cloud_gain > 0:
-            return min(last, now + RETRY)
-        return last
+            self._hopeful.setdefault(task.profile.model, deque()).append(task)
+        belief = self.edge.belief(model.profile)
+        return int(task.deadline - belief.mean + belief.sigma)
+
+    def _fill_slots(self, now: int) -> Iterable[Decision]:
+        """Give the slots that have become free to those who waited, the dearest models first."""
+        for name in sorted(self._hopeful, key=self._slot_worth, reverse=True):
+            model, queue = self._models[name], self._hopeful[name]
+            while queue and not self.cloud.crowded:
+                task = queue.popleft()
+                if model.waiting.get(task, True) or self._cloud_value(model, task, now) <= 0:
+                    continue
+                self._refresh(now)
+                if task not in self._planned:
+                    yield self._send(model, task, now)
+
+    def _slot_worth(self, name: str) -> float:
+        profile = self._models[name].profile
+        return profile.cloud_gain / profile.cloud_time
 
     def _wake_up(self, now: int, at: int | None = None) -> list[Decision]:
         if self._due and (at is None or self._due[0][0] < at):

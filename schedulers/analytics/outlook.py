@@ -46,6 +46,8 @@ class CloudOutlook:
         self._answered = -1
         """When the newest task that came back had been sent."""
         self._last_sent = 0
+        self._listen_at = 0.0
+        """When the first answer will be overdue; nothing is to be noticed before."""
 
     @property
     def crowded(self) -> bool:
@@ -76,7 +78,7 @@ class CloudOutlook:
         belief = self.beliefs.belief(profile)
         room -= OVERHEAD + self._wait(belief.mean)
         gain = benefit * chance(belief, room) - profile.cloud_cost
-        if self.crowded:
+        if self.slot_price > 0 and self.crowded:
             gain -= self.slot_price * belief.mean
         return max(0.0, gain)
 
@@ -104,6 +106,7 @@ class CloudOutlook:
     def finished(self, result: Result, now: int) -> None:
         """Learn from a task that came back, was lost or never started."""
         sent = self._sent.pop(result.task, now)
+        self._listen_at = 0.0
         if result.place is not Place.CLOUD or result.outcome is Outcome.FAILED:
             return
         if result.outcome is Outcome.TIMEOUT:
@@ -115,13 +118,15 @@ class CloudOutlook:
 
     def listen(self, now: int) -> None:
         """Notice that answers are overdue."""
-        if self.silent_since is not None:
+        if now < self._listen_at or self.silent_since is not None:
             return
         overdue = 0
         for task, sent in self._sent.items():
             belief = self.beliefs.belief(task.profile)
             late = belief.mean + _OVERDUE * belief.sigma + _GRACE + self._wait(belief.mean)
             if now - sent <= late:
+                if not overdue:
+                    self._listen_at = sent + late
                 return
             overdue += sent > self._answered
             if overdue >= _SILENT:

@@ -7,9 +7,16 @@ measured on a Jetson edge and on AWS Lambda.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.config import TaskConfig
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal
 
-__all__ = ["ACTIVE", "PASSIVE", "PUBLISHED"]
+__all__ = ["ACTIVE", "CLOUD_TIME", "EDGE_TIME", "PASSIVE", "PUBLISHED", "told_profile"]
+
+EDGE_TIME, CLOUD_TIME = 100.0, 300.0
+"""Milliseconds taken for an execution of which nothing is known yet."""
 
 # model: benefit, deadline, edge time, cloud time, edge cost, cloud cost, QoE bonus, urgent
 _TABLE: dict[str, tuple[float, int, int, int, float, float, float, bool]] = {
@@ -43,3 +50,23 @@ PASSIVE: tuple[str, ...] = ("HV", "DEV", "MD", "BP")
 """Models of the P workloads."""
 ACTIVE: tuple[str, ...] = tuple(PUBLISHED)
 """Models of the A workloads."""
+
+
+def told_profile(model: str, tasks: Mapping[str, TaskConfig]) -> Profile:
+    """What the environment file's `schedulers.tasks` tell of an analysis.
+
+    `model` is the analysis' stream; the file knows it by its name without the robot. Raises
+    SchedulerError for figures that no scheduler could work with.
+    """
+    told = tasks.get(model.rpartition("/")[2], TaskConfig())
+    window = round(told.qoe_window * NANOSECONDS)
+    return Profile(
+        model,
+        told.benefit,
+        int(told.deadline * MILLISECOND),
+        int((told.edge_time or EDGE_TIME) * MILLISECOND),
+        int((told.cloud_time or CLOUD_TIME) * MILLISECOND),
+        told.edge_cost,
+        told.cloud_cost,
+        QoeGoal(told.qoe_bonus, told.qoe_share, window) if told.qoe_bonus else None,
+    )

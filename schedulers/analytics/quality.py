@@ -31,9 +31,12 @@ class QualityWatch:
     done: int = 0
     missed: int = 0
     success: float = 0.9
+    _worth: float | None = None
+    """Worked out since the last change."""
 
     def arrival(self, at: int) -> None:
         """Count a task that arrived, and begin a new window when one is due."""
+        self._worth = None
         window = at // self.goal.window
         if window != self.window:
             self.before = self.arrived if window == self.window + 1 else 0
@@ -43,6 +46,7 @@ class QualityWatch:
 
     def ended(self, arrival: int, *, in_time: bool) -> None:
         """Count the end of a task that arrived at `arrival`."""
+        self._worth = None
         self.success += _MEMORY * (in_time - self.success)
         if arrival // self.goal.window == self.window:
             self.done += in_time
@@ -50,6 +54,11 @@ class QualityWatch:
 
     def worth(self) -> float:
         """Value of one more task in time, above its own benefit."""
+        if self._worth is None:
+            self._worth = self._marginal_bonus() if self.goal.bonus else 0.0
+        return self._worth
+
+    def _marginal_bonus(self) -> float:
         total = max(self.before, self.arrived)
         others = total - self.done - self.missed - 1
         needed = self.goal.share * total - self.done

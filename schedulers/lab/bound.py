@@ -87,10 +87,10 @@ def _split(path: SamplePath, grid: int) -> tuple[float, _Jobs]:
         worth = 0.0
         if gain > 0:
             end = path.network.earliest_end(path.cloud_times[task.id], task.arrival)
-            worth = gain if end is not None and end <= task.deadline else 0.0
+            worth = gain if end is not None and end <= task.deadline + task.reserve else 0.0
         elsewhere += worth
         length = path.edge_times[task.id]
-        latest = task.deadline - length
+        latest = task.deadline + task.reserve - length
         if latest < task.arrival or task.profile.edge_gain <= worth:
             continue
         if length < SHORTEST * grid:

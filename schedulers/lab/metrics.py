@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, fields
 from statistics import fmean, stdev
 
 from aerodaas.schedulers.analytics.base import MIGRATED, STOLEN, Outcome, Place, Task
+from aerodaas.schedulers.analytics.windows import QoeWindows
 from aerodaas.schedulers.lab.simulator import Trace
 
 __all__ = ["Mean", "Score", "mean_of", "score"]
@@ -92,21 +93,13 @@ def score(tasks: Sequence[Task], trace: Trace) -> Score:
 
 
 def _bonuses(tasks: Sequence[Task], trace: Trace) -> float:
-    goals = {task.profile.model: task.profile.qoe for task in tasks if task.profile.qoe}
-    done: Counter[tuple[str, int]] = Counter()
-    arrived: Counter[tuple[str, int]] = Counter()
+    windows = QoeWindows()
     for task in tasks:
-        if (goal := task.profile.qoe) is not None:
-            arrived[task.profile.model, task.arrival // goal.window] += 1
+        windows.arrived(task)
     for result in trace.results:
-        goal = result.task.profile.qoe
-        if goal is not None and result.outcome is Outcome.DONE:
-            done[result.task.profile.model, result.task.arrival // goal.window] += 1
-    return sum(
-        goals[window[0]].bonus
-        for window, count in arrived.items()
-        if done[window] >= goals[window[0]].share * count
-    )
+        if result.outcome is Outcome.DONE:
+            windows.done(result.task)
+    return windows.utility
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,8 @@ class Arrival:
     edge_time: int | None = None
     """Measured on the edge, where it was."""
     cloud_time: int | None = None
+    reserve: int = 0
+    """As in `Task`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,8 +90,9 @@ class Workload:
                     number,
                     self.models[a.model],
                     a.at,
-                    a.at + self.models[a.model].deadline,
+                    a.at + self.models[a.model].deadline - a.reserve,
                     a.source,
+                    reserve=a.reserve,
                 )
                 for number, a in enumerate(self.arrivals_at(edge))
             ]

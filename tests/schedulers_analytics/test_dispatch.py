@@ -22,7 +22,7 @@ from aerodaas.schedulers.analytics.base import (
     Task,
     WakeAt,
 )
-from aerodaas.schedulers.analytics.dispatch import Dispatch
+from aerodaas.schedulers.analytics.dispatch import EXECUTOR_DOWN, Dispatch
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 
 MODEL = Profile("m", 10, 100 * MILLISECOND, 10 * MILLISECOND, 20 * MILLISECOND, 1, 2)
@@ -113,7 +113,8 @@ def test_the_cloud_queue_keeps_order_and_gives_up_at_the_latest_start() -> None:
     dispatch.finished(tasks[0], 45)
     dispatch.finished(tasks[1], 60)
     assert host.asked == [("cloud", 0, 0), ("cloud", 1, 45)]
-    assert [r.outcome for r in host.results] == [Outcome.DONE, Outcome.DROPPED, Outcome.DONE]
+    ends = {r.task.id: r.outcome for r in host.results}
+    assert ends == {0: Outcome.DONE, 1: Outcome.DONE, 2: Outcome.DROPPED}
     assert [r.task.id for r in scheduler.heard] == [0, 2, 1]
 
 
@@ -184,6 +185,92 @@ def test_another_scheduler_takes_over_what_is_undecided() -> None:
     assert host.asked == [("edge", 0, 0), ("cloud", 1, 5)]
     assert not dispatch.undecided
     assert [r.task.id for r in host.results] == [2]
+
+
+def test_a_scheduler_that_fails_at_the_end_of_a_task_loses_nothing() -> None:
+    """The end was taken note of before the scheduler heard of it, and once only."""
+
+    class Failing(_Scripted):
+        def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
+            raise ZeroDivisionError(f"{result} at {now}")
+
+    dispatch, host = _dispatch_of(Failing(idle=True))
+    dispatch.arrived(_task(0), 0)
+    running = dispatch.running
+    assert running is not None
+    with pytest.raises(ZeroDivisionError):
+        dispatch.finished(running, 5)
+    dispatch.replace(_Scripted(idle=True), 5)
+    assert [r.task.id for r in host.results] == [0]
+
+
+def test_a_result_is_judged_by_the_true_deadline() -> None:
+    """The scheduler plans for an earlier one."""
+    dispatch, host = _dispatch_of(_Scripted(idle=True))
+    reserve = 7
+    for number, late in enumerate((7, 8)):
+        one = Task(number, MODEL, 0, 100, reserve=reserve)
+        dispatch.arrived(one, 0)
+        dispatch.finished(one, 100 + late)
+    assert [r.outcome for r in host.results] == [Outcome.DONE, Outcome.LATE]
+
+
+def test_an_executor_that_is_down_is_not_given_work() -> None:
+    """What pays and fits goes to the cloud, the rest is dropped; the scheduler hears of both."""
+    scheduler = _Scripted(*([lambda t, _: RunOnEdge(t)] * 3))
+    dispatch, host = _dispatch_of(scheduler)
+    dispatch.down.add("m")
+    tasks = [_task(0), _task(1, -85 * MILLISECOND), _task(2)]
+    for one in tasks[:2]:
+        dispatch.arrived(one, 0)
+    dispatch.finished(tasks[0], 20)
+    dispatch.down.clear()
+    dispatch.arrived(tasks[2], 30)
+    assert host.asked == [("cloud", 0, 0), ("edge", 2, 30)]
+    assert [(r.task.id, r.outcome) for r in host.results] == [
+        (1, Outcome.DROPPED),
+        (0, Outcome.DONE),
+    ]
+    assert scheduler.heard == host.results
+    assert [one.reason for one in host.decisions[:2]] == [EXECUTOR_DOWN] * 2  # type: ignore[union-attr]
+
+
+def test_a_cloud_that_is_gone_takes_no_tasks() -> None:
+    """What waits for it and what a scheduler goes on sending is given up, not refused."""
+    send = lambda t, _: SendToCloud(t)  # noqa: E731
+    scheduler = _Scripted(send, send, send, send)
+    dispatch, host = _dispatch_of(scheduler)
+    tasks = [_task(number) for number in range(4)]
+    for one in tasks[:2]:
+        dispatch.arrived(one, 0)
+    dispatch.change_resources(Resources(cloud_slots=0), 5)
+    assert scheduler.resources.cloud_slots == 0
+    dispatch.arrived(tasks[2], 6)
+    dispatch.finished(tasks[0], 7, Outcome.FAILED)
+    dispatch.change_resources(Resources(cloud_slots=1), 8)
+    dispatch.arrived(tasks[3], 9)
+    assert host.asked == [("cloud", 0, 0), ("cloud", 3, 9)]
+    assert [(r.task.id, r.outcome) for r in host.results] == [
+        (1, Outcome.DROPPED),
+        (2, Outcome.DROPPED),
+        (0, Outcome.FAILED),
+    ]
+    assert scheduler.heard == host.results
+
+
+@pytest.mark.parametrize("name", scheduler_names())
+def test_every_scheduler_keeps_off_a_cloud_that_is_gone(name: str) -> None:
+    """Told in the middle of a run, it sends nothing until the cloud is back."""
+    host = _RecordingHost()
+    dispatch = Dispatch(load_scheduler(name), Resources(), host)
+    dispatch.start(0)
+    dispatch.change_resources(Resources(cloud_slots=0), 1)
+    for number in range(8):
+        dispatch.arrived(_task(number, 2), 2)
+    assert not [one for one in host.asked if one[0] == "cloud"]
+    for _, at in sorted({(0, at) for kind, _, at in host.asked if kind == "wake"}):
+        dispatch.timer(max(at, 2))
+    assert not [one for one in host.asked if one[0] == "cloud"]
 
 
 @pytest.mark.parametrize("name", scheduler_names())

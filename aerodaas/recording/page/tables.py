@@ -33,6 +33,7 @@ def figures(summary: FlightSummary) -> dict[str, object]:
             found[f"{camera}: frames per second"] = count / summary.duration_s
     found |= {f"seen: {label}": count for label, count in summary.detections.items()}
     found |= {f"scheduler: {action}": count for action, count in summary.decisions.items()}
+    found |= {f"scheduler: {name} utility": gained for name, gained in summary.utility.items()}
     found["alerts"] = len(summary.alerts)
     found["dropped"] = sum(summary.drops.values())
     return found
@@ -48,6 +49,10 @@ def sections(summary: FlightSummary) -> Iterator[str]:
         ]
         head = ["stream", "count", "median (ms)", "99th perc.", "overhead"]
         yield section("Latency since capture", table(head, rows))
+    if summary.reasons:
+        rows = [(*said.split(": ", 1), count) for said, count in summary.reasons.items()]
+        head = ["decision or outcome", "reason", "tasks"]
+        yield section("Why the scheduler decided so", table(head, rows), wide=True)
     if summary.alerts:
         yield section("Alerts", table(["at (s)", "kind", "text"], _alerts(summary)))
     if summary.drops:

@@ -11,14 +11,14 @@ from numpy.typing import ArrayLike, NDArray
 from panda3d.core import NodePath
 
 from aerodaas.simulation.scenario import Building, Fence, Tower
-from aerodaas.simulation.scene.layers import attach
+from aerodaas.simulation.scene.layers import LABEL, attach
 from aerodaas.simulation.scene.light import Light
 from aerodaas.simulation.scene.mesh import Mesh, box, merged, sheet, tube
 from aerodaas.simulation.scene.plants import rng_of
 from aerodaas.simulation.scene.textures import Palette
 from aerodaas.simulation.world import ROOF_RISE, Thing
 
-__all__ = ["add_building", "add_fence", "add_tower", "beam"]
+__all__ = ["TowerLook", "add_building", "add_fence", "add_tower", "beam"]
 
 _EAVES = 0.45
 """Metres by which a roof reaches over the walls."""
@@ -205,25 +205,48 @@ def add_fence(parent: NodePath, thing: Thing, palette: Palette, light: Light) ->
     attach(parent, spec.id, merged(parts).painted((1.2, 1.15, 1.1)).lit(light.sun), palette["wood"])
 
 
-def add_tower(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
-    """Attach a lattice tower in red and white bands, with aerials at its top."""
+@dataclass(frozen=True)
+class TowerLook:
+    """How a lattice tower is built and painted."""
+
+    paint: tuple[tuple[float, float, float], tuple[float, float, float]] = (
+        (0.86, 0.16, 0.12),
+        (0.95, 0.95, 0.95),
+    )
+    """Colours of its bands, in turn from the foot."""
+    taper: float = 0.22
+    """Width at the top over that at the foot."""
+    section: float = 2.4
+    """Metres from one ring of bars to the next, about."""
+    stout: float = 1.0
+    """Girth of the bars over the usual one."""
+
+
+def add_tower(
+    parent: NodePath,
+    thing: Thing,
+    palette: Palette,
+    light: Light,
+    look: TowerLook,
+) -> None:
+    """Attach a lattice tower, with aerials at its top."""
     spec = thing.spec
     if not isinstance(spec, Tower):
         raise TypeError(f"{thing.id} is no tower")
-    sections = max(4, round(spec.height / 2.4))
+    sections = max(4, round(spec.height / look.section))
     levels = np.linspace(0.0, spec.height - 2.0, sections + 1)
-    half = spec.width / 2 * np.linspace(1.0, 0.22, sections + 1)
+    half = spec.width / 2 * np.linspace(1.0, look.taper, sections + 1)
     corner = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
     parts = []
     for k in range(sections):
-        band = (0.86, 0.16, 0.12) if k * 7 // sections % 2 == 0 else (0.95, 0.95, 0.95)
+        band = look.paint[k * 7 // sections % 2]
         low = np.c_[corner * half[k], np.full(4, levels[k])]
         high = np.c_[corner * half[k + 1], np.full(4, levels[k + 1])]
         for i in range(4):
             j = (i + 1) % 4
             bars = [(low[i], high[i], 0.07), (low[i], high[j], 0.035), (low[j], high[i], 0.035)]
             bars.append((high[i], high[j], 0.035))
-            parts += [beam(a, b, radius, 3).painted(band) for a, b, radius in bars]
+            parts += [beam(a, b, look.stout * radius, 3).painted(band) for a, b, radius in bars]
     top = levels[-1]
     parts.append(beam((0, 0, top), (0, 0, spec.height), 0.05).painted((0.9, 0.9, 0.9)))
     for k in range(3):
@@ -236,4 +259,5 @@ def add_tower(parent: NodePath, thing: Thing, palette: Palette, light: Light) ->
     dish = replace(dish, points=dish.points[:, swap], normals=dish.normals[:, swap])
     parts.append(dish.moved((half[-2], 0, 0.72 * spec.height)).painted((0.93, 0.93, 0.93)))
     tower = merged(parts).moved((thing.x, thing.y, 0.0), thing.yaw)
-    attach(parent, spec.id, tower.lit(light.sun), palette["plain"], both_sides=True)
+    node = attach(parent, spec.id, tower.lit(light.sun), palette["plain"], both_sides=True)
+    node.set_tag(LABEL, f"{spec.id}/tower")

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from panda3d.core import NodePath
 
 from aerodaas.simulation.scenario import Car
-from aerodaas.simulation.scene.layers import attach
+from aerodaas.simulation.scene.layers import LABEL, attach
 from aerodaas.simulation.scene.mesh import Mesh, merged, sheet, tube
 from aerodaas.simulation.scene.plants import rng_of
 from aerodaas.simulation.scene.textures import Palette
 from aerodaas.simulation.world import State, Thing
 
-__all__ = ["CarFigure"]
+__all__ = ["CarFigure", "CarShape"]
 
 _COLOURS = (
     (0.75, 0.10, 0.10),
@@ -40,16 +41,30 @@ _BODY = (
     (2.08, 0.58, 0.78),
     (2.10, 0.42, 0.76),
 )
-_CABIN = ((-1.75, 0.90), (-1.30, 1.40), (0.05, 1.43), (0.95, 0.90))
 _WHEELS = ((-1.30, 0.0), (1.32, 0.0))
 _WHEEL_RADIUS = 0.33
 _ABOVE = np.array([0.3, 0.25, 0.92])
 
 
+@dataclass(frozen=True)
+class CarShape:
+    """A car's outline; the standard one is a saloon of `CAR_SIZE`."""
+
+    cabin: tuple[tuple[float, float], ...] = (
+        (-1.75, 0.90),
+        (-1.30, 1.40),
+        (0.05, 1.43),
+        (0.95, 0.90),
+    )
+    """x and z of the windows' outline from the rear: sill, roof, roof, sill; metres."""
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    """Of the whole car: along, across, up."""
+
+
 class CarFigure:
     """The node of one car."""
 
-    def __init__(self, parent: NodePath, thing: Thing, palette: Palette) -> None:
+    def __init__(self, parent: NodePath, thing: Thing, palette: Palette, shape: CarShape) -> None:
         """Paint the car by its seed."""
         spec = thing.spec
         if not isinstance(spec, Car):
@@ -57,8 +72,10 @@ class CarFigure:
         rng = rng_of(thing)
         colour = np.array(spec.colour or _COLOURS[rng.integers(len(_COLOURS))])
         self.node = parent.attach_new_node(spec.id)
-        mesh = merged([*_body(colour), *_cabin(colour), *_wheels(), *_lamps()])
-        attach(self.node, "car", mesh.lit(_ABOVE), palette["plain"], both_sides=True)
+        mesh = merged([*_body(colour), *_cabin(colour, shape.cabin), *_wheels(), *_lamps()])
+        mesh = mesh.moved((0, 0, 0), scale=shape.scale)
+        body = attach(self.node, "car", mesh.lit(_ABOVE), palette["plain"], both_sides=True)
+        body.set_tag(LABEL, f"{spec.id}/car")
 
     def pose(self, state: State) -> None:
         """Put the car where `state` says."""
@@ -88,18 +105,18 @@ def _body(colour: NDArray[np.float64]) -> list[Mesh]:
     return parts
 
 
-def _cabin(colour: NDArray[np.float64]) -> list[Mesh]:
+def _cabin(colour: NDArray[np.float64], outline: tuple[tuple[float, float], ...]) -> list[Mesh]:
     low, high = 0.82, 0.66
     half = [low, high, high, low]
     parts = []
-    for i, ((x0, z0), (x1, z1)) in enumerate(itertools.pairwise(_CABIN)):
+    for i, ((x0, z0), (x1, z1)) in enumerate(itertools.pairwise(outline)):
         top = sheet(
             [(x1, -half[i + 1], z1), (x1, half[i + 1], z1), (x0, half[i], z0), (x0, -half[i], z0)]
         )
         roof = i == 1
         parts.append(_upward(top).painted(colour if roof else _GLASS))
     for side in (-1.0, 1.0):
-        corners = [(x, side * w, z) for (x, z), w in zip(_CABIN, half, strict=True)]
+        corners = [(x, side * w, z) for (x, z), w in zip(outline, half, strict=True)]
         pane = sheet([corners[0], corners[3], corners[2], corners[1]])
         parts.append(_outward(pane, side).painted(_GLASS))
         a, b = np.array([-0.35, side * 0.835, 0.9]), np.array([-0.42, side * 0.675, 1.42])

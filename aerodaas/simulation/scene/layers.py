@@ -13,7 +13,10 @@ from panda3d.core import NodePath, Texture, TransparencyAttrib
 
 from aerodaas.simulation.scene.mesh import Mesh
 
-__all__ = ["Layer", "attach"]
+__all__ = ["LABEL", "Layer", "attach"]
+
+LABEL = "label"
+"""Tag of the nodes that detectors look for: the thing's id, a slash, the kind."""
 
 
 class Layer(enum.IntEnum):

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 from panda3d.core import LMatrix4f, NodePath, Texture
 
 from aerodaas.simulation.scenario import Person
-from aerodaas.simulation.scene.layers import attach
+from aerodaas.simulation.scene.layers import LABEL, attach
 from aerodaas.simulation.scene.mesh import Mesh, blob, merged, tube
-from aerodaas.simulation.scene.plants import rng_of
-from aerodaas.simulation.scene.textures import Palette, vest_texture
+from aerodaas.simulation.scene.textures import Palette, VestCut, vest_texture
 from aerodaas.simulation.skeleton import JOINTS, LIMBS
 from aerodaas.simulation.world import Thing
 
-__all__ = ["PersonFigure"]
+__all__ = ["Outfit", "PersonFigure"]
+
+Colour: TypeAlias = tuple[float, float, float]
+"""Red, green and blue, 0 to 1."""
 
 _VESTS = {
     "yellow": (0.93, 0.96, 0.12),
@@ -48,46 +52,79 @@ _RADII = {
 """Metres at the beginning and the end of the limb that starts at this joint."""
 
 _REFERENCE_HEIGHT = 1.75
+_CHEST_RADII = np.array([0.155, 0.165, 0.185, 0.215, 0.205, 0.09])
+_CHEST_LEVELS = np.array([-0.04, 0.15, 0.5, 0.78, 0.92, 1.02])
+"""Of the torso; levels run from the pelvis (0) to the neck (1)."""
 
 _ABOVE = np.array([0.35, 0.2, 0.91])
 """A figure turns while its light is baked in, so all are lit from above, a little ahead."""
 
 
-class PersonFigure:
-    """The nodes of one person, posed anew for each picture."""
+@dataclass(frozen=True)
+class Outfit:
+    """What a person looks like."""
 
-    def __init__(self, parent: NodePath, thing: Thing, palette: Palette) -> None:
-        """Dress the person by its seed."""
-        spec = thing.spec
-        if not isinstance(spec, Person):
-            raise TypeError(f"{thing.id} is no person")
-        rng = rng_of(thing)
+    skin: Colour
+    hair: Colour
+    shirt: Colour
+    trousers: Colour
+    shoes: Colour = _SHOES
+    bare_arms: bool = False
+    """Forearms without sleeves."""
+    vest: VestCut | None = None
+    build: float = 1.0
+    """Girth over that of an average adult."""
+
+    @classmethod
+    def draw(cls, spec: Person, rng: np.random.Generator) -> Outfit:
+        """Dress a person of a scenario."""
         skin, hair = _choose(rng, _SKINS), _choose(rng, _HAIRS)
         shirt, trousers = _choose(rng, _SHIRTS), _choose(rng, _TROUSERS)
         vest = spec.vest if spec.vest != "any" else str(rng.choice(sorted(_VESTS)))
-        forearm = shirt if rng.integers(2) else skin
-        colours = dict(zip(_RADII, (shirt, forearm, trousers, trousers, _SHOES), strict=True))
+        cut = None if vest == "none" else VestCut(_VESTS[vest])
+        return cls(skin, hair, shirt, trousers, bare_arms=not rng.integers(2), vest=cut)
+
+
+class PersonFigure:
+    """The nodes of one person, posed anew for each picture."""
+
+    def __init__(self, parent: NodePath, thing: Thing, palette: Palette, wear: Outfit) -> None:
+        """Dress the person."""
+        spec = thing.spec
+        if not isinstance(spec, Person):
+            raise TypeError(f"{thing.id} is no person")
+        forearm = wear.skin if wear.bare_arms else wear.shirt
+        clothes = (wear.shirt, forearm, wear.trousers, wear.trousers, wear.shoes)
         self._root = parent.attach_new_node(spec.id)
+        self._root.set_tag(LABEL, f"{spec.id}/person")
         self._scale = thing.height / _REFERENCE_HEIGHT
         self._nodes: list[NodePath] = []
         self._bones: list[tuple[int, int]] = []
         plain = palette["plain"]
+        colours = dict(zip(_RADII, clothes, strict=True))
         for upper, lower in LIMBS:
             joint = upper.split("_")[1]
-            limb = _limb(*_RADII[joint]).painted(colours[joint])
+            limb = _limb(*_RADII[joint]).moved((0, 0, 0), scale=(wear.build, wear.build, 1.0))
+            limb = limb.painted(colours[joint])
             if joint == "elbow":
-                limb = merged([limb, _hand().painted(skin)])
+                limb = merged([limb, _hand().painted(wear.skin)])
             self._add((upper, lower), limb, plain)
-        self._add(("neck", "head"), _head(skin, hair), plain)
-        self._add(("pelvis", "neck"), _hips().painted(trousers), plain)
-        if vest == "none":
-            self._add(("pelvis", "neck"), _torso().painted(shirt), plain)
+        self._add(("neck", "head"), _head(wear.skin, wear.hair), plain)
+        self._add(("pelvis", "neck"), _hips(wear.build).painted(wear.trousers), plain)
+        if wear.vest is None:
+            self._add(("pelvis", "neck"), _torso(wear.build).painted(wear.shirt), plain)
         else:
-            self._add(("pelvis", "neck"), _torso(), vest_texture(_VESTS[vest]))
+            self._wear(wear.vest, wear)
 
-    def _add(self, bone: tuple[str, str], mesh: Mesh, texture: Texture) -> None:
-        self._nodes.append(attach(self._root, bone[1], mesh.lit(_ABOVE), texture))
+    def _wear(self, cut: VestCut, wear: Outfit) -> None:
+        node = self._add(("pelvis", "neck"), _vest(cut, wear.build), vest_texture(cut, wear.shirt))
+        node.set_tag(LABEL, f"{self._root.name}/vest")
+
+    def _add(self, bone: tuple[str, str], mesh: Mesh, texture: Texture) -> NodePath:
+        node = attach(self._root, bone[1], mesh.lit(_ABOVE), texture)
+        self._nodes.append(node)
         self._bones.append((JOINTS.index(bone[0]), JOINTS.index(bone[1])))
+        return node
 
     def pose(self, joints: NDArray[np.float64], yaw: float) -> None:
         """Put the limbs between `joints` (len(JOINTS), 3), ENU metres."""
@@ -113,9 +150,7 @@ class PersonFigure:
             self._root.hide()
 
 
-def _choose(
-    rng: np.random.Generator, colours: tuple[tuple[float, float, float], ...]
-) -> tuple[float, float, float]:
+def _choose(rng: np.random.Generator, colours: tuple[Colour, ...]) -> Colour:
     return colours[rng.integers(len(colours))]
 
 
@@ -129,21 +164,30 @@ def _hand() -> Mesh:
     return blob(0.05, rings=5, sides=6).moved((0.0, 0.0, 1.1), scale=(0.75, 0.55, 4.0))
 
 
-def _torso() -> Mesh:
+def _torso(build: float) -> Mesh:
     """Chest and belly of length 1 from the pelvis to the neck, flatter than wide."""
-    return tube(
-        [0.155, 0.165, 0.185, 0.215, 0.205, 0.09],
-        [-0.04, 0.15, 0.5, 0.78, 0.92, 1.02],
-        sides=12,
-        flatten=0.62,
-    )
+    return tube(_CHEST_RADII * _girth(build), _CHEST_LEVELS, sides=12, flatten=0.62)
 
 
-def _hips() -> Mesh:
-    return tube([0.10, 0.165, 0.16], [-0.20, -0.08, 0.02], sides=10, flatten=0.68)
+def _vest(cut: VestCut, build: float) -> Mesh:
+    """The torso within a vest, whose hem hangs a little away from the body."""
+    radii, levels = _CHEST_RADII * _girth(build), _CHEST_LEVELS.copy()
+    radii[:2] += cut.flare
+    levels[0] = -cut.hem
+    return tube(radii, levels, sides=12, flatten=0.62)
 
 
-def _head(skin: tuple[float, float, float], hair: tuple[float, float, float]) -> Mesh:
+def _girth(build: float) -> NDArray[np.float64]:
+    """Factors of a torso's radii: shoulders and neck change less than the belly."""
+    return 1.0 + (build - 1.0) * np.array([1.0, 1.0, 0.9, 0.5, 0.4, 0.2])
+
+
+def _hips(build: float) -> Mesh:
+    girth = np.array([0.10, 0.165, 0.16]) * build
+    return tube(girth, [-0.20, -0.08, 0.02], sides=10, flatten=0.68)
+
+
+def _head(skin: Colour, hair: Colour) -> Mesh:
     """Neck, face and hair; z runs from the neck joint (0) to the middle of the head (1)."""
     stretch = 1.0 / 0.15
     neck = tube([0.055, 0.05], [-0.35, 0.6], sides=7).painted(skin)

@@ -3,11 +3,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from panda3d.core import SamplerState, Texture
 
-__all__ = ["Palette", "noise", "vest_texture"]
+__all__ = ["Palette", "VestCut", "noise", "vest_texture"]
 
 Floats = NDArray[np.float64]
 
@@ -51,19 +53,46 @@ def _texture(name: str, colours: Floats, alpha: Floats | None = None) -> Texture
     return texture
 
 
-def vest_texture(colour: ArrayLike) -> Texture:
-    """A hazard vest around a torso: two silver bands around, two over the shoulders, a zip."""
+@dataclass(frozen=True)
+class VestCut:
+    """How a hazard vest is made."""
+
+    colour: tuple[float, float, float]
+    silver: tuple[float, float, float] = (0.86, 0.87, 0.88)
+    """Colour of the reflective bands."""
+    bands: tuple[float, ...] = (0.16, 0.40)
+    """Where bands run around, from the hem (0) to the neck (1)."""
+    band: float = 0.055
+    """Half the width of a band around, likewise."""
+    straps: bool = True
+    """Bands over the shoulders, down to the lowest band around `straps_from`."""
+    straps_from: float = 0.40
+    strap: float = 0.03
+    """Half the width of a band over the shoulder, as a share of the way around."""
+    open_sides: float = 0.0
+    """Half the width of the gap below the arms in which the shirt shows, likewise."""
+    hem: float = 0.04
+    """How far the vest hangs below the pelvis, as a share of the torso."""
+    flare: float = 0.0
+    """Metres by which the hem stands off the body."""
+
+
+def vest_texture(cut: VestCut, shirt: ArrayLike) -> Texture:
+    """A hazard vest around a torso over a shirt: silver bands, a zip, gaps at the sides."""
     size = 64
     u, v = np.meshgrid((np.arange(size) + 0.5) / size, (np.arange(size) + 0.5) / size)
-    cloth = np.asarray(colour) * (1.0 + 0.05 * noise(size, 1.0, 7))[..., None]
-    silver = np.array([0.86, 0.87, 0.88])
-    around = (np.abs(v - 0.16) < 0.055) | (np.abs(v - 0.40) < 0.055)
+    cloth = np.asarray(cut.colour) * (1.0 + 0.05 * noise(size, 1.0, 7))[..., None]
+    around = np.zeros_like(u, dtype=bool)
+    for level in cut.bands:
+        around |= np.abs(v - level) < cut.band
     # u runs once around from the back: 0.25 is the right side, 0.5 the chest, 0.75 the left.
     over = np.zeros_like(u, dtype=bool)
-    for place in (0.10, 0.40, 0.60, 0.90):
-        over |= (np.abs(u - place) < 0.03) & (v > 0.40)
-    cloth[around | over] = silver
+    for place in (0.10, 0.40, 0.60, 0.90) if cut.straps else ():
+        over |= (np.abs(u - place) < cut.strap) & (v > cut.straps_from)
+    cloth[around | over] = np.asarray(cut.silver)
     cloth[(np.abs(u - 0.5) < 0.012) & ~around] *= 0.55
+    gap = (np.abs(np.abs(u - 0.5) - 0.25) < cut.open_sides) & (v < 0.9) & ~around
+    cloth[gap] = np.asarray(shirt)
     return _texture("vest", cloth)
 
 

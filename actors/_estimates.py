@@ -1,0 +1,49 @@
+"""What a scheduler is told of each analysis: the user's figures, or else what was measured."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from aerodaas.actors._costs import Executions
+from aerodaas.clock import NANOSECONDS
+from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
+
+__all__ = ["Estimates"]
+
+_WORTH_TELLING = 0.05
+"""Relative difference between what was told and what is measured that is told."""
+
+
+class Estimates:
+    """Profiles whose times follow what is measured, where the user left them out."""
+
+    def __init__(self, speed: float, learnt: frozenset[str]) -> None:
+        """Mission time runs at `speed`; the scheduler learns the times named in `learnt` itself.
+
+        A time that both would correct would be corrected twice.
+        """
+        self.edge = Executions()
+        self._speed = speed
+        self._learnt = learnt
+        self._told: dict[str, Profile] = {}
+
+    def profile(self, told: Profile, open_times: frozenset[str], cloud: float | None) -> Profile:
+        """The profile for a new task of an analysis.
+
+        `told` is what the environment file says, `open_times` which of its times are to be
+        measured, `cloud` the host seconds that the cloud is expected to take, if known.
+        """
+        profile = self._told.setdefault(told.model, told)
+        measured = {"edge_time": self.edge.seconds(told.model), "cloud_time": cloud}
+        news = {
+            name: max(MILLISECOND, round(seconds * self._speed * NANOSECONDS))
+            for name, seconds in measured.items()
+            if seconds is not None and name in open_times - self._learnt
+        }
+        if any(_differs(getattr(profile, name), time) for name, time in news.items()):
+            profile = self._told[told.model] = replace(profile, **news)
+        return profile
+
+
+def _differs(old: int, new: int) -> bool:
+    return abs(new - old) > _WORTH_TELLING * old

@@ -1,0 +1,94 @@
+"""What analyses of boxes share: they take a detector's stream, or a camera's and find the boxes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, TypeAlias, TypeVar
+
+from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.models import DETECTOR_CLASSES
+from aerodaas.data import Alert, Detections, Frame
+from aerodaas.errors import GraphError
+from aerodaas.graph import AeroStreamData
+from aerodaas.interfaces import IAeroData
+
+__all__ = ["BoxAnalytics", "shipped_detector"]
+
+O_co = TypeVar("O_co", covariant=True)
+
+
+def shipped_detector(owner: str, labels: Sequence[str]) -> Analytics[Detections]:
+    """Open the detector that ships for those of `labels` that it knows.
+
+    Raises GraphError, in the name of `owner`, where it knows none of them, and ModelError where
+    its file is missing.
+    """
+    known = [label for label in labels if label in DETECTOR_CLASSES]
+    if not known:
+        message = (
+            f"{owner} takes boxes, not frames: the detector that ships knows no "
+            f"{' or '.join(labels)}; analyse the camera with an OnnxDetector of your own first, "
+            "or pass one as detector="
+        )
+        raise GraphError(message)
+    # onnxruntime takes its time to load.
+    from aerodaas.analytics.onnx.detector import OnnxDetector  # noqa: PLC0415
+
+    return OnnxDetector(classes=known)
+
+
+class BoxAnalytics(Analytics[O_co]):
+    """An analysis of boxes; subclasses implement `examine`.
+
+    Of a camera's stream it finds the boxes itself, with `detector` or the one that ships.
+    """
+
+    Detector: TypeAlias = Analytics[Detections]
+    accepts: ClassVar[tuple[type, ...]] = (Detections, Frame)
+
+    def __init__(self, labels: Sequence[str], detector: Detector | None) -> None:
+        """Look at boxes with one of `labels`."""
+        self.labels = (labels,) if isinstance(labels, str) else tuple(labels)
+        self.detector = detector
+        self._explained = False
+
+    def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co]:
+        """Analyse a stream of boxes or of frames; raises GraphError for any other."""
+        if isinstance(data, AeroStreamData) and issubclass(data.item, Frame):
+            self.detector = self.detector or shipped_detector(type(self).__name__, self.labels)
+            self.isolated = True
+        return super().analyse(data)
+
+    def examine(self, boxes: Detections, context: Context) -> O_co | None:
+        """Turn the boxes of one frame into a result."""
+        raise NotImplementedError
+
+    def open(self) -> None:
+        """Start the detector, where there is one."""
+        if self.detector is not None:
+            self.detector.open()
+
+    def close(self) -> None:
+        """Release the detector, where there is one."""
+        if self.detector is not None:
+            self.detector.close()
+
+    def process(self, item: Detections | Frame, context: Context) -> O_co | None:
+        """Turn one frame, or its boxes, into a result."""
+        if not isinstance(item, Frame):
+            return self.examine(item, context)
+        found = self.detector.process(item, context) if self.detector is not None else None
+        return None if found is None else self.examine(found, context)
+
+    def explain_once(self, boxes: Detections, context: Context) -> None:
+        """Tell people, once, what geometry lacks."""
+        if self._explained:
+            return
+        self._explained = True
+        lack = (
+            "is not calibrated; give the sensor its horizontal_fov"
+            if boxes.camera is None
+            else "does not know the drone's height at capture"
+        )
+        text = f"{boxes.header.source} {lack}. Distances on the ground are unknown."
+        context.alert(Alert(boxes.header, "camera_uncalibrated", text))

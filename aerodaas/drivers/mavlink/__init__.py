@@ -1,0 +1,1 @@
+"""PX4 and ArduCopter over MAVLink 2: UDP, TCP or serial."""

@@ -1,0 +1,158 @@
+"""Commands and their acknowledgements: asked again when lost, never done twice by mistake."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from aerodaas.drivers.mavlink.dialect import mavlink
+
+__all__ = ["Commander", "Order", "Outcome", "always"]
+
+_log = logging.getLogger(__name__)
+
+_TIMEOUT = 1.0
+"""Seconds to wait for an acknowledgement."""
+_PROGRESS = 5.0
+"""The same after the word that it is being worked on."""
+_TRIES = 4
+_RESULTS = {
+    mavlink.MAV_RESULT_TEMPORARILY_REJECTED: "rejected for now",
+    mavlink.MAV_RESULT_DENIED: "denied",
+    mavlink.MAV_RESULT_UNSUPPORTED: "not supported",
+    mavlink.MAV_RESULT_FAILED: "failed",
+}
+
+
+@dataclass(frozen=True)
+class Order:
+    """One command to the autopilot.
+
+    With a `frame` it goes as COMMAND_INT, where parameters 5 and 6 are degrees times 10^7.
+    """
+
+    number: int
+    values: tuple[float, ...]
+    """Parameters 1 to 7."""
+    what: str
+    """For people: what it does."""
+    frame: int | None = None
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of an order."""
+
+    accepted: bool
+    text: str = ""
+    """Why not, in a few words."""
+
+
+def always() -> bool:
+    """An order that may be repeated whatever has happened meanwhile."""
+    return True
+
+
+@dataclass
+class _Pending:
+    order: Order
+    done: Callable[[Outcome], None]
+    still: Callable[[], bool]
+    tries: int = 0
+    deadline: float = 0.0
+
+
+class Commander:
+    """One outstanding order of each number; the link's thread calls `take` and `turn`."""
+
+    def __init__(self, send: Callable[[Any], None], target: tuple[int, int], ours: int) -> None:
+        """Send by `send` to `target` (system, component); `ours` is our own system id."""
+        self.stray = 0
+        """Acknowledgements that came late, twice, or to somebody else."""
+        self._send = send
+        self._target = target
+        self._ours = ours
+        self._pending: dict[int, _Pending] = {}
+        self._lock = threading.RLock()
+
+    def give(
+        self,
+        order: Order,
+        done: Callable[[Outcome], None] = lambda _: None,
+        *,
+        still: Callable[[], bool] = always,
+        now: float,
+    ) -> None:
+        """Give an order; `done` is told its outcome, in the link's thread.
+
+        It is repeated only while `still` says that it needs doing. A newer order of the same
+        number takes the place of an older one, whose `done` is told so.
+        """
+        with self._lock:
+            before = self._pending.get(order.number)
+            self._pending[order.number] = pending = _Pending(order, done, still)
+            self._transmit(pending, now)
+        if before is not None:
+            before.done(Outcome(accepted=False, text="replaced by a newer order"))
+
+    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Take a COMMAND_ACK."""
+        if message.target_system not in {0, self._ours}:
+            return
+        with self._lock:
+            pending = self._pending.get(message.command)
+            if pending is None:
+                self.stray += 1
+                return
+            if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
+                pending.deadline = now + _PROGRESS
+                return
+            del self._pending[message.command]
+        if message.result == mavlink.MAV_RESULT_ACCEPTED:
+            pending.done(Outcome(accepted=True))
+        else:
+            word = _RESULTS.get(message.result, f"result {message.result}")
+            pending.done(Outcome(accepted=False, text=word))
+
+    def turn(self, now: float) -> None:
+        """Repeat what has not been acknowledged, or give it up."""
+        ended: list[tuple[_Pending, Outcome]] = []
+        with self._lock:
+            for number, pending in list(self._pending.items()):
+                if now < pending.deadline:
+                    continue
+                if not pending.still():
+                    del self._pending[number]
+                    ended.append((pending, Outcome(accepted=True)))
+                elif pending.tries >= _TRIES:
+                    del self._pending[number]
+                    ended.append((pending, Outcome(accepted=False, text="no answer")))
+                else:
+                    self._transmit(pending, now)
+        for pending, outcome in ended:
+            if not outcome.accepted:
+                _log.warning("no answer to: %s", pending.order.what)
+            pending.done(outcome)
+
+    def forget(self) -> None:
+        """Repeat nothing any more."""
+        with self._lock:
+            self._pending.clear()
+
+    def _transmit(self, pending: _Pending, now: float) -> None:
+        order = pending.order
+        p1, p2, p3, p4, p5, p6, p7 = order.values
+        if order.frame is None:
+            message = mavlink.MAVLink_command_long_message(
+                *self._target, order.number, pending.tries, p1, p2, p3, p4, p5, p6, p7
+            )
+        else:
+            message = mavlink.MAVLink_command_int_message(
+                *self._target, order.frame, order.number, 0, 0, p1, p2, p3, p4, int(p5), int(p6), p7
+            )
+        pending.tries += 1
+        pending.deadline = now + _TIMEOUT
+        self._send(message)

@@ -1,0 +1,169 @@
+"""From the first HEARTBEAT to a vehicle that knows where it is and protects itself."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerodaas.config import RobotConfig
+from aerodaas.drivers.mavlink.autopilot import Autopilot
+from aerodaas.drivers.mavlink.commander import Commander
+from aerodaas.drivers.mavlink.fence import upload_fence
+from aerodaas.drivers.mavlink.frames import LocalFrame
+from aerodaas.drivers.mavlink.link import MavlinkLink
+from aerodaas.drivers.mavlink.parameters import Parameters, unsafe_parameters
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
+from aerodaas.drivers.mavlink.telemetry import Telemetry
+from aerodaas.errors import VehicleError
+from aerodaas.geometry import GeodeticOrigin, Vector, ned_to_enu
+
+__all__ = ["Connection", "establish", "global_origin"]
+
+_log = logging.getLogger(__name__)
+
+_CHECKS = 4.0
+"""Seconds between requests to run the arming checks and say what they find."""
+_WORDS = 40.0
+"""Seconds that the autopilot's words may be old to explain why it is not ready."""
+_FAR = 20.0
+"""Metres between where home says that it stands and where it believes to be."""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """What stays the same for as long as a vehicle is connected."""
+
+    link: MavlinkLink
+    autopilot: Autopilot
+    commander: Commander
+    frame: LocalFrame
+    target: tuple[int, int]
+    """System and component."""
+
+
+def establish(
+    link: MavlinkLink,
+    autopilot: Autopilot,
+    commander: Commander,
+    telemetry: Telemetry,
+    *,
+    robot: RobotConfig,
+    settings: MavlinkSettings,
+    home: GeodeticOrigin | None,
+    pause: Callable[[], None],
+) -> Connection:
+    """Wait until it is ready, see to its failsafes and its fence; raises VehicleError."""
+    assert link.target is not None  # noqa: S101 - it was just adopted
+    commander.give(autopilot.version(), now=time.monotonic())
+    _await_ready(autopilot, commander, telemetry, robot.id, settings, pause)
+    frame = _frame(telemetry, robot, settings, home, pause)
+    if not telemetry.armed:
+        _see_to_failsafes(link, autopilot, settings, robot.id)
+        if settings.fence != "off":
+            origin = global_origin(telemetry, frame)
+            upload_fence(link, autopilot, robot.limits.geofence, origin, settings.fence)
+    _log.info("%s: %s %s, system %d", robot.id, autopilot.name, telemetry.software, link.target[0])
+    return Connection(link, autopilot, commander, frame, link.target)
+
+
+def _await_ready(
+    autopilot: Autopilot,
+    commander: Commander,
+    telemetry: Telemetry,
+    name: str,
+    settings: MavlinkSettings,
+    pause: Callable[[], None],
+) -> None:
+    """Until it knows its place, and would arm; the latter is not insisted upon here."""
+    began = time.monotonic()
+    checked_at = began
+    while True:
+        now = time.monotonic()
+        places = telemetry.knows_place(now) and telemetry.place is not None
+        # Whether it is armed decides what follows.
+        places = places and telemetry.beat_at > -math.inf
+        if places and (telemetry.armed or not autopilot.objections(telemetry, now)):
+            return
+        if now - began > settings.ready_timeout:
+            if places:
+                return
+            said = telemetry.texts.recent(now, _WORDS) or list(telemetry.events.objections)
+            words = f"; it says: {'; '.join(said)}" if said else ""
+            raise VehicleError(
+                f"{name}: {autopilot.name} has not told its position within "
+                f"{settings.ready_timeout:g} s{words}"
+            )
+        if now - checked_at > _CHECKS:
+            checked_at = now
+            commander.give(autopilot.check(), now=now)
+        pause()
+
+
+def _frame(
+    telemetry: Telemetry,
+    robot: RobotConfig,
+    settings: MavlinkSettings,
+    home: GeodeticOrigin | None,
+    pause: Callable[[], None],
+) -> LocalFrame:
+    start = np.array(robot.start, dtype=np.float64)
+    assert telemetry.position is not None  # noqa: S101 - it is ready
+    assert telemetry.place is not None  # noqa: S101 - the same
+    if settings.frame == "home" and home is not None:
+        up = float(start[2])
+        if telemetry.armed:
+            up += float(
+                ned_to_enu(telemetry.position)[2] - ned_to_enu(_armed_at(telemetry, pause))[2]
+            )
+        return LocalFrame.over_home(home, *telemetry.place, up, telemetry.position)
+    ned = _armed_at(telemetry, pause) if telemetry.armed else telemetry.position
+    if home is not None:
+        east, north, _ = home.to_local(*telemetry.place, home.altitude)
+        away = float(np.hypot(east - start[0], north - start[1]))
+        if away > _FAR and not telemetry.armed:
+            _log.warning(
+                "%s stands %.0f m from where the environment's home and its start say: global "
+                'waypoints would lead astray; mend home, or set "frame": "home"',
+                robot.id,
+                away,
+            )
+    return LocalFrame.standing_at(start, ned)
+
+
+def _armed_at(telemetry: Telemetry, pause: Callable[[], None]) -> Vector:
+    """Where a vehicle that is in the air already took off, NED metres."""
+    patience = 3.0
+    deadline = time.monotonic() + patience
+    while telemetry.home is None and time.monotonic() < deadline:
+        pause()
+    if telemetry.home is None:
+        raise VehicleError("it is flying already, and does not say where it took off; land it")
+    return telemetry.home
+
+
+def global_origin(telemetry: Telemetry, frame: LocalFrame) -> GeodeticOrigin:
+    """Where zero of our local frame lies on the earth, by the autopilot's own estimate."""
+    assert telemetry.place is not None  # noqa: S101 - it is ready
+    assert telemetry.position is not None  # noqa: S101 - the same
+    here = GeodeticOrigin(*telemetry.place)
+    latitude, longitude, _ = here.to_geodetic(-frame.position(telemetry.position))
+    return GeodeticOrigin(latitude, longitude)
+
+
+def _see_to_failsafes(
+    link: MavlinkLink, autopilot: Autopilot, settings: MavlinkSettings, name: str
+) -> None:
+    if settings.failsafes == "ignore":
+        return
+    parameters = Parameters(link, autopilot)
+    for unsafe in unsafe_parameters(parameters, autopilot, settings):
+        if settings.failsafes == "set":
+            parameters.set(unsafe.failsafe.name, unsafe.failsafe.safe)
+            _log.warning("%s: %s: set", name, unsafe.text)
+        else:
+            _log.warning('%s: %s ("failsafes": "set" does it)', name, unsafe.text)

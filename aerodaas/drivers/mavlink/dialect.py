@@ -1,0 +1,86 @@
+"""MAVLink's messages: pymavlink's, and the one of PX4 that it lacks."""
+
+from __future__ import annotations
+
+import struct
+from typing import Any, ClassVar
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+__all__ = ["EventMessage", "mavlink"]
+
+
+class EventMessage(mavlink.MAVLink_message):  # type: ignore[misc]
+    """EVENT, with which PX4 says what STATUSTEXT says elsewhere (common.xml, message 410)."""
+
+    id = 410
+    msgname = "EVENT"
+    fieldnames: ClassVar[list[str]] = [
+        "destination_component",
+        "destination_system",
+        "id",
+        "event_time_boot_ms",
+        "sequence",
+        "log_levels",
+        "arguments",
+    ]
+    ordered_fieldnames: ClassVar[list[str]] = [
+        "id",
+        "event_time_boot_ms",
+        "sequence",
+        "destination_component",
+        "destination_system",
+        "log_levels",
+        "arguments",
+    ]
+    fieldtypes: ClassVar[list[str]] = [
+        *("uint8_t", "uint8_t", "uint32_t", "uint32_t", "uint16_t", "uint8_t", "uint8_t"),
+    ]
+    fielddisplays_by_name: ClassVar[dict[str, str]] = {}
+    fieldenums_by_name: ClassVar[dict[str, str]] = {}
+    fieldunits_by_name: ClassVar[dict[str, str]] = {}
+    orders: ClassVar[list[int]] = [3, 4, 0, 1, 2, 5, 6]
+    lengths: ClassVar[list[int]] = [1, 1, 1, 1, 1, 1, 40]
+    array_lengths: ClassVar[list[int]] = [0, 0, 0, 0, 0, 0, 40]
+    crc_extra = 160
+    unpacker = struct.Struct("<IIHBBB40B")
+
+    def __init__(
+        self,
+        destination_component: int,
+        destination_system: int,
+        event: int,
+        event_time_boot_ms: int,
+        sequence: int,
+        log_levels: int,
+        arguments: list[int],
+    ) -> None:
+        """Hold the fields; `event` is the message's field `id`."""
+        super().__init__(self.id, self.msgname)
+        self._fieldnames = self.fieldnames
+        self._instance_field = None
+        self._instance_offset = -1
+        self.destination_component = destination_component
+        self.destination_system = destination_system
+        self.event = event
+        self.event_time_boot_ms = event_time_boot_ms
+        self.sequence = sequence
+        self.log_levels = log_levels
+        self.arguments = arguments
+
+    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:  # noqa: ANN401, FBT001, FBT002 - pymavlink's signature
+        """Serialise."""
+        payload = self.unpacker.pack(
+            self.event,
+            self.event_time_boot_ms,
+            self.sequence,
+            self.destination_component,
+            self.destination_system,
+            self.log_levels,
+            *self.arguments,
+        )
+        packed: bytes = self._pack(mav, self.crc_extra, payload, force_mavlink1=force_mavlink1)
+        return packed
+
+
+mavlink.mavlink_map.setdefault(EventMessage.id, EventMessage)

@@ -1,0 +1,89 @@
+"""Places to fly to, turned into a target that moves there at the speed asked for.
+
+Neither autopilot takes a speed with a position: PX4 would fly at its own. So the target itself
+moves, as far ahead of the vehicle as a moment's flight, and its velocity is sent along. If we
+fall silent, the vehicle stops at the target, which is near, instead of flying on to the place.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerodaas.geometry import Vector, wrap_angle
+from aerodaas.navigation.control import braking_speed
+
+__all__ = ["MovingTarget", "Target"]
+
+_LEASH = 1.0
+"""Seconds of flight that the target may be ahead of the vehicle, and a metre beside that."""
+_LONGEST = 0.2
+"""Seconds of motion at most between two calls: a loop that was held up does not catch up."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """One moment of the target's way: ENU metres, ENU m/s, radians."""
+
+    position: Vector
+    velocity: Vector
+    yaw: float
+
+
+class MovingTarget:
+    """The target of one vehicle that keeps to `acceleration` (m/s²) and `yaw_rate` (rad/s)."""
+
+    def __init__(self, acceleration: float, yaw_rate: float) -> None:
+        self._acceleration = acceleration
+        self._yaw_rate = yaw_rate
+        self._position: Vector | None = None
+        self._velocity: Vector = np.zeros(3)
+        self._yaw = 0.0
+        self._now = 0.0
+
+    def forget(self) -> None:
+        """Begin anew from where the vehicle is at the next call."""
+        self._position = None
+
+    def towards(
+        self,
+        place: Vector,
+        yaw: float | None,
+        speed: float,
+        *,
+        vehicle: Vector,
+        velocity: Vector,
+        facing: float,
+        now: float,
+        waits: bool = False,
+    ) -> Target:
+        """Where the target is at `now` (seconds) on its way to `place` at `speed` (m/s).
+
+        `vehicle`, `velocity` and `facing` say how the vehicle itself is; while it `waits` for
+        its mode the target stays with it.
+        """
+        duration = min(_LONGEST, max(0.0, now - self._now))
+        self._now = now
+        if self._position is None or waits:
+            self._position, self._velocity = vehicle, np.zeros(3) if waits else velocity
+            self._yaw = facing
+            if waits:
+                return Target(vehicle, np.zeros(3), facing)
+        way = place - self._position
+        left = float(np.linalg.norm(way))
+        direction = way / left if left > 0.0 else np.zeros(3)
+        ahead = float(np.linalg.norm(self._position - vehicle))
+        pace = max(0.0, float(self._velocity @ direction)) + self._acceleration * duration
+        pace = min(speed, pace, braking_speed(left, self._acceleration, 0.0))
+        if ahead > 1.0 + _LEASH * speed:
+            pace = 0.0
+        step = min(left, pace * duration)
+        self._position = self._position + step * direction
+        self._velocity = pace * direction
+        if yaw is not None:
+            most = self._yaw_rate * duration
+            turn = wrap_angle(yaw - self._yaw)
+            self._yaw = wrap_angle(self._yaw + math.copysign(min(abs(turn), most), turn))
+        return Target(self._position, self._velocity, self._yaw)

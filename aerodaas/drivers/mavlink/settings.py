@@ -1,0 +1,71 @@
+"""What an environment file says of a vehicle that speaks MAVLink."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from aerodaas.config import RobotConfig
+from aerodaas.errors import ConfigError
+
+__all__ = ["KEY_VARIABLE", "MavlinkSettings", "mavlink_settings"]
+
+KEY_VARIABLE = "AERODAAS_MAVLINK_KEY"
+"""Environment variable that may hold the signing key, as 64 hexadecimal digits."""
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Identity = Annotated[int, Field(ge=1, le=255)]
+
+
+class MavlinkSettings(BaseModel):
+    """Settings of a robot whose driver is `mavlink`."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    url: str = "udpin:0.0.0.0:14540"
+    """`udpin:HOST:PORT` (wait for packets there), `udpout:HOST:PORT` (send there first),
+    `tcp:HOST:PORT` or `serial:DEVICE:BAUD`."""
+    system: Identity | None = None
+    """The vehicle's system id; None takes the first multicopter that is heard."""
+    own_system: Identity = 245
+    """Our own system id. Ground stations are 255."""
+    own_component: Identity = 191
+    """Our own component id; 191 is an onboard computer."""
+    role: Literal["companion", "ground_station"] = "companion"
+    """What our heartbeats say that we are. As a ground station (with `own_system` 255) their end
+    triggers the autopilot's ground-station failsafe; beside a real ground station they hide that
+    it is lost."""
+    frame: Literal["start", "home"] = "start"
+    """How local coordinates are pinned: the place where it is armed is the robot's `start`, or
+    the autopilot's global position is laid over the environment's `home` (global waypoints)."""
+    ready_timeout: Positive = 60.0
+    """Seconds given to the autopilot to know its position, once it is heard."""
+    failsafes: Literal["report", "set", "ignore"] = "report"
+    """Parameters that leave it unprotected: say so, set them, or do not ask."""
+    fence: Literal["off", "warn", "hold", "return", "land"] = "off"
+    """Upload the robot's geofence, with this action when it is crossed; `off` leaves the vehicle's
+    own fence as it is."""
+    forward: str | None = None
+    """Pass everything on to a ground station or another program and back, such as
+    `udpout:127.0.0.1:14550`."""
+    signing_key: str | None = None
+    """File with the key of MAVLink 2 signing: 32 bytes, or 64 hexadecimal digits. The environment
+    variable AERODAAS_MAVLINK_KEY takes its place."""
+    max_speed: Positive = 10.0
+    """m/s that the vehicle itself can do horizontally."""
+    max_climb: Positive = 3.0
+    """m/s that the vehicle itself can do vertically."""
+
+
+def mavlink_settings(robot: RobotConfig) -> MavlinkSettings:
+    """Check the settings of `robot`; raises ConfigError that names the robot and the setting."""
+    try:
+        return MavlinkSettings.model_validate(robot.settings)
+    except ValidationError as error:
+        problems = "; ".join(
+            f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}"
+            for problem in error.errors()
+        )
+        known = ", ".join(sorted(MavlinkSettings.model_fields))
+        raise ConfigError(f"robot {robot.id}: settings: {problems} (known: {known})") from None

@@ -1,0 +1,179 @@
+"""The newest of everything that the vehicle has said."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from aerodaas.data import Battery, GpsFix
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.events import EventReader
+from aerodaas.drivers.mavlink.frames import Attitude, attitude_from_frd
+from aerodaas.drivers.mavlink.texts import Texts
+from aerodaas.geometry import Vector
+
+__all__ = ["Telemetry"]
+
+_FRESH = 1.0
+"""Seconds after which a position or an attitude is none any more."""
+_FIX = 2
+"""GPS fix types from this one on are positions."""
+_UNKNOWN_SATELLITES = 255
+_UNKNOWN_VOLTAGE = 65535
+
+
+class Telemetry:
+    """Takes messages, each with the monotonic second of its arrival; in the autopilot's frames."""
+
+    def __init__(self) -> None:
+        self.heard_at = -math.inf
+        """Any message at all."""
+        self.beat_at = -math.inf
+        """The latest HEARTBEAT."""
+        self.custom_mode = 0
+        self.armed = False
+        self.critical = False
+        """Its own protection is at work."""
+        self.position: Vector | None = None
+        """NED metres from the autopilot's own origin."""
+        self.velocity: Vector = np.zeros(3)
+        self.position_at = -math.inf
+        self.attitude = Attitude()
+        self.attitude_at = -math.inf
+        self.home: Vector | None = None
+        """Where it was armed, NED metres."""
+        self.altitude: float | None = None
+        """Metres above mean sea level, by its own estimate."""
+        self.place: tuple[float, float] | None = None
+        """Latitude and longitude in degrees, by its own estimate."""
+        self.gps: GpsFix | None = None
+        self.battery = Battery(math.nan)
+        self.on_ground: bool | None = None
+        self.ready: bool | None = None
+        """Whether its own checks would let it arm; None where it does not say."""
+        self.boot_time = math.nan
+        """Seconds of the autopilot's own clock since it started."""
+        self.clock = math.nan
+        """The same clock in seconds since the Unix epoch."""
+        self.reboots = 0
+        self.software = ""
+        self.seen: dict[str, float] = {}
+        """When each kind of message came last."""
+        self.texts = Texts()
+        self.events = EventReader()
+        self._takers: dict[str, Callable[[Any, float], None]] = {
+            "HEARTBEAT": self._heartbeat,
+            "LOCAL_POSITION_NED": self._local_position,
+            "ATTITUDE": self._attitude,
+            "GLOBAL_POSITION_INT": self._global_position,
+            "GPS_RAW_INT": self._gps,
+            "SYS_STATUS": self._status,
+            "EXTENDED_SYS_STATE": self._landed,
+            "HOME_POSITION": self._home,
+            "SYSTEM_TIME": self._time,
+            "AUTOPILOT_VERSION": self._version,
+            "STATUSTEXT": self._text,
+            "EVENT": self._event,
+        }
+
+    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Take note of a message of the vehicle."""
+        self.heard_at = now
+        kind = message.get_type()
+        self.seen[kind] = now
+        taker = self._takers.get(kind)
+        if taker is not None:
+            taker(message, now)
+
+    def knows_place(self, now: float) -> bool:
+        """Tell whether it has said lately where it is and how it stands."""
+        return now - self.position_at < _FRESH and now - self.attitude_at < _FRESH
+
+    def _heartbeat(self, message: Any, now: float) -> None:  # noqa: ANN401
+        self.beat_at = now
+        self.custom_mode = message.custom_mode
+        self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        self.critical = message.system_status in {
+            mavlink.MAV_STATE_CRITICAL,
+            mavlink.MAV_STATE_EMERGENCY,
+        }
+
+    def _local_position(self, message: Any, now: float) -> None:  # noqa: ANN401
+        position = np.array([message.x, message.y, message.z], dtype=np.float64)
+        velocity = np.array([message.vx, message.vy, message.vz], dtype=np.float64)
+        if np.isfinite(position).all() and np.isfinite(velocity).all():
+            self.position, self.velocity, self.position_at = position, velocity, now
+            self._tick(message.time_boot_ms)
+
+    def _attitude(self, message: Any, now: float) -> None:  # noqa: ANN401
+        angles = (message.roll, message.pitch, message.yaw, message.yawspeed)
+        if all(map(math.isfinite, angles)):
+            self.attitude, self.attitude_at = attitude_from_frd(*angles), now
+
+    def _global_position(self, message: Any, _: float) -> None:  # noqa: ANN401
+        self.altitude = message.alt / 1e3
+        self.place = message.lat / 1e7, message.lon / 1e7
+
+    def _gps(self, message: Any, _: float) -> None:  # noqa: ANN401
+        if message.fix_type < _FIX:
+            self.gps = None
+            return
+        count = message.satellites_visible
+        self.gps = GpsFix(
+            message.lat / 1e7,
+            message.lon / 1e7,
+            (message.alt_ellipsoid or message.alt) / 1e3,
+            message.h_acc / 1e3,
+            message.v_acc / 1e3,
+            0 if count == _UNKNOWN_SATELLITES else count,
+        )
+
+    def _status(self, message: Any, _: float) -> None:  # noqa: ANN401
+        left = message.battery_remaining
+        voltage = message.voltage_battery
+        self.battery = Battery(
+            left / 100 if left >= 0 else math.nan,
+            voltage / 1e3 if voltage != _UNKNOWN_VOLTAGE else 0.0,
+            max(0, message.current_battery) / 100,
+        )
+        check = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+        says = message.onboard_control_sensors_present & check
+        self.ready = bool(message.onboard_control_sensors_health & check) if says else None
+
+    def _landed(self, message: Any, _: float) -> None:  # noqa: ANN401
+        unknown = message.landed_state == mavlink.MAV_LANDED_STATE_UNDEFINED
+        grounded = message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
+        self.on_ground = None if unknown else grounded
+
+    def _home(self, message: Any, _: float) -> None:  # noqa: ANN401
+        home = np.array([message.x, message.y, message.z], dtype=np.float64)
+        self.home = home if np.isfinite(home).all() else None
+
+    def _time(self, message: Any, _: float) -> None:  # noqa: ANN401
+        self.clock = message.time_unix_usec / 1e6
+        self._tick(message.time_boot_ms)
+
+    def _tick(self, milliseconds: int) -> None:
+        boot_time = milliseconds / 1e3
+        # Packets may overtake each other by a little; only a restart goes back by far.
+        far = 5.0
+        if boot_time < self.boot_time - far:
+            self.reboots += 1
+        self.boot_time = boot_time
+
+    def _version(self, message: Any, _: float) -> None:  # noqa: ANN401
+        version = message.flight_sw_version
+        self.software = ".".join(str(version >> shift & 0xFF) for shift in (24, 16, 8))
+
+    def _text(self, message: Any, now: float) -> None:  # noqa: ANN401
+        text = message.text
+        words = text.decode("ascii", "replace") if isinstance(text, bytes) else str(text)
+        self.texts.take(words, message.severity, now, message.id, message.chunk_seq)
+
+    def _event(self, message: Any, now: float) -> None:  # noqa: ANN401
+        said = self.events.take(message.event, message.log_levels, message.sequence, now)
+        if said is not None:
+            self.texts.add(said.text, said.severity, now)

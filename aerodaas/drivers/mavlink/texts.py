@@ -1,0 +1,54 @@
+"""What the autopilot has said lately: STATUSTEXT, put together from its pieces."""
+
+from __future__ import annotations
+
+from collections import deque
+from typing import NamedTuple
+
+__all__ = ["Texts"]
+
+_KEPT = 40
+_PIECES = 16
+_GRAVE = 4
+"""Severity of a warning; smaller is graver."""
+
+
+class _Text(NamedTuple):
+    at: float
+    severity: int
+    text: str
+
+
+class Texts:
+    """The newest texts of one vehicle."""
+
+    def __init__(self) -> None:
+        self._texts: deque[_Text] = deque(maxlen=_KEPT)
+        self._pieces: dict[int, dict[int, str]] = {}
+
+    def take(self, text: str, severity: int, now: float, number: int = 0, piece: int = 0) -> None:
+        """Take note of one STATUSTEXT; one in pieces has a `number` other than zero."""
+        whole = 50
+        if number == 0:
+            self.add(text, severity, now)
+            return
+        pieces = self._pieces.setdefault(number, {})
+        pieces[piece] = text
+        if len(text) < whole or len(pieces) >= _PIECES:
+            del self._pieces[number]
+            self.add("".join(pieces[index] for index in sorted(pieces)), severity, now)
+        while len(self._pieces) > _PIECES:
+            self._pieces.pop(next(iter(self._pieces)))
+
+    def add(self, text: str, severity: int, now: float) -> None:
+        """Take note of a whole text."""
+        text = "".join(letter for letter in text if letter.isprintable()).strip()
+        if text:
+            self._texts.append(_Text(now, severity, text))
+
+    def recent(self, now: float, seconds: float, severity: int = _GRAVE) -> list[str]:
+        """Texts of the last `seconds` that are as grave as `severity`, each once, oldest first."""
+        fresh = (
+            one.text for one in self._texts if now - one.at <= seconds and one.severity <= severity
+        )
+        return list(dict.fromkeys(fresh))

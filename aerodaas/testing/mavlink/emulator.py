@@ -1,0 +1,230 @@
+"""EmulatedAutopilot: one vehicle on UDP, in real time."""
+
+from __future__ import annotations
+
+import contextlib
+import selectors
+import socket
+import threading
+import time
+from types import TracebackType
+from typing import Any
+
+from typing_extensions import Self
+
+from aerodaas.data import Odometry
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.signing import sign_with
+from aerodaas.simulation.dynamics import STEP
+from aerodaas.testing.mavlink.ardupilot import EmulatedArduPilot
+from aerodaas.testing.mavlink.firmware import Firmware
+from aerodaas.testing.mavlink.flight import MavFlight
+from aerodaas.testing.mavlink.options import AutopilotOptions
+from aerodaas.testing.mavlink.px4 import EmulatedPX4
+from aerodaas.testing.tello.channel import Channel
+from aerodaas.testing.tello.options import Impairment
+from aerodaas.vehicle import VehicleMode
+
+__all__ = ["EmulatedAutopilot"]
+
+_TURN = 0.01
+_LARGEST = 65535
+_LONGEST_LEAP = 0.2
+"""Seconds of flight at most in one turn: a host that was held up does not catch up."""
+_HEARTBEAT = 1.0
+_PLANS = {"MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_COUNT", "MISSION_ITEM_INT"}
+
+
+class EmulatedAutopilot:
+    """PX4 or ArduCopter on loopback, from `start` (or `with`) to `stop`.
+
+    It sends to `options.peer` at once, and to everybody who has spoken to it since.
+    """
+
+    def __init__(self, options: AutopilotOptions | None = None) -> None:
+        """Open a port of its own."""
+        self.options = options or AutopilotOptions()
+        self.heard: list[tuple[float, Any]] = []
+        """Every message that arrived whole, with its monotonic second."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.settimeout(0.0)
+        self._socket.bind(("127.0.0.1", 0))
+        self.port: int = self._socket.getsockname()[1]
+        """Where it listens."""
+        self._peers: set[tuple[str, int]] = {self.options.peer}
+        self._lock = threading.RLock()
+        self._flight = MavFlight(self.options)
+        kind = EmulatedPX4 if self.options.family == "px4" else EmulatedArduPilot
+        self.firmware: Firmware = kind(self.options, self._flight, self._say)
+        self._mav: Any = mavlink.MAVLink(None, self.options.system, 1)
+        self._mav.robust_parsing = True
+        if self.options.key is not None:
+            sign_with(self._mav, self.options.key)
+        seed = self.options.seed
+        self._up = Channel(self.options.uplink, f"{seed}/up", self._hear)
+        self._down = Channel(self.options.downlink, f"{seed}/down", self._transmit)
+        self._due: dict[int, float] = {}
+        self._beat_due = 0.0
+        self._stopping = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    @property
+    def truth(self) -> Odometry:
+        """Exact state of motion."""
+        with self._lock:
+            return self._flight.truth
+
+    @property
+    def mode(self) -> VehicleMode:
+        """What its body is doing."""
+        with self._lock:
+            return self._flight.mode
+
+    @property
+    def armed(self) -> bool:
+        """Whether its motors turn."""
+        with self._lock:
+            return self.firmware.armed
+
+    def take_over(self) -> None:
+        """Let a pilot fly."""
+        with self._lock:
+            firmware = self.firmware
+            assert isinstance(firmware, EmulatedPX4 | EmulatedArduPilot)  # noqa: S101 - all there are
+            firmware.take_over()
+
+    def protect_itself(self) -> None:
+        """Let its own protection take it home."""
+        with self._lock:
+            self.firmware.enter_return()
+
+    def spoil(self, *, up: Impairment | None = None, down: Impairment | None = None) -> None:
+        """Change how bad the link is from now on, for each way that is given."""
+        if up is not None:
+            self._up.impairment = up
+        if down is not None:
+            self._down.impairment = down
+
+    def cut(self, *, off: bool = True) -> None:
+        """Cut the link, or mend it."""
+        impairment = Impairment(loss=1.0 if off else 0.0)
+        self.spoil(up=impairment, down=impairment)
+
+    def inject(self, content: bytes) -> None:
+        """Send these bytes to everybody, as they are."""
+        with self._lock:
+            for peer in self._peers:
+                self._transmit(content, peer)
+
+    def start(self) -> None:
+        """Switch it on."""
+        self._thread = threading.Thread(target=self._run, name="emulated-autopilot", daemon=True)
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Switch it off."""
+        self._stopping.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._socket.close()
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.stop()
+
+    def _run(self) -> None:
+        last = time.monotonic()
+        with selectors.DefaultSelector() as selector:
+            selector.register(self._socket, selectors.EVENT_READ)
+            while not self._stopping.is_set():
+                selector.select(_TURN)
+                now = time.monotonic()
+                with self._lock:
+                    self._receive(now)
+                    self._up.turn(now)
+                    steps = int((now - last) / STEP)
+                    last += steps * STEP
+                    self.firmware.advance(min(steps * STEP, _LONGEST_LEAP))
+                    self._report(now)
+                    self._down.turn(now)
+
+    def _receive(self, now: float) -> None:
+        while True:
+            try:
+                content, (address, port) = self._socket.recvfrom(_LARGEST)
+            except BlockingIOError:
+                return
+            except OSError:
+                continue
+            self._peers.add((address, port))
+            self._up.send(content, (address, port), now)
+
+    def _hear(self, content: bytes, peer: tuple[str, int]) -> None:
+        del peer
+        messages = self._mav.parse_buffer(content) or []
+        for message in messages:
+            if message.get_type() != "BAD_DATA":
+                self.heard.append((time.monotonic(), message))
+                self._obey(message)
+
+    def _obey(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
+        kind = message.get_type()
+        firmware = self.firmware
+        if getattr(message, "target_system", 0) not in {0, self.options.system}:
+            return
+        if kind == "COMMAND_LONG":
+            values = tuple(getattr(message, f"param{index}") for index in range(1, 8))
+            self._acknowledge(message, firmware.obey(message.command, values, None))
+        elif kind == "COMMAND_INT":
+            values = tuple(getattr(message, f"param{index}") for index in range(1, 5))
+            values += (message.x, message.y, message.z)
+            self._acknowledge(message, firmware.obey(message.command, values, message.frame))
+        elif kind == "SET_POSITION_TARGET_LOCAL_NED":
+            firmware.setpoint(message)
+        elif kind in {"PARAM_REQUEST_READ", "PARAM_SET"}:
+            answer = firmware.parameters.handle(message)
+            if answer is not None:
+                self._say(answer)
+        elif kind in _PLANS:
+            for answer in firmware.plans.handle(message):
+                self._say(answer)
+        elif kind == "HEARTBEAT" and isinstance(firmware, EmulatedArduPilot):
+            firmware.hear_heartbeat(message)
+
+    def _acknowledge(self, message: Any, result: int | None) -> None:  # noqa: ANN401
+        if result is None:
+            return
+        peer = (message.get_srcSystem(), message.get_srcComponent())
+        for _ in range(2 if self.options.family == "px4" else 1):
+            self._say(mavlink.MAVLink_command_ack_message(message.command, result, 0, 0, *peer))
+
+    def _report(self, now: float) -> None:
+        if now >= self._beat_due:
+            self._beat_due = now + _HEARTBEAT
+            self._say(self.firmware.heartbeat())
+        for number, rate in self.firmware.rates.items():
+            if rate <= 0.0 or now < self._due.get(number, 0.0):
+                continue
+            self._due[number] = max(now, self._due.get(number, now) + 1.0 / rate)
+            message = self.firmware.message(number)
+            if message is not None:
+                self._say(message)
+
+    def _say(self, message: Any) -> None:  # noqa: ANN401
+        packet = message.pack(self._mav)
+        self._mav.seq = (self._mav.seq + 1) % 256
+        now = time.monotonic()
+        for peer in self._peers:
+            self._down.send(packet, peer, now)
+
+    def _transmit(self, content: bytes, peer: tuple[str, int]) -> None:
+        with contextlib.suppress(OSError):
+            self._socket.sendto(content, peer)

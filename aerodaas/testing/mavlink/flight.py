@@ -1,0 +1,158 @@
+"""The emulated vehicle's flight: the embedded simulator, seen in its own NED frame."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from aerodaas.data import Odometry
+from aerodaas.geometry import GeodeticOrigin, Vector, enu_to_ned, wrap_angle
+from aerodaas.simulation.airframe import Airframe
+from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Steer
+from aerodaas.simulation.dynamics import STEP, Multirotor
+from aerodaas.simulation.noise import SensorNoise
+from aerodaas.simulation.wind import Wind
+from aerodaas.testing.mavlink.options import AutopilotOptions
+from aerodaas.vehicle import VehicleMode
+
+__all__ = ["GuidedTarget", "MavFlight"]
+
+_SPEED, _CLIMB, _ACCELERATION, _TURN = 12.0, 3.0, 4.0, math.radians(120.0)
+_POSITION_GAIN = 1.0
+"""1/s, about that of both autopilots."""
+_YAW_GAIN = 2.0
+
+
+class GuidedTarget:
+    """The latest setpoint in ENU; None where it was to be ignored."""
+
+    def __init__(
+        self,
+        position: Vector | None,
+        velocity: Vector | None,
+        yaw: float | None,
+        yaw_rate: float | None,
+    ) -> None:
+        self.position = position
+        self.velocity = velocity
+        self.yaw = yaw
+        self.yaw_rate = yaw_rate
+
+
+class MavFlight:
+    """Body, motion and battery; time moves in `advance`."""
+
+    def __init__(self, options: AutopilotOptions) -> None:
+        """Stand where `options` say."""
+        airframe = Airframe(battery=options.battery)
+        yaw = wrap_angle(math.radians(options.start_yaw))
+        self._rotor = Multirotor(
+            airframe,
+            Wind(options.wind, options.gust, f"{options.seed}/wind", STEP),
+            max_acceleration=_ACCELERATION,
+            max_yaw_rate=_TURN,
+            start=options.start,
+            yaw=yaw,
+        )
+        self._noise = SensorNoise(options.noise, f"{options.seed}/noise")
+        self._exact = SensorNoise(0.0, "")
+        limits = FlightLimits(_SPEED, _CLIMB, _ACCELERATION, 2.0)
+        self._autopilot = Autopilot(airframe, self._rotor, self._noise, limits)
+        self._shift = np.array(options.estimator_origin)
+        latitude, longitude, self._sea_level = options.origin
+        self.origin = GeodeticOrigin(latitude, longitude)
+        self.target: GuidedTarget | None = None
+
+    @property
+    def truth(self) -> Odometry:
+        """Exact state of motion, ENU."""
+        return self._exact.odometry(self._rotor.motion())
+
+    @property
+    def believed(self) -> Odometry:
+        """What its estimator says, ENU."""
+        return self._noise.odometry(self._rotor.motion())
+
+    @property
+    def ned(self) -> Vector:
+        """Its place in its own NED frame."""
+        return enu_to_ned(self.believed.position - self._shift)
+
+    def enu(self, ned: Vector) -> Vector:
+        """A place of its own NED frame in ENU."""
+        return enu_to_ned(ned) + self._shift
+
+    @property
+    def altitude(self) -> float:
+        """Metres above mean sea level."""
+        return self._sea_level + float(self.believed.position[2])
+
+    def rise_to(self, altitude: float) -> float:
+        """Metres from here up to an altitude above mean sea level."""
+        return altitude - self.altitude
+
+    @property
+    def mode(self) -> VehicleMode:
+        """What the body's own autopilot is doing."""
+        return self._autopilot.mode
+
+    @property
+    def flying(self) -> bool:
+        """True while the rotors carry it."""
+        return self._autopilot.flying
+
+    @property
+    def charge(self) -> float:
+        """Of the battery, 0 to 1."""
+        return self._autopilot.battery.fraction
+
+    @property
+    def voltage(self) -> float:
+        """Of the battery."""
+        return self._autopilot.battery.state.voltage
+
+    def take_off(self, height: float) -> None:
+        """Rise by `height` metres."""
+        self.target = None
+        self._autopilot.take_off(height)
+
+    def hold(self) -> None:
+        """Stay."""
+        self.target = None
+        if self.flying:
+            self._autopilot.hold()
+
+    def return_home(self) -> None:
+        """Fly home and land."""
+        self.target = None
+        if self.flying:
+            self._autopilot.return_home()
+
+    def land(self) -> None:
+        """Land here."""
+        self.target = None
+        if self.flying:
+            self._autopilot.land()
+
+    def advance(self, duration: float) -> None:
+        """Fly on for `duration` seconds, in whole steps of the simulator."""
+        for _ in range(round(duration / STEP)):
+            if self.target is not None and self.flying:
+                self._autopilot.guide(self._steer(self.target))
+            self._autopilot.step()
+
+    def _steer(self, target: GuidedTarget) -> Steer:
+        believed = self.believed
+        velocity = np.zeros(3) if target.velocity is None else target.velocity
+        if target.position is not None:
+            velocity = velocity + _POSITION_GAIN * (target.position - believed.position)
+        across = float(np.linalg.norm(velocity[:2]))
+        if across > _SPEED:
+            velocity = velocity * np.array([_SPEED / across, _SPEED / across, 1.0])
+        rate = target.yaw_rate or 0.0
+        if target.yaw is not None:
+            rate = _YAW_GAIN * wrap_angle(target.yaw - believed.yaw)
+        x, y, z = velocity
+        climb = float(np.clip(z, -_CLIMB, _CLIMB))
+        return Steer((float(x), float(y), climb), float(np.clip(rate, -_TURN, _TURN)))

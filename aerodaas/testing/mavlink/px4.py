@@ -1,0 +1,152 @@
+"""The emulated PX4, with the habits that were seen in flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from aerodaas.drivers.mavlink.dialect import EventMessage, mavlink
+from aerodaas.drivers.mavlink.events import event_number
+from aerodaas.testing.mavlink.firmware import Firmware, Result
+from aerodaas.testing.mavlink.flight import MavFlight
+from aerodaas.testing.mavlink.options import AutopilotOptions
+from aerodaas.testing.mavlink.store import ParameterStore
+from aerodaas.vehicle import VehicleMode
+
+__all__ = ["EmulatedPX4"]
+
+_OK, _LATER = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+_AUTO, _POSITION, _OFFBOARD = 4, 3, 6
+_TAKE_OFF, _HOLD, _RETURN, _LAND = 2, 3, 5, 6
+_LOSS = 1.0
+"""COM_OF_LOSS_T: seconds without setpoints after which it leaves offboard."""
+_NEAR = 0.7
+"""Metres below its altitude at which a take-off counts as done, about NAV_MC_ALT_RAD."""
+_RETURN_ACTION, _HOLD_ACTION = 3.0, 5.0
+
+
+class EmulatedPX4(Firmware):
+    """Take-off above the sea, offboard that must be fed, reasons as events."""
+
+    number: ClassVar[int] = mavlink.MAV_AUTOPILOT_PX4
+    arming_refused: ClassVar[int] = _LATER
+    default_rates: ClassVar[dict[int, float]] = {
+        mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
+        mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
+        mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: 10.0,
+        mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
+        mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
+        mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+    }
+
+    def __init__(
+        self, options: AutopilotOptions, flight: MavFlight, say: Callable[[Any], None]
+    ) -> None:
+        values = {
+            "COM_LOW_BAT_ACT": 0.0,
+            "COM_OBL_RC_ACT": 0.0,
+            "NAV_DLL_ACT": 0.0,
+            "GF_ACTION": 2.0,
+            "GF_MAX_VER_DIST": 0.0,
+            "MPC_XY_VEL_MAX": 12.0,
+        }
+        integers = {"COM_LOW_BAT_ACT", "COM_OBL_RC_ACT", "NAV_DLL_ACT", "GF_ACTION"}
+        super().__init__(options, flight, say, ParameterStore(values, integers, bytewise=True))
+        self._main, self._sub = _AUTO, _HOLD
+        self._altitude = math.nan
+        self._sequence = 0
+
+    @property
+    def custom_mode(self) -> int:
+        """Main mode in the third byte, sub mode in the fourth."""
+        return self._main << 16 | self._sub << 24
+
+    @property
+    def guided(self) -> bool:
+        """Offboard."""
+        return self._main == _OFFBOARD
+
+    def may_arm(self) -> bool:
+        """Not in offboard without setpoints, though that mode itself was accepted."""
+        fed = self.now - self._setpoint_at < _LOSS
+        return self.ready and (not self.guided or fed)
+
+    def command(self, number: int, values: tuple[float, ...], frame: int | None) -> Result:
+        """Modes and take-off."""
+        if number == mavlink.MAV_CMD_DO_SET_MODE:
+            return self._set_mode(int(values[1]), int(values[2]))
+        if number == mavlink.MAV_CMD_NAV_TAKEOFF:
+            if frame not in {None, mavlink.MAV_FRAME_GLOBAL}:
+                return mavlink.MAV_RESULT_DENIED
+            self._altitude = values[6]
+            return self._set_mode(_AUTO, _TAKE_OFF)
+        sub = {mavlink.MAV_CMD_NAV_LAND: _LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _RETURN}
+        if number in sub:
+            return self._set_mode(_AUTO, sub[number])
+        return mavlink.MAV_RESULT_UNSUPPORTED
+
+    def _set_mode(self, main: int, sub: int) -> Result:
+        if main == _AUTO and not self.ready:
+            self._event("commander_modeswitch_not_avail", mavlink.MAV_SEVERITY_CRITICAL)
+            return _LATER
+        if (main, sub) == (self._main, self._sub):
+            return _OK
+        self._main, self._sub = main, sub
+        self.failsafe = False
+        if main == _AUTO and self.flight.flying:
+            deeds = {_HOLD: self.flight.hold, _RETURN: self.flight.return_home}
+            deeds[_LAND] = self.flight.land
+            if sub in deeds:
+                self.motions.append({_HOLD: "hold", _RETURN: "return", _LAND: "land"}[sub])
+                deeds[sub]()
+        return _OK
+
+    def take_over(self) -> None:
+        """A pilot moves the sticks: position mode."""
+        self._main, self._sub = _POSITION, 0
+        self.flight.hold()
+
+    def enter_return(self) -> None:
+        """Return to launch, by its own protection."""
+        self._set_mode(_AUTO, _RETURN)
+        self.failsafe = True
+
+    def breach(self) -> None:
+        """By GF_ACTION: 2 hold, 3 return, 5 land."""
+        sub = {2.0: _HOLD, 3.0: _RETURN, 5.0: _LAND}.get(self.parameters.values["GF_ACTION"])
+        self._event("check_gf_violation_custom_gf", mavlink.MAV_SEVERITY_CRITICAL)
+        if sub is not None:
+            self._set_mode(_AUTO, sub)
+            self.failsafe = True
+
+    def protect(self) -> None:
+        """Lift once armed for take-off; leave offboard when setpoints stop."""
+        taking_off = (self._main, self._sub) == (_AUTO, _TAKE_OFF)
+        if taking_off and not self._lifted:
+            self.lift(max(0.5, self.flight.rise_to(self._altitude)))
+        elif taking_off and self.flight.rise_to(self._altitude) < _NEAR:
+            self._sub = _HOLD
+            self.flight.hold()
+        if self.guided and self.flight.flying and self.now - self._setpoint_at > _LOSS:
+            action = self.parameters.values["COM_OBL_RC_ACT"]
+            sub = {_RETURN_ACTION: _RETURN, _HOLD_ACTION: _HOLD}.get(action, _LAND)
+            self._event("commander_failsafe_enter_generic", mavlink.MAV_SEVERITY_CRITICAL)
+            self._set_mode(_AUTO, sub)
+            self.failsafe = True
+
+    def refuse_arming(self) -> None:
+        """The report of the arming checks, as events."""
+        self._event("commander_arming_check_summary", 8)
+        if not self.ready:
+            self._event("check_estimator_hor_pos_not_stable", mavlink.MAV_SEVERITY_ERROR)
+        if not self.may_arm() and self.guided:
+            self._event("check_modes_offboard_signal", mavlink.MAV_SEVERITY_ERROR)
+        self._event("commander_health_summary", 8)
+
+    def _event(self, name: str, severity: int) -> None:
+        self._sequence = (self._sequence + 1) % 0x10000
+        boot = int(self.now * 1e3)
+        arguments = [0] * 40
+        levels = severity | severity << 4
+        self._say(EventMessage(0, 0, event_number(name), boot, self._sequence, levels, arguments))

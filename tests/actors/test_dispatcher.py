@@ -1,0 +1,208 @@
+"""The dispatcher in flight: executors that die, a cloud that goes and comes, bad schedulers."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable
+from typing import Any
+
+import psutil
+import pytest
+import schedulers_at_fault
+from flying import Flyer, hop, robot
+
+from aerodaas import Environment
+from aerodaas.analytics import SyntheticAnalytics
+from aerodaas.recording.reader import Recording
+from aerodaas.run import Run
+
+_CAMERA = {"driver": "simulated", "settings": {"width": 64, "height": 36}}
+
+
+def _environment(rate: float = 4.0, *, cloud: bool = False, **task: Any) -> dict[str, Any]:  # noqa: ANN401
+    """A drone with a camera that one analysis, `model`, watches."""
+    clouds = [{"id": "cloud", "kind": "cloud", "executors": 4}] if cloud else []
+    return {
+        "robots": [robot(sensors=[{"id": "camera", "rate": rate, **_CAMERA}])],
+        "compute": [{"id": "edge"}, *clouds],
+        "schedulers": {"tasks": {"model": {"benefit": 10, **task}}},
+        "recording": {"images": "none"},
+        "simulation": {"world": "empty"},
+    }
+
+
+def _build(scheduler: Any, edge_ms: float, cloud_ms: float = 0.0) -> Callable[[Environment], None]:  # noqa: ANN401
+    def build(env: Environment) -> None:
+        env.set_analytics_scheduler(scheduler)
+        drone = env.get_robot_by_id("drone")
+        model = SyntheticAnalytics("model", edge_ms, cloud_ms)
+        model.deploy(env.get_compute_resource_by_id("edge"))
+        model.analyse(drone.get_sensor_by_id("camera").get_data_stream())
+        drone.navigate(hop((1, 0), hover=600))
+
+    return build
+
+
+def _values(env: Environment) -> dict[str, Any]:
+    run = env.launch()
+    run.look()
+    return run.reports()["dispatcher"].values
+
+
+def _until(env: Environment, holds: Callable[[dict[str, Any]], bool], seconds: float = 40) -> None:
+    """Wait until the dispatcher's figures satisfy `holds`."""
+    end = time.monotonic() + seconds
+    while not holds(_values(env)):
+        assert time.monotonic() < end, f"it never happened: {_values(env)}"
+        time.sleep(0.1)
+
+
+def _pid(env: Environment, name: str) -> int:
+    flight = env.launch()._flight
+    assert flight is not None
+    return flight.infos()[name].pid
+
+
+def _process(name: str) -> psutil.Process:
+    """The one process below this one that runs the actor class `name`."""
+    for process in psutil.Process().children(recursive=True):
+        with contextlib.suppress(psutil.Error):
+            if " ".join(process.cmdline()).startswith(f"ray::{name}"):
+                return process
+    raise AssertionError(f"no {name}")
+
+
+def _decisions(run: Run) -> list[dict[str, Any]]:
+    assert run.recording is not None
+    with Recording.open(run.recording) as recording:
+        return [record.value for record in recording.records(schemas=["aerodaas.Decision"])]
+
+
+def _alerts(run: Run) -> dict[str, list[str]]:
+    assert run.recording is not None
+    found: dict[str, list[str]] = defaultdict(list)
+    with Recording.open(run.recording) as recording:
+        for record in recording.records(schemas=["aerodaas.Alert"]):
+            found[record.value["kind"]].append(record.value["text"])
+    return found
+
+
+def _require_one_end_each(run: Run) -> Counter[str]:
+    """No task ended twice; of those that arrived at most the very last are open."""
+    decisions = _decisions(run)
+    ends = [one for one in decisions if one["action"] not in {"edge", "cloud", "retry"}]
+    each = Counter(one["task"] for one in ends)
+    assert max(each.values()) == 1
+    values = run.reports()["dispatcher"].values
+    assert sum(values["outcomes"].values()) == len(ends)
+    assert 0 <= values["tasks"] - len(ends) <= 8
+    return Counter(one["action"] for one in ends)
+
+
+@pytest.mark.slow
+def test_an_executor_that_dies_is_restarted_and_its_task_tried_again(flyer: Flyer) -> None:
+    """With 20 s to go, the running task waits for the restart, runs once more and is done."""
+    content = _environment(1.0, edge_time=900, deadline=20_000)
+    with flyer.flying(_build("fifo", 900), content, speed=1.0) as env:
+        _until(env, lambda values: values["outcomes"].get("done", 0) >= 2)
+        os.kill(_pid(env, "analytics/edge"), signal.SIGKILL)
+        done = _values(env)["outcomes"]["done"]
+        _until(env, lambda values: values["outcomes"]["done"] >= done + 3)
+        env.get_robot_by_id("drone").end_mission()
+    run = env.launch()
+    ends = _require_one_end_each(run)
+    values = run.reports()["dispatcher"].values
+    assert values["retried"] == 1
+    assert values["edge_down"] == []
+    assert ends["failed"] == 0
+    again = next(one for one in _decisions(run) if one["action"] == "retry")
+    assert again["reason"] == "its executor on the edge died"
+    became = [one["action"] for one in _decisions(run) if one["task"] == again["task"]]
+    assert became == ["edge", "retry", "edge", "done"]
+    alerts = _alerts(run)
+    assert alerts["executor_lost"] == ["drone/model died on the edge: restarting"]
+    assert alerts["executor_back"] == ["drone/model is back on the edge"]
+
+
+@pytest.mark.slow
+def test_a_task_whose_deadline_is_too_near_is_not_tried_again(flyer: Flyer) -> None:
+    """It fails; those that come while the executor is down are dropped, with the reason."""
+    content = _environment(1.0, edge_time=900, deadline=1000)
+    with flyer.flying(_build("fifo", 900), content, speed=1.0) as env:
+        _until(env, lambda values: values["outcomes"].get("done", 0) >= 2)
+        os.kill(_pid(env, "analytics/edge"), signal.SIGKILL)
+        _until(env, lambda values: bool(values["edge_down"]))
+        _until(env, lambda values: not values["edge_down"])
+        done = _values(env)["outcomes"]["done"]
+        _until(env, lambda values: values["outcomes"]["done"] > done)
+        env.get_robot_by_id("drone").end_mission()
+    run = env.launch()
+    ends = _require_one_end_each(run)
+    assert run.reports()["dispatcher"].values["retried"] == 0
+    assert ends["failed"] <= 1
+    reasons = {one["reason"] for one in _decisions(run) if one["action"] in {"drop", "failed"}}
+    assert reasons & {
+        "edge: its executor on the edge died",
+        "its executor on the edge is down",
+    }
+
+
+@pytest.mark.slow
+def test_work_moves_to_the_edge_while_the_cloud_is_gone(flyer: Flyer) -> None:
+    """E+C sends what the edge cannot do; after the executor's death that stops until it is back."""
+    content = _environment(4.0, cloud=True, edge_time=400, cloud_time=600, deadline=1500)
+    with flyer.flying(_build("ec_edf", 400, 500), content, speed=1.0) as env:
+        _until(env, lambda values: values["outcomes"].get("done", 0) >= 6)
+        _process("CloudExecutor").kill()
+        _until(env, lambda values: values["cloud_slots"] == 0)
+        _until(env, lambda values: values["cloud_slots"] == 4)
+        done = _values(env)["outcomes"]["done"]
+        _until(env, lambda values: values["outcomes"]["done"] >= done + 8)
+        env.get_robot_by_id("drone").end_mission()
+    run = env.launch()
+    _require_one_end_each(run)
+    alerts = _alerts(run)
+    assert len(alerts["cloud_lost"]) == len(alerts["cloud_back"]) == 1
+    order = [one for one in _decisions(run) if one["action"] == "cloud"]
+    assert run.recording is not None
+    with Recording.open(run.recording) as recording:
+        found = {
+            r.value["kind"]: r.value["stamp"] for r in recording.records(schemas=["aerodaas.Alert"])
+        }
+    gone, back = found["cloud_lost"], found["cloud_back"]
+    assert not [one for one in order if gone < one["stamp"] < back]
+    in_cloud = {one["task"] for one in order if one["stamp"] > back}
+    assert in_cloud & {one["task"] for one in _decisions(run) if one["action"] == "done"}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ("Raising", "ZeroDivisionError: a bug of the user's own at schedulers_at_fault.py:"),
+        ("Silent", "Silent answered an event with None"),
+        ("Twice", "Twice decided RunOnEdge of task"),
+        ("Forgetful", "Forgetful: left drone/model#"),
+        ("Slow", "Slow took more than 50 ms to decide, 3 times in a row"),
+        ("Hanging", "Hanging.task_arrived does not come to an end"),
+    ],
+)
+def test_a_scheduler_that_goes_wrong_is_replaced(flyer: Flyer, fault: str, said: str) -> None:
+    """People are told why, edge-first EDF goes on with what was waiting, and nothing is lost."""
+    content = _environment(8.0, edge_time=50, deadline=1000)
+    scheduler = getattr(schedulers_at_fault, fault)()
+    with flyer.flying(_build(scheduler, 20), content, speed=1.0) as env:
+        _until(env, lambda values: values.get("replaced", False))
+        done = _values(env)["outcomes"]["done"]
+        _until(env, lambda values: values["outcomes"]["done"] >= done + 5)
+        assert _values(env)["scheduler"] == "EdgeCloudEdf"
+        env.get_robot_by_id("drone").end_mission()
+    run = env.launch()
+    _require_one_end_each(run)
+    [text] = _alerts(run)["scheduler_failed"]
+    assert said in text
+    assert text.endswith("going on with edge-first EDF")
