@@ -150,4 +150,6 @@ def test_boxes_lie_over_their_pictures(flown: Path) -> None:
             assert shape.timestamp == value.points[0].timestamp
             assert all(0 <= point.x <= 64 and 0 <= point.y <= 36 for point in shape.points)
     calibrations = [value for _, kind, _, value in found if kind == "foxglove.CameraCalibration"]
-    assert [(one.frame_id, one.width, one.height) for one in calibrations] == [("drone/cam", 64, 36)]
+    assert [(one.frame_id, one.width, one.height) for one in calibrations] == [
+        ("drone/cam", 64, 36)
+    ]

@@ -129,7 +129,9 @@ class Ear:
 
     def acknowledge(self, number: int, result: int, now: float) -> None:
         """Answer."""
-        self.commander.take(mavlink.MAVLink_command_ack_message(number, result, 0, 0, 245, 191), now)
+        self.commander.take(
+            mavlink.MAVLink_command_ack_message(number, result, 0, 0, 245, 191), now
+        )
 
 
 TAKE_OFF = Order(mavlink.MAV_CMD_NAV_TAKEOFF, (0.0,) * 7, "take off")
@@ -260,9 +262,12 @@ def test_a_plan_of_qgroundcontrol_becomes_waypoints(tmp_path: Path) -> None:
 @given(
     st.recursive(
         st.none() | st.floats() | st.text(max_size=5) | st.sampled_from(["mission", "items"]),
-        lambda inner: st.lists(inner, max_size=3)
-        | st.dictionaries(
-            st.sampled_from(["mission", "items", "type", "params", "plannedHomePosition"]), inner
+        lambda inner: (
+            st.lists(inner, max_size=3)
+            | st.dictionaries(
+                st.sampled_from(["mission", "items", "type", "params", "plannedHomePosition"]),
+                inner,
+            )
         ),
         max_leaves=12,
     )

@@ -313,5 +313,3 @@ def test_home_frame_needs_a_home() -> None:
     """Said when the vehicle is built, not in flight."""
     with pytest.raises(ConfigError, match="needs a home"):
         vehicle_at(1, frame="home")
-
-
