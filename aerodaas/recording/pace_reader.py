@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 from aerodaas.recording.pace import Pace
@@ -77,9 +78,13 @@ def read_pace(path: str | Path) -> Pace:
             "aerodaas.Latency": found.latency,
         }
         for record in recording.records(schemas=readers):
-            readers[record.schema](record)
+            # Another version's message: the rest is still worth keeping to.
+            with suppress(KeyError, TypeError, IndexError, AttributeError):
+                readers[record.schema](record)
     return Pace(
-        *(_sorted(stamps) for stamps in (found.readings, found.turns, found.plans)),
+        _sorted(found.readings),
+        _sorted(found.turns),
+        _sorted(found.plans),
         {robot: tuple(heard) for robot, heard in found.heard.items()},
         {
             stream: {source: dict(states) for source, states in sources.items()}
