@@ -47,6 +47,8 @@ class ActorInfo:
     shared_memory: bool
     publishes: tuple[str, ...]
     reads: tuple[str, ...]
+    clock: int
+    """What its machine's clock read when it was ready, host time in nanoseconds."""
 
 
 @dataclass(frozen=True)
@@ -133,6 +135,7 @@ class StreamActor:
             self.inbox.shared,
             tuple(self.outlets),
             tuple(self.reads()),
+            host_time_ns(),
         )
 
     def connect(self, readers: dict[str, list[Any]]) -> None:

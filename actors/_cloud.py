@@ -1,30 +1,48 @@
-"""The dispatcher's way to the cloud: executions under way, their answers, and whether it is there.
+"""The dispatcher's way to one executor of the cloud: what is under way, and whether it is there.
 
-The cloud is gone when its executor's process or node is, or when an execution has timed out and
-nothing sent later was answered. From then on it is probed, a few bytes a second, until it answers.
+The executor is gone when its process or node is, or when an execution has timed out and nothing
+sent later was answered. From then on it is probed, a few bytes a second, until it answers.
 """
 
 from __future__ import annotations
 
+import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future
+from concurrent.futures import Future, wait
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
-import ray
 from ray.exceptions import RayError, RayTaskError
 
-from aerodaas.actors.executor import UnpreparedError
-from aerodaas.actors.streams import decode_message, encode_message
+from aerodaas.actors._costs import Executions
+from aerodaas.actors._parcels import Parcel, Parcels
+from aerodaas.actors.executor import Executed, UnpreparedError
+from aerodaas.actors.streams import decode_message
 from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import Task
 from aerodaas.status import Message
 
-__all__ = ["Cloud", "CloudAnswer"]
+__all__ = ["Cloud", "CloudAnswer", "Executor"]
 
-_FRAMES_KEPT = 8
 _PROBE_EVERY = NANOSECONDS
+
+
+@dataclass(frozen=True)
+class Executor:
+    """One process of a compute resource in the cloud, or before an endpoint."""
+
+    site: str
+    """Id of the compute resource."""
+    handle: Any
+    """Ray's."""
+    works: list[Any]
+    """A Ray reference to the analyses that it is prepared with, in a list so that it stays one."""
+    models: frozenset[str]
+    """Streams of these analyses."""
+    slots: int
+    compression: str
 
 
 @dataclass(frozen=True)
@@ -39,66 +57,79 @@ class CloudAnswer:
     """Its executor is gone."""
     error: str = ""
     """What the analysis raised."""
+    way: str = ""
+    """Where the frame went, and how."""
+    figures: dict[str, float] | None = None
+    """What it took: milliseconds and kilobytes."""
+
+
+@dataclass
+class _Sent:
+    task: Task
+    at: int
+    """Mission time."""
+    future: Future[Executed] | None = None
+    parcel: Parcel | None = None
+    began: float = 0.0
+    ended: float = 0.0
+    problem: str = ""
 
 
 class Cloud:
-    """Executions in the cloud; a frame crosses the link once, however many analyses want it."""
+    """Executions on one executor."""
 
     def __init__(
-        self,
-        executor: Any,  # noqa: ANN401 - a Ray handle
-        works: Any,  # noqa: ANN401 - a Ray reference
-        timeout_ns: int,
-        wake: Callable[[], None],
+        self, executor: Executor, parcels: Parcels, timeout_ns: int, wake: Callable[[], None]
     ) -> None:
-        """Execute on `executor`; one that was restarted is given `works`, the analyses, anew.
+        """Send frames as `parcels`, which all executors of a node share.
 
-        `wake` is called, from another thread, when an answer is there.
+        An executor that was restarted is given its analyses anew. `wake` is called, from another
+        thread, when an answer is there.
         """
         self.gone = False
-        self._executor = executor
-        self._works = works
+        self.executor = executor
+        self.parcels = parcels
+        self.executions = Executions()
         self._timeout = timeout_ns
         self._wake = wake
-        self._started: dict[int, tuple[Task, int, Any]] = {}
-        self._answered: deque[tuple[Task, Future[bytes]]] = deque()
+        self._started: dict[int, _Sent] = {}
+        self._answered: deque[_Sent] = deque()
         self._answered_since = -1
         """When the newest execution that was answered had been sent."""
-        self._frames: dict[tuple[str, int], Any] = {}
         self._probe: Future[bool] | None = None
         self._preparing: Future[None] | None = None
         self._probed = 0
 
-    def send(self, task: Task, message: Message[Any], now: int) -> None:
-        """Start an execution."""
-        key = (message.stream, message.seq)
-        if key not in self._frames:
-            self._frames = dict(list(self._frames.items())[-_FRAMES_KEPT:])
-            self._frames[key] = ray.put(encode_message(message))
-        reference = self._executor.execute.remote(task.profile.model, self._frames[key])
-        self._started[task.id] = (task, now, reference)
+    @property
+    def load(self) -> float:
+        """Executions under way by slot."""
+        return len(self._started) / self.executor.slots
 
-        def answered(future: Future[bytes]) -> None:
-            self._answered.append((task, future))
-            self._wake()
+    def expected(self, model: str) -> float | None:
+        """Seconds that a task may be expected to take; None before the first one was executed."""
+        work = self.executions.seconds(model)
+        return None if work is None else self.parcels.expected + work
 
-        reference.future().add_done_callback(answered)
+    def send(self, task: Task, message: Message[Any], now: int, budget: float) -> None:
+        """Start an execution whose result is of use for `budget` seconds of the host."""
+        sent = self._started[task.id] = _Sent(task, now)
+        until = time.monotonic() + budget
+        self.parcels.later(partial(self._carry, sent, message, until))
 
     def answers(self, now: int) -> Iterator[CloudAnswer]:
         """Yield what has come back or timed out; what comes after its time-out is passed over."""
         while self._answered:
-            task, future = self._answered.popleft()
-            found = self._started.pop(task.id, None)
-            if found is not None:
-                yield self._answer(task, future, found[1])
-        for task, started, _ in list(self._started.values()):
-            if now - started > self._timeout:
-                del self._started[task.id]
-                self.gone |= self._answered_since < started
-                yield CloudAnswer(task, timed_out=True)
+            sent = self._answered.popleft()
+            if self._started.pop(sent.task.id, None) is not None:
+                yield self._answer(sent)
+        for sent in list(self._started.values()):
+            if now - sent.at > self._timeout:
+                del self._started[sent.task.id]
+                self.gone |= self._answered_since < sent.at
+                yield CloudAnswer(sent.task, timed_out=True, way=self.executor.site)
 
     def probe(self, now: int) -> None:
-        """Look whether a cloud that was gone is back; costs a few bytes."""
+        """Look at the link; and whether an executor that was gone is back, for a few bytes."""
         if self._probe is not None and self._probe.done():
             probe, self._probe = self._probe, None
             if probe.exception() is None and probe.result():
@@ -106,33 +137,79 @@ class Cloud:
                 self._answered_since = now
             elif probe.exception() is None:
                 self._prepare()
-        if self.gone and self._probe is None and now - self._probed >= _PROBE_EVERY:
+        if not self.gone:
+            self.parcels.ping(self.executor.handle)
+        elif self._probe is None and now - self._probed >= _PROBE_EVERY:
             self._probed = now
-            future: Future[bool] = self._executor.ready.remote().future()
+            future: Future[bool] = self.executor.handle.ready.remote().future()
             future.add_done_callback(lambda _: self._wake())
             self._probe = future
 
-    def _prepare(self) -> None:
-        if self._preparing is None or self._preparing.done():
-            self._preparing = self._executor.prepare.remote(self._works).future()
-
     def finish(self, timeout: float) -> None:
         """Wait up to `timeout` seconds for what is under way, so that its executor may be ended."""
-        references = [reference for _, _, reference in self._started.values()]
-        if references and not self.gone:
-            ray.wait(references, num_returns=len(references), timeout=timeout)
+        futures = [sent.future for sent in self._started.values() if sent.future is not None]
+        if futures and not self.gone:
+            wait(futures, timeout)
+        self.parcels.close()
 
-    def _answer(self, task: Task, future: Future[bytes], started: int) -> CloudAnswer:
+    def _prepare(self) -> None:
+        if self._preparing is None or self._preparing.done():
+            works = self.executor.works[0]
+            self._preparing = self.executor.handle.prepare.remote(works).future()
+
+    def _carry(self, sent: _Sent, message: Message[Any], until: float) -> None:
+        """In the packing thread: code the frame, and start the execution."""
         try:
-            message = decode_message(memoryview(future.result()))
+            sent.parcel = self.parcels.pack(message)
+            sent.began = time.perf_counter()
+            execute, left = self.executor.handle.execute, until - time.monotonic()
+            reference = execute.remote(sent.task.profile.model, sent.parcel.reference, left)
+            sent.future = reference.future()
+            sent.future.add_done_callback(lambda _: self._came_back(sent))
+        except Exception as error:  # noqa: BLE001 - whatever it is, it must not be silence
+            sent.problem = f"{type(error).__name__}: {error}"
+            self._came_back(sent)
+
+    def _came_back(self, sent: _Sent) -> None:
+        sent.ended = time.perf_counter()
+        self._answered.append(sent)
+        self._wake()
+
+    def _answer(self, sent: _Sent) -> CloudAnswer:
+        if sent.future is None:
+            return CloudAnswer(sent.task, error=sent.problem, way=self.executor.site)
+        try:
+            executed = sent.future.result()
         except RayTaskError as error:
             if isinstance(error.cause, UnpreparedError):
                 self.gone = True
-                return CloudAnswer(task, lost=True)
-            self._answered_since = max(self._answered_since, started)
-            return CloudAnswer(task, error=f"{type(error.cause).__name__}: {error.cause}")
+                return CloudAnswer(sent.task, lost=True)
+            self._answered_since = max(self._answered_since, sent.at)
+            text = f"{type(error.cause).__name__}: {error.cause}"
+            return CloudAnswer(sent.task, error=text, way=self.executor.site)
         except RayError:
             self.gone = True
-            return CloudAnswer(task, lost=True)
-        self._answered_since = max(self._answered_since, started)
-        return CloudAnswer(task, message)
+            return CloudAnswer(sent.task, lost=True)
+        self._answered_since = max(self._answered_since, sent.at)
+        return self._learned(sent, executed)
+
+    def _learned(self, sent: _Sent, executed: Executed) -> CloudAnswer:
+        """Take what an execution tells about the link, the coding and the work."""
+        message: Message[Any] = decode_message(memoryview(executed.message))
+        parcel, hop = sent.parcel, message.hops[-1]
+        assert parcel is not None  # noqa: S101 - it was sent
+        there = (hop.published - hop.received) / NANOSECONDS
+        link = max(0.0, sent.ended - sent.began - there)
+        first = parcel.fresh
+        self.parcels.arrived(parcel, link, executed.decoding)
+        self.executions.observe(sent.task.profile.model, there - executed.decoding)
+        figures = {
+            "link_ms": link * 1e3,
+            "work_ms": (there - executed.decoding) * 1e3,
+            "decode_ms": executed.decoding * 1e3,
+            "sent_kb": parcel.size / 1e3 if first else 0.0,
+            "frame_kb": parcel.original / 1e3,
+            "expected_way_ms": parcel.expected * 1e3,
+        }
+        way = f"{parcel.coding} to {self.executor.site}"
+        return CloudAnswer(sent.task, message, way=way, figures=figures)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import contextlib
 import logging
 import os
-import socket
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import ray
+from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
+from aerodaas.actors.greeting import greet
 from aerodaas.config import ComputeConfig
 from aerodaas.errors import AeroDaaSError, ConfigError
 
@@ -19,14 +20,19 @@ __all__ = [
     "connect",
     "disconnect",
     "discover",
+    "home_edge",
+    "join",
+    "nodes_at",
     "options_for",
     "outlives_application",
+    "pinned",
 ]
 
 _KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
 _SHARE = 0.001
 """Share of a node's `edge` or `cloud` resource that an actor takes: it says where, not how much."""
-_PROBE_SECONDS = 5.0
+_NAMESPACE = "aerodaas"
+"""Ray's, for the names of actors that outlive their application."""
 _STORE_BYTES = 128 * 2**20
 """Object store of a one-machine run; its streams travel in shared memory of their own."""
 
@@ -54,19 +60,11 @@ def connect(address: str | None) -> None:
         return
     _ours = False
     address = address or os.environ.get("RAY_ADDRESS")
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    # The first error is told; Ray would print the tracebacks of those that followed.
-    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
-    common: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
     if address:
-        _require_listener(address)
-        try:
-            ray.init(address=address, **common)
-        except (ConnectionError, RuntimeError, ValueError) as error:
-            reason = str(error).strip().splitlines()[0]
-            raise _unreachable(address, reason) from None
+        join(address)
         _require_edge(address)
         return
+    common = _settings()
     # "local": else Ray joins whatever cluster someone has started on this machine.
     ray.init(
         address="local",
@@ -80,22 +78,34 @@ def connect(address: str | None) -> None:
     _trim()
 
 
+def join(address: str) -> None:
+    """Join the cluster at `address`, whatever its nodes offer; AeroDaaSError if that fails."""
+    if ray.is_initialized():
+        return
+    common = _settings()
+    greet(address)
+    try:
+        ray.init(address=address, **common)
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        reason = str(error).strip().splitlines()[0]
+        raise _unreachable(address, reason) from None
+
+
+def _settings() -> dict[str, Any]:
+    """How quiet Ray is to be."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    # The first error is told; Ray would print the tracebacks of those that followed.
+    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
+    # Ray would refuse a node whose Python differs in its patch level; a Jetson's always does.
+    os.environ.setdefault("RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL", "minor")
+    return {"logging_level": logging.ERROR, "log_to_driver": False, "namespace": _NAMESPACE}
+
+
 def _unreachable(address: str, reason: str) -> AeroDaaSError:
     return AeroDaaSError(
         f"cannot join the Ray cluster at {address}: {reason}; "
         "check the address and that the head runs the same Ray and Python versions"
     )
-
-
-def _require_listener(address: str) -> None:
-    """Ray takes minutes to give an address up at which nobody listens; this takes seconds."""
-    host, _, port = address.removeprefix("ray://").rpartition(":")
-    if not host or not port.isdigit():
-        return  # "auto", or something else that Ray understands
-    try:
-        socket.create_connection((host.strip("[]"), int(port)), timeout=_PROBE_SECONDS).close()
-    except (OSError, OverflowError) as error:
-        raise _unreachable(address, str(error)) from None
 
 
 def _trim() -> None:
@@ -138,15 +148,79 @@ def discover() -> list[ComputeConfig]:
     return list(found.values())
 
 
+def nodes_at(place: Place) -> list[dict[str, Any]]:
+    """The living nodes that `place` may mean, as Ray describes them.
+
+    Raises ConfigError if there are none, or if Ray does not know the named one as this kind.
+    """
+    alive = [node for node in ray.nodes() if node["Alive"]]
+    kind = [node for node in alive if place.kind in node["Resources"]]
+    if place.node is None:
+        if not kind:
+            raise ConfigError(
+                f"no node of the cluster offers {place.kind!r}; start one with "
+                f"`ray start --address … --resources '{{\"{place.kind}\": 1}}'`"
+            )
+        return kind
+    named = [node for node in alive if place.node in _names(node)]
+    if not named:
+        known = ", ".join(sorted({_label(node) for node in alive}))
+        raise ConfigError(f"no node of the cluster is called {place.node!r}; known: {known}")
+    if not any(node in kind for node in named):
+        raise ConfigError(
+            f"the node {place.node!r} does not offer {place.kind!r}; start it with "
+            f"`--resources '{{\"{place.kind}\": 1}}'`, or correct the resource's kind"
+        )
+    return [node for node in named if node in kind]
+
+
+def _names(node: dict[str, Any]) -> set[str]:
+    """How an environment file may call a node: by address, name, host name or id."""
+    keys = ("NodeManagerAddress", "NodeName", "NodeManagerHostname", "NodeID")
+    return {node[key] for key in keys if key in node}
+
+
+def _label(node: dict[str, Any]) -> str:
+    address: str = node["NodeManagerAddress"]
+    name: str = node.get("NodeName", address)
+    return address if name == address else f"{name} ({address})"
+
+
+def home_edge() -> str:
+    """Id of the edge node beside the drones where the environment file names none.
+
+    This process' own node if it is one, else the first. Raises ConfigError if there is none.
+    """
+    offered = sorted(node["NodeID"] for node in nodes_at(Place()))
+    here: str = ray.get_runtime_context().get_node_id()
+    return here if here in offered else offered[0]
+
+
 def options_for(place: Place, *, restarts: int) -> dict[str, Any]:
     """Ray's options for an actor at `place`.
 
     Raises ConfigError if no node of the cluster fits.
     """
-    resource = f"node:{place.node}" if place.node else place.kind
-    if resource not in ray.cluster_resources():
-        offered = ", ".join(sorted({"edge", "cloud"} & set(ray.cluster_resources()))) or "neither"
-        raise ConfigError(
-            f"no node of the cluster offers {resource!r}; of edge and cloud it has: {offered}"
-        )
-    return {"num_cpus": 0, "resources": {resource: _SHARE}, "max_restarts": restarts}
+    nodes = nodes_at(place)
+    options: dict[str, Any] = {
+        "num_cpus": 0,
+        "resources": {place.kind: _SHARE},
+        "max_restarts": restarts,
+    }
+    if place.node is not None:
+        address = nodes[0]["NodeManagerAddress"]
+        neighbours = [n for n in ray.nodes() if n["Alive"] and n["NodeManagerAddress"] == address]
+        if len(neighbours) == 1:
+            # By its address, so that a node that was restarted is known again.
+            options["resources"][f"node:{address}"] = _SHARE
+        else:
+            options["scheduling_strategy"] = pinned(nodes[0]["NodeID"])
+    elif place.kind == "edge":
+        # All that is beside the drones is beside each other, however many edges there are.
+        options["scheduling_strategy"] = pinned(home_edge())
+    return options
+
+
+def pinned(node_id: str) -> NodeAffinitySchedulingStrategy:
+    """Ray's strategy of running on this node or nowhere."""
+    return NodeAffinitySchedulingStrategy(node_id, soft=False)

@@ -15,20 +15,23 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections import Counter, deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor, failure_line
-from aerodaas.actors._cloud import Cloud, CloudAnswer
+from aerodaas.actors._cloud import CloudAnswer, Executor
+from aerodaas.actors._estimates import Estimates
 from aerodaas.actors._fence import FencedDispatch
 from aerodaas.actors._lifeline import Life, Lifelines
+from aerodaas.actors._sites import Sites
 from aerodaas.actors._way import Way
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.data import Header
 from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
     AnalyticsScheduler,
     Decision,
     Drop,
@@ -52,8 +55,11 @@ DECISIONS = "decisions"
 """Stream of the scheduler's decisions and their outcomes."""
 _LAST_ANSWERS = 2.0
 """Seconds given to the cloud at the end of a run."""
+_COMPLAINTS_KEPT = 16
 _EDGE_PATIENCE = 10
 """An execution on the edge that takes so many times its expected time has failed."""
+_LEAST_PATIENCE = NANOSECONDS
+"""... but not before this: a first inference may take some."""
 _FORGOTTEN = NANOSECONDS
 """A task still undecided so long after its deadline, the edge being idle, has been forgotten."""
 
@@ -78,6 +84,8 @@ class Managed:
     """Its model's name is the stream."""
     acknowledges: bool = False
     """True in lockstep for an analysis whose results nobody reads."""
+    open_times: frozenset[str] = frozenset()
+    """Times of the profile that the user left to be measured."""
 
 
 class DispatcherActor(StreamActor):
@@ -99,6 +107,7 @@ class DispatcherActor(StreamActor):
         self._many = {one.stream for one in managed if len(one.inputs) > 1}
         self._resources = resources
         self._dispatch = FencedDispatch(scheduler, resources, self)
+        self._dispatch.hurried = not session.lockstep
         self._replaced = False
         self._numbers = itertools.count()
         self._frames: dict[int, Message[Any]] = {}
@@ -106,7 +115,10 @@ class DispatcherActor(StreamActor):
         self._timers: list[int] = []
         self._edge_since = 0
         self._way = Way()
+        self._estimates = Estimates(session.speed or 1.0, scheduler.learns)
         self._now = 0
+        self._figures: dict[int, dict[str, float]] = {}
+        """What an execution in the cloud took, by task."""
         self._why: dict[int, str] = {}
         """Why an execution failed, by task."""
         self._lost: set[int] = set()
@@ -119,25 +131,24 @@ class DispatcherActor(StreamActor):
         """... and those that wait for their executor, by model."""
         self._gone: set[str] = set()
         """Models whose executor on the edge will not come back."""
+        self._complaints: deque[str] = deque(maxlen=_COMPLAINTS_KEPT)
+        """Failures in the cloud that people were told of."""
         self._counts = _Counts()
 
     def prepare(
         self,
         edge: Mapping[str, Any] | None = None,
-        cloud: Any = None,  # noqa: ANN401 - a Ray handle
-        works: list[Any] | None = None,
+        cloud: Sequence[Executor] = (),
     ) -> Any:  # noqa: ANN401 - the base's info
         """Open the streams.
 
-        `edge` are the actors of the analyses, by stream; `cloud` is the executor in the cloud,
-        where there is one, and `works` refers to what it is prepared with.
+        `edge` are the actors of the analyses, by stream; `cloud` are the executors in the cloud.
         """
         info = super().prepare()
         assert self.inbox is not None  # noqa: S101 - prepared
         timeout = self._resources.cloud_timeout
-        reference = works[0] if works else None
         wake = self.inbox.wake
-        self._cloud = Cloud(cloud, reference, timeout, wake) if cloud is not None else None
+        self._cloud = Sites(cloud, timeout, wake) if cloud else None
         self._lifelines = Lifelines(edge or {}, wake)
         return info
 
@@ -180,7 +191,8 @@ class DispatcherActor(StreamActor):
         if message.item is None:
             self._publish(managed.stream, message, None)
             return
-        profile = managed.profile
+        cloud = self._cloud.expected(managed.stream) if self._cloud is not None else None
+        profile = self._estimates.profile(managed.profile, managed.open_times, cloud)
         reserve = 0 if self.session.lockstep else self._way.reserve(profile.deadline)
         task = Task(
             id=next(self._numbers),
@@ -206,6 +218,8 @@ class DispatcherActor(StreamActor):
         self._results[task.id] = message
         if not self.session.lockstep:
             self._way.travelled(message, now - self._edge_since)
+            taken = self.session.host_seconds(now - self._edge_since)
+            self._estimates.edge.observe(managed.stream, taken)
         self._guarded("finished", task, now)
 
     def _executor_is(self, model: str, life: Life, now: int) -> None:
@@ -238,7 +252,7 @@ class DispatcherActor(StreamActor):
         if self._cloud is not None:
             self._hear_from(self._cloud, now)
         running = self._dispatch.running
-        if running and now - self._edge_since > _EDGE_PATIENCE * running.profile.edge_time:
+        if running and now - self._edge_since > self._patience_with(running.profile):
             model = running.profile.model
             self.alert("executor_lost", f"{model} does not answer on the edge")
             self._dispatch.down.add(model)
@@ -247,14 +261,20 @@ class DispatcherActor(StreamActor):
         elif running is None:
             self._require_decisions(now)
 
-    def _hear_from(self, cloud: Cloud, now: int) -> None:
+    def _patience_with(self, profile: Profile) -> int:
+        """How long an execution on the edge may take, nanoseconds."""
+        return max(_EDGE_PATIENCE * profile.edge_time, _LEAST_PATIENCE)
+
+    def _hear_from(self, cloud: Sites, now: int) -> None:
         answers = list(cloud.answers(now))
         cloud.probe(now)
         # First of all, so that nothing is tried again in a cloud that is gone.
-        slots = 0 if cloud.gone else self._resources.cloud_slots
-        if slots != self._dispatch.resources.cloud_slots:
-            if cloud.gone:
+        slots, before = cloud.slots, self._dispatch.resources.cloud_slots
+        if slots != before:
+            if not slots:
                 self.alert("cloud_lost", "the cloud is gone; work stays on the edge meanwhile")
+            elif slots < before:
+                self.alert("cloud_lost", f"a part of the cloud is gone; {slots} slots are left")
             else:
                 self.alert("cloud_back", "the cloud answers again")
             self._guarded("change_resources", replace(self._resources, cloud_slots=slots), now)
@@ -263,6 +283,10 @@ class DispatcherActor(StreamActor):
 
     def _cloud_answered(self, answer: CloudAnswer, now: int) -> None:
         task = answer.task
+        if answer.way:
+            self._why[task.id] = answer.way
+        if answer.figures is not None:
+            self._figures[task.id] = answer.figures
         if answer.lost:
             self._lose(task, "its executor in the cloud is gone", now)
         elif answer.timed_out:
@@ -270,6 +294,9 @@ class DispatcherActor(StreamActor):
             self._guarded("finished", task, now, Outcome.TIMEOUT)
         elif answer.message is None:
             self._why[task.id] = answer.error
+            if answer.error not in self._complaints:
+                self._complaints.append(answer.error)
+                self.alert("cloud_failed", f"{task.profile.model} {answer.way}: {answer.error}")
             self._guarded("finished", task, now, Outcome.FAILED)
         else:
             self._results[task.id] = answer.message
@@ -359,7 +386,8 @@ class DispatcherActor(StreamActor):
     def run_cloud(self, task: Task, now: int) -> None:
         """Send a task to the cloud."""
         if self._cloud is not None:
-            self._cloud.send(task, self._frames[task.id], now)
+            left = self.session.host_seconds(task.deadline + task.reserve - now)
+            self._cloud.send(task, self._frames[task.id], now, left)
 
     def wake_at(self, at: int) -> None:
         """Remember a time at which the scheduler wants to be woken."""
@@ -394,11 +422,15 @@ class DispatcherActor(StreamActor):
         self._publish(task.profile.model, origin, origin.item if answer and in_time else None)
         self._counts.ended(result)
         why = self._why.pop(task.id, None)
+        figures = self._figures.pop(task.id, None)
         if result.outcome is not Outcome.DROPPED:
             reason = f"{result.place.value}: {why}" if why else result.place.value
-            self._note(task, result.outcome.value, reason, result.finished)
         elif why is None:
-            self._note(task, "dropped", "no room in the cloud in time", result.finished)
+            reason = "no room in the cloud in time"
+        else:
+            return
+        totals = {"utility": result.utility, **self._counts.totals, **(figures or {})}
+        self._note(task, result.outcome.value, reason, result.finished, totals)
 
     def _publish(self, node: str, origin: Message[Any], item: Any) -> None:  # noqa: ANN401
         if item is not None or self.session.lockstep:
@@ -413,11 +445,23 @@ class DispatcherActor(StreamActor):
         source = f"{task.source}:" if model in self._many else ""
         return f"{model}#{source}{task.segment}"
 
-    def _note(self, task: Task, action: str, reason: str, now: int) -> None:
+    def _note(
+        self,
+        task: Task,
+        action: str,
+        reason: str,
+        now: int,
+        totals: Mapping[str, float] | None = None,
+    ) -> None:
         slack = task.deadline + task.reserve - now
-        values = {"slack_ms": slack / 1e6, "waited_ms": (now - task.arrival) / 1e6}
+        waited = (now - task.arrival) / 1e6
+        values = {"slack_ms": slack / 1e6, "waited_ms": waited}
+        if action in {"edge", "cloud"}:
+            values["edge_ms"] = task.profile.edge_time / MILLISECOND
+            values["cloud_ms"] = task.profile.cloud_time / MILLISECOND
         if task.reserve:
             values["reserve_ms"] = task.reserve / 1e6
+        values |= totals or {}
         header = Header(self._decisions.sent, now, DECISIONS)
         record = DecisionRecord(now, self._label(task), action, reason, values)
         self._decisions.measure(record, header, host_time_ns())
@@ -445,6 +489,7 @@ class DispatcherActor(StreamActor):
             "edge_down": sorted(self._dispatch.down),
             "cloud_slots": self._dispatch.resources.cloud_slots,
             "reserve_ms": self._way.reserve(1 << 62) / 1e6,
+            "sites": self._cloud.values() if self._cloud is not None else {},
         }
 
 
@@ -468,12 +513,16 @@ class _Counts:
         if result.outcome is Outcome.DONE:
             self._windows.done(result.task)
 
+    @property
+    def totals(self) -> dict[str, float]:
+        """Utility so far."""
+        return {"qos_total": self._utility, "qoe_total": self._windows.utility}
+
     def values(self) -> dict[str, Any]:
         return {
             "tasks": self._tasks,
             "outcomes": dict(self._outcomes),
             "retried": self.retried,
-            "utility": self._utility,
-            "qoe": self._windows.utility,
+            **self.totals,
             "qoe_windows": self._windows.won,
         }

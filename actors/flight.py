@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,18 +14,21 @@ from ray.exceptions import RayActorError, RayTaskError
 from typing_extensions import Self
 
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
+from aerodaas.actors._cloud import Executor
 from aerodaas.actors._ending import end_actors
 from aerodaas.actors._lifeline import LIFE
+from aerodaas.actors._offload import CloudProcess
 from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.caretaker import Caretaker
-from aerodaas.actors.cluster import Place, options_for, outlives_application
+from aerodaas.actors.cluster import Place, nodes_at, options_for, outlives_application
 from aerodaas.actors.dispatcher import DispatcherActor, done_stream
 from aerodaas.actors.drone import DroneActor, RobotReport
 from aerodaas.actors.executor import CloudExecutor
-from aerodaas.actors.plan import Dispatching, FlightPlan
+from aerodaas.actors.isolation import isolation_options
+from aerodaas.actors.plan import Analyses, Dispatching, FlightPlan
 from aerodaas.actors.recorder import RecorderActor
 from aerodaas.actors.sensor import SensorActor
-from aerodaas.clock import host_time_ns
+from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.data import Alert
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.navigation.commands import Answer, Command
@@ -36,7 +39,11 @@ __all__ = ["Flight", "FlightState"]
 _PREPARE_TIMEOUT = 90.0
 _ANSWER_TIMEOUT = 5.0
 _REPORT_INTERVAL = 0.5
-_ANALYTICS_RESTARTS = 3
+_RESTARTS = 3
+_LOOKS = 2
+"""Calls of an executor in the cloud that only look whether and how far away it is."""
+_CLOCKS_APART = 1.0
+"""Seconds by which clocks may differ; missions are timed by them, and latencies measured."""
 
 
 @dataclass(frozen=True)
@@ -68,6 +75,8 @@ class _Member:
     pending: ray.ObjectRef[ActorReport] | None = None
     reviving: ray.ObjectRef[ActorInfo] | None = None
     """Under way after a restart."""
+    lost_at: float | None = None
+    """Host's monotonic seconds at which it was found dead; None while it lives."""
 
 
 class Flight:
@@ -79,10 +88,12 @@ class Flight:
         recording: Path | None = None,
         provenance: Provenance | None = None,
         live: str | None = None,
+        page: str | None = None,
     ) -> None:
         """Create the actors of `plan`, all at once; `recording` is where the MCAP file goes.
 
-        With `live`, `host:port`, what is recorded is served there, too.
+        With `live`, `host:port`, what is recorded is served there, too; with `page`, the cameras
+        are shown there to browsers.
         """
         self.plan = plan
         self.recording = recording if plan.recorded else None
@@ -94,7 +105,8 @@ class Flight:
         self._caretaker: Any = None
         self._opening: list[Any] = []
         session, edge = plan.session, Place()
-        for specs in plan.drones:
+        environments = _environments(plan)
+        for specs, place in zip(plan.drones, plan.edges, strict=True):
             name = f"drone/{'+'.join(spec.robot.id for spec in specs)}"
             self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
             mine = {spec.robot.id for spec in specs}
@@ -104,10 +116,11 @@ class Flight:
                 for spec in group
                 if spec.robot.id not in mine
             )
-            self._create(name, DroneActor, edge, (session, name, specs, plan.conduct, others))
+            self._create(name, DroneActor, place, (session, name, specs, plan.conduct, others))
         for camera in plan.cameras:
             args = (session, camera.stream, camera.sensor, camera.state)
-            self._create(f"sensor/{camera.stream}", SensorActor, edge, args, ends=camera.ends)
+            name = f"sensor/{camera.stream}"
+            self._create(name, SensorActor, camera.place, args, ends=camera.ends)
         for actor in plan.analyses:
             self._create(
                 actor.name,
@@ -115,13 +128,14 @@ class Flight:
                 actor.place,
                 (session, actor.name),
                 setup=actor.nodes,
-                restarts=_ANALYTICS_RESTARTS,
+                restarts=_RESTARTS,
+                options=environments[actor.name],
             )
         if plan.dispatch is not None:
-            self._create_dispatcher(plan.dispatch)
+            self._create_dispatcher(plan.dispatch, environments)
         if self.recording is not None and provenance is not None:
-            recorder = (session, self.recording, plan.recorded, provenance, live)
-            self._create("recorder", RecorderActor, edge, recorder)
+            recorder = (session, self.recording, plan.recorded, provenance, live, page)
+            self._create("recorder", RecorderActor, edge, recorder, restarts=_RESTARTS)
         if self._detached:
             self._appoint_caretaker()
         self._origin = 0
@@ -222,13 +236,16 @@ class Flight:
         *,
         restarts: int = 0,
         setup: tuple[Any, ...] = (),
+        options: Mapping[str, Any] | None = None,
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
-        # Calls that wait for an analysis' life to end must not keep others waiting.
-        groups = {"concurrency_groups": {LIFE: 1}} if kind is AnalyticsActor else {}
-        made: Any = ray.remote(**groups)(kind) if groups else ray.remote(kind)
-        remote = made.options(**self._options(name, place, restarts=restarts))
-        self._members[name] = _Member(name, remote.remote(*args, **kwargs), setup)
+        remote: Any = ray.remote
+        if kind is AnalyticsActor:
+            # Calls that wait for its life to end must not keep others waiting.
+            remote = remote(concurrency_groups={LIFE: 1})
+        placed = {**self._options(name, place, restarts=restarts), **(options or {})}
+        made = remote(kind).options(**placed)
+        self._members[name] = _Member(name, made.remote(*args, **kwargs), setup)
 
     def _options(self, name: str, place: Place, *, restarts: int) -> dict[str, Any]:
         """Ray's options; in a cluster that outlives us, actors do too, and have a name."""
@@ -237,17 +254,13 @@ class Flight:
             options |= {"lifetime": "detached", "name": f"{self.plan.session.id}/{name}"}
         return options
 
-    def _create_dispatcher(self, dispatch: Dispatching) -> None:
-        executor = works = None
-        if dispatch.cloud is not None:
-            # A node that comes and goes must not use restarts up: without one there is no cloud.
-            options = self._options("cloud", dispatch.cloud, restarts=-1)
-            slots = dispatch.resources.cloud_slots
-            remote: Any = ray.remote(CloudExecutor)
-            executor = remote.options(**options, max_concurrency=slots).remote()
-            self._helpers.append(executor)
-            works = ray.put(dispatch.works)
-            self._opening.append(executor.prepare.remote(works))
+    def _create_dispatcher(
+        self, dispatch: Dispatching, environments: Mapping[str, Mapping[str, Any]]
+    ) -> None:
+        executors = [
+            self._create_executor(f"cloud/{number}/{process.site}", process, environments)
+            for number, process in enumerate(dispatch.cloud)
+        ]
         hosts = {
             node.stream: self._members[actor.name].handle
             for actor in self.plan.analyses
@@ -255,13 +268,26 @@ class Flight:
         }
         edge = {one.stream: hosts[done_stream(one.stream)] for one in dispatch.managed}
         args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
-        # A reference by itself would be replaced by what it refers to.
-        setup = (edge, executor, [works])
-        self._create("dispatcher", DispatcherActor, Place(), args, setup=setup)
+        setup = (edge, executors)
+        self._create("dispatcher", DispatcherActor, Place(), args, restarts=_RESTARTS, setup=setup)
+
+    def _create_executor(
+        self, name: str, process: CloudProcess, environments: Mapping[str, Mapping[str, Any]]
+    ) -> Executor:
+        # A node that comes and goes must not use restarts up: without one there is no cloud.
+        options = {**self._options(name, process.place, restarts=-1), **environments[name]}
+        remote: Any = ray.remote(CloudExecutor)
+        concurrency = process.slots + _LOOKS
+        handle = remote.options(**options, max_concurrency=concurrency).remote()
+        self._helpers.append(handle)
+        works = ray.put(process.works)
+        self._opening.append(handle.prepare.remote(works))
+        models = frozenset(process.works)
+        return Executor(process.site, handle, [works], models, process.slots, process.compression)
 
     def _prepare(self, members: list[_Member], progress: Callable[[str], None]) -> None:
         waiting = {member.handle.prepare.remote(*member.setup): member for member in members}
-        deadline = time.monotonic() + _PREPARE_TIMEOUT
+        deadline, began = time.monotonic() + _PREPARE_TIMEOUT, host_time_ns()
         while waiting:
             ready, _ = ray.wait(list(waiting), timeout=max(0.0, deadline - time.monotonic()))
             if not ready:
@@ -269,6 +295,7 @@ class Flight:
                 raise MissionError(f"{names} not ready within {_PREPARE_TIMEOUT:.0f} s")
             member = waiting.pop(ready[0])
             member.info = self._ask(ready[0])
+            _require_clock(member.name, member.info, began)
             progress(member.name)
         self._connect(members)
 
@@ -326,10 +353,14 @@ class Flight:
         error = MissionError(f"the actor {member.name} died")
         if member.name in self._ids():
             raise error
-        if member.report.phase != "failed":
-            for name in self._ids():
-                self._members[name].handle.note.remote("actor_lost", str(error))
+        if member.lost_at is None:
+            member.lost_at = time.monotonic()
+            self._note("actor_lost", str(error))
         member.report = ActorReport("failed", error)
+
+    def _note(self, kind: str, text: str) -> None:
+        for name in self._ids():
+            self._members[name].handle.note.remote(kind, text)
 
     def _revive(self, member: _Member) -> None:
         """Set an actor up that Ray has restarted, without waiting: the drones need our word."""
@@ -343,6 +374,10 @@ class Flight:
                 self._connect([member])
                 member.handle.start.remote(self._origin)
                 member.report = ActorReport("running")
+                if member.lost_at is not None:
+                    absence = time.monotonic() - member.lost_at
+                    member.lost_at = None
+                    self._note("actor_back", f"{member.name} is back after {absence:.1f} s")
 
     @staticmethod
     def _ask(reference: Any) -> Any:  # noqa: ANN401 - whatever the actor returns
@@ -359,6 +394,33 @@ class Flight:
             raise MissionError(f"an actor died: {reason}") from None
         except ray.exceptions.GetTimeoutError:
             raise MissionError(f"an actor did not answer within {_ANSWER_TIMEOUT:.0f} s") from None
+
+
+def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
+    """Ray's options for the environment of each process that runs analyses.
+
+    Before any actor is there, so that what cannot be provided leaves nothing behind. Raises
+    ConfigError for that, and for a place that no node offers.
+    """
+    processes: dict[str, Analyses | CloudProcess] = {one.name: one for one in plan.analyses}
+    for number, process in enumerate(plan.dispatch.cloud if plan.dispatch else ()):
+        processes[f"cloud/{number}/{process.site}"] = process
+    for place in {*plan.edges, *(one.place for one in processes.values())}:
+        nodes_at(place)
+    return {
+        name: isolation_options(one.runtime_env, one.place, name) for name, one in processes.items()
+    }
+
+
+def _require_clock(name: str, info: ActorInfo, began: int) -> None:
+    """A clock that reads what it cannot have read while `prepare` was under way is wrong."""
+    ahead = max(info.clock - host_time_ns(), 0) - max(began - info.clock, 0)
+    if abs(ahead) > _CLOCKS_APART * NANOSECONDS:
+        side = "ahead of" if ahead > 0 else "behind"
+        raise MissionError(
+            f"the clock of the machine that runs {name} is {abs(ahead) / NANOSECONDS:.0f} s {side} "
+            "this one's; set both by NTP (`timedatectl set-ntp true`) before flying"
+        )
 
 
 def _share_memory(one: ActorInfo, other: ActorInfo) -> bool:

@@ -7,6 +7,7 @@ from typing import Any
 
 from aerodaas.actors._barrier import ACKS, paths
 from aerodaas.actors._names import state_stream
+from aerodaas.actors._offload import CloudProcess, allowed, cloud_processes, priced, short_name
 from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
 from aerodaas.actors.cluster import Place
 from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
@@ -15,9 +16,16 @@ from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
-from aerodaas.config import ComputeConfig, RobotConfig, SensorConfig
+from aerodaas.analytics.endpoint.analysis import endpoint_analysis
+from aerodaas.config import (
+    ComputeConfig,
+    RobotConfig,
+    RuntimeEnvConfig,
+    SensorConfig,
+    TaskConfig,
+)
 from aerodaas.data import Frame
-from aerodaas.errors import GraphError
+from aerodaas.errors import GraphError, UnknownIdError
 from aerodaas.graph import Graph, NavigationEdge, Node
 from aerodaas.handles import SENSOR_ITEMS
 from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
@@ -48,6 +56,7 @@ class Cameras:
     sensor: SensorConfig
     state: str
     ends: bool
+    place: Place
 
 
 @dataclass(frozen=True)
@@ -57,18 +66,17 @@ class Analyses:
     name: str
     place: Place
     nodes: tuple[NodeSpec, ...]
+    runtime_env: RuntimeEnvConfig | None = None
 
 
 @dataclass(frozen=True)
 class Dispatching:
-    """The dispatcher's actor, and the cloud's executor if there is one."""
+    """The dispatcher's actor, and the executors in the cloud."""
 
     scheduler: AnalyticsScheduler
     managed: tuple[Managed, ...]
     resources: Resources
-    cloud: Place | None
-    works: dict[str, Analytics[Any]]
-    """The managed analyses, by stream, for the cloud."""
+    cloud: tuple[CloudProcess, ...]
 
 
 @dataclass(frozen=True)
@@ -78,6 +86,8 @@ class FlightPlan:
     session: Session
     drones: tuple[tuple[RobotSpec, ...], ...]
     """One actor for each group."""
+    edges: tuple[Place, ...]
+    """Where the drones of each group are flown from."""
     cameras: tuple[Cameras, ...]
     analyses: tuple[Analyses, ...]
     dispatch: Dispatching | None
@@ -160,7 +170,13 @@ class _Planner:
 
     def cameras(self) -> tuple[Cameras, ...]:
         return tuple(
-            Cameras(node.id, node.work, self.state_of(node), self.reaches_a_drone(node.id))
+            Cameras(
+                node.id,
+                node.work,
+                self.state_of(node),
+                self.reaches_a_drone(node.id),
+                self.edge_of(node.robot),
+            )
             for node in self.sensors()
             if node.work.type == "camera"
         )
@@ -178,26 +194,29 @@ class _Planner:
         nodes = self.managed()
         if self.dispatch_with is None or not nodes:
             return None
-        clouds = [resource for resource in self.compute.values() if resource.kind == "cloud"]
-        slots = sum(resource.executors for resource in clouds)
-        if self.session.lockstep:
-            # Simulated time stands still while an analysis runs, so there is nothing to offload.
-            clouds, slots = [], 0
-        told = self.session.environment.schedulers.tasks
+        # In lockstep time stands still while an analysis runs, so there is nothing to offload.
+        compute = {} if self.session.lockstep else self.compute
+        envs = {node.id: self.runtime_env_of(node) for node in nodes}
+        processes = cloud_processes(nodes, compute, envs)
+        slots = {process.site: process.slots for process in processes}
         return Dispatching(
             scheduler=self.dispatch_with,
-            managed=tuple(
-                Managed(
-                    n.id,
-                    tuple(n.inputs),
-                    told_profile(n.id, told),
-                    self.acknowledgements(n.id) == 0,
-                )
-                for n in nodes
-            ),
-            resources=Resources(cloud_slots=slots),
-            cloud=Place(clouds[0].kind, clouds[0].node) if clouds else None,
-            works={node.id: node.work for node in nodes},
+            managed=tuple(self.managed_one(node) for node in nodes),
+            resources=Resources(cloud_slots=sum(slots.values())),
+            cloud=processes,
+        )
+
+    def managed_one(self, node: Node) -> Managed:
+        tasks = self.session.environment.schedulers.tasks
+        told = tasks.get(short_name(node), TaskConfig())
+        times = ("edge_time", "cloud_time")
+        profile = told_profile(node.id, tasks)
+        return Managed(
+            stream=node.id,
+            inputs=tuple(node.inputs),
+            profile=priced(profile, allowed(node, self.compute)),
+            acknowledges=self.acknowledgements(node.id) == 0,
+            open_times=frozenset(time for time in times if getattr(told, time) is None),
         )
 
     def node_spec(self, node: Node) -> NodeSpec:
@@ -213,7 +232,7 @@ class _Planner:
         wakers = [n for n in self.analyses() if any(t.target == node.id for t in n.triggers)]
         return NodeSpec(
             stream=done_stream(node.id) if managed else node.id,
-            work=node.work,
+            work=self.work_of(node),
             inputs={
                 name: self.depth(name) if self.session.lockstep else 1
                 for name in ([task_stream(node.id)] if managed else node.inputs)
@@ -235,20 +254,46 @@ class _Planner:
         frames = stream.endswith(task_stream("")) or (node is not None and node.item is Frame)
         return FRAME_DEPTH if frames else MESSAGE_DEPTH
 
+    def edge_of(self, robot: str | None) -> Place:
+        """The edge beside a robot; that of all drones for what no robot carries."""
+        named = next((r.edge for r in self.robots if r.id == robot), None)
+        return Place("edge", self.compute[named].node) if named is not None else Place()
+
     def place_of(self, node: Node) -> Place:
-        if node.compute is None:
-            return Place()
-        resource = self.compute[node.compute]
-        # Under a dispatcher, an analysis has an executor on the edge wherever it is deployed.
-        return Place() if self.is_managed(node) else Place(resource.kind, resource.node)
+        resource = self.compute[node.compute] if node.compute is not None else None
+        # Under a dispatcher, an analysis has an executor on the edge wherever it is deployed; an
+        # endpoint is called from there.
+        if resource is None or resource.kind == "http" or self.is_managed(node):
+            return self.edge_of(node.robot)
+        return Place(resource.kind, resource.node)
+
+    def work_of(self, node: Node) -> Analytics[Any]:
+        """The analysis itself, or before the endpoint that it is deployed on."""
+        resource = self.compute[node.compute] if node.compute is not None else None
+        work: Analytics[Any] = node.work
+        if resource is None or resource.kind != "http" or self.is_managed(node):
+            return work
+        return endpoint_analysis(work, short_name(node), resource, strict=False)
+
+    def runtime_env_of(self, node: Node) -> RuntimeEnvConfig | None:
+        """What an analysis has for itself: the environment file's word comes last."""
+        return self.session.environment.runtime_env.get(short_name(node), node.runtime_env)
+
+    def require_runtime_envs(self) -> None:
+        known = {short_name(node) for node in self.analyses()}
+        for name in self.session.environment.runtime_env:
+            if name not in known:
+                raise UnknownIdError("analysis (under runtime_env)", name, sorted(known))
 
     def analyses_by_actor(self) -> tuple[Analyses, ...]:
         shared: dict[Place, list[NodeSpec]] = {}
         actors = []
         for node in self.analyses():
-            if node.work.isolated:
+            env = self.runtime_env_of(node)
+            if node.work.isolated or env is not None:
                 name = f"analytics/{node.id}"
-                actors.append(Analyses(name, self.place_of(node), (self.node_spec(node),)))
+                spec = self.node_spec(node)
+                actors.append(Analyses(name, self.place_of(node), (spec,), env))
             else:
                 shared.setdefault(self.place_of(node), []).append(self.node_spec(node))
         for place, nodes in shared.items():
@@ -326,6 +371,7 @@ def make_plan(
     if not planner.robots:
         raise GraphError("no robot navigates: call drone.navigate(…) before start_mission()")
     planner.require_plugins()
+    planner.require_runtime_envs()
     specs = tuple(planner.robot_spec(robot) for robot in planner.robots)
     cameras = planner.cameras()
     analyses = planner.analyses_by_actor()
@@ -344,6 +390,7 @@ def make_plan(
     return FlightPlan(
         session=session,
         drones=drones,
+        edges=tuple(planner.edge_of(group[0].robot.id) for group in drones),
         cameras=cameras,
         analyses=analyses,
         dispatch=dispatch,

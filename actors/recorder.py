@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections import Counter
+import itertools
+from collections import Counter, deque
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor
@@ -13,11 +15,12 @@ from aerodaas.clock import host_time_ns
 from aerodaas.data import Header
 from aerodaas.errors import RecordingError
 from aerodaas.geometry import GeodeticOrigin
-from aerodaas.recording.live import LiveServer
 from aerodaas.recording.provenance import Provenance
-from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.status import Message
 from aerodaas.vitals import Vitals
+
+if TYPE_CHECKING:
+    from aerodaas.recording.camera_page import CameraPage
 
 __all__ = ["RecorderActor"]
 
@@ -32,8 +35,11 @@ class RecorderActor(StreamActor):
         streams: dict[str, int],
         provenance: Provenance,
         live: str | None = None,
+        page: str | None = None,
     ) -> None:
         """Write the recording at `path`, and serve it at `live` (`host:port`) meanwhile.
+
+        At `page`, likewise, the cameras are shown to browsers.
 
         So many messages of each of the `streams` may wait; more are dropped and counted, for the
         flight never waits.
@@ -41,16 +47,24 @@ class RecorderActor(StreamActor):
         super().__init__(session, "recorder", streams)
         self._path = path
         self._address = live
+        self._page_address = page
         self._provenance = provenance
         self._failure = ""
         self._lost: Counter[str] = Counter()
         self._readings = 0
 
     def _open(self) -> None:
+        # The application's process knows this class, and does without the writers.
+        from aerodaas.recording.live import LiveServer  # noqa: PLC0415
+        from aerodaas.recording.recorder import FlightRecorder  # noqa: PLC0415
+
         environment = self.session.environment
         home = environment.home
         name = self._provenance.name
         self._live = LiveServer(self._address, name) if self._address else None
+        # One that was restarted leaves what its predecessor wrote alone, and writes a second part.
+        self._path = _unwritten(self._path)
+        self._page = _camera_page(self._page_address)
         self._recorder = FlightRecorder(
             self._path,
             config=environment.recording,
@@ -74,18 +88,25 @@ class RecorderActor(StreamActor):
     def _run(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first
         while True:
-            messages = self.inbox.receive(0.2)
-            for message in messages:
-                self.follow(message.stamp)
-                self._write(message)
-            self._note_drops()
-            if self._acks is not None and messages:
-                done = tuple((one.header.source, one.header.stamp) for one in messages)
-                self._acks.derive(done, messages[-1], host_time_ns(), messages[-1].stamp)
+            messages = deque(self.inbox.receive(0.2))
             if self.stopping and not messages:
                 return
+            done = tuple((one.header.source, one.header.stamp) for one in messages)
+            last = replace(messages[-1], item=None) if messages else None
+            while messages:
+                # None is held on to longer than it takes to write it: frames are large.
+                self._take(messages.popleft())
+            self._note_drops()
+            if self._acks is not None and last is not None:
+                self._acks.derive(done, last, host_time_ns(), last.stamp)
+
+    def _take(self, message: Message[Any]) -> None:
+        self.follow(message.stamp)
+        self._write(message)
 
     def _write(self, message: Message[Any]) -> None:
+        if self._page is not None:
+            self._page.put(message)
         if self._failure:
             return
         try:
@@ -106,6 +127,26 @@ class RecorderActor(StreamActor):
         self._summary = self._recorder.close()
         if self._live is not None:
             self._live.close()
+        if self._page is not None:
+            self._page.close()
 
     def _values(self) -> dict[str, Any]:
         return {"path": str(self._path), "failure": self._failure}
+
+
+def _unwritten(path: Path) -> Path:
+    """`path`, or the first of `flight.2.mcap`, `flight.3.mcap`, ... that is not there yet."""
+    parts = itertools.count(2)
+    part = path
+    while part.exists():
+        part = path.with_suffix(f".{next(parts)}{path.suffix}")
+    return part
+
+
+def _camera_page(address: str | None) -> CameraPage | None:
+    if address is None:
+        return None
+    # The web server takes its time to load, and memory, which only who watches should pay.
+    from aerodaas.recording.camera_page import CameraPage  # noqa: PLC0415
+
+    return CameraPage(address)

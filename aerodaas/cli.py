@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `remote`, `lab`, `schema`, `doctor`, and for recordings."""
+"""The command line: flying, watching, studying, tuning, clusters, and recordings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.commands import lab, remote
+from aerodaas.commands import cluster, lab, remote, tune
 from aerodaas.commands.application import run_application, speed_option
 from aerodaas.commands.export import export
 from aerodaas.commands.replay import replay
@@ -43,6 +43,8 @@ flies a simulated drone or a Tello.
 )
 app.add_typer(remote.app, name="remote")
 app.add_typer(lab.app, name="lab")
+app.add_typer(tune.app, name="tune")
+app.add_typer(cluster.app, name="cluster")
 
 
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
@@ -67,11 +69,27 @@ def run(
     address: Annotated[
         str | None, typer.Option(help="Ray cluster to join. Default: RAY_ADDRESS, or none.")
     ] = None,
+    guest: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Another application that shares the sensors and compute, but may not navigate."
+        ),
+    ] = None,
     setting: Annotated[
         list[str] | None,
         typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
     ] = None,
-    view: Annotated[bool, typer.Option(help="Show the live view.")] = True,  # noqa: FBT002
+    view: Annotated[
+        bool | None,
+        typer.Option(
+            "--view/--no-view",
+            help="Show the cameras in a browser, too. By default the terminal shows the flight; "
+            "with --no-view nothing does.",
+        ),
+    ] = None,
+    view_address: Annotated[
+        str, typer.Option(help="Where --view listens; on 0.0.0.0 anyone on the network may watch.")
+    ] = "127.0.0.1:8360",
     live: Annotated[  # noqa: FBT002
         bool, typer.Option("--live", help="Serve the flight to Foxglove while it goes on.")
     ] = False,
@@ -86,6 +104,7 @@ def run(
         aerodaas run apps/farm_survey.py
         aerodaas run apps/farm_survey.py --speed 5 --seed 7 --record /tmp/farm
         aerodaas run apps/farm_survey.py --set quadrotor_base.limits.cruise_speed=1
+        aerodaas run apps/disaster_survey.py --guest apps/crowd_watch.py
         aerodaas run apps/watch_frames.py -- pictures/ yolov8n.onnx --rate 5
     """
     factor, lockstep = speed_option(speed)
@@ -97,10 +116,14 @@ def run(
         record=record,
         address=address,
         overrides=dict(parse_setting(text) for text in setting or ()),
-        view=view,
+        view=view is not False,
         live=live_address if live else None,
+        page=view_address if view else None,
+        guests=tuple(path.resolve() for path in guest or ()),
         application=application.resolve(),
     )
+    if view:
+        typer.echo(f"view: open http://{view_address} in a browser")
     if live:
         typer.echo(f"live: open ws://{live_address} in Foxglove")
     run_application(application, context.args, options)

@@ -11,6 +11,7 @@ import json
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+from packaging.requirements import InvalidRequirement, Requirement
 from pydantic import BaseModel, ConfigDict, Field, SecretStr, ValidationError, model_validator
 from typing_extensions import Self
 
@@ -19,6 +20,7 @@ from aerodaas.errors import ConfigError
 __all__ = [
     "CameraConfig",
     "ComputeConfig",
+    "EndpointConfig",
     "EnvironmentConfig",
     "GeofenceConfig",
     "HomeConfig",
@@ -27,10 +29,12 @@ __all__ = [
     "RecordingConfig",
     "RemoteConfig",
     "RobotConfig",
+    "RuntimeEnvConfig",
     "SchedulersConfig",
     "SensorConfig",
     "SimulationConfig",
     "TaskConfig",
+    "as_runtime_env",
     "validated",
 ]
 
@@ -173,22 +177,93 @@ class RobotConfig(_Strict):
     sensors: list[SensorConfig] = Field(default_factory=list)
     limits: LimitsConfig = LimitsConfig()
     mission: MissionConfig = MissionConfig()
+    edge: Identifier | None = None
+    """Compute resource, of the kind `edge`, that flies it; None: the edge beside all drones."""
     start: tuple[Finite, Finite, Finite] = (0.0, 0.0, 0.0)
     """Where it stands before take-off, ENU metres."""
     start_yaw: Finite = 0.0
     """Degrees counter-clockwise from east."""
 
 
+class EndpointConfig(_Strict):
+    """How an inference endpoint is called; the calls come from the edge node."""
+
+    url: Annotated[str, Field(pattern=r"^https?://[^\s@]+$")]
+    """Without a password: a secret belongs into `token_env`."""
+    protocol: Literal["v2", "function"] = "v2"
+    """`v2`: the Open Inference Protocol; `function`: JPEG in, JSON detections out."""
+    models: dict[Identifier, str] = Field(default_factory=dict)
+    """Name there by analysis. An analytics scheduler may send the analyses named here."""
+    timeout: Positive = 2.0
+    """Seconds for one frame, all attempts together."""
+    retries: Annotated[int, Field(ge=0, le=10)] = 2
+    """Further attempts after a refused connection or a busy server, while there is time."""
+    cost: NotNegative | None = None
+    """Utility that a call costs; None: the analysis' `cloud_cost`."""
+    token_env: Annotated[str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")] | None = None
+    """Environment variable of the edge node that holds the secret to send along."""
+    token_header: Annotated[str, Field(pattern=r"^[A-Za-z0-9\-]+$")] = "Authorization"  # noqa: S105
+    """As `Bearer …` where it is `Authorization`, else the bare secret."""
+
+
+class RuntimeEnvConfig(_Strict):
+    """What one analysis has for itself: packages, environment variables, or a container."""
+
+    packages: list[str] = Field(default_factory=list)
+    """Requirements such as `torch==2.4.1`, or paths of wheels, laid over the node's own."""
+    env_vars: dict[str, str] = Field(default_factory=dict)
+    image_uri: str | None = None
+    """Container image, for nodes that have podman; it brings its own packages."""
+
+    @model_validator(mode="after")
+    def _makes_sense(self) -> Self:
+        if self.image_uri is not None and self.packages:
+            message = "an image_uri brings its own packages; build them into the image"
+            raise ValueError(message)
+        for package in self.packages:
+            _check_requirement(package)
+        for name in self.env_vars:
+            if not name.isidentifier() or name.startswith("RAY_"):
+                message = f"{name!r} cannot be set: a letter first, and not one of Ray's (RAY_…)"
+                raise ValueError(message)
+        return self
+
+
+def _check_requirement(package: str) -> None:
+    if package.endswith(".whl"):
+        return
+    try:
+        Requirement(package)
+    except InvalidRequirement as error:
+        reason = str(error).splitlines()[0]
+        message = f"{package!r} is neither a requirement such as name==1.0 nor a wheel: {reason}"
+        raise ValueError(message) from None
+
+
 class ComputeConfig(_Strict):
     """One compute resource: a class of Ray nodes by their custom resource, or an endpoint."""
 
     id: Identifier
-    kind: Literal["edge", "cloud"] = "edge"
+    kind: Literal["edge", "cloud", "http"] = "edge"
     node: str | None = None
     """A named node's address, where the kind alone does not say."""
     executors: Annotated[int, Field(ge=1, le=256)] = 1
     """Inferences that may run at once."""
+    compression: Literal["auto", "lossless", "none"] = "auto"
+    """How a scheduler's frames may travel to a cloud node; which way is faster is measured."""
+    endpoint: EndpointConfig | None = None
+    """Of the kind `http`."""
     settings: dict[str, Any] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _endpoint_of_http(self) -> Self:
+        if (self.kind == "http") != (self.endpoint is not None):
+            message = 'the kind "http" needs an endpoint, and no other kind has one'
+            raise ValueError(message)
+        if self.kind == "http" and self.node is not None:
+            message = 'the kind "http" has no node; its address is endpoint.url'
+            raise ValueError(message)
+        return self
 
 
 class TaskConfig(_Strict):
@@ -200,10 +275,13 @@ class TaskConfig(_Strict):
     benefit: Positive = 1.0
     deadline: Positive = 1000.0
     """From the frame's arrival at the dispatcher."""
-    edge_time: Positive = 100.0
-    """Expected execution on the edge."""
-    cloud_time: Positive = 300.0
-    """Expected time from sending a frame to the cloud until its result is back."""
+    edge_time: Positive | None = None
+    """Expected execution on the edge; None: measured, 100 until then."""
+    cloud_time: Positive | None = None
+    """Expected time from sending a frame to the cloud until its result is back.
+
+    None: measured, 300 until then.
+    """
     edge_cost: NotNegative = 0.0
     cloud_cost: NotNegative = 0.0
     qoe_bonus: NotNegative = 0.0
@@ -275,6 +353,8 @@ class EnvironmentConfig(_Strict):
     sensors: list[SensorConfig] = Field(default_factory=list)
     """Sensors of the environment that no robot carries."""
     compute: list[ComputeConfig] | Literal["auto"] = "auto"
+    runtime_env: dict[Identifier, RuntimeEnvConfig] = Field(default_factory=dict)
+    """By the name of an analysis; replaces what the application gave to `deploy`."""
     schedulers: SchedulersConfig = SchedulersConfig()
     recording: RecordingConfig = RecordingConfig()
     remote: RemoteConfig = RemoteConfig()
@@ -291,6 +371,19 @@ class EnvironmentConfig(_Strict):
             twice = sorted({name for name in ids if ids.count(name) > 1})
             if twice:
                 message = f"more than one {kind} is called {', '.join(twice)}"
+                raise ValueError(message)
+        return self
+
+    @model_validator(mode="after")
+    def _known_edges(self) -> Self:
+        known = {
+            resource.id
+            for resource in (() if self.compute == "auto" else self.compute)
+            if resource.kind == "edge"
+        }
+        for robot in self.robots:
+            if robot.edge is not None and robot.edge not in known:
+                message = f"{robot.id}.edge: no edge under compute is called {robot.edge!r}"
                 raise ValueError(message)
         return self
 
@@ -332,6 +425,14 @@ def validated(content: object, place: str) -> EnvironmentConfig:
         return EnvironmentConfig.model_validate(content)
     except ValidationError as error:
         raise ConfigError(f"{place}: {_explain(error)}") from None
+
+
+def as_runtime_env(content: object, place: str) -> RuntimeEnvConfig:
+    """Check what an application says of a runtime_env; raises ConfigError that names `place`."""
+    try:
+        return RuntimeEnvConfig.model_validate(content)
+    except ValidationError as error:
+        raise ConfigError(f"{place}: runtime_env: {_explain(error)}") from None
 
 
 def _explain(error: ValidationError) -> str:

@@ -8,7 +8,7 @@ import platform
 import shutil
 import socket
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -19,7 +19,7 @@ from rich.table import Table
 
 from aerodaas.errors import AeroDaaSError
 
-__all__ = ["Finding", "examine"]
+__all__ = ["Finding", "examine", "show_findings"]
 
 _PACKAGES = {
     "ray": "ray",
@@ -65,16 +65,20 @@ def examine(address: str | None = None) -> bool:
         _ports,
         lambda: _cluster(address),
     ]
-    table = Table(title="aerodaas doctor", title_justify="left", box=None, pad_edge=False)
+    return show_findings("aerodaas doctor", (finding for check in checks for finding in check()))
+
+
+def show_findings(title: str, findings: Iterable[Finding]) -> bool:
+    """Print findings in one table; True if nothing needs mending."""
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     for column in ("", "subject", "finding"):
         table.add_column(column, overflow="fold")
     good = True
-    for check in checks:
-        for finding in check():
-            good &= finding.ok
-            remedy = f" [yellow]→ {finding.remedy}[/]" if finding.remedy else ""
-            mark = "[green]ok[/]" if finding.ok else "[red]no[/]"
-            table.add_row(mark, finding.subject, finding.text + remedy)
+    for finding in findings:
+        good &= finding.ok
+        remedy = f" [yellow]→ {finding.remedy}[/]" if finding.remedy else ""
+        mark = "[green]ok[/]" if finding.ok else "[red]no[/]"
+        table.add_row(mark, finding.subject, finding.text + remedy)
     Console().print(table)
     return good
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from aerodaas import sharing
 from aerodaas.config import ComputeConfig, EnvironmentConfig, RobotConfig
 from aerodaas.errors import ConfigError, GraphError, MissionError, UnknownIdError
 from aerodaas.graph import Graph, NavigationEdge
@@ -171,6 +172,8 @@ class Environment(PaperNames, IEnvironment):
         """Start the mission of every robot that navigates; once."""
         if self.run is None:
             self._place_entries()
+            for guest in current_options.get().guests:
+                sharing.welcome(guest, self)
             self.run = Run(self)
             self.run.start()
         return self.run
@@ -242,11 +245,14 @@ class Robot(PaperNames, IRobot):
     def start_mission(self, hook: Callable[[], None] | None = None, *, wait: bool = True) -> None:
         """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
 
-        With `wait=False`, return as soon as it flies. Raises the project's errors; whatever
+        With `wait=False`, return as soon as it flies; as a guest of another application, which
+        flies, at once. Raises the project's errors; whatever
         happens, the drone is landed and the recording closed first.
         """
         for each in [*self._start_hooks, *([hook] if hook else [])]:
             each()
+        if sharing.offer(self._environment):
+            return
         run = self._environment.launch()
         run.on_end.extend(self._end_hooks)
         if wait:

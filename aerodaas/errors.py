@@ -10,6 +10,7 @@ __all__ = [
     "AeroDaaSError",
     "ClockError",
     "ConfigError",
+    "EndpointError",
     "GraphError",
     "InvalidWaypointError",
     "MissionError",
@@ -90,6 +91,10 @@ class VehicleError(AeroDaaSError):
 
 class MissionError(AeroDaaSError):
     """A mission failed in flight; the drone was held, returned or landed before this was raised."""
+
+
+class EndpointError(AeroDaaSError):
+    """An inference endpoint did not answer in time, or not as agreed."""
 
 
 class RecordingError(AeroDaaSError):

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
+from aerodaas.config import RuntimeEnvConfig
 from aerodaas.errors import GraphError
 from aerodaas.interfaces import IAeroData
 from aerodaas.names import PaperNames
@@ -95,6 +96,8 @@ class Node:
     robot: str | None = None
     inputs: list[str] = field(default_factory=list)
     compute: str | None = None
+    runtime_env: RuntimeEnvConfig | None = None
+    """What it has for itself, if the application says so."""
     triggers: list[Trigger] = field(default_factory=list)
     dormant: bool = False
     """Runs only once triggered."""

@@ -31,12 +31,16 @@ class RunOptions:
     """Show the live terminal view."""
     live: str | None = None
     """Serve Foxglove's WebSocket at this `host:port` while flying."""
+    page: str | None = None
+    """Show the cameras to browsers at this `host:port` while flying."""
     replay: Path | None = None
     """Recording to be flown again: its environment takes the place of the application's."""
     scheduler: str | None = None
     """Analytics scheduler instead of the application's own."""
     model: Path | None = None
     """ONNX model for every detector, instead of its own."""
+    guests: tuple[Path, ...] = ()
+    """Applications that share the drone's sensors and compute, but not its navigation."""
     application: Path | None = None
     """The application's file, for relative paths and the recording's provenance."""
 

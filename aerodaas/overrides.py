@@ -52,6 +52,11 @@ def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
     for settings in (place["settings"] for place in places):
         if isinstance(settings.get("path"), str):
             settings["path"] = _absolute(settings["path"], folder)
+    for env in content["runtime_env"].values():
+        env["packages"] = [
+            _absolute(package, folder) if package.endswith(".whl") else package
+            for package in env["packages"]
+        ]
     if content["simulation"]["world"].endswith(".json"):
         content["simulation"]["world"] = _absolute(content["simulation"]["world"], folder)
     return validated(content, "environment")

@@ -19,7 +19,7 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
-__all__ = ["Report"]
+__all__ = ["Report", "machine_line"]
 
 _WIDEST = 400
 _ROOT = Path(__file__).resolve().parent.parent
@@ -54,7 +54,7 @@ class Report:
         """Print the table."""
         table = Table(
             title=self.name,
-            caption=_machine_line(),
+            caption=machine_line(),
             caption_justify="left",
             box=SIMPLE_HEAD,
             padding=(0, 1),
@@ -104,7 +104,7 @@ def _machine() -> dict[str, Any]:
     }
 
 
-def _machine_line() -> str:
+def machine_line() -> str:
     machine = _machine()
     return f"{machine['cpu']}, {machine['cores']} cores, {machine['memory_gib']} GiB"
 

@@ -15,11 +15,12 @@ only what is cheap to send and checks only what the user could have got wrong.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar, runtime_checkable
 
 from typing_extensions import Self
 
+from aerodaas.config import RuntimeEnvConfig, TaskConfig, as_runtime_env
 from aerodaas.data import Alert
 from aerodaas.errors import GraphError
 from aerodaas.graph import AeroStreamData, Graph, Node, Trigger
@@ -28,7 +29,7 @@ from aerodaas.names import PaperNames, snake_case
 from aerodaas.vehicle import VehicleState
 from aerodaas.waypoints import AeroNavigation
 
-__all__ = ["Analytics", "ComputeKind", "Context", "NavigableAnalytics"]
+__all__ = ["Analytics", "ComputeKind", "Context", "NavigableAnalytics", "TimedContext"]
 
 ComputeKind: TypeAlias = Literal["edge", "cloud"]
 O_co = TypeVar("O_co", covariant=True)
@@ -55,6 +56,15 @@ class Context(Protocol):
         ...
 
 
+@runtime_checkable
+class TimedContext(Protocol):
+    """A context that knows how long the result is of use."""
+
+    def time_left(self) -> float | None:
+        """Wall seconds until then; None where nothing says."""
+        ...
+
+
 class Analytics(PaperNames, IAnalyse[O_co]):
     """An analysis; subclasses say what they accept and produce, and implement `process`.
 
@@ -70,6 +80,10 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     """True for an analysis that needs a process of its own, such as a neural network."""
     scheduled: bool = False
     """True for an analysis of frames whose every run the analytics scheduler decides on."""
+    concurrent: bool = False
+    """True if several threads may call `process` at once, as executors in the cloud do."""
+    task: TaskConfig | None = None
+    """What the scheduler is told of it, unless the environment file's `schedulers.tasks` do."""
     rate: float = 1.0
     """How often an external source (`instantiate`) is asked, in Hz."""
     name: str = ""
@@ -79,6 +93,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     """Place in the graph, once `analyse` or `instantiate` was called."""
     _graph: Graph | None = None
     _compute: str | None = None
+    _runtime_env: RuntimeEnvConfig | None = None
     _triggers: tuple[Trigger, ...] = ()
 
     def open(self) -> None:
@@ -91,12 +106,28 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     def close(self) -> None:
         """Release what `open` took."""
 
-    def deploy(self, compute: ICompute) -> Self:
-        """Run on `compute`; returns itself."""
+    def deploy(
+        self, compute: ICompute, runtime_env: RuntimeEnvConfig | Mapping[str, Any] | None = None
+    ) -> Self:
+        """Run on `compute`; returns itself.
+
+        `runtime_env` is what the analysis has for itself: `{"packages": ["torch==2.4.1"]}`,
+        `{"env_vars": {…}}` or `{"image_uri": "…"}`. The environment file may replace it. Such an
+        analysis has a process of its own. Raises ConfigError for one that makes no sense.
+        """
         self._compute = str(compute.get_compute_properties()["id"])
         self._graph = getattr(compute, "graph", None)
+        if runtime_env is not None:
+            self._runtime_env = as_runtime_env(runtime_env, f"{type(self).__name__}.deploy")
         if self.node is not None:
             self.node.compute = self._compute
+            self.node.runtime_env = self._runtime_env
+        return self
+
+    def beside(self, other: Analytics[Any]) -> Self:
+        """Run where `other` runs; returns itself."""
+        self._compute, self._graph = other._compute, other._graph
+        self._runtime_env = other._runtime_env
         return self
 
     def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co]:
@@ -169,6 +200,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
                     work=self,
                     robot=robot,
                     compute=self._compute,
+                    runtime_env=self._runtime_env,
                     triggers=list(self._triggers),
                 )
             )

@@ -20,7 +20,8 @@ class Box:
     id: str
     """Of the entity it surrounds."""
     label: str
-    """`person`, `vest`, `car`, `tower`, `tree`, `building`, `crop_rows` or `fence`."""
+    """`person`, `vest`, `car`, `tower`, `tree`, `building`, `crop_rows`, `rubble` or
+    `fence`."""
     centre: tuple[float, float, float]
     size: tuple[float, float, float]
     """Metres along its yaw, across it and up."""

@@ -26,8 +26,10 @@ __all__ = [
     "Gesture",
     "Ground",
     "Motion",
+    "Pause",
     "Person",
     "Road",
+    "Rubble",
     "Scenario",
     "Sky",
     "Tower",
@@ -55,6 +57,14 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class Pause(_Strict):
+    """A rest on the way."""
+
+    at: Annotated[float, Field(ge=0)]
+    """Metres from the first point."""
+    seconds: Length
+
+
 class Motion(_Strict):
     """A walk or drive along a path, its corners rounded."""
 
@@ -68,6 +78,9 @@ class Motion(_Strict):
     """At the last point: stay there, go on to the first one, or be gone."""
     corner: Annotated[float, Field(ge=0)] = 1.0
     """How far before and after a point its corner is rounded."""
+    pauses: list[Pause] = Field(default_factory=list)
+    jitter: Annotated[float, Field(ge=0, le=100)] = 0.0
+    """Metres east and north by which the seed may displace each point but the first, at most."""
 
     @model_validator(mode="after")
     def _moves(self) -> Self:
@@ -82,6 +95,8 @@ class Gesture(_Strict):
     kind: Literal["hand_raised", "fallen"]
     start: Annotated[float, Field(ge=0)]
     duration: Length = 1_000.0
+    jitter: Annotated[float, Field(ge=0, le=1_000)] = 0.0
+    """Seconds by which the seed may shift the start, at most."""
 
 
 class _Placed(_Strict):
@@ -145,6 +160,14 @@ class Road(_Strict):
     surface: Literal["asphalt", "gravel", "soil"] = "asphalt"
 
 
+class Rubble(_Placed):
+    """A heap of broken masonry."""
+
+    kind: Literal["rubble"]
+    size: tuple[Length, Length, Length] = (4.0, 3.0, 0.9)
+    """Length along its yaw, width, height of the heap."""
+
+
 class Fence(_Strict):
     """A wooden fence."""
 
@@ -183,7 +206,7 @@ class Tower(_Placed):
 
 
 EntitySpec: TypeAlias = Annotated[
-    Tree | Trees | Building | CropRows | Road | Fence | Person | Car | Tower,
+    Tree | Trees | Building | CropRows | Road | Rubble | Fence | Person | Car | Tower,
     Field(discriminator="kind"),
 ]
 

@@ -16,6 +16,9 @@ _CORNER_PIECES = 6
 _SPEED_PERIOD = 17.0
 """Seconds of one swing of the speed."""
 
+_MOMENT = 1e-3
+"""Seconds to which the beginning of a rest is known."""
+
 _LOOK = 0.15
 """Metres before and after a place between which its direction is taken."""
 
@@ -42,12 +45,17 @@ class Track:
     def __init__(self, motion: Motion, seed: str) -> None:
         """Prepare the path."""
         self._motion = motion
-        self._phase = random.Random(seed).uniform(0.0, math.tau)
-        points = [*motion.points, motion.points[0]] if motion.end == "loop" else motion.points
+        draw = random.Random(seed)
+        self._phase = draw.uniform(0.0, math.tau)
+        points = _displaced(motion, draw)
+        if motion.end == "loop":
+            points = [*points, points[0]]
         self._points = _rounded(points, motion.corner, closed=motion.end == "loop")
         self._lengths = [0.0]
         for here, there in itertools.pairwise(self._points):
             self._lengths.append(self._lengths[-1] + math.dist(here, there))
+        ordered = sorted(motion.pauses, key=lambda pause: pause.at)
+        self._pauses = [(self._time_to(pause.at), pause.seconds) for pause in ordered]
 
     @property
     def length(self) -> float:
@@ -57,12 +65,10 @@ class Track:
     def at(self, time: float) -> TrackPoint:
         """Place at `time` seconds of the mission clock."""
         motion = self._motion
-        moving = max(0.0, time - motion.start)
-        turn = math.tau / _SPEED_PERIOD
-        swing = math.sin(turn * moving + self._phase) - math.sin(self._phase)
-        travelled = motion.speed * (moving + motion.variation * swing / turn)
-        speed = 0.0
-        if time > motion.start:
+        moving, rests = self._moving(time)
+        travelled, speed = self._travelled(moving), 0.0
+        if not rests:
+            turn = math.tau / _SPEED_PERIOD
             speed = motion.speed * (1.0 + motion.variation * math.cos(turn * moving + self._phase))
         ended = motion.end != "loop" and travelled >= self.length
         if ended:
@@ -71,6 +77,33 @@ class Track:
         before, after = self._place(travelled - _LOOK), self._place(travelled + _LOOK)
         yaw = math.atan2(after[1] - before[1], after[0] - before[0])
         return TrackPoint(x, y, yaw, travelled, speed, not (ended and motion.end == "vanish"))
+
+    def _moving(self, time: float) -> tuple[float, bool]:
+        """Seconds spent in motion until `time`, and whether it rests then."""
+        moving = time - self._motion.start
+        if moving <= 0.0:
+            return 0.0, True
+        for reached, rest in self._pauses:
+            if moving <= reached:
+                break
+            if moving <= reached + rest:
+                return reached, True
+            moving -= rest
+        return moving, False
+
+    def _travelled(self, moving: float) -> float:
+        """Metres after so many seconds in motion."""
+        motion, turn = self._motion, math.tau / _SPEED_PERIOD
+        swing = math.sin(turn * moving + self._phase) - math.sin(self._phase)
+        return motion.speed * (moving + motion.variation * swing / turn)
+
+    def _time_to(self, metres: float) -> float:
+        """Seconds in motion after which so many metres are done, by bisection."""
+        low, high = 0.0, metres / self._motion.speed + _SPEED_PERIOD
+        while high - low > _MOMENT:
+            middle = (low + high) / 2
+            low, high = (middle, high) if self._travelled(middle) < metres else (low, middle)
+        return high
 
     def _place(self, travelled: float) -> tuple[float, float]:
         if self._motion.end == "loop":
@@ -81,6 +114,16 @@ class Track:
         piece = self._lengths[index + 1] - self._lengths[index]
         share = min(max((travelled - self._lengths[index]) / piece, 0.0), 1.0)
         return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
+
+
+def _displaced(motion: Motion, draw: random.Random) -> list[tuple[float, float]]:
+    """The points, each but the first moved by what the seed says."""
+    reach = motion.jitter
+    moved = [
+        (x + draw.uniform(-reach, reach), y + draw.uniform(-reach, reach))
+        for x, y in motion.points[1:]
+    ]
+    return [motion.points[0], *moved]
 
 
 def _rounded(

@@ -21,9 +21,11 @@ from aerodaas.simulation.scenario import (
     Car,
     CropRows,
     Fence,
+    Gesture,
     Motion,
     Person,
     Road,
+    Rubble,
     Scenario,
     Tower,
     Tree,
@@ -77,7 +79,7 @@ class State:
 class Thing:
     """One thing of a world: its specification, its place and what the seed made of it."""
 
-    spec: Tree | Building | CropRows | Road | Fence | Person | Car | Tower
+    spec: Tree | Building | CropRows | Road | Rubble | Fence | Person | Car | Tower
     seed: str
     """Seeds the thing's looks; the same in every process."""
     x: float = 0.0
@@ -86,6 +88,8 @@ class Thing:
     height: float = 0.0
     """Metres, where the kind has one."""
     track: Track | None = None
+    gestures: tuple[Gesture, ...] = ()
+    """A person's, at the times that the seed has chosen."""
 
     @property
     def id(self) -> str:
@@ -95,32 +99,33 @@ class Thing:
     @property
     def moves(self) -> bool:
         """True if its state depends on time."""
-        return self.track is not None or bool(isinstance(self.spec, Person) and self.spec.gestures)
+        return self.track is not None or bool(self.gestures)
 
     def state(self, time: float) -> State:
         """State at `time` seconds of the mission clock."""
         if self.track is None:
             return State(self.x, self.y, self.yaw, posture=self._posture(time, 0.0, 0.0))
-        if isinstance(self.spec, Person) and self._fallen(time):
-            # A fallen person stays where the fall began.
-            time_of_walk = min(g.start for g in self.spec.gestures if g.kind == "fallen")
-            point = self.track.at(min(time, time_of_walk))
-            posture = self._posture(time, point.travelled, 0.0)
-            return State(point.x, point.y, point.yaw, point.present, posture)
-        point = self.track.at(time)
-        posture = self._posture(time, point.travelled, point.speed)
-        return State(point.x, point.y, point.yaw, point.present, posture, point.speed)
+        lying, lies = self._lying(time)
+        point = self.track.at(time - lying)
+        speed = 0.0 if lies else point.speed
+        posture = self._posture(time, point.travelled, speed)
+        return State(point.x, point.y, point.yaw, point.present, posture, speed)
 
-    def _fallen(self, time: float) -> bool:
-        return isinstance(self.spec, Person) and any(
-            gesture.kind == "fallen" and time >= gesture.start for gesture in self.spec.gestures
-        )
+    def _lying(self, time: float) -> tuple[float, bool]:
+        """Seconds until `time` for which a fall held up the walk, and whether it does so then."""
+        lying, lies = 0.0, False
+        for gesture in self.gestures:
+            if gesture.kind == "fallen" and time > gesture.start:
+                down = gesture.duration + _GESTURE_TIME
+                lying += min(time - gesture.start, down)
+                lies = lies or time < gesture.start + down
+        return lying, lies
 
     def _posture(self, time: float, travelled: float, speed: float) -> Posture:
         if not isinstance(self.spec, Person):
             return Posture()
         done = {"hand_raised": 0.0, "fallen": 0.0}
-        for gesture in self.spec.gestures:
+        for gesture in self.gestures:
             rise = _smooth((time - gesture.start) / _GESTURE_TIME)
             fall = _smooth((time - gesture.start - gesture.duration) / _GESTURE_TIME)
             done[gesture.kind] = max(done[gesture.kind], rise - fall)
@@ -166,6 +171,8 @@ class Thing:
             return east - west, north - south, spec.height
         if isinstance(spec, Car):
             return CAR_SIZE
+        if isinstance(spec, Rubble):
+            return spec.size
         if isinstance(spec, Tower):
             return spec.width, spec.width, spec.height
         return 2 * CROWN_SHARE * self.height, 2 * CROWN_SHARE * self.height, self.height
@@ -236,7 +243,7 @@ class World:
 
 
 def _place(
-    spec: Tree | Building | CropRows | Road | Fence | Person | Car | Tower, seed: str
+    spec: Tree | Building | CropRows | Road | Rubble | Fence | Person | Car | Tower, seed: str
 ) -> Thing:
     draw = random.Random(f"{seed}/place")
     if isinstance(spec, CropRows | Road | Fence):
@@ -253,7 +260,17 @@ def _place(
         height = spec.height
     motion = spec.motion if isinstance(spec, Person | Car) else None
     track = Track(motion, f"{seed}/track") if motion else None
-    return Thing(spec, seed, x, y, yaw, height, track)
+    gestures = _timed(spec, draw) if isinstance(spec, Person) else ()
+    return Thing(spec, seed, x, y, yaw, height, track, gestures)
+
+
+def _timed(spec: Person, draw: random.Random) -> tuple[Gesture, ...]:
+    """The person's gestures, each shifted by what the seed says."""
+    shifts = [draw.uniform(-gesture.jitter, gesture.jitter) for gesture in spec.gestures]
+    return tuple(
+        gesture.model_copy(update={"start": max(0.0, gesture.start + shift)})
+        for gesture, shift in zip(spec.gestures, shifts, strict=True)
+    )
 
 
 def _scatter(

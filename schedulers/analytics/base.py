@@ -241,6 +241,11 @@ class AnalyticsScheduler:
     """
 
     resources: Resources = Resources()
+    learns: frozenset[str] = frozenset()
+    """Times of a profile, `edge_time` or `cloud_time`, that it learns from results by itself.
+
+    In flight, those that it does not learn follow what is measured, where the user told none.
+    """
 
     def start(self, resources: Resources, now: int) -> None:  # noqa: ARG002 - for overriding
         """Begin a run; tasks follow."""

@@ -44,6 +44,8 @@ class DemsA(Dems):
     own time; any other starts the cooling again. A task that never came back has no observed time.
     """
 
+    learns = frozenset({"cloud_time"})
+
     def __init__(self, *, published: bool = False) -> None:
         super().__init__(published=published)
         self._models: dict[str, _Estimate] = {}

@@ -84,6 +84,8 @@ class _Model:
 class Margin(AnalyticsScheduler):
     """Plans the edge a second ahead by expected gain over the cloud, with the risk priced in."""
 
+    learns = frozenset({"edge_time", "cloud_time"})
+
     def __init__(self) -> None:
         self.cloud = CloudOutlook()
         self.edge = ExecutionBeliefs(shared=False)

@@ -13,7 +13,10 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.config import TaskConfig
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal
 
-__all__ = ["ACTIVE", "PASSIVE", "PUBLISHED", "told_profile"]
+__all__ = ["ACTIVE", "CLOUD_TIME", "EDGE_TIME", "PASSIVE", "PUBLISHED", "told_profile"]
+
+EDGE_TIME, CLOUD_TIME = 100.0, 300.0
+"""Milliseconds taken for an execution of which nothing is known yet."""
 
 # model: benefit, deadline, edge time, cloud time, edge cost, cloud cost, QoE bonus, urgent
 _TABLE: dict[str, tuple[float, int, int, int, float, float, float, bool]] = {
@@ -61,8 +64,8 @@ def told_profile(model: str, tasks: Mapping[str, TaskConfig]) -> Profile:
         model,
         told.benefit,
         int(told.deadline * MILLISECOND),
-        int(told.edge_time * MILLISECOND),
-        int(told.cloud_time * MILLISECOND),
+        int((told.edge_time or EDGE_TIME) * MILLISECOND),
+        int((told.cloud_time or CLOUD_TIME) * MILLISECOND),
         told.edge_cost,
         told.cloud_cost,
         QoeGoal(told.qoe_bonus, told.qoe_share, window) if told.qoe_bonus else None,

@@ -64,6 +64,20 @@ class Network:
             network = cls(wanted, latency, outages, bandwidth)
         return network
 
+    def latency_at(self, stamp: int) -> int:
+        """Latency that is added at `stamp`, both in nanoseconds."""
+        return int(_linear(self.latency, stamp)) if self.latency else 0
+
+    def bandwidth_at(self, stamp: int) -> float | None:
+        """Bytes per second at `stamp`, nanoseconds; None where nothing is said of it."""
+        if not self.bandwidth:
+            return None
+        return self.bandwidth[max(bisect_right(self.bandwidth, (stamp, float("inf"))) - 1, 0)][1]
+
+    def out_at(self, stamp: int) -> bool:
+        """Tell whether there is no way to the cloud at `stamp`, nanoseconds."""
+        return any(begin <= stamp < end for begin, end in self.outages)
+
     def cloud_time(self, nominal: int, start: int) -> int | None:
         """Time of an execution begun at `start`, nanoseconds; None if it is lost."""
         taken = nominal

@@ -145,6 +145,50 @@ def test_gestures_come_and_go() -> None:
     assert person.size[2] < 0.7
 
 
+def test_a_walk_rests_where_it_says() -> None:
+    """The pause holds it up at its place for its time; the way before and after is the same."""
+    points, pauses = [(0.0, 0.0), (20.0, 0.0)], [{"at": 5.0, "seconds": 10.0}]
+    plain = Track(Motion(points=points, variation=0.5), "s")
+    resting = Track(Motion.model_validate({**plain._motion.model_dump(), "pauses": pauses}), "s")
+    reached = next(time for time in np.arange(0, 20, 0.01) if plain.at(time).travelled >= 5.0)
+    for time in (reached + 1.0, reached + 9.0):
+        assert resting.at(time).x == pytest.approx(5.0, abs=0.02)
+        assert resting.at(time).speed == 0.0
+    assert resting.at(reached - 1.0).x == plain.at(reached - 1.0).x
+    assert resting.at(reached + 14.0).x == pytest.approx(plain.at(reached + 4.0).x, abs=0.02)
+
+
+def test_a_seed_displaces_a_walk_but_not_its_start() -> None:
+    """Within the jitter; the same seed gives the same way."""
+    motion = Motion(points=[(0, 0), (10, 0), (10, 10)], jitter=1.0, variation=0.0)
+    one, two, same = (Track(motion, seed) for seed in ("a", "b", "a"))
+    assert one.at(0.0).x == two.at(0.0).x == 0.0
+    ends = [(track.at(100.0).x, track.at(100.0).y) for track in (one, two, same)]
+    assert ends[0] == ends[2] != ends[1]
+    assert all(abs(x - 10) <= 1.0 and abs(y - 10) <= 1.0 for x, y in ends)
+
+
+def test_who_falls_gets_up_and_walks_on() -> None:
+    """The fall holds up the walk for as long as it lasts, at a time that the seed shifts."""
+    spec = {
+        "kind": "person",
+        "id": "vip",
+        "motion": {"points": [(0, 0), (60, 0)], "speed": 1.0, "variation": 0.0},
+        "gestures": [{"kind": "fallen", "start": 10, "duration": 8, "jitter": 3}],
+    }
+    starts = set()
+    for seed in range(5):
+        vip = make(spec, seed=seed).thing("vip")
+        (fall,) = vip.gestures
+        starts.add(fall.start)
+        assert abs(fall.start - 10) <= 3
+        assert vip.state(fall.start + 4).x == pytest.approx(fall.start)
+        assert vip.joints(fall.start + 4)[:, 2].max() < 0.5
+        assert vip.joints(fall.start + 10)[:, 2].max() > 1.4
+        assert vip.state(40.0).x == pytest.approx(40.0 - 8.7)
+    assert len(starts) == 5
+
+
 def test_boxes_hold_what_they_surround() -> None:
     """A person's joints lie in the person's box, which stands on the ground."""
     world = make({"kind": "person", "id": "vip", "vest": "any", "at": (3, 4), "yaw": 70})
@@ -190,7 +234,7 @@ def test_a_motion_that_stands_still_is_told() -> None:
 
 def test_a_missing_world_names_the_known_ones() -> None:
     """Neither a name nor a file: the message lists what there is."""
-    with pytest.raises(ConfigError, match="campus, empty, field"):
+    with pytest.raises(ConfigError, match="campus, disaster, empty, field"):
         World.load(SimulationConfig(world="atlantis"))
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import logging
+import threading
 from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from typing_extensions import Self
 
 from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.endpoint.tensors import TensorSpec
 from aerodaas.analytics.models import DETECTOR
 from aerodaas.analytics.onnx.coco import COCO_NAMES
 from aerodaas.analytics.onnx.families import FAMILIES
@@ -33,6 +35,16 @@ _MOST_DETECTIONS = 300
 _WARM_UP_RUNS = 2
 
 
+class _Desk(threading.local):
+    """What one thread works with; a copy of it, sent elsewhere, is a clean one."""
+
+    letterbox: Letterbox | None = None
+    buffer: NDArray[np.floating] | None = None
+
+    def __reduce__(self) -> tuple[type[_Desk], tuple[()]]:
+        return _Desk, ()
+
+
 class OnnxDetector(Analytics[Detections]):
     """Detects objects, and keypoints where the model is a pose model.
 
@@ -45,6 +57,7 @@ class OnnxDetector(Analytics[Detections]):
     produces: ClassVar[type] = Detections
     isolated = True
     scheduled = True
+    concurrent = True
 
     def __init__(
         self,
@@ -95,8 +108,10 @@ class OnnxDetector(Analytics[Detections]):
         self._batches = model.batches
         self._flexible = model.resizes
         self._session: ort.InferenceSession | None = None
-        self._letterbox: Letterbox | None = None
-        self._buffer: NDArray[np.floating] | None = None
+        self._outputs = tuple(
+            TensorSpec.of(output.name, np.float32, output.shape) for output in model.outputs
+        )
+        self._desk = _Desk()
 
     def with_model(self, path: str | Path) -> Self:
         """Return the same detector with the model at `path`; raises ModelError."""
@@ -144,21 +159,34 @@ class OnnxDetector(Analytics[Detections]):
             return [Detections.of(frame, ()) for frame in frames]
         return self.postprocess(frames, self.infer(self.preprocess(frames)))
 
+    @property
+    def model_name(self) -> str:
+        """What the model is called at an endpoint that serves it: its file's name, bare."""
+        return Path(self.path).stem
+
+    @property
+    def signature(self) -> tuple[TensorSpec, tuple[TensorSpec, ...]]:
+        """The network's input for one frame, and its outputs."""
+        axes = (None, None) if self._flexible else self.size
+        spec = TensorSpec.of(self._input, self._dtype, (1, 3, *axes))
+        return spec, self._outputs
+
     def preprocess(self, frames: Sequence[Frame]) -> NDArray[np.floating]:
         """Letterbox frames of one size into the network's input, count x 3 x height x width.
 
-        The array is the detector's own and is overwritten by the next call.
+        The array is the detector's own and is overwritten by this thread's next call.
         """
+        desk = self._desk
         shape = (frames[0].height, frames[0].width)
-        if self._letterbox is None or self._letterbox.frame != shape:
+        if desk.letterbox is None or desk.letterbox.frame != shape:
             style = self.decoder.preprocessing
-            self._letterbox = Letterbox(shape, self.size, style, flexible=self._flexible)
-            self._buffer = None
-        if self._buffer is None or len(self._buffer) != len(frames):
-            self._buffer = self._letterbox.buffer(len(frames), self._dtype)
-        for frame, slot in zip(frames, self._buffer, strict=True):
-            self._letterbox.write(frame.image, slot)
-        return self._buffer
+            desk.letterbox = Letterbox(shape, self.size, style, flexible=self._flexible)
+            desk.buffer = None
+        if desk.buffer is None or len(desk.buffer) != len(frames):
+            desk.buffer = desk.letterbox.buffer(len(frames), self._dtype)
+        for frame, slot in zip(frames, desk.buffer, strict=True):
+            desk.letterbox.write(frame.image, slot)
+        return desk.buffer
 
     def infer(self, pixels: NDArray[np.floating]) -> list[NDArray[np.floating]]:
         """Run the network; raises ModelError before `open`."""
@@ -171,13 +199,12 @@ class OnnxDetector(Analytics[Detections]):
         self, frames: Sequence[Frame], outputs: Sequence[NDArray[np.floating]]
     ) -> list[Detections]:
         """Turn the network's outputs for the frames last preprocessed into detections."""
-        if self._letterbox is None:
+        letterbox = self._desk.letterbox
+        if letterbox is None:
             message = f"{self.path}: preprocess the frames first"
             raise ModelError(message)
         return [
-            self._gather(
-                frame, self._letterbox, [np.asarray(o[index], np.float32) for o in outputs]
-            )
+            self._gather(frame, letterbox, [np.asarray(o[index], np.float32) for o in outputs])
             for index, frame in enumerate(frames)
         ]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from panda3d.core import NodePath
 
-from aerodaas.simulation.scenario import Building, CropRows, Person, Road, Tower, Tree
+from aerodaas.simulation.scenario import Building, CropRows, Person, Road, Rubble, Tower, Tree
 from aerodaas.simulation.scene.layers import Layer, attach
 from aerodaas.simulation.scene.light import HAZE, Light
 from aerodaas.simulation.scene.mesh import Mesh, merged, sheet
@@ -139,8 +139,9 @@ def add_shadow(parent: NodePath, thing: Thing, palette: Palette, light: Light) -
         attach(parent, "shadow", dark, palette["shadow"], layer=Layer.SHADOW)
     elif isinstance(spec, Person):
         attach(parent, "shadow", _soft((0, 0), 0.5, 0.5), palette["shadow"], layer=Layer.SHADOW)
-    elif isinstance(spec, Tower):
-        dark = _soft((thing.x, thing.y), spec.width, spec.width)
+    elif isinstance(spec, Tower | Rubble):
+        wide, deep = spec.size[:2] if isinstance(spec, Rubble) else (spec.width, spec.width)
+        dark = _soft((thing.x, thing.y), wide, deep)
         attach(parent, "shadow", dark, palette["shadow"], layer=Layer.SHADOW)
     else:
         length, width, _ = CAR_SIZE

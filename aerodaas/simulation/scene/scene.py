@@ -4,13 +4,24 @@ from __future__ import annotations
 
 from panda3d.core import NodePath
 
-from aerodaas.simulation.scenario import Building, Car, CropRows, Fence, Person, Road, Tower, Tree
+from aerodaas.simulation.scenario import (
+    Building,
+    Car,
+    CropRows,
+    Fence,
+    Person,
+    Road,
+    Rubble,
+    Tower,
+    Tree,
+)
 from aerodaas.simulation.scene.buildings import TowerLook, add_building, add_fence, add_tower
 from aerodaas.simulation.scene.cars import CarFigure, CarShape
 from aerodaas.simulation.scene.ground import add_field, add_ground, add_road, add_shadow
 from aerodaas.simulation.scene.light import Light, sky_dome
 from aerodaas.simulation.scene.people import Outfit, PersonFigure
 from aerodaas.simulation.scene.plants import add_crops, add_tree, rng_of
+from aerodaas.simulation.scene.rubble import add_rubble
 from aerodaas.simulation.scene.textures import Palette
 from aerodaas.simulation.world import Thing, World
 
@@ -19,6 +30,11 @@ __all__ = ["Looks", "Scene"]
 
 class Looks:
     """What the seed gives to things of one kind; another may be more colourful."""
+
+    def palette(self, world: World) -> Palette:
+        """Textures of a world."""
+        del world
+        return Palette()
 
     def outfit(self, thing: Thing) -> Outfit:
         """Dress a person."""
@@ -44,17 +60,17 @@ class Scene:
         """Build everything that stands, and the figures of what moves."""
         self.looks = looks or Looks()
         self.root = NodePath("world")
-        self._palette = Palette()
+        self.palette = self.looks.palette(world)
         self._light = Light.draw(world.scenario.sky, world.seed)
         self._sky = sky_dome(self.root, self._light)
-        add_ground(self.root, world.scenario.ground.surface, self._palette, self._light)
+        add_ground(self.root, world.scenario.ground.surface, self.palette, self._light)
         self._people: list[tuple[Thing, PersonFigure, NodePath]] = []
         self._cars: list[tuple[Thing, CarFigure]] = []
         for thing in world.things:
             self._add(thing)
 
     def _add(self, thing: Thing) -> None:
-        root, palette, light, spec = self.root, self._palette, self._light, thing.spec
+        root, palette, light, spec = self.root, self.palette, self._light, thing.spec
         if isinstance(spec, Road):
             add_road(root, spec, palette, light)
         elif isinstance(spec, CropRows):
@@ -68,6 +84,9 @@ class Scene:
         elif isinstance(spec, Building):
             add_shadow(root, thing, palette, light)
             add_building(root, thing, palette, light)
+        elif isinstance(spec, Rubble):
+            add_shadow(root, thing, palette, light)
+            add_rubble(root, thing, palette, light)
         elif isinstance(spec, Tower):
             add_shadow(root, thing, palette, light)
             add_tower(root, thing, palette, light, self.looks.tower(thing))

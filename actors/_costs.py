@@ -1,0 +1,75 @@
+"""What a node costs: the way there and back by size, and the execution of each analysis.
+
+All of it is observed, in seconds of the host; a few newest observations count, so that estimates
+follow the network, and quantiles rather than means, so that one odd value does not move them.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+__all__ = ["Executions", "Link", "quantile"]
+
+_KEPT = 11
+_LINK_KEPT = 5
+_LARGE = 16384
+"""Bytes from which a transfer tells about the bandwidth, below which about the latency."""
+_SURE = 0.9
+"""Quantile of the execution times that one may count on."""
+
+
+def quantile(values: Sequence[float], share: float) -> float:
+    """The smallest of `values` that at least `share` of them, 0 to 1, do not exceed."""
+    ordered = sorted(values)
+    place = -int(-share * len(ordered) // 1) - 1
+    return ordered[max(0, min(len(ordered) - 1, place))]
+
+
+class Link:
+    """The way to a node and back: `seconds = latency + size / bandwidth`. Threads may share it."""
+
+    def __init__(self) -> None:
+        self._latencies: deque[float] = deque(maxlen=_LINK_KEPT)
+        self._transfers: deque[tuple[int, float]] = deque(maxlen=_LINK_KEPT)
+
+    def observe(self, size: int, seconds: float) -> None:
+        """Learn from `size` bytes that were there and answered after `seconds`."""
+        if size < _LARGE:
+            self._latencies.append(max(0.0, seconds))
+        else:
+            self._transfers.append((size, seconds))
+
+    @property
+    def latency(self) -> float:
+        """Seconds that an empty message takes there and back; 0 before the first one did."""
+        known = tuple(self._latencies)
+        return quantile(known, 0.5) if known else 0.0
+
+    @property
+    def bandwidth(self) -> float:
+        """Bytes per second; infinite before anything large was sent."""
+        # Of the latency as it is known now: a link that changes is not explained twice.
+        latency = self.latency
+        known = [size / max(1e-6, seconds - latency) for size, seconds in tuple(self._transfers)]
+        return quantile(known, 0.5) if known else float("inf")
+
+    def seconds(self, size: float) -> float:
+        """Expected seconds from sending `size` bytes until a small answer, without any work."""
+        return self.latency + size / self.bandwidth
+
+
+class Executions:
+    """How long each analysis works on one item at one place."""
+
+    def __init__(self) -> None:
+        self._seen: dict[str, deque[float]] = {}
+
+    def observe(self, model: str, seconds: float) -> None:
+        """Learn from one execution."""
+        self._seen.setdefault(model, deque(maxlen=_KEPT)).append(seconds)
+
+    def seconds(self, model: str) -> float | None:
+        """Seconds that one may count on; None before the first execution."""
+        seen = self._seen.get(model)
+        return quantile(seen, _SURE) if seen else None

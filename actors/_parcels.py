@@ -1,0 +1,148 @@
+"""The way of frames to one node: each crosses the link once, coded as is faster, and is timed."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import ray
+
+from aerodaas.actors._coding import CODINGS, Coder, Coding, fastest
+from aerodaas.actors._costs import Link
+from aerodaas.actors.streams import encode_message
+from aerodaas.data import Frame
+from aerodaas.status import Message
+
+__all__ = ["Parcel", "Parcels"]
+
+_KEPT = 8
+_PING_EVERY = 2.0
+"""Seconds between two looks at the link while nothing else tells about it."""
+_LARGE_EVERY = 5.0
+"""Seconds without a frame after which a ping carries `_LARGE`, to see the bandwidth, too."""
+_LARGE = 65536
+_PATIENCE = 60.0
+"""Seconds after which a ping has got lost."""
+
+
+@dataclass
+class Parcel:
+    """A frame on its way to a node."""
+
+    reference: Any
+    """Of the encoded message, in Ray's object store: whoever wants it there, it goes once."""
+    frame: Frame | None
+    coding: Coding
+    size: int
+    original: int
+    """Bytes of the message before coding."""
+    expected: float
+    """Seconds of coding and way that were expected."""
+    fresh: bool = True
+    """True until an execution has told how long it travelled."""
+
+
+class Parcels:
+    """Everything about the way to one node. `later` runs things in the thread that packs."""
+
+    def __init__(self, compression: str) -> None:
+        """`compression` is that of `ComputeConfig`."""
+        self.link = Link()
+        self.chosen: dict[str, int] = {}
+        """Frames sent, by coding."""
+        self.bytes = 0
+        """Sent in frames."""
+        self._allowed = CODINGS[compression]
+        self._coder = Coder()
+        self._parcels: OrderedDict[tuple[str, int], Parcel] = OrderedDict()
+        self._packer = ThreadPoolExecutor(1, "packer")
+        self._lock = threading.Lock()
+        self._expected = 0.0
+        self._pinged = self._transferred = float("-inf")
+        self._pinging: Future[Any] | None = None
+
+    def later(self, work: Callable[[], None]) -> None:
+        """Do `work` in the packing thread, after what was asked for before."""
+        self._packer.submit(work)
+
+    def pack(self, message: Message[Any]) -> Parcel:
+        """The parcel for a message; made at the first call. In the packing thread only."""
+        key = (message.stream, message.seq)
+        parcel = self._parcels.get(key)
+        if parcel is None:
+            parcel = self._parcels[key] = self._pack(message)
+            while len(self._parcels) > _KEPT:
+                self._parcels.popitem(last=False)
+        return parcel
+
+    def arrived(self, parcel: Parcel, seconds: float, decoding: float) -> None:
+        """Learn from the first execution on a frame: `seconds` of way, and of decompressing."""
+        with self._lock:
+            if not parcel.fresh:
+                return
+            parcel.fresh = False
+        self._transferred = time.monotonic()
+        self.link.observe(parcel.size, seconds)
+        if parcel.frame is not None and decoding > 0:
+            self._coder.took_to_decode(parcel.frame, parcel.coding, decoding)
+        parcel.frame = None
+
+    @property
+    def expected(self) -> float:
+        """Seconds of coding and way that a frame like the last one may be expected to take."""
+        return max(self._expected, self.link.latency)
+
+    def ping(self, executor: Any) -> None:  # noqa: ANN401 - a Ray handle
+        """Look at the link, if it is time to."""
+        now = time.monotonic()
+        answered = self._pinging is None or self._pinging.done()
+        if now - self._pinged < (_PING_EVERY if answered else _PATIENCE):
+            return
+        self._pinged = now
+        large = now - self._transferred >= _LARGE_EVERY and self.link.latency > 0
+        if large:
+            self._transferred = now
+        self.later(lambda: self._ping(executor, _LARGE if large else 0))
+
+    def close(self) -> None:
+        """Stop packing."""
+        self._packer.shutdown(wait=False, cancel_futures=True)
+
+    def _ping(self, executor: Any, size: int) -> None:  # noqa: ANN401
+        # Random, so that no link compresses it.
+        data = ray.put(os.urandom(size)) if size else b""
+        began = time.perf_counter()
+        self._pinging = executor.ping.remote(data).future()
+
+        def answered(future: Future[int]) -> None:
+            if future.exception() is None:
+                self.link.observe(size, time.perf_counter() - began)
+
+        self._pinging.add_done_callback(answered)
+
+    def _pack(self, message: Message[Any]) -> Parcel:
+        frame = message.item if isinstance(message.item, Frame) else None
+        coding: Coding = "raw"
+        original = 0
+        if frame is not None:
+            original = frame.image.nbytes
+            costs = self._coder.costs(frame, self._allowed)
+            coding, self._expected = fastest(costs, self.link.seconds)
+            if coding != "raw":
+                message = _with_item(message, self._coder.encode(frame, coding))
+        data = encode_message(message)
+        self.chosen[coding] = self.chosen.get(coding, 0) + 1
+        self.bytes += len(data)
+        reference = ray.put(data)
+        return Parcel(reference, frame, coding, len(data), original or len(data), self._expected)
+
+
+def _with_item(message: Message[Any], item: Any) -> Message[Any]:  # noqa: ANN401
+    fields = (message.stream, message.seq, message.stamp, message.header, message.captured)
+    return Message(*fields, message.hops, item)

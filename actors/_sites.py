@@ -1,0 +1,90 @@
+"""All of the cloud as the dispatcher sees it: which executor takes a task, and what that takes."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from aerodaas.actors._cloud import Cloud, CloudAnswer, Executor
+from aerodaas.actors._parcels import Parcels
+from aerodaas.schedulers.analytics.base import Task
+from aerodaas.status import Message
+
+__all__ = ["Sites"]
+
+_UNKNOWN = 0.3
+"""Seconds expected of an executor that has not executed an analysis yet."""
+
+
+class Sites:
+    """The executors in the cloud. A task goes to the one that is expected to answer first."""
+
+    def __init__(
+        self, executors: Sequence[Executor], timeout_ns: int, wake: Callable[[], None]
+    ) -> None:
+        """Use `executors`; `timeout_ns` and `wake` as of `Cloud`."""
+        # Processes of one node share its link, and frames cross it once for all of them.
+        parcels = {one.site: Parcels(one.compression) for one in executors}
+        self._clouds = [Cloud(one, parcels[one.site], timeout_ns, wake) for one in executors]
+        self._parcels = parcels
+        self._slots = {one.site: one.slots for one in executors}
+        self._homeless: deque[CloudAnswer] = deque()
+
+    @property
+    def slots(self) -> int:
+        """Executions that may be under way at once, on what is not gone."""
+        present = {cloud.executor.site for cloud in self._clouds if not cloud.gone}
+        return sum(self._slots[site] for site in present)
+
+    def expected(self, model: str) -> float | None:
+        """Seconds from sending a task to its result; None while nobody knows."""
+        known = [cloud.expected(model) for cloud in self._able(model)]
+        return min((seconds for seconds in known if seconds is not None), default=None)
+
+    def send(self, task: Task, message: Message[Any], now: int, budget: float) -> None:
+        """Start an execution whose result is of use for `budget` seconds of the host."""
+        model = task.profile.model
+        able = self._able(model)
+        if able:
+            best = min(able, key=lambda cloud: self._delay(cloud, model))
+            best.send(task, message, now, budget)
+        else:
+            self._homeless.append(CloudAnswer(task, error="nothing in the cloud runs it"))
+
+    def answers(self, now: int) -> Iterator[CloudAnswer]:
+        """Yield what has come back, timed out, or could not be sent."""
+        while self._homeless:
+            yield self._homeless.popleft()
+        for cloud in self._clouds:
+            yield from cloud.answers(now)
+
+    def probe(self, now: int) -> None:
+        """Look after links, and executors that are gone."""
+        for cloud in self._clouds:
+            cloud.probe(now)
+
+    def finish(self, timeout: float) -> None:
+        """Wait up to `timeout` seconds for what is under way."""
+        for cloud in self._clouds:
+            cloud.finish(timeout)
+
+    def values(self) -> dict[str, Any]:
+        """What is known of each site: milliseconds, Mbit/s, frames by coding."""
+        return {
+            site: {
+                "latency_ms": parcels.link.latency * 1e3,
+                "bandwidth_mbit": parcels.link.bandwidth * 8e-6,
+                "frames": dict(parcels.chosen),
+                "sent_mb": parcels.bytes / 1e6,
+            }
+            for site, parcels in self._parcels.items()
+        }
+
+    def _able(self, model: str) -> list[Cloud]:
+        return [c for c in self._clouds if model in c.executor.models and not c.gone]
+
+    @staticmethod
+    def _delay(cloud: Cloud, model: str) -> float:
+        expected = cloud.expected(model)
+        return (_UNKNOWN if expected is None else expected) * (1.0 + cloud.load)

@@ -1,0 +1,115 @@
+"""Processes with packages of their own: an analysis' `runtime_env` as Ray's options.
+
+Packages are laid over the node's own by `uv run --with`, which keeps them in a cache and leaves
+the node's own environment alone; Ray starts the process through it (`py_executable`). Everything
+is installed on every node that the analysis may run on before the mission starts, for in flight
+there may be no network, and an error then would come too late.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import ray
+from ray.exceptions import GetTimeoutError, RayError
+
+from aerodaas.actors.cluster import Place, nodes_at, pinned
+from aerodaas.config import RuntimeEnvConfig
+from aerodaas.errors import ConfigError
+
+__all__ = ["isolation_options"]
+
+_INSTALL_TIMEOUT = 600.0
+"""Seconds for the packages of one analysis: PyTorch alone is gigabytes."""
+
+
+@dataclass(frozen=True)
+class _Installed:
+    """What a node said."""
+
+    command: tuple[str, ...] = ()
+    """Starts a Python that has the packages."""
+    problem: str = ""
+
+
+def isolation_options(env: RuntimeEnvConfig | None, place: Place, name: str) -> dict[str, Any]:
+    """Ray's options for the process of the analysis `name`, once everything is in its place.
+
+    Raises ConfigError, with the node's own words, where a node cannot provide it.
+    """
+    if env is None:
+        return {}
+    runtime_env: dict[str, Any] = {"env_vars": dict(env.env_vars)} if env.env_vars else {}
+    if env.image_uri is not None:
+        _ask_all(place, name, _find_engine, ())
+        runtime_env["image_uri"] = env.image_uri
+    if env.packages:
+        found = _ask_all(place, name, _install, env.packages)
+        if len(set(found)) > 1:
+            raise ConfigError(
+                f"runtime_env of {name}: the nodes of kind {place.kind} keep Python or uv in "
+                "different places; name one of them as the resource's `node`"
+            )
+        command = list(found[0])
+        if place.kind == "edge":
+            command.insert(command.index("run") + 1, "--offline")
+        runtime_env["py_executable"] = shlex.join(command)
+    return {"runtime_env": runtime_env} if runtime_env else {}
+
+
+def _ask_all(place: Place, name: str, question: Any, about: Iterable[str]) -> list[tuple[str, ...]]:  # noqa: ANN401
+    """Put a question to every node where the analysis may run; raises ConfigError."""
+    ask: Any = ray.remote(question)
+    answers = {}
+    for node in nodes_at(place):
+        strategy = pinned(node["NodeID"])
+        options = ask.options(num_cpus=0, max_retries=0, scheduling_strategy=strategy)
+        answers[node["NodeManagerAddress"]] = options.remote(list(about))
+    found = []
+    for address, reference in answers.items():
+        try:
+            answer = ray.get(reference, timeout=_INSTALL_TIMEOUT)
+        except GetTimeoutError:
+            answer = _Installed(problem=f"not installed within {_INSTALL_TIMEOUT:.0f} s")
+        except RayError as error:
+            answer = _Installed(problem=str(error).strip().splitlines()[-1])
+        if answer.problem:
+            raise ConfigError(f"runtime_env of {name}: on node {address}: {answer.problem}")
+        found.append(answer.command)
+    return found
+
+
+def _install(packages: list[str]) -> _Installed:
+    """Install on this node, and try."""
+    if importlib.util.find_spec("uv") is None:
+        return _Installed(problem='uv is missing; there, `pip install "aerodaas[isolation]"`')
+    from uv import find_uv_bin  # noqa: PLC0415 - an extra
+
+    chosen = [word for package in packages for word in ("--with", package)]
+    command = (find_uv_bin(), "run", "--no-project", "--python", sys.executable, *chosen, "python")
+    try:
+        done = subprocess.run(  # noqa: S603 - checked requirements
+            [*command, "-c", "pass"],
+            capture_output=True,
+            text=True,
+            timeout=_INSTALL_TIMEOUT,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return _Installed(problem=f"not installed within {_INSTALL_TIMEOUT:.0f} s")
+    if done.returncode:
+        return _Installed(problem=f"cannot install: {' '.join(done.stderr.split())[-500:]}")
+    return _Installed(command)
+
+
+def _find_engine(_: list[str]) -> _Installed:
+    if shutil.which("podman") is None:
+        return _Installed(problem="podman is missing, so no image_uri can run there; install it")
+    return _Installed()

@@ -1,0 +1,41 @@
+"""Search and Rescue: search an area; whoever is found is escorted to safety (paper, section 6)."""
+
+from math import dist
+
+from aerodaas import AeroNavigation, Environment, MonitoringAnalytics, Waypoint
+from aerodaas.analytics import VipDetectionAnalytics, VipFollowAnalytics
+from aerodaas.data import Readings
+
+SAFE, NEAR = (57, 6), 3
+
+
+def is_safe(readings: Readings) -> bool:
+    """Tell whether the drone has come near the safe place."""
+    at = readings.values
+    return dist((at["position.east"], at["position.north"]), SAFE) < NEAR
+
+
+def main() -> None:
+    """Build the dataflow and fly it."""
+    env = Environment("environments/rescue.json")
+    edge = env.get_compute_resource_by_id("edge")
+    drone = env.get_robot_by_id("tello")
+    scheduler = env.trajectory_scheduler()
+
+    camera = drone.get_sensor_by_id("cam1").get_data_stream()
+    vests = VipDetectionAnalytics().deploy(edge).analyse(camera)
+    follow = VipFollowAnalytics(distance=2).deploy(edge).analyse(vests)
+    odometry = drone.get_sensor_by_id("odom").get_data_stream()
+    watch = MonitoringAnalytics(["position"]).deploy(edge)
+    watch.trigger(drone.end_mission, when=is_safe).analyse(odometry)
+
+    places = [(0, 12), (14, 13), (24, 26), (0, 26)]
+    search = [Waypoint(f"wp{i}", x, y, 1.5, hover_duration=3) for i, (x, y) in enumerate(places, 1)]
+    drone.navigate(AeroNavigation(data=search))
+    scheduler.clear_navigation()
+    scheduler.add_navigation(follow)
+    drone.start_mission()
+
+
+if __name__ == "__main__":
+    main()

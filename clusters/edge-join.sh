@@ -1,0 +1,49 @@
+#!/bin/sh
+# Join an edge node (a Jetson, a ground station, any Linux box) to a cluster, and stay.
+#
+#   edge-join.sh HEAD:PORT [own address]
+#
+# HEAD is an address that this machine reaches, and the own address one by which the cluster
+# reaches this machine; behind NAT both are addresses of a VPN (docs/cluster.md). Without the
+# second, it is the address of the interface that leads to the head.
+#
+# From the environment, or /etc/aerodaas/edge.env under aerodaas-edge.service:
+#   AERODAAS_VENV        Python environment with aerodaas   (default: ~/aerodaas)
+#   AERODAAS_RESOURCES   what this node offers              (default: {"edge":1})
+#   RAY_AUTH_TOKEN_PATH  the cluster's token                (default: ~/.ray/auth_token)
+set -eu
+
+fail() {
+    echo "edge-join: $1" >&2
+    exit 1
+}
+
+head=${1:-${AERODAAS_HEAD:-}}
+own=${2:-${AERODAAS_OWN_ADDRESS:-}}
+venv=${AERODAAS_VENV:-$HOME/aerodaas}
+resources=${AERODAAS_RESOURCES:-'{"edge":1}'}
+
+[ -n "$head" ] || fail "say whom to join: edge-join.sh HEAD:6379"
+case $head in *:*) ;; *) head=$head:6379 ;; esac
+[ -x "$venv/bin/python" ] || fail "no Python in $venv: set AERODAAS_VENV, or python3 -m venv $venv && $venv/bin/pip install aerodaas"
+
+# A second node on one machine would be given work that this machine cannot do twice.
+if pgrep -x raylet >/dev/null 2>&1; then
+    fail "a Ray node runs on this machine already: \`$venv/bin/ray stop\` ends it"
+fi
+
+# Ray gives a head up that is silent for a minute, and ends this node with the drone's actor on
+# it. A day lets the drone come home by its own rules first.
+export RAY_gcs_rpc_server_reconnect_timeout_s="${RAY_gcs_rpc_server_reconnect_timeout_s:-86400}"
+export RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL=minor
+export RAY_AUTH_MODE="${RAY_AUTH_MODE:-token}"
+export RAY_USAGE_STATS_ENABLED=0
+
+# Says in one line what Ray would say in a screenful: no answer, wrong token, other versions.
+"$venv/bin/python" -m aerodaas cluster greet "$head" || exit 1
+
+if [ -z "$own" ]; then
+    own=$(ip -o route get "${head%:*}" | sed -n 's/.* src \([^ ]*\).*/\1/p')
+fi
+echo "edge-join: joining $head as $own with $resources"
+exec "$venv/bin/ray" start --block --address "$head" --node-ip-address "$own" --resources "$resources"

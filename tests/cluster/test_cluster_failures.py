@@ -1,0 +1,256 @@
+"""What breaks on an edge-cloud while a drone is in the air, and what must not break with it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+import ray
+from cluster_flights import ENVIRONMENT, Told, Watched, eventually
+from flying import Flyer
+
+from aerodaas.actors import cluster
+from aerodaas.cluster import EdgeCloud, Shape
+from aerodaas.status import MissionState
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.timeout(240),
+    pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
+]
+_HERE = Path(__file__).resolve().parent
+_ROOT = _HERE.parents[1]
+
+PLAIN = Shape(0.04, 50e6)
+
+
+@pytest.fixture(scope="module")
+def edge_cloud() -> Iterator[EdgeCloud]:
+    """An edge and two cloud nodes, 40 ms and 50 Mbit/s away; Ray here is connected to them."""
+    before = ray.is_initialized()
+    if before:
+        cluster.disconnect()
+    paths = (_ROOT, _HERE, _ROOT / "tests", _ROOT / "tests/actors")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PYTHONPATH", os.pathsep.join(map(str, paths)))
+        with EdgeCloud(2, shape=PLAIN) as made:
+            cluster.connect(made.address)
+            try:
+                yield made
+            finally:
+                cluster.disconnect()
+    if before:
+        cluster.connect(None)
+
+
+@pytest.fixture
+def watched(edge_cloud: EdgeCloud, tmp_path: Path) -> Watched:
+    """A flight to be broken."""
+    return Watched(Flyer(tmp_path), edge_cloud)
+
+
+def report(what: str, told: Told, watched: Watched, where: str = "") -> None:
+    """State what a failure cost; shown with `pytest -rP`."""
+    seconds = told.recovery(watched.broken_at, where)
+    print(f"{what}: next result in time after {seconds:.2f} s; tasks: {told.summary()}")  # noqa: T201
+
+
+def on_clouds(nodes: EdgeCloud, act: Callable[[str], None]) -> None:
+    """Do something to every cloud node that has power."""
+    for name in nodes.clouds():
+        if nodes.far[name].machine.alive:
+            act(name)
+
+
+def test_a_tenth_of_the_bandwidth_and_400_ms_more(watched: Watched) -> None:
+    """A slow link costs tasks their deadlines, never the drone or the count."""
+    with watched.flying():
+        for shape in (Shape(0.04, 5e6), Shape(0.44, 50e6)):
+            watched.broke()
+            on_clouds(watched.cluster, lambda name: watched.cluster.shape(name, shape))  # noqa: B023
+            watched.goes_on()
+            time.sleep(4.0)
+        on_clouds(watched.cluster, lambda name: watched.cluster.shape(name, PLAIN))
+        watched.goes_on()
+    told = Told.of(watched)
+    report("400 ms more", told, watched)
+    told.safe()
+    told.each_counted_once()
+
+
+def test_the_cloud_is_cut_off_for_ten_seconds(watched: Watched) -> None:
+    """The edge goes on alone; afterwards the cloud is used again."""
+    with watched.flying():
+        watched.broke()
+        on_clouds(watched.cluster, watched.cluster.cut)
+        time.sleep(10.0)
+        on_clouds(watched.cluster, watched.cluster.mend)
+        mended = watched.now()
+        watched.goes_on()
+        time.sleep(12.0)
+    told = Told.of(watched)
+    report("cut off", told, watched, "edge")
+    print(f"cloud used again {told.recovery(mended, 'cloud'):.1f} s after the link came back")  # noqa: T201
+    told.safe()
+    told.each_counted_once()
+    assert told.recovery(watched.broken_at, "edge") < 10.0
+    assert told.recovery(mended, "cloud") < 12.0
+
+
+def test_an_analysis_is_killed(watched: Watched) -> None:
+    """Ray restarts it, it is prepared anew, and what it lost is counted."""
+    with watched.flying():
+        watched.broke()
+        watched.process("analytics/drone/glance").kill()
+        eventually(lambda: watched.run.look().reports["analytics/drone/glance"].phase == "failed")
+        eventually(lambda: watched.run.look().reports["analytics/drone/glance"].phase == "running")
+        watched.goes_on()
+    told = Told.of(watched)
+    report("analysis killed", told, watched)
+    told.safe()
+    told.each_counted_once()
+    assert told.alerts("actor_lost") == ["the actor analytics/drone/glance died"]
+    assert any("glance is back after" in text for text in told.alerts("actor_back"))
+
+
+def test_an_analysis_hangs(watched: Watched) -> None:
+    """People are told, the cloud takes over, and what hung is used again once it answers."""
+    with watched.flying():
+        watched.broke()
+        watched.stop.touch()
+        time.sleep(8.0)
+        watched.stop.unlink()
+        watched.goes_on()
+    told = Told.of(watched)
+    report("analysis hung", told, watched, "cloud")
+    told.safe()
+    told.each_counted_once()
+    assert any("does not answer on the edge" in text for text in told.alerts("executor_lost"))
+
+
+def test_the_dispatcher_is_killed(watched: Watched) -> None:
+    """Another takes its place; the frames in between are lost, and everyone can see which."""
+    with watched.flying():
+        watched.broke()
+        watched.process("dispatcher").kill()
+        eventually(lambda: watched.run.look().reports["dispatcher"].phase == "failed")
+        eventually(lambda: watched.run.look().reports["dispatcher"].phase == "running")
+        watched.goes_on()
+    told = Told.of(watched)
+    report("dispatcher killed", told, watched)
+    told.safe()
+    assert not {task: ends for task, ends in told.ends.items() if len(ends) > 1}
+    missing = {int(task.rpartition("#")[2]) for task in told.missing()}
+    assert missing
+    assert max(missing) - min(missing) < len(missing) + 3, "lost in one stretch"
+    assert told.alerts("actor_lost") == ["the actor dispatcher died"]
+    assert any("dispatcher is back after" in text for text in told.alerts("actor_back"))
+
+
+def test_the_recorder_is_killed(watched: Watched) -> None:
+    """What it wrote can be read, and a second part goes on."""
+    with watched.flying():
+        watched.broke()
+        watched.process("recorder").kill()
+        eventually(lambda: watched.run.look().reports["recorder"].phase == "failed")
+        eventually(lambda: watched.run.look().reports["recorder"].phase == "running")
+        watched.goes_on()
+    first = Told.of(watched)
+    assert watched.run.recording is not None
+    watched.run.recording = watched.run.recording.with_name("flight.2.mcap")
+    second = Told.of(watched)
+    report("recorder killed", second, watched)
+    assert second.flight.robots["drone"].outcome.startswith("landed")
+    assert not set(first.ends) & set(second.ends)
+    assert any("recorder is back after" in text for text in second.alerts("actor_back"))
+
+
+def test_the_heads_control_service_restarts(watched: Watched) -> None:
+    """Actors that run go on without it; it comes back with what it knew."""
+    with watched.flying():
+        watched.broke()
+        watched.cluster.restart_control_service()
+        watched.goes_on()
+        time.sleep(5.0)
+        watched.goes_on()
+    told = Told.of(watched)
+    report("control service restarted", told, watched)
+    told.safe()
+    told.each_counted_once()
+    assert {"edge", "cloud"} <= set(ray.cluster_resources())
+
+
+def test_the_object_store_is_full(watched: Watched) -> None:
+    """Somebody's data fills it; frames to the cloud may fail, nothing else does."""
+    with watched.flying():
+        watched.broke()
+        hoard = [ray.put(np.random.default_rng(i).bytes(20_000_000)) for i in range(9)]
+        watched.goes_on()
+        time.sleep(3.0)
+        del hoard
+        watched.goes_on()
+    told = Told.of(watched)
+    report("object store full", told, watched)
+    told.safe()
+    told.each_counted_once()
+    assert not told.alerts("scheduler_failed")
+
+
+def test_the_edges_disk_is_full(edge_cloud: EdgeCloud, tmp_path: Path) -> None:
+    """The recording stops and says so; the flight does not."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=300k", "tmpfs", str(disk)]
+    subprocess.run(mount, check=True)
+    edge_cloud.edge.run(*mount)
+    watched = Watched(Flyer(tmp_path), edge_cloud, {**ENVIRONMENT, "recording": {"images": "png"}})
+    try:
+        record = watched.flyer.folder / "flight"
+        record.symlink_to(disk)
+        with watched.flying(settle=0.0):
+            eventually(lambda: bool(watched.run.look().reports["recorder"].values["failure"]))
+            watched.goes_on()
+        assert watched.run.state is not None
+        assert watched.run.state.robots["drone"].status.state is MissionState.LANDED
+        assert "No space left" in watched.run.reports()["recorder"].values["failure"]
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)  # noqa: S607
+
+
+def test_a_cloud_node_is_killed(watched: Watched) -> None:
+    """Its work goes to the edge at once, and to another cloud node when Ray has noticed."""
+    with watched.flying():
+        (name,) = (n for n in watched.cluster.clouds() if _has_executor(watched.cluster, n))
+        watched.broke()
+        watched.cluster.kill(name)
+        watched.goes_on()
+        time.sleep(5.0)
+        watched.goes_on()
+    told = Told.of(watched)
+    report("cloud node killed", told, watched, "edge")
+    told.safe()
+    told.each_counted_once()
+
+
+def test_the_cloud_is_cut_off_for_good(watched: Watched) -> None:
+    """The mission ends on the edge alone; the last of this module, for the cloud stays away."""
+    with watched.flying():
+        watched.broke()
+        on_clouds(watched.cluster, watched.cluster.cut)
+        watched.goes_on(20)
+        time.sleep(5.0)
+        watched.goes_on(20)
+    told = Told.of(watched)
+    report("cut off for good", told, watched, "edge")
+    told.safe()
+    told.each_counted_once()
+
+
+def _has_executor(nodes: EdgeCloud, name: str) -> bool:
+    commands = (process.cmdline() for process in nodes.far[name].machine.processes())
+    return any("CloudExecutor" in word for command in commands for word in command)
