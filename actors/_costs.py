@@ -12,7 +12,7 @@ from collections.abc import Sequence
 __all__ = ["Executions", "Link", "quantile"]
 
 _KEPT = 11
-_BANDWIDTHS_KEPT = 5
+_LINK_KEPT = 5
 _LARGE = 16384
 """Bytes from which a transfer tells about the bandwidth, below which about the latency."""
 _SURE = 0.9
@@ -30,25 +30,29 @@ class Link:
     """The way to a node and back: `seconds = latency + size / bandwidth`. Threads may share it."""
 
     def __init__(self) -> None:
-        self._latencies: deque[float] = deque(maxlen=_KEPT)
-        self._bandwidths: deque[float] = deque(maxlen=_BANDWIDTHS_KEPT)
+        self._latencies: deque[float] = deque(maxlen=_LINK_KEPT)
+        self._transfers: deque[tuple[int, float]] = deque(maxlen=_LINK_KEPT)
 
     def observe(self, size: int, seconds: float) -> None:
         """Learn from `size` bytes that were there and answered after `seconds`."""
         if size < _LARGE:
             self._latencies.append(max(0.0, seconds))
         else:
-            self._bandwidths.append(size / max(1e-6, seconds - self.latency))
+            self._transfers.append((size, seconds))
 
     @property
     def latency(self) -> float:
         """Seconds that an empty message takes there and back; 0 before the first one did."""
-        return quantile(tuple(self._latencies), 0.5) if self._latencies else 0.0
+        known = tuple(self._latencies)
+        return quantile(known, 0.5) if known else 0.0
 
     @property
     def bandwidth(self) -> float:
         """Bytes per second; infinite before anything large was sent."""
-        return quantile(tuple(self._bandwidths), 0.5) if self._bandwidths else float("inf")
+        # Of the latency as it is known now: a link that changes is not explained twice.
+        latency = self.latency
+        known = [size / max(1e-6, seconds - latency) for size, seconds in tuple(self._transfers)]
+        return quantile(known, 0.5) if known else float("inf")
 
     def seconds(self, size: float) -> float:
         """Expected seconds from sending `size` bytes until a small answer, without any work."""

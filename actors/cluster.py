@@ -21,6 +21,7 @@ __all__ = [
     "disconnect",
     "discover",
     "home_edge",
+    "join",
     "nodes_at",
     "options_for",
     "outlives_application",
@@ -59,25 +60,11 @@ def connect(address: str | None) -> None:
         return
     _ours = False
     address = address or os.environ.get("RAY_ADDRESS")
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
-    # The first error is told; Ray would print the tracebacks of those that followed.
-    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
-    # Ray would refuse a node whose Python differs in its patch level; a Jetson's always does.
-    os.environ.setdefault("RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL", "minor")
-    common: dict[str, Any] = {
-        "logging_level": logging.ERROR,
-        "log_to_driver": False,
-        "namespace": _NAMESPACE,
-    }
     if address:
-        greet(address)
-        try:
-            ray.init(address=address, **common)
-        except (ConnectionError, RuntimeError, ValueError) as error:
-            reason = str(error).strip().splitlines()[0]
-            raise _unreachable(address, reason) from None
+        join(address)
         _require_edge(address)
         return
+    common = _settings()
     # "local": else Ray joins whatever cluster someone has started on this machine.
     ray.init(
         address="local",
@@ -89,6 +76,29 @@ def connect(address: str | None) -> None:
     )
     _ours = True
     _trim()
+
+
+def join(address: str) -> None:
+    """Join the cluster at `address`, whatever its nodes offer; AeroDaaSError if that fails."""
+    if ray.is_initialized():
+        return
+    common = _settings()
+    greet(address)
+    try:
+        ray.init(address=address, **common)
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        reason = str(error).strip().splitlines()[0]
+        raise _unreachable(address, reason) from None
+
+
+def _settings() -> dict[str, Any]:
+    """How quiet Ray is to be."""
+    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    # The first error is told; Ray would print the tracebacks of those that followed.
+    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
+    # Ray would refuse a node whose Python differs in its patch level; a Jetson's always does.
+    os.environ.setdefault("RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL", "minor")
+    return {"logging_level": logging.ERROR, "log_to_driver": False, "namespace": _NAMESPACE}
 
 
 def _unreachable(address: str, reason: str) -> AeroDaaSError:

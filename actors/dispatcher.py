@@ -107,6 +107,7 @@ class DispatcherActor(StreamActor):
         self._many = {one.stream for one in managed if len(one.inputs) > 1}
         self._resources = resources
         self._dispatch = FencedDispatch(scheduler, resources, self)
+        self._dispatch.hurried = not session.lockstep
         self._replaced = False
         self._numbers = itertools.count()
         self._frames: dict[int, Message[Any]] = {}
@@ -424,9 +425,12 @@ class DispatcherActor(StreamActor):
         figures = self._figures.pop(task.id, None)
         if result.outcome is not Outcome.DROPPED:
             reason = f"{result.place.value}: {why}" if why else result.place.value
-            self._note(task, result.outcome.value, reason, result.finished, figures)
         elif why is None:
-            self._note(task, "dropped", "no room in the cloud in time", result.finished)
+            reason = "no room in the cloud in time"
+        else:
+            return
+        totals = {"utility": result.utility, **self._counts.totals, **(figures or {})}
+        self._note(task, result.outcome.value, reason, result.finished, totals)
 
     def _publish(self, node: str, origin: Message[Any], item: Any) -> None:  # noqa: ANN401
         if item is not None or self.session.lockstep:
@@ -447,16 +451,17 @@ class DispatcherActor(StreamActor):
         action: str,
         reason: str,
         now: int,
-        figures: Mapping[str, float] | None = None,
+        totals: Mapping[str, float] | None = None,
     ) -> None:
         slack = task.deadline + task.reserve - now
         waited = (now - task.arrival) / 1e6
-        values = {"slack_ms": slack / 1e6, "waited_ms": waited, **(figures or {})}
+        values = {"slack_ms": slack / 1e6, "waited_ms": waited}
         if action in {"edge", "cloud"}:
             values["edge_ms"] = task.profile.edge_time / MILLISECOND
             values["cloud_ms"] = task.profile.cloud_time / MILLISECOND
         if task.reserve:
             values["reserve_ms"] = task.reserve / 1e6
+        values |= totals or {}
         header = Header(self._decisions.sent, now, DECISIONS)
         record = DecisionRecord(now, self._label(task), action, reason, values)
         self._decisions.measure(record, header, host_time_ns())
@@ -508,12 +513,16 @@ class _Counts:
         if result.outcome is Outcome.DONE:
             self._windows.done(result.task)
 
+    @property
+    def totals(self) -> dict[str, float]:
+        """Utility so far."""
+        return {"qos_total": self._utility, "qoe_total": self._windows.utility}
+
     def values(self) -> dict[str, Any]:
         return {
             "tasks": self._tasks,
             "outcomes": dict(self._outcomes),
             "retried": self.retried,
-            "utility": self._utility,
-            "qoe": self._windows.utility,
+            **self.totals,
             "qoe_windows": self._windows.won,
         }

@@ -123,7 +123,8 @@ class _Planner:
         for robot in self.robots:
             for sensor in robot.sensors:
                 stream = f"{robot.id}/{sensor.id}"
-                wanted = self.recorded or sensor.type != "camera"
+                shows = self.recorded and self.session.environment.has_pictures(sensor)
+                wanted = shows or sensor.type != "camera"
                 if sensor.driver == "replayed" or not wanted or stream in self.graph.nodes:
                     continue
                 item = SENSOR_ITEMS[sensor.type]

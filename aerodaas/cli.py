@@ -1,4 +1,4 @@
-"""The command line: `aerodaas run`, `remote`, `lab`, `cluster`, ..., and for recordings."""
+"""The command line: flying, watching, studying, tuning, clusters, and recordings."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.commands import cluster, lab, remote
+from aerodaas.commands import cluster, lab, remote, tune
 from aerodaas.commands.application import run_application, speed_option
 from aerodaas.commands.export import export
 from aerodaas.commands.replay import replay
@@ -43,6 +43,7 @@ flies a simulated drone or a Tello.
 )
 app.add_typer(remote.app, name="remote")
 app.add_typer(lab.app, name="lab")
+app.add_typer(tune.app, name="tune")
 app.add_typer(cluster.app, name="cluster")
 
 

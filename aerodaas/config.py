@@ -397,6 +397,14 @@ class EnvironmentConfig(_Strict):
         carriers = [robot.driver for robot in self.robots if sensor in robot.sensors]
         return carriers[0] if carriers else "simulated"
 
+    def has_pictures(self, sensor: SensorConfig) -> bool:
+        """Tell whether a camera has a source at all.
+
+        MAVLink carries no pictures: the camera of such a robot is the stream that its `path`
+        names, and without one it can only be left out.
+        """
+        return self.camera_driver(sensor) != "mavlink" or bool(sensor.settings.get("path"))
+
     @classmethod
     def load(cls, path: str | Path) -> EnvironmentConfig:
         """Read an environment file; raises ConfigError that names the file and the place."""

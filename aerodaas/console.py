@@ -93,6 +93,7 @@ class Watching:
                 ),
                 streams=(*self._streams(state), *_commands(state)),
                 alerts=tuple(alert.text for alert in state.alerts[-_ALERTS_SHOWN:]),
+                scheduler=_scheduler_text(state),
             )
         )
 
@@ -124,6 +125,27 @@ class Watching:
             for stream, sent in report.sent.items()
             if not stream.startswith(("alerts/", "acks/")) and "/commands" not in stream
         ]
+
+
+def _scheduler_text(state: FlightState) -> str:
+    """How the analytics scheduler fares; empty before it has decided anything."""
+    report = state.reports.get("dispatcher")
+    values = report.values if report is not None else {}
+    ended = sum(values.get("outcomes", {}).values())
+    if not ended:
+        return ""
+    outcomes = ", ".join(
+        f"{count} {name}" for name, count in values["outcomes"].items() if name != "done"
+    )
+    windows = [sum(counts) for counts in zip(*values["qoe_windows"].values(), strict=True)]
+    share = 100 * values["outcomes"].get("done", 0) / ended
+    head = f"{values['scheduler']}: {share:.0f} % of {ended} in time"
+    parts = [f"{head}, {outcomes}" if outcomes else head, f"utility {values['qos_total']:.0f}"]
+    if windows:
+        parts.append(f"QoE {values['qoe_total']:.0f} ({windows[0]} of {windows[1]} windows)")
+    if values["edge_down"]:
+        parts.append(f"down: {', '.join(values['edge_down'])}")
+    return "; ".join(parts)
 
 
 def _commands(state: FlightState) -> list[StreamSnapshot]:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerodaas.clock import seconds
-from aerodaas.config import EnvironmentConfig
+from aerodaas.config import EnvironmentConfig, TaskConfig
 from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, MissionError, RecordingError
 from aerodaas.navigation.commands import Answer, Command, End
 from aerodaas.options import RunOptions, current_options
@@ -168,6 +168,7 @@ class Run:
         from aerodaas.actors.session import Session  # noqa: PLC0415
 
         self._check_world()
+        self._take_tasks()
         speed = None if self.lockstep else (self.options.speed or 1.0)
         session = Session(self.config, speed, pace=self._pace())
         scheduler = self._environment.trajectory_scheduler()
@@ -184,9 +185,13 @@ class Run:
             load_scenario(self.config.simulation.world)
 
     def _pace(self) -> Pace:
-        from aerodaas.recording.pace import Pace, read_pace  # noqa: PLC0415 - loads readers
+        from aerodaas.recording.pace import Pace  # noqa: PLC0415 - only where it flies
 
-        return read_pace(self.options.replay) if self.options.replay else Pace()
+        if self.options.replay is None:
+            return Pace()
+        from aerodaas.recording.pace_reader import read_pace  # noqa: PLC0415 - loads decoders
+
+        return read_pace(self.options.replay)
 
     def _change_models(self) -> None:
         """Give every detector the model that the command line asks for."""
@@ -196,6 +201,17 @@ class Run:
             for node in self.graph.nodes.values():
                 if isinstance(node.work, OnnxDetector):
                     node.work = node.work.with_model(self.options.model)
+
+    def _take_tasks(self) -> None:
+        """Add what the application says of its analyses to what the environment file does."""
+        own = {
+            node.id.rpartition("/")[2]: task
+            for node in self.graph.nodes.values()
+            if isinstance(task := getattr(node.work, "task", None), TaskConfig)
+        }
+        told = self.config.schedulers
+        schedulers = told.model_copy(update={"tasks": {**own, **told.tasks}})
+        self.config = self.config.model_copy(update={"schedulers": schedulers})
 
     def _speed_text(self) -> str:
         return "max" if self.lockstep else f"{self.options.speed or 1.0:g}"

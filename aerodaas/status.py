@@ -118,12 +118,13 @@ class Decision:
 
     stamp: int
     task: str
-    """Analysis and frame, `node#frame`."""
+    """Analysis and frame, `node#frame`; `node#camera:frame` where it watches several cameras."""
     action: str
-    """`edge`, `cloud`, `drop`, `late`, `done`."""
+    """`edge`, `cloud`, `drop` are decisions, `retry` is one of the dispatcher's; `done`, `late`,
+    `timeout`, `failed` and `dropped` (it never came to its turn) are how a task ended."""
     reason: str = ""
     values: dict[str, float] = field(default_factory=dict)
-    """Figures behind it: slack, expected times, utility; seconds or the table's own units."""
+    """Figures behind it: milliseconds, or utility in the environment file's own unit."""
 
 
 class Hop(NamedTuple):

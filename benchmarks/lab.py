@@ -13,6 +13,7 @@ import typer
 from _report import Report
 from rich.progress import track
 
+from aerodaas.actors.spread import spread_over
 from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.lab import Workload, run_lab
 
@@ -24,6 +25,7 @@ def main(
     edges: Annotated[str, typer.Option(help="Comma-separated; 3 drones each.")] = "1,10,100,1000",
     duration: Annotated[float, typer.Option(help="Simulated seconds of the growing fleet.")] = 30,
     jobs: Annotated[int, typer.Option(help="Processes.", min=1)] = 1,
+    address: Annotated[str | None, typer.Option(help="Ray cluster instead of processes.")] = None,
     json: Annotated[Path | None, typer.Option(help="File for the figures.")] = None,
 ) -> None:
     """Simulated tasks per second; the aim is 80 drones, 6 models, 300 s in under 3 s on a core."""
@@ -32,15 +34,25 @@ def main(
     for count in edges.split(","):
         name = f"{3 * int(count)}D-A/{count}"
         loads[f"{name} {duration:g} s"] = Workload.named(name, round(duration * NANOSECONDS))
+    spread = spread_over(address) if address else None
+    per_task: dict[str, list[tuple[int, float]]] = {}
     cases = [(case, name) for name in scheduler.split(",") for case in loads]
     for case, name in track(cases, "simulating", transient=True):
         began, worked = time.perf_counter(), time.process_time()
-        result = run_lab(loads[case], [name], [0], bound=False, jobs=jobs)
+        result = run_lab(loads[case], [name], [0], bound=False, jobs=jobs, spread=spread)
         taken, cpu = time.perf_counter() - began, time.process_time() - worked
         tasks = result.scores[name][0].tasks
         figures = (taken, cpu, tasks / 1e3, tasks / 1e3 / taken, taken / tasks * 1e6)
         report.row(f"{name} {case}", dict(zip(UNITS, figures, strict=True)))
-    report.note(f"{jobs} process(es), without the clairvoyant bound; CPU is of the first process")
+        per_task.setdefault(name, []).append((loads[case].edges, taken / tasks))
+    for name, grown in per_task.items():
+        (least, first), (most, last) = grown[1], grown[-1]
+        report.note(
+            f"{name}: from {least} to {most} edges the time per task grows {last / first:.2f} times"
+            " (1 is linear growth)"
+        )
+    where = f"the cluster at {address}" if address else f"{jobs} process(es)"
+    report.note(f"{where}, without the clairvoyant bound; CPU is of the first process")
     report.show()
     if json is not None:
         report.write(json)

@@ -28,6 +28,7 @@ def lines(text: str) -> list[str]:
 @pytest.mark.parametrize(
     ("listing", "heading"),
     [
+        ("situation_awareness", "Situation Awareness"),
         ("farm_survey", "Farm Survey"),
         ("disaster_survey", "Human-in-the-loop Disaster Zone Survey"),
     ],

@@ -20,7 +20,7 @@ from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar, runtime
 
 from typing_extensions import Self
 
-from aerodaas.config import RuntimeEnvConfig, as_runtime_env
+from aerodaas.config import RuntimeEnvConfig, TaskConfig, as_runtime_env
 from aerodaas.data import Alert
 from aerodaas.errors import GraphError
 from aerodaas.graph import AeroStreamData, Graph, Node, Trigger
@@ -82,6 +82,8 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     """True for an analysis of frames whose every run the analytics scheduler decides on."""
     concurrent: bool = False
     """True if several threads may call `process` at once, as executors in the cloud do."""
+    task: TaskConfig | None = None
+    """What the scheduler is told of it, unless the environment file's `schedulers.tasks` do."""
     rate: float = 1.0
     """How often an external source (`instantiate`) is asked, in Hz."""
     name: str = ""
@@ -120,6 +122,12 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         if self.node is not None:
             self.node.compute = self._compute
             self.node.runtime_env = self._runtime_env
+        return self
+
+    def beside(self, other: Analytics[Any]) -> Self:
+        """Run where `other` runs; returns itself."""
+        self._compute, self._graph = other._compute, other._graph
+        self._runtime_env = other._runtime_env
         return self
 
     def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co]:

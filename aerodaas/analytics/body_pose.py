@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
+
+from typing_extensions import Self
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.debounce import Debounce
@@ -14,10 +16,11 @@ from aerodaas.analytics.gestures import GESTURE_MODEL, POINTS, GestureClassifier
 from aerodaas.analytics.models import POSE
 from aerodaas.analytics.tracking import Tracker
 from aerodaas.clock import seconds
+from aerodaas.config import RuntimeEnvConfig
 from aerodaas.data import Alert, Detection, Detections, Frame
 from aerodaas.errors import ConfigError, GraphError
 from aerodaas.graph import AeroStreamData, Trigger
-from aerodaas.interfaces import IAeroData, IEnvironment
+from aerodaas.interfaces import IAeroData, ICompute, IEnvironment
 
 __all__ = ["BodyPoseEmergencyAnalytics", "fallen", "hand_raised"]
 
@@ -44,10 +47,11 @@ def fallen(result: object) -> bool:
 class BodyPoseEmergencyAnalytics(Analytics[Detections]):
     """Watches one person's body: a raised hand lands the drone, a fall alerts people.
 
-    Analyse a pose model's stream, or the camera's, in which it runs the pose model that ships. A
-    gesture counts once `needed` of the last `of` frames show it for `hold` seconds. The landing
-    is a `trigger` of the robot whose camera it is; set others with the conditions `hand_raised`
-    and `fallen` of this module::
+    Analyse a pose model's stream, or the camera's: then the pose model that ships runs as an
+    analysis of its own, called `body_pose`, which an analytics scheduler may schedule. A gesture
+    counts once `needed` of the last `of` frames show it for `hold` seconds. The landing is a
+    `trigger` of the robot whose camera it is; set others with the conditions `hand_raised` and
+    `fallen` of this module::
 
         pose = BodyPoseEmergencyAnalytics(lands=False).deploy(edge)
         pose.analyse(camera)
@@ -106,6 +110,8 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self._events = {name: Debounce(needed, of, hold) for name in _TEXTS}
         self._vests: Detections | None = None
         self._streams = 0
+        self._poses: str | None = None
+        """Stream of the pose model that runs for this analysis alone."""
         self._told = False
 
     def analyse(self, data: IAeroData[Any]) -> AeroStreamData[Detections]:
@@ -114,14 +120,8 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         Raises GraphError for any other stream, and for boxes of a model without keypoints alone.
         """
         if isinstance(data, AeroStreamData) and issubclass(data.item, Frame):
-            if self.detector is None:
-                # onnxruntime takes its time to load.
-                from aerodaas.analytics.onnx.detector import OnnxDetector  # noqa: PLC0415
-
-                self.detector = OnnxDetector(POSE)
-            _require_keypoints(self.detector, type(self).__name__)
-            self.isolated = self.scheduled = True
-        elif isinstance(data, AeroStreamData) and not self._streams:
+            data = self._poses_in(data)
+        if isinstance(data, AeroStreamData) and not self._streams:
             _require_keypoints(data.graph.nodes[data.name].work, type(self).__name__)
         stream = super().analyse(data)
         self._streams += 1
@@ -131,23 +131,36 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
                 self.node.triggers.append(landing)
         return stream
 
+    def deploy(
+        self, compute: ICompute, runtime_env: RuntimeEnvConfig | Mapping[str, Any] | None = None
+    ) -> Self:
+        """Run on `compute`, the pose model that it runs itself included; returns itself."""
+        super().deploy(compute, runtime_env)
+        if self._poses is not None and self.node is not None and self._graph is not None:
+            self._graph.nodes[self._poses].compute = self.node.compute
+        return self
+
+    def _poses_in(self, camera: AeroStreamData[Frame]) -> AeroStreamData[Detections]:
+        """Run a pose model on `camera`: an analysis of its own, so that it can be scheduled."""
+        # onnxruntime takes its time to load.
+        from aerodaas.analytics.onnx.detector import OnnxDetector  # noqa: PLC0415
+
+        detector = self.detector or OnnxDetector(POSE)
+        detector.name = detector.name or "body_pose"
+        stream = detector.beside(self).analyse(camera)
+        self._poses, self.detector = stream.name, None
+        return stream
+
     def open(self) -> None:
-        """Load the models."""
-        if self.detector is not None:
-            self.detector.open()
+        """Load the classifier."""
         self.classifier.open()
 
     def close(self) -> None:
-        """Release the models."""
-        if self.detector is not None:
-            self.detector.close()
+        """Release the classifier."""
         self.classifier.close()
 
-    def process(self, item: Detections | Frame, context: Context) -> Detections | None:
+    def process(self, item: Detections, context: Context) -> Detections | None:
         """Watch one frame; None for boxes of vests, which only say who counts."""
-        if isinstance(item, Frame):
-            found = self.detector.process(item, context) if self.detector is not None else None
-            return None if found is None else self._watch(found, context)
         if item.labelled(*self.vest_labels):
             self._vests = item
         bodies = any(one.keypoints is not None for one in item)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 __all__ = ["BoxFilter"]
 
 Array = NDArray[np.float64]
-_MEASUREMENT = 0.05
+_MEASUREMENT = 0.08
 """Standard deviation of a detected box, in box heights."""
 _FIRST_VELOCITY = 1.0
 """Standard deviation of an unknown velocity, in box heights a second."""

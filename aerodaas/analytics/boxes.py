@@ -56,7 +56,7 @@ class BoxAnalytics(Analytics[O_co]):
         """Analyse a stream of boxes or of frames; raises GraphError for any other."""
         if isinstance(data, AeroStreamData) and issubclass(data.item, Frame):
             self.detector = self.detector or shipped_detector(type(self).__name__, self.labels)
-            self.isolated = self.scheduled = True
+            self.isolated = True
         return super().analyse(data)
 
     def examine(self, boxes: Detections, context: Context) -> O_co | None:

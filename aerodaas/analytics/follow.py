@@ -22,6 +22,8 @@ from aerodaas.waypoints import DEFAULT_PRIORITY, AeroNavigation, NavigationType
 __all__ = ["FollowAnalytics"]
 
 _log = logging.getLogger(__name__)
+_REACH, _REACH_SHARE = 0.3, 0.2
+"""Metres, and parts of the distance, from where the target should stand to where it is seen."""
 _WIDTH_MEMORY = 0.1
 """Weight of the newest look in the mean of the target's width: arms swing."""
 
@@ -83,9 +85,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if item.camera is None:
             self.explain_once(item, context)
             return None
-        phase = self.controller.phase
         if self._has_left():
             self._let_go(item, context)
+        phase = self.controller.phase
         detection = self._target_in(self.tracker.update(item))
         sighting = None if detection is None else self._sight(detection, item)
         state = context.vehicle()
@@ -108,6 +110,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         found = tracked.labelled(*self.labels)
         trusted = [item for item in found if item.track_id is not None]
         mine = next((item for item in trusted if item.track_id == self.target), None)
+        if mine is None:
+            mine = self._found_where_expected(found, tracked)
         if mine is not None or not self._may_choose():
             return mine
         trusted = [item for item in trusted if self._is_inside(item, tracked)]
@@ -139,6 +143,30 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         towards = np.array([math.cos(heading), math.sin(heading)])
         place = odometry.position[:2] + sighting.distance * towards
         return bool(np.isfinite(place).all() and self.area.covers(Point(*place)))
+
+    def _found_where_expected(
+        self, found: Sequence[Detection], item: Detections
+    ) -> Detection | None:
+        """The box that stands on the ground where the target should: it has lost its track only.
+
+        A drone that pitches shakes the picture more than a tracker of boxes can know.
+        """
+        odometry, motion = item.odometry, self.controller.motion
+        expected = None if odometry is None else motion.relative_to(odometry, item.header.stamp)
+        if self.target is None or expected is None:
+            return None
+        reach = _REACH + _REACH_SHARE * expected[0].distance
+        best = None
+        for detection in found:
+            sighting = sight(detection, item, self.size.with_width(self._width))
+            if sighting is None:
+                continue
+            off = float(np.linalg.norm(sighting.offset - expected[0].offset))
+            if off <= reach:
+                best, reach = detection, off
+        if best is not None and best.track_id is not None:
+            self.target = best.track_id
+        return best
 
     def _may_choose(self) -> bool:
         """Another target is taken only when the present one has been gone for a while."""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.follow import FollowAnalytics
 from aerodaas.interfaces import IEnvironment
-from aerodaas.navigation.follow_settings import LostPolicy
+from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
 from aerodaas.navigation.sighting import TargetSize
 from aerodaas.waypoints import DEFAULT_PRIORITY
 
@@ -33,6 +33,9 @@ class VipFollowAnalytics(FollowAnalytics):
         labels: Sequence[str] = ("vest", "hazard vest"),
         target_height: float = 0.65,
         target_width: float = 0.45,
+        gains: FollowGains | None = None,
+        limits: FollowLimits | None = None,
+        lost: LostPolicy | None = None,
         priority: int = DEFAULT_PRIORITY,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
@@ -47,6 +50,9 @@ class VipFollowAnalytics(FollowAnalytics):
             height,
             target_height=target_height,
             target_width=target_width,
+            gains=gains,
+            limits=limits,
+            lost=lost,
             priority=priority,
             detector=detector,
         )
@@ -70,6 +76,8 @@ class CarFollowAnalytics(FollowAnalytics):
         target_width: float = 1.8,
         target_length: float = 4.2,
         area: Sequence[tuple[float, float]] | None = None,
+        gains: FollowGains | None = None,
+        limits: FollowLimits | None = None,
         lost: LostPolicy | None = None,
         priority: int = DEFAULT_PRIORITY,
         detector: BoxAnalytics.Detector | None = None,
@@ -87,6 +95,8 @@ class CarFollowAnalytics(FollowAnalytics):
             target_height=target_height,
             target_width=target_width,
             area=area,
+            gains=gains,
+            limits=limits,
             lost=lost or _CAR_LOST,
             priority=priority,
             detector=detector,

@@ -14,6 +14,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
+from typing import Any
 from xml.etree import ElementTree as ET
 
 from aerodaas.data import GpsFix
@@ -84,7 +85,7 @@ def parse_track(text: str, name: str) -> GpsTrack:
 def _gpx(text: str, name: str) -> Iterator[Mapping[str, object] | None]:
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise SourceError(f"{name}: a GPX file declares no entities; this one is not read")
-    parser = ET.XMLPullParser(["end"])
+    parser: Any = ET.XMLPullParser(["end"])
     broken = False
     try:
         parser.feed(text.lstrip("\ufeff \t\r\n"))
@@ -96,10 +97,9 @@ def _gpx(text: str, name: str) -> Iterator[Mapping[str, object] | None]:
     events = parser.read_events()
     while True:
         try:
-            event, element = next(events)
+            _, element = next(events)
         except (StopIteration, ET.ParseError):
             break
-        del event
         if _local(element.tag) in {"trkpt", "rtept", "wpt"}:
             points += 1
             values = {_local(child.tag): child.text for child in element}

@@ -21,6 +21,7 @@ class SyntheticAnalytics(Analytics[Readings]):
     accepts: ClassVar[tuple[type, ...]] = (Frame,)
     produces: ClassVar[type] = Readings
     scheduled = True
+    concurrent = True
 
     def __init__(self, name: str, edge_ms: float, cloud_ms: float) -> None:
         """Take `edge_ms` milliseconds on the edge and `cloud_ms` in the cloud.

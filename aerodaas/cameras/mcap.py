@@ -11,7 +11,7 @@ from aerodaas.config import EnvironmentConfig, SensorConfig
 from aerodaas.data import Odometry
 from aerodaas.errors import RecordingError, SourceError
 from aerodaas.geometry import CameraModel
-from aerodaas.recording.pictures import PICTURE_SCHEMAS, Shot, shots
+from aerodaas.recording.pictures import PICTURE_SCHEMAS, Shot, decoded_ahead, shots
 from aerodaas.recording.reader import Recording
 
 __all__ = ["McapCamera", "ReplayedCamera"]
@@ -122,8 +122,11 @@ class McapCamera:
 
     def _rewind(self) -> None:
         if self._recording is not None:
-            self._shots = shots(self._recording, [self._topic])
+            self._shots = self._play(shots(self._recording, [self._topic]))
             self._next = next(self._shots, None)
+
+    def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:
+        return found
 
     def _choose(self, recording: Recording) -> str:
         topics = [
@@ -151,6 +154,10 @@ class ReplayedCamera(McapCamera):
     def finished(self) -> bool:
         """True once the last picture was given, of a camera that came to an end in flight, too."""
         return super().finished and not self._settings.loop
+
+    def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:
+        # Every picture is shown, as fast as pictures can be had: decoding is what takes longest.
+        return decoded_ahead(found)
 
     def _due_at(self, shot: Shot, stamp: int) -> int:
         del stamp

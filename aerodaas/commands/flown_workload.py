@@ -47,7 +47,8 @@ def flown_workload(path: str | Path) -> tuple[Workload, Resources]:
     Raises RecordingError for a recording without decisions or without its environment.
     """
     with Recording.open(path) as recording:
-        tasks = _tasks(record.value for record in recording.records(schemas=["aerodaas.Decision"]))
+        decisions = [r.value for r in recording.records(schemas=["aerodaas.Decision"])]
+        tasks = _tasks(one for one in decisions if "waited_ms" in one["values"])
         if not tasks:
             raise RecordingError(
                 f"{path} holds no decisions of an analytics scheduler; fly with one, such as "

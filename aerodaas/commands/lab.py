@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from math import isnan
 from pathlib import Path
 from typing import Annotated
@@ -14,7 +15,7 @@ from rich.table import Table
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import AeroDaaSError
-from aerodaas.schedulers.analytics.base import MILLISECOND, Resources
+from aerodaas.schedulers.analytics.base import MILLISECOND, AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.profiles import PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
 from aerodaas.schedulers.lab import (
@@ -25,6 +26,7 @@ from aerodaas.schedulers.lab import (
     load_workload,
     run_lab,
 )
+from aerodaas.schedulers.lab.run import Spread
 from aerodaas.schedulers.lab.workload import SIX
 
 __all__ = ["app", "result_table"]
@@ -102,6 +104,10 @@ def run(
     jobs: Annotated[
         int | None, typer.Option(help="Processes; default one per core.", min=1)
     ] = None,
+    address: Annotated[
+        str | None,
+        typer.Option(help="Ray cluster (`host:port`, `auto`) whose cores share the seeds."),
+    ] = None,
     plots: Annotated[Path | None, typer.Option(help="Folder for plots.")] = None,
     json_path: Annotated[
         Path | None, typer.Option("--json", help="File for every figure and its interval.")
@@ -122,19 +128,21 @@ def run(
         loads, resources = _loads(workload, flown, duration)
         if cloud_slots is not None:
             resources = Resources(cloud_slots=cloud_slots)
+        spread, wanted = _spread(address, names)
         for load in loads:
             with_bound = load.edges <= 10 if bound is None else bound  # noqa: PLR2004 - see help
             with _progress() as progress:
                 bar = progress.add_task(load.name, total=seeds * load.edges)
                 result = run_lab(
                     load,
-                    names,
+                    wanted,
                     range(seeds),
                     network=Network.named(network, load.duration),
                     times=ExecutionTimes.named(times),
                     resources=resources,
                     bound=with_bound,
                     jobs=jobs,
+                    spread=spread,
                     progress=lambda done, _: progress.update(bar, completed=done),  # noqa: B023
                 )
             results.append(result)
@@ -201,6 +209,16 @@ def result_table(result: LabResult) -> Table:
 def _workload(name: str, duration: float | None) -> Workload:
     found = load_workload(name) if name.endswith(".json") else Workload.named(name)
     return found if duration is None else found.lasting(round(duration * NANOSECONDS))
+
+
+def _spread(
+    address: str | None, names: list[str]
+) -> tuple[Spread | None, Sequence[str | type[AnalyticsScheduler]]]:
+    if address is None:
+        return None, names
+    from aerodaas.actors.spread import shipped, spread_over  # noqa: PLC0415 - loads ray
+
+    return spread_over(address), [shipped(name) for name in names]
 
 
 def _loads(

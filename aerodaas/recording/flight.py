@@ -148,10 +148,16 @@ class Flight:
     decisions: Counter[str] = field(default_factory=Counter)
     """Scheduler decisions, by action."""
     outcomes: list[Outcome] = field(default_factory=list)
+    reasons: Counter[tuple[str, str]] = field(default_factory=Counter)
+    """Scheduler decisions and outcomes, by action and reason."""
+    utility: dict[str, float] = field(default_factory=dict)
+    """What the analytics scheduler gained: `QoS`, and `QoE`, the bonuses of its windows."""
     loads: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
     """By actor."""
     machines: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
     """By machine."""
+    gpus: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
+    """Graphics processors, as machines, by machine and number."""
     alerts: list[tuple[float, str, str]] = field(default_factory=list)
     """Mission seconds, kind, text."""
     drops: dict[str, int] = field(default_factory=dict)
@@ -244,6 +250,10 @@ def _detections(flight: Flight, record: Record) -> None:
 def _decision(flight: Flight, record: Record) -> None:
     value = record.value
     flight.decisions[value["action"]] += 1
+    flight.reasons[value["action"], value["reason"]] += 1
+    totals = {"QoS": "qos_total", "QoE": "qoe_total"}
+    values = value["values"]
+    flight.utility |= {name: values[key] for name, key in totals.items() if key in values}
     analysis = value["task"].rpartition("#")[0]
     flight.outcomes.append(Outcome(seconds(value["stamp"]), analysis, value["action"]))
 
@@ -271,6 +281,11 @@ def _vitals(flight: Flight, record: Record) -> None:
         machine.time.append(now)
         machine.cpu.append(value["machine_cpu"])
         machine.memory.append(value["machine_memory"])
+        for number, gpu in enumerate(value.get("gpus", ())):
+            load = flight.gpus[f"{value['machine']} {number}"]
+            load.time.append(now)
+            load.cpu.append(gpu["busy"])
+            load.memory.append(gpu["memory"])
 
 
 _READERS: dict[str, Callable[[Flight, Record], None]] = {

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass, field
+from collections import defaultdict, deque
+from collections.abc import Callable, Collection, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -23,10 +25,20 @@ from aerodaas.recording.images import (
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.states import odometry_of
 
-__all__ = ["PICTURE_SCHEMAS", "Shot", "detections", "detections_by_frame", "frames", "shots"]
+__all__ = [
+    "PICTURE_SCHEMAS",
+    "Shot",
+    "decoded_ahead",
+    "detections",
+    "detections_by_frame",
+    "frames",
+    "shots",
+]
 
 PICTURE_SCHEMAS = IMAGE_SCHEMAS | VIDEO_SCHEMAS
 """Schemas whose messages are pictures."""
+_AHEAD = 4
+"""Pictures decoded before they are asked for."""
 
 
 @dataclass
@@ -67,6 +79,8 @@ class Shot:
     video: _VideoFrame | None = None
     size: tuple[int, int] | None = None
     """Width and height in pixels, where they were recorded."""
+    decoded: Callable[[], NDArray[np.uint8] | None] | None = None
+    """Gives the picture where it is being decoded already."""
 
     @property
     def format(self) -> str:
@@ -75,6 +89,8 @@ class Shot:
 
     def image(self) -> NDArray[np.uint8] | None:
         """Decode the picture, BGR; None if it is broken, SourceError for an unknown format."""
+        if self.decoded is not None:
+            return self.decoded()
         if self.video is None:
             return decode_image(self.record.schema, self.record.value)
         if self.format != "h264":
@@ -112,6 +128,22 @@ def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterat
             header = Header(value["id"], value["stamp"], value["source"])
             size = value["width"], value["height"]
             yield Shot(header, odometry_of(value.get("odometry")), record, video, size)
+
+
+def decoded_ahead(found: Iterator[Shot]) -> Iterator[Shot]:
+    """The same shots, the next few of them being decoded meanwhile by threads of our own."""
+    first = next(found, None)
+    if first is None:
+        return
+    # The frames of a video need each other, pictures do not.
+    threads = 1 if first.video is not None else 2
+    waiting: deque[Shot] = deque()
+    with ThreadPoolExecutor(threads, "decoder") as pool:
+        for shot in chain([first], found):
+            waiting.append(replace(shot, decoded=pool.submit(shot.image).result))
+            if len(waiting) > _AHEAD:
+                yield waiting.popleft()
+        yield from waiting
 
 
 def frames(

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass, field
+from datetime import datetime, timezone
 from typing import Any
 
 import numpy as np
 from typing_extensions import Self
 
+from aerodaas.clock import NANOSECONDS
 from aerodaas.recording.flight import Flight, RobotFlight, StreamLatency
 from aerodaas.recording.reader import Recording
 
@@ -44,6 +46,16 @@ class RobotFigures:
     setpoints_clipped: dict[str, int]
     """Setpoints that a limit changed, by limit."""
 
+    @property
+    def course(self) -> str:
+        """How far it flew, in one line."""
+        visited = f"{self.waypoints_visited} of {self.waypoints_planned} waypoints, "
+        used = self.battery_used
+        return (
+            f"{visited if self.waypoints_planned else ''}{self.distance_m:.1f} m in "
+            f"{self.duration_s:.1f} s{'' if used is None else f', {100 * used:.0f} % of battery'}"
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class FlightSummary:
@@ -63,6 +75,10 @@ class FlightSummary:
     """Objects found in single frames, by label."""
     decisions: dict[str, int] = field(default_factory=dict)
     """Scheduler decisions, by action."""
+    reasons: dict[str, int] = field(default_factory=dict)
+    """Scheduler decisions and outcomes, by `action: reason`."""
+    utility: dict[str, float] = field(default_factory=dict)
+    """What the analytics scheduler gained: `QoS` and `QoE`."""
     alerts: list[dict[str, Any]] = field(default_factory=list)
     drops: dict[str, int] = field(default_factory=dict)
     """Messages that did not reach the recorder, by stream."""
@@ -80,10 +96,22 @@ class FlightSummary:
             latencies={name: _latency(it) for name, it in flight.latencies.items()},
             detections=dict(flight.detections),
             decisions=dict(flight.decisions),
+            reasons={f"{did}: {why}": n for (did, why), n in flight.reasons.most_common()},
+            utility={name: round(value, 3) for name, value in flight.utility.items()},
             alerts=[{"time_s": at, "kind": kind, "text": t} for at, kind, t in flight.alerts],
             drops=dict(flight.drops),
             provenance=dict(recording.provenance),
         )
+
+    @property
+    def begun(self) -> str:
+        """Date and time of day at which it began, with the zone; empty where nobody knows."""
+        try:
+            seconds = int(self.provenance["epoch_ns"]) / NANOSECONDS
+            began = datetime.fromtimestamp(seconds, timezone.utc).astimezone()
+        except (KeyError, ValueError, OverflowError, OSError):
+            return ""
+        return f"{began:%Y-%m-%d %H:%M:%S %Z}"
 
     def as_dict(self) -> dict[str, Any]:
         """Everything, for JSON."""
@@ -95,10 +123,7 @@ class FlightSummary:
         if not self.complete:
             lines[0] += " (cut off: the file was not closed or is damaged)"
         for name, robot in self.robots.items():
-            lines.append(
-                f"  {name}: {robot.outcome}; {_waypoints_text(robot)}{robot.distance_m:.1f} m in "
-                f"{robot.duration_s:.1f} s{_battery_text(robot)}"
-            )
+            lines.append(f"  {name}: {robot.outcome}; {robot.course}")
         for camera, count in self.frames.items():
             rate = f", {count / self.duration_s:.1f} per second" if self.duration_s else ""
             lines.append(f"  {camera}: {count} frames{rate}")
@@ -107,19 +132,17 @@ class FlightSummary:
                 f"  {stream}: {latency.median_ms:.1f} ms median, {latency.p99_ms:.1f} ms "
                 "99th percentile since capture"
             )
+        if self.decisions:
+            lines.append(f"  {_scheduler_text(self)}")
         lines += [f"  alert at {it['time_s']:.1f} s: {it['text']}" for it in self.alerts]
         lines += [f"  dropped {count} of {stream}" for stream, count in self.drops.items()]
         return "\n".join(lines)
 
 
-def _waypoints_text(robot: RobotFigures) -> str:
-    if not robot.waypoints_planned:
-        return ""
-    return f"{robot.waypoints_visited} of {robot.waypoints_planned} waypoints, "
-
-
-def _battery_text(robot: RobotFigures) -> str:
-    return "" if robot.battery_used is None else f", {100 * robot.battery_used:.0f} % of battery"
+def _scheduler_text(summary: FlightSummary) -> str:
+    counts = ", ".join(f"{count} {action}" for action, count in summary.decisions.items())
+    gained = ", ".join(f"{name} utility {value:.0f}" for name, value in summary.utility.items())
+    return f"analytics scheduler: {counts}{'; ' if gained else ''}{gained}"
 
 
 def _latency(latency: StreamLatency) -> LatencyFigures:

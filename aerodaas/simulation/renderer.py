@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from panda3d.core import (
     Camera,
     FrameBufferProperties,
@@ -17,6 +17,7 @@ from panda3d.core import (
     GraphicsPipe,
     GraphicsPipeSelection,
     LMatrix4f,
+    NodePath,
     PerspectiveLens,
     Texture,
     WindowProperties,
@@ -68,18 +69,20 @@ class Renderer:
                 "reinstall it with `pip install --force-reinstall panda3d`"
             )
         # An engine of its own: rendering one camera must not render all others of the process.
+        self._pipe = pipe
         self._engine = GraphicsEngine(pipe)
         self._scene = Scene(world, looks)
         self._eye = self._scene.root.attach_new_node(Camera("eye", _lens(camera)))
-        self._buffer, self._pixels = self._open(pipe)
+        self._pixels = self._open(self._eye, HAZE)
 
-    def _open(self, pipe: GraphicsPipe) -> tuple[GraphicsOutput, Texture]:
+    def _open(self, eye: NodePath, clear: ArrayLike) -> Texture:
+        """Open a buffer for what `eye` sees and return the texture that it fills."""
         camera = self._camera
         properties = FrameBufferProperties()
         properties.set_rgb_color(True)
         properties.set_depth_bits(24)
         buffer = self._engine.make_output(
-            pipe,
+            self._pipe,
             "camera",
             0,
             properties,
@@ -90,11 +93,11 @@ class Renderer:
             raise SourceError(
                 f"cannot render {camera.width} x {camera.height} pixels; ask for fewer"
             )
-        buffer.set_clear_color((*HAZE, 1.0))
+        buffer.set_clear_color((*np.asarray(clear, dtype=float).tolist(), 1.0))
         pixels = Texture("pixels")
         buffer.add_render_texture(pixels, GraphicsOutput.RTM_copy_ram)
-        buffer.make_display_region().set_camera(self._eye)
-        return buffer, pixels
+        buffer.make_display_region().set_camera(eye)
+        return pixels
 
     def render(self, time: float, pose: Odometry) -> NDArray[np.uint8]:
         """Picture (height, width, 3) in BGR at `time` seconds from a vehicle at `pose`."""

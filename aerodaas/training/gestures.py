@@ -8,13 +8,14 @@ gives the same file. It needs ``pip install 'aerodaas[training]'``.
 
 from __future__ import annotations
 
-import argparse
+import importlib.util
 import math
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 import onnxruntime as ort
+import typer
 from numpy.typing import NDArray
 
 from aerodaas.analytics.gestures import GESTURE_MODEL, GESTURES, POINTS, normalised
@@ -59,7 +60,7 @@ def sample_keypoints(rng: np.random.Generator, gesture: str) -> NDArray[np.float
             found = found[_MIRRORED]
         kept = inside & (rng.random(POINTS) >= rng.uniform(0, 0.25))
         found[:, 2] = np.where(kept, rng.uniform(0.4, 1.0, POINTS), 0.1)
-        return np.nan_to_num(found).astype(np.float32)
+        return np.nan_to_num(found.astype(np.float32))
 
 
 def draw(seed: int, count: int) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
@@ -164,18 +165,20 @@ like one that sits, and a follower two metres behind a person has the feet out o
 """
 
 
-def main(arguments: list[str] | None = None) -> None:
-    """Train and write the model and its card."""
-    parser = argparse.ArgumentParser(prog="python -m aerodaas.training gestures")
-    parser.add_argument("--seed", type=int, default=7)
-    parser.add_argument("--bodies", type=int, default=3000, help="of each gesture")
-    parser.add_argument("--out", type=Path, default=GESTURE_MODEL)
-    words = parser.parse_args(arguments)
-    content, figures = train(words.seed, words.bodies)
-    words.out.write_bytes(content)
-    words.out.with_suffix(".md").write_text(_card(figures), encoding="utf-8")
-    print(_card(figures))  # noqa: T201 - a command
-
-
-if __name__ == "__main__":
-    main()
+def main(
+    seed: Annotated[int, typer.Option(help="Seed of the bodies.")] = 7,
+    bodies: Annotated[int, typer.Option(help="Bodies of each gesture.", min=100)] = 3000,
+    out: Annotated[Path, typer.Option(help="File of the model; its card lies beside.")] = (
+        GESTURE_MODEL
+    ),
+) -> None:
+    """Train the classifier of gestures, write it, and print its card."""
+    missing = [name for name in ("sklearn", "skl2onnx") if importlib.util.find_spec(name) is None]
+    if missing:
+        typer.echo("training needs scikit-learn and skl2onnx: pip install 'aerodaas[training]'")
+        raise typer.Exit(1)
+    content, figures = train(seed, bodies)
+    card = _card(figures)
+    out.write_bytes(content)
+    out.with_suffix(".md").write_text(card, encoding="utf-8")
+    typer.echo(card)

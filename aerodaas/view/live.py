@@ -92,6 +92,8 @@ class MissionView:
         rule = Rule(style="dim", characters="-" if ascii_only else "─")
         if snapshot.streams:
             parts += [rule, streams_panel(snapshot.streams)]
+        if snapshot.scheduler:
+            parts += [rule, Text(snapshot.scheduler)]
         if snapshot.alerts:
             parts += [rule, alerts_panel(snapshot.alerts)]
         return Panel(
@@ -117,6 +119,8 @@ class MissionView:
     def _print(self, snapshot: Snapshot) -> None:
         for robot in snapshot.robots:
             self._console.print(robot_line(snapshot, robot), markup=False, soft_wrap=True)
+        if snapshot.scheduler:
+            self._console.print(snapshot.scheduler, markup=False, soft_wrap=True)
         for alert in snapshot.alerts[self._alerts :]:
             self._console.print(f"alert: {alert}", markup=False, soft_wrap=True)
         self._alerts = max(self._alerts, len(snapshot.alerts))

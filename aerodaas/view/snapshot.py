@@ -46,6 +46,8 @@ class Snapshot:
     streams: tuple[StreamSnapshot, ...] = ()
     alerts: tuple[str, ...] = ()
     """One line each, newest last; the view shows the last few."""
+    scheduler: str = ""
+    """How the analytics scheduler fares, one line; empty without one."""
     speed: float | None = None
     """Mission seconds per wall second; None: worked out from the two times."""
 

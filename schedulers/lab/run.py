@@ -24,7 +24,8 @@ __all__ = ["LabResult", "Spread", "run_lab"]
 
 Wanted = str | type[AnalyticsScheduler] | AnalyticsScheduler
 Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
-"""Something like `map`, such as `Pool.imap` of multiprocessing or of ray.util.multiprocessing."""
+"""Something like `map`, such as `Pool.imap` of multiprocessing, or
+`aerodaas.actors.spread.spread_over(address)` for a Ray cluster."""
 
 
 @dataclass(frozen=True, slots=True)

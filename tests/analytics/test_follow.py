@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 import pickle
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from follow_world import TELLO, Path, Snapshot, World
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.analytics.follow import FollowAnalytics
@@ -22,6 +23,7 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.data import Alert, Detection, Detections, Frame, Header, Odometry
 from aerodaas.errors import ConfigError, GraphError
 from aerodaas.graph import AeroStreamData, Graph, Node
+from aerodaas.navigation.sighting import sight
 from aerodaas.waypoints import AeroNavigation
 
 
@@ -221,3 +223,118 @@ def test_lengths_that_cannot_be_are_refused(length: float) -> None:
     """A distance of nothing would fly into the target."""
     with pytest.raises(ConfigError, match="distance must be above 0 m"):
         FollowAnalytics(distance=length)
+
+
+def car_world(target: Path, hidden: Callable[[float], bool] = lambda _: False) -> World:
+    """A car seen from behind."""
+    return World(
+        target,
+        np.array([0.0, 0.0, 2.5]),
+        target_height=1.5,
+        target_width=1.8,
+        label="car",
+        noise=0.01,
+        rate=5.0,
+        hidden=hidden,
+    )
+
+
+def test_a_car_that_leaves_the_area_is_given_up() -> None:
+    """At once, with one alert; it is not followed again out there, so that a survey resumes."""
+    world = car_world(lambda time: (9 + 0.5 * time, 0.0))
+    follow = CarFollowAnalytics(area=[(-5, -5), (15, -5), (15, 5), (-5, 5)])
+    world.run(follow, 40)
+    out = next(i for i, command in enumerate(world.commands) if i > 20 and command is None)
+    assert world.commands[out:] == [None] * (len(world.commands) - out)
+    assert 9 + 0.5 * out / world.rate == pytest.approx(15, abs=1.5)
+    assert [alert.kind for alert in world.alerts] == ["target_left_area"]
+
+
+def test_a_car_that_turns_away_is_given_up_within_seconds() -> None:
+    """Sooner than a person, so that the survey resumes."""
+    world = car_world(lambda time: (9 + 0.5 * time, 0.0), hidden=lambda time: time > 15)
+    world.run(CarFollowAnalytics(), 26)
+    assert world.commands[round(14 * world.rate)] is not None
+    assert world.commands[round(23.5 * world.rate) :] == [None] * round(2.5 * world.rate)
+
+
+def test_a_car_from_its_side_is_no_nearer_than_from_behind() -> None:
+    """Its length does not pass for a width that is near."""
+    side = World(
+        lambda _: (9.0, 0.0),
+        np.array([0.0, 0.0, 2.5]),
+        target_height=1.5,
+        target_width=4.2,
+        label="car",
+    )
+    boxes = side.look(np.random.default_rng(0))
+    found = sight(boxes[0], boxes, CarFollowAnalytics().size)
+    assert found is not None
+    assert found.distance == pytest.approx(9.0, rel=0.05)
+
+
+@given(
+    gaps=st.lists(st.tuples(st.floats(5, 40), st.floats(0.2, 6.0)), max_size=4),
+    speed=st.floats(0.0, 1.0),
+    seed=st.integers(0, 1000),
+)
+@settings(max_examples=10, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+def test_it_never_runs_away(gaps: list[tuple[float, float]], speed: float, seed: int) -> None:
+    """Whenever the target is lost and found: never near, never fast, and at rest at the end."""
+
+    def hidden(time: float) -> bool:
+        return time > 45 or any(start < time < start + length for start, length in gaps)
+
+    world = World(circle(speed), np.array([0.0, 0.0, 1.5]), rate=5.0, noise=0.01, hidden=hidden)
+    follow = PersonFollowAnalytics()
+    distances = world.run(follow, 66, seed)
+    limits = follow.controller.limits
+    for command in world.commands:
+        if command is not None:
+            assert np.hypot(command.forward, command.left) <= limits.forward + 1e-9
+            assert abs(command.yaw_rate) <= limits.yaw_rate + 1e-9
+    assert min(distances[: round(45 * world.rate)]) > 1.0
+    assert world.commands[-1] is None
+    assert np.linalg.norm(world.velocity) < 0.01
+
+
+@pytest.mark.parametrize("area", [[], [(0, 0), (1, 1)], [(0, 0), (1, 0), (math.nan, 1)]])
+def test_an_area_that_is_none_is_refused(area: list[tuple[float, float]]) -> None:
+    """At build time."""
+    with pytest.raises(ConfigError, match="three or more corners"):
+        CarFollowAnalytics(area=area)
+
+
+class Shaken(World):
+    """A drone that pitches at random: the picture jumps, and the odometry says why."""
+
+    def look(self, random: np.random.Generator) -> Detections:
+        """Shift the box as the pitch does."""
+        seen = super().look(random)
+        pitch = float(random.uniform(-0.16, 0.16))
+        up = self.camera.fy * math.tan(pitch)
+        items = []
+        for item in seen:
+            left, top, right, bottom = item.box
+            top, bottom = np.clip([top - up, bottom - up], 0, 720).tolist()
+            items.append(replace(item, box=(left, top, right, bottom)))
+        assert seen.odometry is not None
+        pose = replace(seen.odometry, pitch=pitch)
+        return replace(seen, items=tuple(items), odometry=pose)
+
+
+def test_a_target_that_loses_its_track_is_found_where_it_stands() -> None:
+    """Boxes that jump more than a tracker of pictures can know still belong to one person."""
+    world = Shaken(
+        circle(0.5),
+        np.array([0.0, 0.0, 1.5]),
+        target_height=0.65,
+        target_width=0.42,
+        target_base=0.9,
+        label="vest",
+        rate=8.0,
+        noise=0.02,
+    )
+    distances = world.run(VipFollowAnalytics(), 30)
+    assert world.alerts == []
+    assert np.mean(np.abs(np.array(distances[80:]) - 2.0) < 0.4) > 0.9

@@ -107,6 +107,7 @@ class Site:
             self.time += dt
 
 
+@pytest.mark.slow
 @given(
     distance=st.floats(15.0, 60.0),
     bearing=st.floats(-0.5, 0.5),

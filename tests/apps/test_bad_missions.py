@@ -69,9 +69,10 @@ def blind_model(path: Path) -> Path:
     ],
 )
 def test_a_broken_world_is_told_before_anything_starts(
-    flyer: Flyer, content: str | None, told: str
+    tmp_path: Path, content: str | None, told: str
 ) -> None:
-    """The file and the place in it are named, and no recording is begun."""
+    """The file and the place in it are named; neither Ray nor a recording is begun."""
+    flyer = Flyer(tmp_path)
     world = flyer.folder / "world.json"
     if content is not None:
         world.write_text(content)

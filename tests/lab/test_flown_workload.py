@@ -12,7 +12,11 @@ from aerodaas import Environment
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.commands.flown_workload import flown_workload
 from aerodaas.commands.lab import app
+from aerodaas.config import TaskConfig
 from aerodaas.errors import RecordingError
+from aerodaas.recording.flight import Flight
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.summary import FlightSummary
 from aerodaas.schedulers.analytics.base import MILLISECOND
 from aerodaas.schedulers.lab import run_lab
 
@@ -23,7 +27,6 @@ _CONTENT = {
     "schedulers": {
         "analytics": "ec_edf",
         "tasks": {
-            "quick": {"benefit": 10, "edge_time": 60, "cloud_time": 250, "deadline": 700},
             "slow": {"benefit": 30, "edge_time": 330, "cloud_time": 450, "cloud_cost": 5,
                      "qoe_bonus": 7, "qoe_share": 0.5, "qoe_window": 4},
         },
@@ -35,7 +38,10 @@ _CONTENT = {
 
 def _watch_with_two(env: Environment) -> None:
     drone = env.get_robot_by_id("drone")
-    for model in (SyntheticAnalytics("quick", 50, 200), SyntheticAnalytics("slow", 300, 400)):
+    quick, slow = SyntheticAnalytics("quick", 50, 200), SyntheticAnalytics("slow", 300, 400)
+    quick.task = TaskConfig(benefit=10, edge_time=60, cloud_time=250, deadline=700)
+    slow.task = TaskConfig(benefit=1000)  # the environment file knows better
+    for model in (quick, slow):
         model.deploy(env.get_compute_resource_by_id("edge"))
         for camera in ("camera0", "camera1"):
             model.analyse(drone.get_sensor_by_id(camera).get_data_stream())
@@ -52,18 +58,24 @@ def test_a_recorded_flight_becomes_a_workload(flyer: Flyer) -> None:
     assert resources.cloud_slots == 5
     assert 0 <= values["tasks"] - len(workload.arrivals) <= 2
     assert {one.source for one in workload.arrivals} == {"drone/camera0", "drone/camera1"}
+    quick = workload.models["drone/quick"]
+    assert (quick.benefit, quick.deadline) == (10, 700 * MILLISECOND)
     slow = workload.models["drone/slow"]
-    assert (slow.edge_time, slow.cloud_cost) == (330 * MILLISECOND, 5)
+    assert (slow.benefit, slow.edge_time, slow.cloud_cost) == (30, 330 * MILLISECOND, 5)
     assert slow.qoe is not None
     assert values["qoe_windows"]["drone/slow"][1] >= 1
     for one in workload.arrivals:
         assert one.edge_time is not None
-        least = 300 if one.model == "drone/slow" else 50
-        assert least * MILLISECOND <= one.edge_time < 1000 * MILLISECOND
+        assert one.edge_time > (150 if one.model == "drone/slow" else 25) * MILLISECOND
     tasks = workload.arrivals
     assert any(one.cloud_time and one.cloud_time >= 400 * MILLISECOND for one in tasks)
     figures = run_lab(workload, ["ec_edf", "margin"], [0], jobs=1).scores["ec_edf"][0]
     assert figures.tasks == len(workload.arrivals)
+    with Recording.open(run.recording) as recording:
+        summary = FlightSummary.of(recording, Flight.read(recording))
+    assert summary.utility == {"QoS": values["qos_total"], "QoE": values["qoe_total"]}
+    why = [count for said, count in summary.reasons.items() if said.startswith("cloud: ")]
+    assert sum(why) == summary.decisions["cloud"] > 0
     arguments = ["run", "--from", str(run.recording), "-s", "ec_edf,dems", "--seeds", "1"]
     outcome = CliRunner().invoke(app, [*arguments, "--jobs", "1"], env={"COLUMNS": "220"})
     assert outcome.exit_code == 0, outcome.output

@@ -41,6 +41,7 @@ def test_summary_tells_the_flight(recorded: Path, tmp_path: Path) -> None:
     assert written["frames"] == {"tello/camera": 106}
     assert written["drops"] == {"tello/camera": 4}
     assert written["decisions"] == {"edge": 106}
+    assert written["reasons"] == {"edge: in time": 106}
     assert written["provenance"]["seed"] == "7"
     detector = written["latencies"]["tello/detector"]
     assert 15 < detector["median_ms"] < detector["p99_ms"] < 60
@@ -48,6 +49,8 @@ def test_summary_tells_the_flight(recorded: Path, tmp_path: Path) -> None:
     text = files.summary_text.read_text()
     assert "tello: landed: mission complete; 4 of 4 waypoints, 43.0 m in 105.0 s" in text
     assert "dropped 4 of tello/camera" in text
+    assert "analytics scheduler: 106 edge" in text
+    assert "Why the scheduler decided so" in files.page.read_text()
 
 
 def test_pictures_show_something(recorded: Path, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -54,7 +55,8 @@ def drawn(width: int, encoding: str = "utf-8") -> str:
     )
     with MissionView(console) as view:
         for time in range(6):
-            view.update(snapshot(float(time), alerts=("battery_low: at 20 %",)))
+            now = snapshot(float(time), alerts=("battery_low: at 20 %",))
+            view.update(replace(now, scheduler="Dems: 93 % of 120 in time"))
     console.file.flush()
     return raw.getvalue().decode(encoding)
 
@@ -72,6 +74,7 @@ def test_panel_shows_what_matters(width: int) -> None:
         "50 %",
         "1 of 3 waypoints",
         "14.9",
+        "Dems: 93 % of 120 in time",
         "battery_low: at 20 %",
         "mission 0:05.0",
         "10.0x real time",

@@ -22,7 +22,7 @@ from aerodaas.drivers.mavlink.telemetry import Telemetry
 from aerodaas.errors import VehicleError
 from aerodaas.geometry import GeodeticOrigin, Vector, ned_to_enu
 
-__all__ = ["Connection", "establish"]
+__all__ = ["Connection", "establish", "global_origin"]
 
 _log = logging.getLogger(__name__)
 
@@ -65,7 +65,7 @@ def establish(
     if not telemetry.armed:
         _see_to_failsafes(link, autopilot, settings, robot.id)
         if settings.fence != "off":
-            origin = _origin(telemetry, frame)
+            origin = global_origin(telemetry, frame)
             upload_fence(link, autopilot, robot.limits.geofence, origin, settings.fence)
     _log.info("%s: %s %s, system %d", robot.id, autopilot.name, telemetry.software, link.target[0])
     return Connection(link, autopilot, commander, frame, link.target)
@@ -146,7 +146,7 @@ def _armed_at(telemetry: Telemetry, pause: Callable[[], None]) -> Vector:
     return telemetry.home
 
 
-def _origin(telemetry: Telemetry, frame: LocalFrame) -> GeodeticOrigin:
+def global_origin(telemetry: Telemetry, frame: LocalFrame) -> GeodeticOrigin:
     """Where zero of our local frame lies on the earth, by the autopilot's own estimate."""
     assert telemetry.place is not None  # noqa: S101 - it is ready
     assert telemetry.position is not None  # noqa: S101 - the same

@@ -17,7 +17,7 @@ from aerodaas.recording.plots.trajectory import profile_figure, trajectory_figur
 
 __all__ = ["Plot", "plots_of"]
 
-_DPI = 150
+_DPI = 200
 
 
 class Plot(NamedTuple):

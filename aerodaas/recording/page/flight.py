@@ -24,12 +24,11 @@ def flight_page(
 ) -> str:
     """All of a flight in one HTML file."""
     parts = [section(plot.title, picture(plot.png, plot.description)) for plot in plots]
+    parts += sections(summary)
     if moments:
         shown = "".join(_moment(moment) for moment in moments)
         parts.append(section("Key moments", f'<div class="moments">{shown}</div>', wide=True))
-    return document(
-        summary.title, _head(summary), [*parts, *sections(summary)], origin_line(summary)
-    )
+    return document(summary.title, _head(summary), parts, origin_line(summary))
 
 
 def origin_line(summary: FlightSummary) -> str:
@@ -40,9 +39,9 @@ def origin_line(summary: FlightSummary) -> str:
 
 
 def _head(summary: FlightSummary) -> list[str]:
-    head = [
-        paragraph(f"{name}: {robot.outcome}", "outcome") for name, robot in summary.robots.items()
-    ]
+    head = [paragraph(f"Began {summary.begun}")] if summary.begun else []
+    for name, robot in summary.robots.items():
+        head += [paragraph(f"{name}: {robot.outcome}", "outcome"), paragraph(robot.course)]
     if not summary.complete:
         head.append(
             paragraph(

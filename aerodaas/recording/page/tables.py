@@ -33,6 +33,7 @@ def figures(summary: FlightSummary) -> dict[str, object]:
             found[f"{camera}: frames per second"] = count / summary.duration_s
     found |= {f"seen: {label}": count for label, count in summary.detections.items()}
     found |= {f"scheduler: {action}": count for action, count in summary.decisions.items()}
+    found |= {f"scheduler: {name} utility": gained for name, gained in summary.utility.items()}
     found["alerts"] = len(summary.alerts)
     found["dropped"] = sum(summary.drops.values())
     return found
@@ -46,8 +47,12 @@ def sections(summary: FlightSummary) -> Iterator[str]:
             (stream, it.count, it.median_ms, it.p99_ms, it.overhead_ms)
             for stream, it in summary.latencies.items()
         ]
-        head = ["stream", "messages", "median (ms)", "99th perc. (ms)", "overhead (ms)"]
-        yield section("Latency since capture", table(head, rows), wide=True)
+        head = ["stream", "count", "median (ms)", "99th perc.", "overhead"]
+        yield section("Latency since capture", table(head, rows))
+    if summary.reasons:
+        why = [(*said.split(": ", 1), count) for said, count in summary.reasons.items()]
+        head = ["decision or outcome", "reason", "tasks"]
+        yield section("Why the scheduler decided so", table(head, why), wide=True)
     if summary.alerts:
         yield section("Alerts", table(["at (s)", "kind", "text"], _alerts(summary)))
     if summary.drops:

@@ -25,8 +25,8 @@ _COLOURS = {"wait": "sky", "work": "blue", "total": "orange", "overhead": "yello
 _MEANINGS = {
     "wait": "on the way to an actor",
     "work": "in an actor",
-    "total": "end to end, since capture",
-    "overhead": "overhead: end to end without the work",
+    "total": "since capture",
+    "overhead": "of that, without the work",
 }
 
 Floats = NDArray[np.float64]
@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 def latency_figure(flight: Flight) -> Figure:
     """A violin a row, on a logarithmic scale, with the median and the 99th percentile written."""
     rows = _rows(flight)
-    figure = new_figure(1.5 + 0.5 * len(rows))
+    figure = new_figure(1.5 + 0.4 * len(rows))
     axes = figure.add_subplot()
     highest = -np.inf
     for place, (_, kind, values) in enumerate(rows):
@@ -57,19 +57,18 @@ def latency_figure(flight: Flight) -> Figure:
     low, _ = axes.get_xlim()
     for place, (_, _, values) in enumerate(rows):
         median, late = np.percentile(values, [50, 99])
-        axes.text(highest, place, f"   {_short(median)} ({_short(late)})", va="center", fontsize=10)
+        axes.text(highest, place, f"   {_short(median)} ({_short(late)})", va="center", fontsize=9)
     # Room for the figures at the right.
-    axes.set_xlim(low, highest + 0.38 * (highest - low) + 0.1)
-    axes.set_yticks(range(len(rows)), [label for label, _, _ in rows])
+    axes.set_xlim(low, highest + 0.62 * (highest - low) + 0.1)
+    axes.set_yticks(range(len(rows)), [label for label, _, _ in rows], fontsize=9)
     axes.invert_yaxis()
-    axes.set_xlabel("Milliseconds (log scale); at the right: median (99th percentile)")
+    axes.set_xlabel("Milliseconds; median (99th percentile)")
     log_milliseconds(axes)
     grid(axes, "x")
     kinds = dict.fromkeys(kind for _, kind, _ in rows)
     legend(
         figure,
         [Patch(color=OKABE_ITO[_COLOURS[kind]], label=_MEANINGS[kind]) for kind in kinds],
-        columns=2,
     )
     return figure
 

@@ -16,7 +16,7 @@ _MOST_LINES = 10
 
 def loads_figure(flight: Flight) -> Figure:
     """Cores and memory of each actor over mission time; the busiest ten of them."""
-    figure = new_figure(5.0)
+    figure = new_figure(4.6)
     cores, memory = figure.subplots(2, 1, sharex=True)
     busiest = sorted(flight.loads, key=lambda name: -sum(flight.loads[name].cpu))[:_MOST_LINES]
     lines: list[Artist] = []
@@ -34,7 +34,17 @@ def loads_figure(flight: Flight) -> Figure:
             color=OKABE_ITO["grey"],
             linestyle=("-", "--", ":")[number % 3],
             linewidth=1.2,
-            label=f"{label} (right scale)",
+            label=f"{label} (right)",
+        )
+        lines.append(line)
+    for number, (name, gpu) in enumerate(flight.gpus.items()):
+        (line,) = share.plot(
+            gpu.time,
+            [100 * busy for busy in gpu.cpu],
+            color="black",
+            linestyle=("-.", ":", "--")[number % 3],
+            linewidth=1.2,
+            label=f"GPU {name if len(flight.machines) > 1 else name.rpartition(' ')[2]} (right)",
         )
         lines.append(line)
     share.set(ylim=(0, 105), ylabel="Whole machine (%)")
@@ -44,5 +54,5 @@ def loads_figure(flight: Flight) -> Figure:
     memory.set(ylabel="Memory (MB)", xlabel="Mission time (s)", ylim=(0, None))
     for axes in (cores, memory):
         grid(axes, "y")
-    legend(figure, lines, columns=2)
+    legend(figure, lines)
     return figure

@@ -22,9 +22,11 @@ _LOOKS = {
     "late": ("orange", "\\\\"),
     "failed": ("black", ""),
     "timeout": ("purple", ".."),
+    "dropped": ("vermilion", ".."),
+    "retry": ("yellow", ""),
 }
 """Colour and hatching of each action; hatching tells them apart in black and white."""
-_DECISIONS = frozenset({"edge", "cloud", "drop"})
+_DECISIONS = frozenset({"edge", "cloud", "drop", "retry"})
 _LEAST_SHARE = 0.08
 
 

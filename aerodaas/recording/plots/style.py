@@ -29,8 +29,8 @@ __all__ = [
     "words",
 ]
 
-WIDTH = 6.4
-"""Inches; at this width 10 points stay readable on a phone."""
+WIDTH = 4.8
+"""Inches; a phone shows less than four, on which 10 points stay readable."""
 
 CYCLE: tuple[tuple[str, str], ...] = tuple(
     (OKABE_ITO[colour], line)
@@ -55,10 +55,17 @@ def grid(axes: Axes, axis: str = "both") -> None:
     axes.set_axisbelow(True)
 
 
-def legend(figure: Figure, handles: list[Artist], columns: int = 3) -> None:
+def legend(figure: Figure, handles: list[Artist], columns: int = 2) -> None:
     """A legend below the plot."""
     if handles:
-        figure.legend(handles=handles, loc="outside lower center", ncols=columns, frameon=False)
+        figure.legend(
+            handles=handles,
+            loc="outside lower center",
+            ncols=columns,
+            frameon=False,
+            fontsize=9,
+            columnspacing=1.2,
+        )
 
 
 def words(name: str) -> str:
@@ -102,7 +109,7 @@ def name_states(axes: Axes, robot: RobotFlight) -> None:
             words(band.state),
             transform=axes.get_xaxis_transform(),
             ha="center",
-            fontsize=9,
+            fontsize=8,
         )
 
 

@@ -24,7 +24,7 @@ def timeline_figure(flight: Flight) -> Figure:
     """Height and battery over mission time, above the states; two rows for each robot."""
     robots = {name: robot for name, robot in flight.robots.items() if robot.states}
     rows = max(1, len(robots))
-    figure = new_figure(0.8 + 3.4 * rows)
+    figure = new_figure(1.0 + 3.0 * rows)
     both = figure.subplots(2 * rows, 1, sharex=True, squeeze=False)[:, 0]
     handles: dict[str, Artist] = {}
     for (name, robot), height, charge in zip(robots.items(), both[::2], both[1::2], strict=False):
@@ -41,7 +41,7 @@ def timeline_figure(flight: Flight) -> Figure:
         name_states(height, robot)
         _mark_alerts(height, flight)
     both[-1].set_xlabel("Mission time (s)")
-    legend(figure, list(handles.values()), columns=3)
+    legend(figure, list(handles.values()))
     return figure
 
 

@@ -37,7 +37,7 @@ def trajectory_figure(flight: Flight) -> Figure:
     A ring around a waypoint shows a state in which the drone stayed there. Small marks beside
     the path show where the drone was when it saw something.
     """
-    figure = new_figure(6.6)
+    figure = new_figure(5.4)
     axes = figure.add_subplot()
     states: dict[str, None] = {}
     seen: list[Artist] = []
@@ -59,14 +59,14 @@ def trajectory_figure(flight: Flight) -> Figure:
     axes.set(xlabel="East of home (m)", ylabel="North of home (m)")
     axes.margins(0.08)
     grid(axes)
-    legend(figure, [*_state_lines(states), *marks, *seen], columns=2)
+    legend(figure, [*_state_lines(states), *marks, *seen])
     return figure
 
 
 def profile_figure(flight: Flight) -> Figure:
     """The flight from the side: height over the way flown, one row for each robot."""
     robots = {name: robot for name, robot in flight.robots.items() if robot.states}
-    figure = new_figure(0.9 + 2.4 * max(1, len(robots)))
+    figure = new_figure(1.1 + 1.9 * max(1, len(robots)))
     rows = figure.subplots(max(1, len(robots)), 1, squeeze=False)[:, 0]
     states: dict[str, None] = {}
     for (name, robot), axes in zip(robots.items(), rows, strict=False):
@@ -87,7 +87,7 @@ def profile_figure(flight: Flight) -> Figure:
         axes.margins(x=0.02, y=0.22)
         grid(axes)
     rows[-1].set_xlabel("Way flown over the ground (m)")
-    legend(figure, [*_state_lines(states), *_visited_mark(flight)], columns=3)
+    legend(figure, [*_state_lines(states), *_visited_mark(flight)])
     return figure
 
 

@@ -72,10 +72,10 @@ class CarFigure:
         rng = rng_of(thing)
         colour = np.array(spec.colour or _COLOURS[rng.integers(len(_COLOURS))])
         self.node = parent.attach_new_node(spec.id)
-        self.node.set_tag(LABEL, f"{spec.id}/car")
         mesh = merged([*_body(colour), *_cabin(colour, shape.cabin), *_wheels(), *_lamps()])
         mesh = mesh.moved((0, 0, 0), scale=shape.scale)
-        attach(self.node, "car", mesh.lit(_ABOVE), palette["plain"], both_sides=True)
+        body = attach(self.node, "car", mesh.lit(_ABOVE), palette["plain"], both_sides=True)
+        body.set_tag(LABEL, f"{spec.id}/car")
 
     def pose(self, state: State) -> None:
         """Put the car where `state` says."""

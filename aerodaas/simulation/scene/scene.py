@@ -31,6 +31,11 @@ __all__ = ["Looks", "Scene"]
 class Looks:
     """What the seed gives to things of one kind; another may be more colourful."""
 
+    def palette(self, world: World) -> Palette:
+        """Textures of a world."""
+        del world
+        return Palette()
+
     def outfit(self, thing: Thing) -> Outfit:
         """Dress a person."""
         if not isinstance(thing.spec, Person):
@@ -55,17 +60,17 @@ class Scene:
         """Build everything that stands, and the figures of what moves."""
         self.looks = looks or Looks()
         self.root = NodePath("world")
-        self._palette = Palette()
+        self.palette = self.looks.palette(world)
         self._light = Light.draw(world.scenario.sky, world.seed)
         self._sky = sky_dome(self.root, self._light)
-        add_ground(self.root, world.scenario.ground.surface, self._palette, self._light)
+        add_ground(self.root, world.scenario.ground.surface, self.palette, self._light)
         self._people: list[tuple[Thing, PersonFigure, NodePath]] = []
         self._cars: list[tuple[Thing, CarFigure]] = []
         for thing in world.things:
             self._add(thing)
 
     def _add(self, thing: Thing) -> None:
-        root, palette, light, spec = self.root, self._palette, self._light, thing.spec
+        root, palette, light, spec = self.root, self.palette, self._light, thing.spec
         if isinstance(spec, Road):
             add_road(root, spec, palette, light)
         elif isinstance(spec, CropRows):

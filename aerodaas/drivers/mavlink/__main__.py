@@ -1,0 +1,74 @@
+"""Look at a vehicle: `python -m aerodaas.drivers.mavlink udpin:0.0.0.0:14540`."""
+
+from __future__ import annotations
+
+import time
+from typing import Annotated
+
+import typer
+
+from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.drivers.mavlink.connecting import Connection
+from aerodaas.drivers.mavlink.parameters import Parameters, unsafe_parameters
+from aerodaas.drivers.mavlink.settings import mavlink_settings
+from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
+from aerodaas.errors import AeroDaaSError
+
+_SETTLING = 2.0
+"""Seconds in which the slowest of its messages have come."""
+
+
+def main(
+    url: Annotated[str, typer.Argument(help="As in the environment file.")] = "udpin:0.0.0.0:14540",
+    system: Annotated[int | None, typer.Option(help="The vehicle's system id.")] = None,
+    timeout: Annotated[float, typer.Option(help="Seconds to wait for its HEARTBEAT.")] = 10.0,
+    *,
+    set_failsafes: Annotated[
+        bool, typer.Option("--set-failsafes", help="Set the failsafes that are found unsafe.")
+    ] = False,
+) -> None:
+    """Connect, say what the vehicle is, what it objects to and what leaves it unprotected."""
+    settings = {"url": url, "system": system, "failsafes": "ignore"}
+    robot = RobotConfig(id="vehicle", driver="mavlink", settings=settings)
+    vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
+    try:
+        vehicle.connect(timeout)
+        time.sleep(_SETTLING)
+        _tell(vehicle)
+        _judge(vehicle.connection, robot, fix=set_failsafes)
+    except AeroDaaSError as error:
+        typer.echo(error, err=True)
+        raise typer.Exit(error.exit_code) from None
+    finally:
+        vehicle.close()
+
+
+def _tell(vehicle: MavlinkVehicle) -> None:
+    connection, state = vehicle.connection, vehicle.read()
+    typer.echo(
+        f"{connection.autopilot.name} {vehicle.telemetry.software}, system {connection.target[0]}: "
+        f"{state.mode.value}, battery {state.battery.fraction:.0%}"
+    )
+    if state.gps is not None:
+        gps = state.gps
+        place = f"{gps.latitude:.6f}, {gps.longitude:.6f}"
+        typer.echo(f"at {place}, {gps.satellites} satellites")
+    for reason in vehicle.preflight():
+        typer.echo(f"would not take off: {reason}")
+
+
+def _judge(connection: Connection, robot: RobotConfig, *, fix: bool) -> None:
+    parameters = Parameters(connection.link, connection.autopilot)
+    found = unsafe_parameters(parameters, connection.autopilot, mavlink_settings(robot))
+    for unsafe in found:
+        if fix:
+            parameters.set(unsafe.failsafe.name, unsafe.failsafe.safe)
+        typer.echo(f"{unsafe.text}{': set' if fix else ''}")
+    if not found:
+        typer.echo("failsafes: nothing to complain about")
+    elif not fix:
+        typer.echo("--set-failsafes sets them")
+
+
+if __name__ == "__main__":
+    typer.run(main)

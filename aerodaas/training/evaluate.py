@@ -1,0 +1,124 @@
+"""Figures of an exported model, measured as it will be used: through `OnnxDetector`."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.analytics.models import DETECTOR_CLASSES
+from aerodaas.analytics.onnx.detector import OnnxDetector
+from aerodaas.data import Detections, Frame, Header
+from aerodaas.training.dataset import Sample
+from aerodaas.training.metrics import Floats, Ranking, overlap, similarity
+
+__all__ = ["Sightings", "keypoint_ranking", "milliseconds", "rankings", "sightings"]
+
+_LEAST = 0.01
+"""Score of the weakest detection that counts for average precision."""
+
+_SMALL = 8.0
+"""Pixels: what is narrower or lower in the network's input need not be found."""
+
+_SMALL_PERSON = 20.0
+"""The same for keypoints."""
+
+_TIMED_RUNS = 200
+
+
+def _opened(model: Path, min_score: float, classes: Sequence[str] | None = None) -> OnnxDetector:
+    detector = OnnxDetector(model, min_score=min_score, classes=classes, threads=1)
+    detector.open()
+    return detector
+
+
+def _find(detector: OnnxDetector, sample: Sample) -> Detections:
+    return detector.detect([Frame(Header(0, 0, "rendered"), sample.image)])[0]
+
+
+def _boxes(found: Detections, label: str) -> tuple[list[float], Floats]:
+    kept = [item for item in found if item.label == label]
+    boxes = np.array([item.box for item in kept], dtype=float).reshape(-1, 4)
+    return [item.score for item in kept], boxes
+
+
+def _large(boxes: Floats, least: float = _SMALL) -> NDArray[np.bool_]:
+    return np.asarray((boxes[:, 2:] - boxes[:, :2]).min(axis=1, initial=np.inf) >= least)
+
+
+def rankings(model: Path, samples: Iterable[Sample]) -> dict[str, Ranking]:
+    """Rank the detections of each class of a detector over labelled pictures."""
+    detector = _opened(model, _LEAST)
+    result = {label: Ranking([], []) for label in detector.names}
+    for sample in samples:
+        found = _find(detector, sample)
+        for label, ranking in result.items():
+            truth = sample.boxes[sample.kinds == DETECTOR_CLASSES.index(label)].astype(float)
+            scores, boxes = _boxes(found, label)
+            ranking.add(np.array(scores), overlap(boxes, truth), _large(truth))
+    return result
+
+
+def keypoint_ranking(model: Path, samples: Iterable[Sample]) -> Ranking:
+    """Rank the people that a pose model finds, alike if their keypoints are (COCO's OKS)."""
+    detector = _opened(model, _LEAST)
+    result = Ranking([], [])
+    for sample in samples:
+        people = (sample.kinds == DETECTOR_CLASSES.index("person")) & (
+            sample.keypoints[..., 2].max(axis=1) > 0
+        )
+        boxes = sample.boxes[people].astype(float)
+        truth = sample.keypoints[people].astype(float)
+        found = list(_find(detector, sample))
+        points = np.array([item.keypoints for item in found], dtype=float).reshape(-1, 17, 3)
+        areas = np.prod(boxes[:, 2:] - boxes[:, :2], axis=1)
+        scores = np.array([item.score for item in found])
+        result.add(scores, similarity(points, truth, areas), _large(boxes, _SMALL_PERSON))
+    return result
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """What a detector made of photographs of one known thing each."""
+
+    pictures: int
+    found: int
+    """Pictures in which a box's middle lies on the thing."""
+    false: int
+    """Boxes elsewhere."""
+
+
+def sightings(model: Path, folder: Path, labels: Path, label: str, min_score: float) -> Sightings:
+    """Try photographs in `folder`; `labels` is JSON, {file: [left, top, right, bottom]}."""
+    detector = _opened(model, min_score, [label])
+    found = false = 0
+    truth = json.loads(labels.read_text(encoding="utf-8"))
+    for name, (left, top, right, bottom) in truth.items():
+        image = np.asarray(cv2.imread(str(folder / name)), np.uint8)
+        middles = [
+            ((item.box[0] + item.box[2]) / 2, (item.box[1] + item.box[3]) / 2)
+            for item in detector.detect([Frame(Header(0, 0, name), image)])[0]
+        ]
+        hits = [left <= u <= right and top <= v <= bottom for u, v in middles]
+        found += any(hits)
+        false += len(hits) - sum(hits)
+    return Sightings(len(truth), found, false)
+
+
+def milliseconds(model: Path) -> float:
+    """Median time of one frame of 1280 x 720 pixels, all included, on one core."""
+    detector = _opened(model, 0.3)
+    noise = np.random.default_rng(0).integers(0, 255, (720, 1280, 3), dtype=np.uint8)
+    frame = Frame(Header(0, 0, "noise"), noise)
+    times = []
+    for _ in range(_TIMED_RUNS):
+        begin = time.perf_counter()
+        detector.detect([frame])
+        times.append(time.perf_counter() - begin)
+    return 1000 * float(np.median(times))

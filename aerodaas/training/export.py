@@ -1,0 +1,133 @@
+"""From weights to the ONNX files that ship, laid out as Ultralytics exports are."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import onnx
+import torch
+from torch import Tensor, nn
+from torch.nn.utils.fusion import fuse_conv_bn_eval
+
+from aerodaas.analytics.models import DETECTOR_CLASSES
+from aerodaas.training.labelling import KEYPOINTS
+from aerodaas.training.network import STRIDES, Eyes, anchors_of, decode_boxes, decode_points
+
+__all__ = ["NOMINAL_SCORE", "SIZE", "export_detector", "export_pose"]
+
+SIZE = 320
+"""Pixels of the square input."""
+
+NOMINAL_SCORE = 0.3
+"""What a score at the best threshold is turned into, so that one threshold suits all classes."""
+
+
+class _Detector(nn.Module):
+    """Boxes (centre, size) and class scores, (1, 4 + classes, n)."""
+
+    def __init__(self, network: Eyes, thresholds: list[float]) -> None:
+        super().__init__()
+        self.network = network
+        self.centres, self.strides = anchors_of((SIZE, SIZE))
+        shifts = [_logit(NOMINAL_SCORE) - _logit(threshold) for threshold in thresholds]
+        self.shifts = torch.tensor(shifts)[None, :, None]
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """Find things."""
+        maps = self.network.maps(pixels)
+        raw = _joined(self.network.boxes, maps)
+        logits = _joined(self.network.kinds, maps)
+        boxes = _centred(decode_boxes(raw, self.centres, self.strides))
+        return torch.cat([boxes, (logits + self.shifts).sigmoid()], 1)
+
+
+class _Pose(_Detector):
+    """Boxes, person scores and keypoints, (1, 5 + 51, n)."""
+
+    def forward(self, pixels: Tensor) -> Tensor:
+        """Find people and their joints."""
+        maps = self.network.maps(pixels)
+        raw = _joined(self.network.boxes, maps)
+        person = DETECTOR_CLASSES.index("person")
+        logits = _joined(self.network.kinds, maps)[:, person : person + 1]
+        points = decode_points(_joined(self.network.points, maps), self.centres, self.strides)
+        points = torch.cat([points[:, :, :2], points[:, :, 2:].sigmoid()], 2)
+        boxes = _centred(decode_boxes(raw, self.centres, self.strides))
+        scores = (logits + self.shifts[:, person : person + 1]).sigmoid()
+        return torch.cat([boxes, scores, points.flatten(1, 2)], 1)
+
+
+def _logit(share: float) -> float:
+    return math.log(share / (1 - share))
+
+
+def _joined(heads: nn.ModuleList, maps: list[Tensor]) -> Tensor:
+    return torch.cat([head(m).flatten(2) for head, m in zip(heads, maps, strict=True)], 2)
+
+
+def _centred(boxes: Tensor) -> Tensor:
+    low, high = boxes[:, :2], boxes[:, 2:]
+    return torch.cat([(low + high) / 2, high - low], 1)
+
+
+def _fused(module: nn.Module) -> nn.Module:
+    """The same with each batch norm folded into the convolution before it."""
+    for name, child in module.named_children():
+        if isinstance(child, nn.Sequential) and len(child) > 1 and _foldable(child):
+            folded = fuse_conv_bn_eval(child[0], child[1])
+            setattr(module, name, nn.Sequential(folded, *child[2:]))
+        else:
+            setattr(module, name, _fused(child))
+    return module
+
+
+def _foldable(child: nn.Sequential) -> bool:
+    return isinstance(child[0], nn.Conv2d) and isinstance(child[1], nn.BatchNorm2d)
+
+
+def export_detector(weights: Path, path: Path, thresholds: list[float]) -> None:
+    """Write the detector; `thresholds` are the classes' best scores, made `NOMINAL_SCORE`."""
+    names = dict(enumerate(DETECTOR_CLASSES))
+    _export(_Detector(_load(weights), thresholds), path, {"task": "detect", "names": str(names)})
+
+
+def export_pose(weights: Path, path: Path, thresholds: list[float]) -> None:
+    """Write the pose model, with the person's threshold made `NOMINAL_SCORE`."""
+    pose = {"task": "pose", "names": str({0: "person"}), "kpt_shape": str([KEYPOINTS, 3])}
+    _export(_Pose(_load(weights), thresholds), path, pose)
+
+
+def _load(weights: Path) -> Eyes:
+    network = Eyes()
+    network.load_state_dict(torch.load(weights, weights_only=True, map_location="cpu"))
+    fused = _fused(network.eval())
+    if not isinstance(fused, Eyes):
+        raise TypeError("folding keeps the network's class")
+    return fused
+
+
+def _export(model: nn.Module, path: Path, metadata: dict[str, str]) -> None:
+    picture = torch.zeros(1, 3, SIZE, SIZE)
+    torch.onnx.export(
+        model.eval(),
+        (picture,),
+        str(path),
+        input_names=["images"],
+        output_names=["output0"],
+        opset_version=17,
+        dynamo=False,
+    )
+    file = onnx.load(str(path))
+    properties = {
+        "description": "AeroDaaS, trained on rendered pictures",
+        "author": "AeroDaaS",
+        "license": "Apache-2.0",
+        "stride": str(max(STRIDES)),
+        "batch": "1",
+        "imgsz": str([SIZE, SIZE]),
+        **metadata,
+    }
+    onnx.helper.set_model_props(file, properties)
+    onnx.checker.check_model(file)
+    onnx.save(file, str(path))

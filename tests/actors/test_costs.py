@@ -1,0 +1,102 @@
+"""What nodes cost is learnt from what was observed, odd values apart."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerodaas.actors._costs import Executions, Link, quantile
+from aerodaas.actors._estimates import Estimates
+from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
+
+TIMES = frozenset({"edge_time", "cloud_time"})
+
+
+@given(st.lists(st.floats(0, 1e6), min_size=1, max_size=50), st.floats(0.01, 1.0))
+def test_a_quantile_is_one_of_the_values_that_enough_do_not_exceed(
+    values: list[float], share: float
+) -> None:
+    """And no smaller one is."""
+    found = quantile(values, share)
+    assert found in values
+    assert sum(value <= found for value in values) >= share * len(values) - 1e-9
+    smaller = [value for value in values if value < found]
+    assert len(smaller) < share * len(values) + 1e-9
+
+
+@given(st.floats(1e-4, 1.0), st.floats(1e4, 1e9), st.lists(st.integers(20_000, 10**7), min_size=1))
+def test_a_link_is_known_by_what_it_carried(
+    latency: float, bandwidth: float, sizes: list[int]
+) -> None:
+    """Latency and bandwidth are recovered, and predict any other size."""
+    link = Link()
+    link.observe(0, latency)
+    for size in sizes:
+        link.observe(size, latency + size / bandwidth)
+    assert link.latency == pytest.approx(latency)
+    assert link.seconds(123_456) == pytest.approx(latency + 123_456 / bandwidth, rel=0.02, abs=1e-6)
+
+
+def test_a_link_of_which_nothing_is_known_is_taken_for_free() -> None:
+    """So that the first frame goes, and tells."""
+    assert Link().seconds(1e6) == 0.0
+
+
+def test_a_link_is_not_misled_by_one_stall_but_follows_a_change() -> None:
+    """The median of a few."""
+    link = Link()
+    for _ in range(10):
+        link.observe(0, 0.02)
+        link.observe(100_000, 0.03)
+    usual = link.seconds(100_000)
+    link.observe(0, 3.0)
+    link.observe(100_000, 5.0)
+    assert link.seconds(100_000) == pytest.approx(usual)
+    for _ in range(6):
+        link.observe(0, 0.4)
+        link.observe(100_000, 0.5)
+    assert link.seconds(100_000) == pytest.approx(0.5)
+
+
+def test_an_execution_time_is_one_to_count_on() -> None:
+    """High, but not the worst that was ever seen."""
+    seen = Executions()
+    assert seen.seconds("model") is None
+    for milliseconds in (10, 10, 10, 11, 12, 10, 10, 10, 11, 12, 500):
+        seen.observe("model", milliseconds / 1e3)
+    assert seen.seconds("model") == pytest.approx(0.012)
+    assert seen.seconds("other") is None
+
+
+def told() -> Profile:
+    """What the user, or nobody, said."""
+    return Profile("model", 1.0, 1000 * MILLISECOND, 100 * MILLISECOND, 300 * MILLISECOND)
+
+
+def test_what_the_user_left_out_is_measured_and_the_rest_stays() -> None:
+    """In mission time, at whatever speed."""
+    estimates = Estimates(2.0, frozenset())
+    assert estimates.profile(told(), TIMES, None) == told()
+    estimates.edge.observe("model", 0.04)
+    found = estimates.profile(told(), frozenset({"edge_time"}), 0.05)
+    assert (found.edge_time, found.cloud_time) == (80 * MILLISECOND, 300 * MILLISECOND)
+    found = estimates.profile(told(), TIMES, 0.05)
+    assert (found.edge_time, found.cloud_time) == (80 * MILLISECOND, 100 * MILLISECOND)
+
+
+def test_what_a_scheduler_learns_by_itself_is_not_corrected_twice() -> None:
+    """DEMS-A follows the cloud on its own, so only the edge's time is told."""
+    estimates = Estimates(1.0, frozenset({"cloud_time"}))
+    estimates.edge.observe("model", 0.02)
+    found = estimates.profile(told(), TIMES, 0.9)
+    assert (found.edge_time, found.cloud_time) == (20 * MILLISECOND, 300 * MILLISECOND)
+
+
+def test_noise_makes_no_new_profile() -> None:
+    """A scheduler may tell profiles apart by identity."""
+    estimates = Estimates(1.0, frozenset())
+    estimates.edge.observe("model", 0.100)
+    first = estimates.profile(told(), TIMES, 0.300)
+    estimates.edge.observe("model", 0.102)
+    assert estimates.profile(told(), TIMES, 0.305) is first

@@ -1,0 +1,48 @@
+"""Each application's main() flies in its own world and meets the criteria of its mission."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pytest
+
+from aerodaas.analytics.models import DETECTOR, POSE
+
+sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
+
+from missions.catalogue import MISSIONS
+from missions.figures import Figures
+from missions.flying import fly
+
+SEED = 0
+SLOWEST = 1800
+
+pytestmark = [pytest.mark.slow, pytest.mark.timeout(SLOWEST)]
+
+NEEDS = {
+    "situation_awareness": (DETECTOR, POSE),
+    "vehicle_tracking": (DETECTOR,),
+    "search_and_rescue": (DETECTOR,),
+    "tower_inspection": (DETECTOR,),
+}
+
+
+@pytest.mark.parametrize("name", sorted(MISSIONS))
+def test_the_mission_meets_its_criteria(name: str, tmp_path: Path) -> None:
+    """By the command line, the remote user being a process of its own."""
+    missing = [path.name for path in NEEDS.get(name, ()) if not path.exists()]
+    if missing:
+        pytest.skip(f"the networks are made by a release: {', '.join(missing)} is not in this tree")
+    mission = MISSIONS[name]
+    flown = fly(mission, SEED, tmp_path, timeout=SLOWEST - 120)
+    assert flown.code == 0, flown.output
+    missed = [
+        f"{check.what}: {check.found}"
+        for check in mission.judge(flown.recording)
+        if not check.holds
+    ]
+    assert not missed, "\n".join(missed)
+    figures = Figures.of(mission, flown.recording)
+    assert figures.distance > 30
+    assert figures.duration < 1.5 * mission.paper.duration

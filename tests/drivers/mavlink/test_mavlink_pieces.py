@@ -1,0 +1,281 @@
+"""The parts of the driver alone: frames, phases, commands, guidance, plans."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import math
+import queue
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from mavlink_flights import flight
+
+from aerodaas.config import GeofenceConfig
+from aerodaas.drivers.mavlink.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.commander import Commander, Order, Outcome
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.fence import fence_items
+from aerodaas.drivers.mavlink.frames import LocalFrame, attitude_from_frd
+from aerodaas.drivers.mavlink.guidance import MovingTarget
+from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.plan_file import read_plan
+from aerodaas.drivers.mavlink.plans import Item
+from aerodaas.drivers.mavlink.px4 import PX4
+from aerodaas.errors import ConfigError
+from aerodaas.geometry import GeodeticOrigin
+from aerodaas.testing.mavlink import AutopilotOptions, Impairment
+from aerodaas.vehicle import VehicleMode
+
+metre = st.floats(-1e4, 1e4)
+place = st.tuples(metre, metre, metre).map(np.array)
+
+
+@given(place, place, place)
+def test_places_go_there_and_back(start: Any, ned: Any, enu: Any) -> None:  # noqa: ANN401
+    """Pinned where it stands, and each way undoes the other."""
+    frame = LocalFrame.standing_at(start, ned)
+    assert frame.position(ned) == pytest.approx(start)
+    assert frame.position(frame.place(enu)) == pytest.approx(enu, abs=1e-6)
+
+
+def test_directions() -> None:
+    """North is y, down is minus z, clockwise is minus, nose up is minus."""
+    frame = LocalFrame.standing_at(np.zeros(3), np.zeros(3))
+    assert frame.position(np.array([1.0, 2.0, 3.0])) == pytest.approx([2.0, 1.0, -3.0])
+    attitude = attitude_from_frd(0.1, 0.2, 0.0, 0.3)
+    assert attitude.yaw == pytest.approx(math.pi / 2)
+    assert (attitude.roll, attitude.pitch, attitude.yaw_rate) == (0.1, -0.2, -0.3)
+
+
+@given(
+    place.map(lambda one: one / 100),
+    st.floats(0.2, 10),
+    st.lists(st.floats(0.0, 0.5), min_size=5, max_size=60),
+)
+def test_the_moving_target_keeps_to_its_speed(goal: Any, speed: float, waits: list[float]) -> None:  # noqa: ANN401
+    """It never moves faster than asked, never runs far ahead, and never overshoots."""
+    target = MovingTarget(3.0, 1.5)
+    here, now = np.zeros(3), 100.0
+    before: Any = None
+    for wait in waits:
+        now += wait
+        seen = target.towards(
+            goal, None, speed, vehicle=here, velocity=np.zeros(3), facing=0.0, now=now
+        )
+        if before is not None:
+            moved = float(np.linalg.norm(seen.position - before))
+            assert moved <= speed * min(wait, 0.2) + 1e-6
+        assert float(np.linalg.norm(seen.position)) <= 1.0 + 1.2 * speed + 1e-6
+        assert np.linalg.norm(seen.position) <= np.linalg.norm(goal) + 1e-6
+        before = seen.position
+
+
+MODES = list(FlightMode)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from([None, *[one for one in MODES if one is not FlightMode.OTHER]]),
+            st.sampled_from(MODES),
+            st.booleans(),
+            st.floats(0.0, 5.0),
+        ),
+        max_size=40,
+    )
+)
+def test_who_has_taken_over_keeps_it(steps: list[tuple[Any, Any, bool, float]]) -> None:
+    """Once taken, a vehicle is ours again only after it has been disarmed."""
+    phase, now, taken = FlightPhase(), 0.0, False
+    for wish, shown, armed, wait in steps:
+        now += wait
+        if wish is not None and not taken:
+            phase.ask(wish, now)
+        phase.observe(shown, now, armed=armed, critical=False)
+        taken = armed and (taken or phase.taken is not None)
+        assert (phase.taken is not None) == taken
+        if taken:
+            assert phase.mode is VehicleMode.MANUAL
+        if not armed:
+            assert phase.mode is VehicleMode.GROUNDED
+
+
+def test_a_late_heartbeat_is_no_pilot() -> None:
+    """HEARTBEATs that still show the mode before are waited for; any other mode is taken."""
+    phase = FlightPhase()
+    phase.observe(FlightMode.HOLD, 0.0, armed=True, critical=False)
+    phase.ask(FlightMode.GUIDED, 1.0)
+    phase.observe(FlightMode.HOLD, 2.0, armed=True, critical=False)
+    phase.observe(FlightMode.GUIDED, 3.0, armed=True, critical=False)
+    assert phase.mode is VehicleMode.GUIDED
+    phase.ask(FlightMode.RETURN, 4.0)
+    phase.observe(FlightMode.GUIDED, 5.0, armed=True, critical=False)
+    assert phase.taken is None
+    phase.observe(FlightMode.HOLD, 6.0, armed=True, critical=True)
+    assert phase.taken is VehicleMode.FAILSAFE
+
+
+class Ear:
+    """What a commander sends, and what became of its orders."""
+
+    def __init__(self) -> None:
+        self.sent: list[Any] = []
+        self.outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
+        self.commander = Commander(self.sent.append, (1, 1), 245)
+
+    def acknowledge(self, number: int, result: int, now: float) -> None:
+        """Answer."""
+        self.commander.take(
+            mavlink.MAVLink_command_ack_message(number, result, 0, 0, 245, 191), now
+        )
+
+
+TAKE_OFF = Order(mavlink.MAV_CMD_NAV_TAKEOFF, (0.0,) * 7, "take off")
+
+
+def test_a_lost_order_is_repeated_only_while_it_needs_doing() -> None:
+    """A take-off whose acknowledgement got lost is not asked for again once it climbs."""
+    ear, climbing = Ear(), [False]
+    ear.commander.give(TAKE_OFF, ear.outcomes.put, still=lambda: not climbing[0], now=0.0)
+    ear.commander.turn(1.5)
+    assert [one.confirmation for one in ear.sent] == [0, 1]
+    climbing[0] = True
+    ear.commander.turn(3.0)
+    assert len(ear.sent) == 2
+    assert ear.outcomes.get_nowait().accepted
+
+
+def test_acknowledgements_twice_late_or_for_others() -> None:
+    """One outcome for one order; in progress means waiting longer."""
+    ear = Ear()
+    ear.commander.give(TAKE_OFF, ear.outcomes.put, now=0.0)
+    other = mavlink.MAVLink_command_ack_message(TAKE_OFF.number, 0, 0, 0, 7, 1)
+    ear.commander.take(other, 0.1)
+    ear.acknowledge(TAKE_OFF.number, mavlink.MAV_RESULT_IN_PROGRESS, 0.5)
+    ear.commander.turn(3.0)
+    assert len(ear.sent) == 1
+    ear.acknowledge(TAKE_OFF.number, mavlink.MAV_RESULT_ACCEPTED, 4.0)
+    ear.acknowledge(TAKE_OFF.number, mavlink.MAV_RESULT_DENIED, 4.1)
+    assert ear.outcomes.get_nowait().accepted
+    assert ear.outcomes.empty()
+    assert ear.commander.stray == 1
+
+
+def test_no_answer_at_all_is_an_outcome() -> None:
+    """Four tries, then it is said."""
+    ear = Ear()
+    ear.commander.give(TAKE_OFF, ear.outcomes.put, now=0.0)
+    for second in range(1, 20):
+        ear.commander.turn(float(second) * 1.1)
+    assert len(ear.sent) == 4
+    assert ear.outcomes.get_nowait() == Outcome(accepted=False, text="no answer")
+
+
+@given(st.integers(-(2**31), 2**31 - 1))
+def test_px4s_integers_travel_by_their_bytes(value: int) -> None:
+    """Except those whose bytes are no number, which no parameter has."""
+    px4, kind = PX4(), mavlink.MAV_PARAM_TYPE_INT32
+    encoded = px4.encode(float(value), kind)
+    if not math.isnan(encoded):
+        assert px4.decode(encoded, kind) == value
+    assert ArduPilot().decode(ArduPilot().encode(7.0, kind), kind) == 7.0
+
+
+def test_missions_go_up_and_come_down() -> None:
+    """Over a bad link, with progress, item by item."""
+    bad = Impairment(loss=0.2, duplicates=0.2)
+    options = AutopilotOptions(uplink=bad, downlink=bad, seed=3)
+    items = [
+        Item(mavlink.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 0.0), 473977420 + i, 85455940, 10.0)
+        for i in range(12)
+    ]
+    seen: list[tuple[int, int]] = []
+    with flight(options) as pair:
+        pair.vehicle.upload_mission(items, lambda done, total: seen.append((done, total)))
+        assert pair.vehicle.download_mission() == items
+    assert seen[-1] == (12, 12)
+
+
+def test_a_fence_is_drawn_where_it_belongs() -> None:
+    """Corners in order, each with their number, no-fly zones as exclusions."""
+    fence = GeofenceConfig(
+        polygon=[(0, 0), (100, 0), (100, 100)], no_fly=[[(10, 5), (20, 5), (20, 10), (10, 10)]]
+    )
+    items = fence_items(fence, GeodeticOrigin(47.0, 8.0))
+    assert [item.values[0] for item in items] == [3.0] * 3 + [4.0] * 4
+    assert (items[0].x, items[0].y) == (470000000, 80000000)
+    assert items[1].y > items[0].y
+    assert abs(items[1].x - items[0].x) < 100
+    assert items[2].x - items[0].x == pytest.approx(100 / 111_150 * 1e7, rel=0.01)
+
+
+PLAN = {
+    "fileType": "Plan",
+    "mission": {
+        "plannedHomePosition": [47.0, 8.0, 488.0],
+        "items": [
+            {"type": "SimpleItem", "command": 22, "frame": 3, "params": [0, 0, 0, None, 47, 8, 9]},
+            {
+                "type": "SimpleItem",
+                "command": 16,
+                "frame": 3,
+                "params": [4, 0, 0, None, 47.0009, 8.0, 20],
+            },
+            {"type": "SimpleItem", "command": 178, "frame": 2, "params": [1, 3, -1, 0, 0, 0, 0]},
+            {
+                "type": "ComplexItem",
+                "complexItemType": "survey",
+                "TransectStyleComplexItem": {
+                    "Items": [
+                        {
+                            "type": "SimpleItem",
+                            "command": 16,
+                            "frame": 0,
+                            "params": [0, 0, 0, 90, 47.0, 8.001, 500],
+                        }
+                    ]
+                },
+            },
+            {"type": "SimpleItem", "command": 20, "frame": 2, "params": [0, 0, 0, 0, 0, 0, 0]},
+        ],
+    },
+}
+
+
+def test_a_plan_of_qgroundcontrol_becomes_waypoints(tmp_path: Path) -> None:
+    """Local places, heights above home, hover times, speeds and headings."""
+    path = tmp_path / "survey.plan"
+    path.write_text(json.dumps(PLAN))
+    first, second = read_plan(path, GeodeticOrigin(47.0, 8.0)).waypoints
+    assert first.position == pytest.approx([0.0, 100.0, 20.0], abs=0.2)
+    assert first.hover_duration == 4.0
+    assert first.speed is None
+    assert second.position == pytest.approx([76.1, 0.0, 12.0], abs=0.2)
+    assert second.speed == 3.0
+    assert second.yaw == pytest.approx(0.0)
+
+
+@given(
+    st.recursive(
+        st.none() | st.floats() | st.text(max_size=5) | st.sampled_from(["mission", "items"]),
+        lambda inner: (
+            st.lists(inner, max_size=3)
+            | st.dictionaries(
+                st.sampled_from(["mission", "items", "type", "params", "plannedHomePosition"]),
+                inner,
+            )
+        ),
+        max_leaves=12,
+    )
+)
+def test_what_is_no_plan_is_refused(tmp_path_factory: pytest.TempPathFactory, content: Any) -> None:  # noqa: ANN401
+    """Any JSON: ConfigError, or an empty plan."""
+    path = tmp_path_factory.mktemp("plans") / "x.plan"
+    path.write_text(json.dumps(content))
+    with contextlib.suppress(ConfigError):
+        assert not read_plan(path, GeodeticOrigin(0.0, 0.0)).waypoints

@@ -1,0 +1,168 @@
+"""Missions on a real autopilot in simulation, flown by the test's own 20 Hz loop."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import signal
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from sitl_relay import Relay
+
+from aerodaas.clock import ScaledClock
+from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
+from aerodaas.navigation.commands import Command, Start
+from aerodaas.navigation.loop import SetpointLoop
+from aerodaas.navigation.mission import Mission
+from aerodaas.navigation.planner import InlinePlanner
+from aerodaas.schedulers.waypoint.nearest_neighbor import NearestNeighborScheduler
+from aerodaas.status import MissionState, MissionStatus
+from aerodaas.vehicle import VehicleMode, VehicleState
+
+__all__ = ["SitlFlight", "autopilot", "robot_at"]
+
+_PERIOD = 0.05
+
+
+@contextmanager
+def autopilot(named: str) -> Iterator[str]:
+    """The URL of the autopilot that the variable names, started if it says how."""
+    command, separator, url = named.rpartition("=>")
+    if not separator:
+        yield named.strip()
+        return
+    process = subprocess.Popen(
+        shlex.split(command),
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    )
+    try:
+        time.sleep(5.0)
+        yield url.strip()
+    finally:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+def robot_at(url: str, **limits: Any) -> RobotConfig:  # noqa: ANN401
+    """The robot that flies what is found at `url`."""
+    return RobotConfig.model_validate(
+        {
+            "id": "drone",
+            "driver": "mavlink",
+            "settings": {"url": url, "ready_timeout": 120.0},
+            "limits": {
+                "cruise_speed": 2.0,
+                "takeoff_height": 3.0,
+                "takeoff_timeout": 60.0,
+                "preflight_timeout": 60.0,
+                "arrival_radius": 0.5,
+                "battery_return": 0.1,
+                "battery_land": 0.05,
+                **limits,
+            },
+        }
+    )
+
+
+class SitlFlight:
+    """One mission on its way."""
+
+    def __init__(self, url: str, *commands: Command, **limits: Any) -> None:  # noqa: ANN401
+        """Connect through a relay that can be cut, and start the mission of `commands`."""
+        self.relay = Relay(url)
+        robot = robot_at(self.relay.url, **limits)
+        self.vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
+        try:
+            self._connect(robot, commands)
+        except BaseException:
+            self.close()
+            raise
+
+    def _connect(self, robot: RobotConfig, commands: tuple[Command, ...]) -> None:
+        self.vehicle.connect(60.0)
+        self.clock = ScaledClock()
+        takeoff = self.vehicle.read().odometry.position
+        self.mission = Mission(robot, InlinePlanner(NearestNeighborScheduler()), takeoff=takeoff)
+        self.loop = SetpointLoop(self.vehicle, self.mission)
+        self.states: list[MissionState] = []
+        self.modes: list[VehicleMode] = []
+        self.vehicle.use_clock(self.clock)
+        for command in commands:
+            answer = self.tell(command)
+            assert answer.accepted, answer.text
+        self.tell(Start())
+
+    def tell(self, command: Command) -> Any:  # noqa: ANN401
+        """Hand a command to the mission."""
+        return self.mission.handle(command, self.clock.now())
+
+    def run(
+        self,
+        seconds: float,
+        until: Callable[[], bool] = lambda: False,
+        each: Callable[[VehicleState], None] = lambda _: None,
+    ) -> bool:
+        """Turn the loop until `until` holds, the mission is over, or time is; True if not time."""
+        end = time.monotonic() + seconds
+        due = time.monotonic()
+        while time.monotonic() < end:
+            time.sleep(max(0.0, due - time.monotonic()))
+            due = max(due + _PERIOD, time.monotonic())
+            self.loop.turn(self.clock.now())
+            state = self.loop.state
+            assert state is not None
+            if not self.states or self.states[-1] is not self.mission.state:
+                self.states.append(self.mission.state)
+            if not self.modes or self.modes[-1] is not state.mode:
+                self.modes.append(state.mode)
+            each(state)
+            if until() or self.mission.finished:
+                return True
+        return False
+
+    def run_to(self, *states: MissionState, seconds: float = 90.0) -> None:
+        """Fly until the mission is in one of `states`; fail if it never is."""
+        self.run(seconds, lambda: self.mission.state in states)
+        assert self.mission.state in states, self.story
+
+    def wait_for_ground(self, seconds: float = 120.0) -> None:
+        """Whoever flies: wait until the motors stand."""
+        end = time.monotonic() + seconds
+        while self.vehicle.read().armed:
+            assert time.monotonic() < end, self.story
+            time.sleep(0.1)
+
+    def command_as_station(self, number: int, *values: float) -> None:
+        """Have a ground station command the vehicle, over the same link."""
+        mav = mavlink.MAVLink(None, 255, 190)
+        target = self.vehicle.connection.target
+        filled = [*values, *[0.0] * (7 - len(values))]
+        message = mavlink.MAVLink_command_long_message(*target, number, 0, *filled)
+        self.relay.inject(message.pack(mav))
+
+    @property
+    def status(self) -> MissionStatus:
+        """What the mission says."""
+        return self.mission.status
+
+    @property
+    def story(self) -> str:
+        """What happened, for a failed assertion."""
+        states = [state.value for state in self.states]
+        modes = [mode.value for mode in self.modes]
+        texts = self.vehicle.read().faults if self.vehicle.connected else ()
+        alerts = [alert.text for alert in self.mission.alerts]
+        return f"{states} {self.status.reason!r} {modes} {alerts} {texts}"
+
+    def close(self) -> None:
+        """Let go."""
+        self.vehicle.close()
+        self.relay.close()

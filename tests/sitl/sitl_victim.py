@@ -1,0 +1,19 @@
+"""A program that flies until it is killed: `sitl_victim.py URL`; says when it is on its way."""
+
+from __future__ import annotations
+
+import sys
+
+from sitl_flights import SitlFlight
+
+from aerodaas.navigation.commands import AddNavigation
+from aerodaas.status import MissionState
+from aerodaas.waypoints import AeroNavigation, NavigationType, Waypoint
+
+if __name__ == "__main__":
+    far = AeroNavigation(NavigationType.DISTANCE_DRIVEN, [Waypoint("far", 0, 80, 3.0)])
+    flight = SitlFlight(sys.argv[1], AddNavigation(far))
+    flight.run_to(MissionState.ENROUTE)
+    sys.stdout.write("enroute\n")
+    sys.stdout.flush()
+    flight.run(600.0)

@@ -1,0 +1,231 @@
+"""Whole missions on real PX4 and ArduCopter in simulation.
+
+`AERODAAS_SITL_PX4` and `AERODAAS_SITL_ARDUPILOT` name them (docs/mavlink.md says how); what is
+not named is skipped. These tests fly by the wall clock and take minutes.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sitl_flights import SitlFlight, autopilot, robot_at
+
+from aerodaas.config import EnvironmentConfig, GeofenceConfig
+from aerodaas.drivers.mavlink.connecting import global_origin
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.fence import upload_fence
+from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
+from aerodaas.errors import VehicleError
+from aerodaas.navigation.commands import AddNavigation, End, OpenStream, Pause, Resume, StreamItem
+from aerodaas.status import MissionState as S
+from aerodaas.vehicle import VehicleMode, VehicleState
+from aerodaas.waypoints import (
+    AeroNavigation,
+    NavigationType,
+    SchedulingType,
+    VelocityCommand,
+    Waypoint,
+)
+
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420)]
+
+VARIABLES = {"px4": "AERODAAS_SITL_PX4", "ardupilot": "AERODAAS_SITL_ARDUPILOT"}
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(params=sorted(VARIABLES))
+def url(request: pytest.FixtureRequest) -> Iterator[str]:
+    """The URL of each autopilot that is named."""
+    named = os.environ.get(VARIABLES[request.param], "")
+    if not named:
+        pytest.skip(
+            f"{VARIABLES[request.param]} names no autopilot in simulation; set it to a URL such "
+            "as udpin:0.0.0.0:14540, or to `start command => URL`"
+        )
+    with autopilot(named) as address:
+        yield address
+
+
+def survey(*places: tuple[float, float], hover: float = 1.0) -> AddNavigation:
+    """Waypoints three metres up, in any order."""
+    stops = [Waypoint(f"wp{i}", x, y, 3.0, hover) for i, (x, y) in enumerate(places, 1)]
+    kind = NavigationType.DISTANCE_DRIVEN
+    return AddNavigation(AeroNavigation(kind, stops, SchedulingType.UNORDERED))
+
+
+FARM = survey((0, 0), (0, 10), (10, 10), (10, 0), hover=5.0)
+FAR = survey((0, 60))
+
+
+def finish(flight: SitlFlight) -> None:
+    """Fly to the mission's end: back home, on the ground."""
+    flight.run(180.0)
+    assert flight.mission.state is S.LANDED, flight.story
+
+
+def test_farm_survey(url: str) -> None:
+    """Four corners, a hover at each, and back to where it took off."""
+    flight = SitlFlight(url, FARM)
+    try:
+        finish(flight)
+        assert set(flight.status.visited) == {"wp1", "wp2", "wp3", "wp4"}
+        assert {S.TAKING_OFF, S.ENROUTE, S.LOITERING} <= set(flight.states)
+        home = flight.vehicle.read().odometry.position
+        assert float(np.linalg.norm(home[:2])) < 1.5
+    finally:
+        flight.close()
+
+
+def test_sensor_driven_flight(url: str) -> None:
+    """Velocities from what odometry says, two seconds each way: it follows, then comes home."""
+    flight = SitlFlight(url, OpenStream("eye/commands"))
+    fastest = [0.0]
+
+    def steer(state: VehicleState) -> None:
+        if flight.mission.state in {S.HOLDING, S.FOLLOWING}:
+            ahead = 1.5 if state.odometry.position[1] < 5.0 else 0.0
+            command = VelocityCommand(forward=ahead, yaw_rate=0.0, valid_for=0.5)
+            navigation = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
+            flight.tell(StreamItem("eye/commands", navigation))
+            speed = float(np.linalg.norm(state.odometry.velocity[:2]))
+            fastest[0] = max(fastest[0], speed)
+
+    try:
+        flight.run_to(S.HOLDING)
+        flight.run(10.0, each=steer)
+        assert S.FOLLOWING in flight.states, flight.story
+        assert 1.0 < fastest[0] < 2.5
+        flight.tell(End("enough"))
+        finish(flight)
+    finally:
+        flight.close()
+
+
+def test_pause_and_resume(url: str) -> None:
+    """Paused it stays within a metre; resumed it flies on."""
+    flight = SitlFlight(url, survey((0, 15)))
+    try:
+        flight.run_to(S.ENROUTE)
+        flight.run(4.0)
+        flight.tell(Pause())
+        flight.run(4.0)
+        assert flight.mission.state is S.PAUSED
+        here = flight.vehicle.read().odometry.position
+        flight.run(5.0)
+        moved = float(np.linalg.norm(flight.vehicle.read().odometry.position - here))
+        assert moved < 1.0
+        flight.tell(Resume())
+        finish(flight)
+        assert flight.status.visited == ("wp1",)
+    finally:
+        flight.close()
+
+
+def test_abort(url: str) -> None:
+    """Landed on the spot, as told."""
+    flight = SitlFlight(url, FAR)
+    try:
+        flight.run_to(S.ENROUTE)
+        flight.run(6.0)
+        flight.tell(End("the user said so"))
+        finish(flight)
+        assert flight.status.reason == "the user said so"
+        assert flight.vehicle.read().odometry.position[1] > 1.0
+    finally:
+        flight.close()
+
+
+def test_fence_breach(url: str) -> None:
+    """Its own fence, smaller than ours: it goes home by itself, and we keep our hands off."""
+    flight = SitlFlight(url, FAR)
+    try:
+        connection = flight.vehicle.connection
+        small = GeofenceConfig(polygon=[(-8, -8), (8, -8), (8, 8), (-8, 8)], ceiling=50)
+        origin = global_origin(flight.vehicle.telemetry, connection.frame)
+        upload_fence(connection.link, connection.autopilot, small, origin, "return")
+        flight.run_to(S.ABORTED)
+        assert VehicleMode.FAILSAFE in flight.modes or VehicleMode.MANUAL in flight.modes
+        flight.wait_for_ground(240.0)
+        assert float(np.linalg.norm(flight.vehicle.read().odometry.position[:2])) < 12.0
+    finally:
+        flight.close()
+
+
+@pytest.mark.parametrize("duration", [3.0, 30.0])
+def test_link_cut(url: str, duration: float) -> None:
+    """It holds, lands or returns; the mission says that nothing was heard, and how it ended."""
+    flight = SitlFlight(url, FAR)
+    try:
+        flight.run_to(S.ENROUTE)
+        flight.run(6.0)
+        flight.relay.cut = True
+        flight.run(duration)
+        assert VehicleMode.LOST in flight.modes, flight.story
+        flight.relay.cut = False
+        flight.run(180.0, lambda: flight.mission.finished)
+        ended = {S.LANDED, S.ABORTED}
+        assert flight.mission.state in ended, flight.story
+        print(f"\nlink cut for {duration:g} s: {flight.story}")  # noqa: T201 - the result itself
+        flight.wait_for_ground(240.0)
+    finally:
+        flight.close()
+
+
+def test_process_killed(url: str) -> None:
+    """Killed in flight, nobody takes off again; the vehicle lands, returns, or holds for us."""
+    command = [sys.executable, str(HERE / "sitl_victim.py"), url]
+    victim = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    assert victim.stdout is not None
+    assert victim.stdout.readline().strip() == "enroute"
+    time.sleep(4.0)
+    victim.send_signal(signal.SIGKILL)
+    victim.wait()
+    time.sleep(8.0)
+    robot = robot_at(url)
+    vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
+    vehicle.connect(30.0)
+    try:
+        state = vehicle.read()
+        print(f"\n8 s after the kill: {state.mode.value}, {state.odometry.velocity.round(2)} m/s")  # noqa: T201
+        assert float(np.linalg.norm(state.odometry.velocity[:2])) < 1.0
+        if state.armed:
+            with pytest.raises(VehicleError, match="already"):
+                vehicle.take_off(3.0)
+            if state.mode in {VehicleMode.GUIDED, VehicleMode.HOLDING}:
+                vehicle.land()
+        end = time.monotonic() + 120.0
+        while vehicle.read().armed:
+            assert time.monotonic() < end
+            time.sleep(0.1)
+    finally:
+        vehicle.close()
+
+
+def test_a_ground_station_takes_over(url: str) -> None:
+    """Hold asked for by somebody else: the mission ends, no setpoint is sent any more."""
+    flight = SitlFlight(url, FAR)
+    try:
+        flight.run_to(S.ENROUTE)
+        flight.run(5.0)
+        px4 = flight.vehicle.connection.autopilot.name == "PX4"
+        # PX4: hold. ArduCopter: brake, for loiter needs a remote control.
+        mode = (1.0, 4.0, 3.0) if px4 else (1.0, 17.0)
+        flight.command_as_station(mavlink.MAV_CMD_DO_SET_MODE, *mode)
+        flight.run_to(S.ABORTED, seconds=10.0)
+        assert flight.status.reason == "a pilot has taken over"
+        sent = flight.vehicle.connection.link.counts.sent
+        flight.run(3.0)
+        assert flight.vehicle.connection.link.counts.sent - sent < 10
+        land = (1.0, 4.0, 6.0) if px4 else (1.0, 9.0)
+        flight.command_as_station(mavlink.MAV_CMD_DO_SET_MODE, *land)
+        flight.wait_for_ground()
+    finally:
+        flight.close()
