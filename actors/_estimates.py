@@ -23,7 +23,7 @@ class Estimates:
         A time that both would correct would be corrected twice.
         """
         self.edge = Executions()
-        self._speed = speed
+        self._second = speed * NANOSECONDS
         self._learnt = learnt
         self._told: dict[str, Profile] = {}
 
@@ -34,16 +34,19 @@ class Estimates:
         measured, `cloud` the host seconds that the cloud is expected to take, if known.
         """
         profile = self._told.setdefault(told.model, told)
-        measured = {"edge_time": self.edge.seconds(told.model), "cloud_time": cloud}
-        news = {
-            name: max(MILLISECOND, round(seconds * self._speed * NANOSECONDS))
-            for name, seconds in measured.items()
-            if seconds is not None and name in open_times - self._learnt
-        }
-        if any(_differs(getattr(profile, name), time) for name, time in news.items()):
-            profile = self._told[told.model] = replace(profile, **news)
+        wanted = open_times - self._learnt
+        edge = self._time(self.edge.seconds(told.model) if "edge_time" in wanted else None)
+        there = self._time(cloud if "cloud_time" in wanted else None)
+        news = replace(
+            profile,
+            edge_time=edge or profile.edge_time,
+            cloud_time=there or profile.cloud_time,
+        )
+        times = ((profile.edge_time, news.edge_time), (profile.cloud_time, news.cloud_time))
+        if any(abs(new - old) > _WORTH_TELLING * old for old, new in times):
+            profile = self._told[told.model] = news
         return profile
 
-
-def _differs(old: int, new: int) -> bool:
-    return abs(new - old) > _WORTH_TELLING * old
+    def _time(self, seconds: float | None) -> int | None:
+        """Mission time that so many host seconds take."""
+        return None if seconds is None else max(MILLISECOND, round(seconds * self._second))

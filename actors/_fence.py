@@ -16,12 +16,12 @@ __all__ = ["FencedDispatch"]
 
 _SLOW = 0.05
 """Seconds on one event above which an answer is slow, ..."""
-_SLOW_IN_A_ROW = 3
+_SLOW_IN_A_ROW = 5
 """... and slow answers in a row that are too many: a single one may be the machine's fault."""
-_LIMIT = 1.0
+_LIMIT = 2.0
 """Seconds on one event after which nobody waits any longer."""
-_START_LIMIT = 10.0
-"""The same for `start`, which may load something."""
+_PATIENT_LIMIT = 10.0
+"""The same for `start`, which may load something, and where nobody is in a hurry."""
 
 _Answer = tuple[Any, BaseException | None, float]
 
@@ -29,6 +29,8 @@ _Answer = tuple[Any, BaseException | None, float]
 class FencedDispatch(Dispatch):
     """Asks the scheduler in a thread of its own; raises SchedulerError if it is slow or hangs."""
 
+    hurried = True
+    """False where mission time waits: then an answer is never slow, and repeats stay equal."""
     _thinker: _Thinker | None = None
     _slow = 0
 
@@ -36,11 +38,11 @@ class FencedDispatch(Dispatch):
         """Ask, and wait for no longer than the limit."""
         if self._thinker is None:
             self._thinker = _Thinker()
-        starts = event.__name__ == "start"
+        patient = not self.hurried or event.__name__ == "start"
         name = type(self.scheduler).__name__
         try:
             answer, error, taken = self._thinker.think(
-                event, args, _START_LIMIT if starts else _LIMIT
+                event, args, _PATIENT_LIMIT if patient else _LIMIT
             )
         except queue.Empty:
             self._thinker.abandon()
@@ -48,7 +50,7 @@ class FencedDispatch(Dispatch):
             raise SchedulerError(f"{name}.{event.__name__} does not come to an end") from None
         if error is not None:
             raise error
-        self._slow = self._slow + 1 if taken > _SLOW and not starts else 0
+        self._slow = self._slow + 1 if taken > _SLOW and not patient else 0
         if self._slow >= _SLOW_IN_A_ROW:
             self._slow = 0
             raise SchedulerError(

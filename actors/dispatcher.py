@@ -107,6 +107,7 @@ class DispatcherActor(StreamActor):
         self._many = {one.stream for one in managed if len(one.inputs) > 1}
         self._resources = resources
         self._dispatch = FencedDispatch(scheduler, resources, self)
+        self._dispatch.hurried = not session.lockstep
         self._replaced = False
         self._numbers = itertools.count()
         self._frames: dict[int, Message[Any]] = {}

@@ -239,12 +239,13 @@ class Flight:
         options: Mapping[str, Any] | None = None,
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
-        # Calls that wait for an analysis' life to end must not keep others waiting.
-        groups = {"concurrency_groups": {LIFE: 1}} if kind is AnalyticsActor else {}
-        made: Any = ray.remote(**groups)(kind) if groups else ray.remote(kind)
+        remote: Any = ray.remote
+        if kind is AnalyticsActor:
+            # Calls that wait for its life to end must not keep others waiting.
+            remote = remote(concurrency_groups={LIFE: 1})
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}
-        remote = made.options(**placed)
-        self._members[name] = _Member(name, remote.remote(*args, **kwargs), setup)
+        made = remote(kind).options(**placed)
+        self._members[name] = _Member(name, made.remote(*args, **kwargs), setup)
 
     def _options(self, name: str, place: Place, *, restarts: int) -> dict[str, Any]:
         """Ray's options; in a cluster that outlives us, actors do too, and have a name."""

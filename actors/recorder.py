@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections import Counter
+from collections import Counter, deque
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +15,7 @@ from aerodaas.clock import host_time_ns
 from aerodaas.data import Header
 from aerodaas.errors import RecordingError
 from aerodaas.geometry import GeodeticOrigin
-from aerodaas.recording.live import LiveServer
 from aerodaas.recording.provenance import Provenance
-from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.status import Message
 from aerodaas.vitals import Vitals
 
@@ -55,6 +54,10 @@ class RecorderActor(StreamActor):
         self._readings = 0
 
     def _open(self) -> None:
+        # The application's process knows this class, and does without the writers.
+        from aerodaas.recording.live import LiveServer  # noqa: PLC0415
+        from aerodaas.recording.recorder import FlightRecorder  # noqa: PLC0415
+
         environment = self.session.environment
         home = environment.home
         name = self._provenance.name
@@ -85,16 +88,21 @@ class RecorderActor(StreamActor):
     def _run(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first
         while True:
-            messages = self.inbox.receive(0.2)
-            for message in messages:
-                self.follow(message.stamp)
-                self._write(message)
-            self._note_drops()
-            if self._acks is not None and messages:
-                done = tuple((one.header.source, one.header.stamp) for one in messages)
-                self._acks.derive(done, messages[-1], host_time_ns(), messages[-1].stamp)
+            messages = deque(self.inbox.receive(0.2))
             if self.stopping and not messages:
                 return
+            done = tuple((one.header.source, one.header.stamp) for one in messages)
+            last = replace(messages[-1], item=None) if messages else None
+            while messages:
+                # None is held on to longer than it takes to write it: frames are large.
+                self._take(messages.popleft())
+            self._note_drops()
+            if self._acks is not None and last is not None:
+                self._acks.derive(done, last, host_time_ns(), last.stamp)
+
+    def _take(self, message: Message[Any]) -> None:
+        self.follow(message.stamp)
+        self._write(message)
 
     def _write(self, message: Message[Any]) -> None:
         if self._page is not None:

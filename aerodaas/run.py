@@ -185,9 +185,13 @@ class Run:
             load_scenario(self.config.simulation.world)
 
     def _pace(self) -> Pace:
-        from aerodaas.recording.pace import Pace, read_pace  # noqa: PLC0415 - loads readers
+        from aerodaas.recording.pace import Pace  # noqa: PLC0415 - only where it flies
 
-        return read_pace(self.options.replay) if self.options.replay else Pace()
+        if self.options.replay is None:
+            return Pace()
+        from aerodaas.recording.pace_reader import read_pace  # noqa: PLC0415 - loads decoders
+
+        return read_pace(self.options.replay)
 
     def _change_models(self) -> None:
         """Give every detector the model that the command line asks for."""

@@ -1,4 +1,4 @@
-"""What a process takes of its machine: processor time and memory."""
+"""What a process takes of its machine, and what the machine is busy with."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from functools import cache
 import psutil
 
 from aerodaas.clock import host_time_ns
+from aerodaas.gpu import GpuLoad, read_gpus
 from aerodaas.records import travels
 
 __all__ = ["Vitals", "read_vitals"]
@@ -29,6 +30,8 @@ class Vitals:
     """Share of all the machine's cores that was busy since the last reading, 0 to 1."""
     machine_memory: float
     """Share of the machine's memory in use, 0 to 1."""
+    gpus: tuple[GpuLoad, ...] = ()
+    """The machine's graphics processors; none where they cannot be read."""
 
 
 @cache
@@ -44,4 +47,5 @@ def read_vitals() -> Vitals:
         memory=int(_process().memory_info().rss),
         machine_cpu=float(psutil.cpu_percent(None)) / 100,
         machine_memory=float(psutil.virtual_memory().percent) / 100,
+        gpus=read_gpus(),
     )

@@ -20,10 +20,12 @@ __all__ = ["RATE", "SIZE", "ReadyCamera", "build", "draw_pictures", "environment
 SIZE = (1280, 720)
 RATE = 30.0
 _PICTURES = 12
+_PAN = 60
+"""Frames for which the camera pans over one picture, a pixel each."""
 
 
 class ReadyCamera:
-    """Shows the pictures of a folder in turn, decoded beforehand, so that it costs nothing."""
+    """Pans over the pictures of a folder in turn, decoded beforehand: that costs a copy."""
 
     model: CameraModel | None = None
     finished = False
@@ -37,14 +39,17 @@ class ReadyCamera:
     def open(self) -> None:
         """Read the pictures."""
         images = [cv2.imread(str(path)) for path in sorted(self._folder.iterdir())[:_PICTURES]]
+        size = SIZE[0] + _PAN, SIZE[1]
         self._images = [
-            np.asarray(cv2.resize(image, SIZE), np.uint8) for image in images if image is not None
+            np.asarray(cv2.resize(image, size), np.uint8) for image in images if image is not None
         ]
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture:  # noqa: ARG002
         """Return the next picture."""
         self._turn += 1
-        return Picture(self._images[self._turn % len(self._images)], stamp)
+        picture, left = divmod(self._turn, _PAN)
+        image = self._images[picture % len(self._images)][:, left : left + SIZE[0]]
+        return Picture(np.ascontiguousarray(image), stamp)
 
     def close(self) -> None:
         """Nothing to release."""
@@ -75,7 +80,9 @@ def draw_pictures(folder: Path) -> Path:
     return folder
 
 
-def environment(drones: int, pictures: Path, *, recorded: bool) -> dict[str, Any]:
+def environment(
+    drones: int, pictures: Path, *, recorded: bool, images: str = "jpeg"
+) -> dict[str, Any]:
     """The environment file's content."""
     camera = {
         "id": "camera",
@@ -95,7 +102,7 @@ def environment(drones: int, pictures: Path, *, recorded: bool) -> dict[str, Any
         ],
         "compute": [{"id": "edge", "kind": "edge"}],
         "simulation": {"world": "empty"},
-        "recording": {"enabled": recorded},
+        "recording": {"enabled": recorded, "images": images},
     }
 
 

@@ -15,6 +15,7 @@ import json as json_module
 import tempfile
 import time
 from dataclasses import dataclass, field
+from itertools import compress
 from pathlib import Path
 from typing import Annotated
 
@@ -143,7 +144,10 @@ class Live:
                 if action in {"edge", "cloud"}:
                     live.place[task], began[task] = action, stamp
                 elif action in {"done", "late"}:
-                    live.took[task] = stamp - began[task]
+                    live.place[task] = value["reason"].partition(":")[0]
+                    # A busy recorder may have lost the decision.
+                    if task in began:
+                        live.took[task] = stamp - began[task]
                 live.outcome[task] = action
         return live
 
@@ -157,12 +161,18 @@ class Live:
                 found.append((took - nominal) / MILLISECOND)
         return found
 
-    def score(self, profiles: dict[str, Profile], until: int) -> Score:
-        """Judge the tasks that arrived before `until`, as the lab does."""
+    def judged(self, until: int) -> list[bool]:
+        """Whether each task, in order of arrival, came before `until` and its end is known."""
+        return [
+            self.arrived[task] < until and self.outcome[task] not in {"edge", "cloud", "retry"}
+            for task in sorted(self.arrived, key=self.arrived.__getitem__)
+        ]
+
+    def score(self, profiles: dict[str, Profile], judged: list[bool]) -> Score:
+        """Judge tasks as the lab does."""
         score = Score()
-        for task, arrival in self.arrived.items():
-            if arrival >= until:
-                continue
+        ordered = sorted(self.arrived, key=self.arrived.__getitem__)
+        for task in compress(ordered, judged):
             profile, place = profiles[_model(task)], self.place.get(task)
             done = self.outcome[task] == "done"
             ran = self.outcome[task] in {"done", "late", "timeout", "failed"}
@@ -180,13 +190,13 @@ def _model(task: str) -> str:
     return task.partition("#")[0].rpartition("/")[2].upper()
 
 
-def simulated(path: Path, scheduler: str, until: int) -> Score:
-    """What the lab makes of the tasks of a recorded flight that arrived before `until`."""
+def simulated(path: Path, scheduler: str, judged: list[bool]) -> Score:
+    """What the lab makes of a recorded flight, by the tasks that are to be judged."""
     workload, resources = flown_workload(path)
     sample = SamplePath.draw(workload, 0, 0, ExecutionTimes(), Network())
     trace = simulate(sample, load_scheduler(scheduler), resources)
-    trace.results = [result for result in trace.results if result.task.arrival < until]
-    return score([task for task in sample.tasks if task.arrival < until], trace)
+    trace.results = [result for result in trace.results if judged[result.task.id]]
+    return score([task for task in sample.tasks if judged[task.id]], trace)
 
 
 def _figures(found: Score, seconds: float, beyond: list[float]) -> dict[str, float]:
@@ -232,8 +242,9 @@ def main(
             path = fly(scheduler, drones, profiles, seconds, overhead, folder / scheduler)
             live = Live.read(path)
             began, end = min(live.arrived.values()), max(live.arrived.values()) - _TAIL
-            flown = live.score(by_name, end)
-            studied = simulated(path, scheduler, end)
+            judged = live.judged(end)
+            flown = live.score(by_name, judged)
+            studied = simulated(path, scheduler, judged)
             length = (end - began) / NANOSECONDS
             beyond = live.beyond(by_name, "edge")
             report.row(f"{scheduler}, live", _figures(flown, length, beyond))

@@ -28,12 +28,15 @@ UNITS = {
     "published": "frames",
     "dropped": "frames",
     "recorder": "cores",
+    "memory": "MB",
     "machine": "% busy",
     "file": "MB/min",
     "latency": "ms",
     "without": "ms",
     "added": "ms",
 }
+
+IMAGES = ("jpeg", "h264")
 
 
 def main(
@@ -46,31 +49,35 @@ def main(
 ) -> None:
     """Fly 1, 2 and 4 simulated drones in real time, recorded and not, then replay one of them.
 
-    "latency" is the median from a frame's capture to an analysis that does nothing, beside
-    "without": the same flight unrecorded. The cameras' pictures are decoded beforehand.
+    "memory" is the most that the recorder had, frames in shared memory included. "latency" is the
+    median from a frame's capture to an analysis that does nothing, beside "without": the same
+    flight unrecorded. The cameras pan over pictures that are decoded beforehand.
     """
     report = Report("recording", UNITS, packages=["ray", "mcap", "opencv-python-headless"])
     width, height = SIZE
-    report.note(f"Cameras of {width} x {height} at {RATE:g} Hz, one a drone, recorded as JPEG.")
-    with tempfile.TemporaryDirectory() as folder:
-        work = Path(folder)
+    report.note(f"Cameras of {width} x {height} at {RATE:g} Hz, one a drone.")
+    with tempfile.TemporaryDirectory() as temporary:
+        work = Path(temporary)
         pictures = frames.resolve() if frames else draw_pictures(work / "pictures")
-        for count in drones or [1, 2, 4]:
-            report.row(
-                f"{count} drone{'s' * (count > 1)}",
-                _measure(work / str(count), count, pictures, seconds),
-            )
-        factor = _replay(work / str((drones or [1])[0]) / "recorded" / "flight.mcap", seconds)
-    report.note(f"Replay of the first flight: {factor:.1f} times real time, without a DNN.")
+        counts = drones or [1, 2, 4]
+        for kind in IMAGES:
+            for count in counts:
+                folder = work / f"{kind}-{count}"
+                case = f"{count} drone{'s' * (count > 1)}, {kind}"
+                report.row(case, _measure(folder, count, pictures, seconds, kind))
+            factor = _replay(work / f"{kind}-{counts[0]}" / "recorded" / "flight.mcap", seconds)
+            report.note(f"Replay of {kind}: {factor:.1f} times real time, without a DNN.")
     report.show()
     if json is not None:
         report.write(json)
 
 
-def _measure(folder: Path, drones: int, pictures: Path, seconds: float) -> dict[str, float]:
+def _measure(
+    folder: Path, drones: int, pictures: Path, seconds: float, images: str
+) -> dict[str, float]:
     latencies = {}
     for recorded in (False, True):
-        content = environment(drones, pictures, recorded=recorded)
+        content = environment(drones, pictures, recorded=recorded, images=images)
         run, _ = _fly(folder, content, _application(seconds), speed=1.0, lockstep=False)
         assert run.state is not None  # noqa: S101 - it has flown
         seen = [
@@ -91,6 +98,7 @@ def _measure(folder: Path, drones: int, pictures: Path, seconds: float) -> dict[
         "published": sum(flight.frames.values()) + dropped,
         "dropped": dropped,
         "recorder": statistics.fmean(load.cpu),
+        "memory": max(load.memory),
         "machine": 100 * statistics.fmean(machine.cpu),
         "file": path.stat().st_size / 1e6 / duration * 60,
         "latency": latencies[True],

@@ -104,6 +104,12 @@ class Machine:
                 return process
         raise AeroDaaSError(f"no process of {self.name} has the number {pid}")
 
+    def clear(self) -> None:
+        """End everything on it but itself."""
+        for process in self.processes():
+            if process.pid != self.pid:
+                process.kill()
+
     def power_off(self) -> None:
         """End everything on it at once."""
         left = self.processes()

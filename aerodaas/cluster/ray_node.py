@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import psutil
@@ -16,6 +16,9 @@ from aerodaas.errors import AeroDaaSError
 
 __all__ = ["environment", "restart_control_service", "start_head", "start_worker"]
 
+_RETRIES = 2
+_TOO_SLOW = "timed out during startup"
+"""Ray gives a node half a minute to start, which a busy machine may not have to give."""
 STORE_BYTES = 128 * 2**20
 _TOKEN = Path.home() / ".ray" / "auth_token"
 _SLIM = {
@@ -96,16 +99,24 @@ def _start(
     env: Mapping[str, str],
     *words: str,
 ) -> None:
+    command = [
+        *(sys.executable, "-m", "ray.scripts.scripts", "start", "--node-ip-address", address),
+        *("--num-cpus", "1", "--object-store-memory", str(STORE_BYTES)),
+        *("--resources", json.dumps(resources), "--disable-usage-stats", *words),
+    ]
+    _attempt(machine, command, env, _RETRIES)
+
+
+def _attempt(
+    machine: Machine, command: Sequence[str], env: Mapping[str, str], retries: int
+) -> None:
     try:
-        machine.run(
-            sys.executable,
-            *("-m", "ray.scripts.scripts", "start", "--node-ip-address", address),
-            *("--num-cpus", "1", "--object-store-memory", str(STORE_BYTES)),
-            *("--resources", json.dumps(resources), "--disable-usage-stats", *words),
-            env=env,
-        )
+        machine.run(*command, env=env)
     except AeroDaaSError as error:
-        raise AeroDaaSError(f"Ray does not start on {machine.name}: {error}") from None
+        if not retries or _TOO_SLOW not in str(error):
+            raise AeroDaaSError(f"Ray does not start on {machine.name}: {error}") from None
+        machine.clear()
+        _attempt(machine, command, env, retries - 1)
 
 
 def _trim(machine: Machine) -> None:

@@ -156,6 +156,8 @@ class Flight:
     """By actor."""
     machines: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
     """By machine."""
+    gpus: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
+    """Graphics processors, as machines, by machine and number."""
     alerts: list[tuple[float, str, str]] = field(default_factory=list)
     """Mission seconds, kind, text."""
     drops: dict[str, int] = field(default_factory=dict)
@@ -279,6 +281,11 @@ def _vitals(flight: Flight, record: Record) -> None:
         machine.time.append(now)
         machine.cpu.append(value["machine_cpu"])
         machine.memory.append(value["machine_memory"])
+        for number, gpu in enumerate(value.get("gpus", ())):
+            load = flight.gpus[f"{value['machine']} {number}"]
+            load.time.append(now)
+            load.cpu.append(gpu["busy"])
+            load.memory.append(gpu["memory"])
 
 
 _READERS: dict[str, Callable[[Flight, Record], None]] = {

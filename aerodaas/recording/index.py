@@ -136,8 +136,9 @@ def _scan(file: BinaryIO, size: int) -> FileIndex:
         file.seek(offset)
         opcode, length = struct.unpack("<BQ", file.read(_RECORD_HEAD))
         end = offset + _RECORD_HEAD + length
-        if end > size or opcode == Opcode.FOOTER:
-            index.complete = end + _MAGIC == size
+        # There is no opcode 0: a machine that lost its power leaves zeros, maybe gigabytes of them.
+        if end > size or opcode in {0, Opcode.FOOTER}:
+            index.complete = opcode != 0 and end + _MAGIC == size
             break
         try:
             _enter(index, file, opcode, offset, end)

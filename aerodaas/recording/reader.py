@@ -14,7 +14,6 @@ from typing import Any, BinaryIO
 from mcap.data_stream import ReadDataStream
 from mcap.records import Attachment, Channel, Message
 from mcap_protobuf.decoder import DecoderFactory
-from mcap_ros2.decoder import DecoderFactory as RosDecoderFactory
 from typing_extensions import Self
 
 from aerodaas.clock import seconds
@@ -63,7 +62,6 @@ class Recording:
         self._file = file
         self._index = index
         self._protobuf = DecoderFactory()
-        self._ros = RosDecoderFactory()
         self._decoders: dict[int, Callable[[bytes], Any]] = {}
         starts = [block.start for block in index.blocks]
         self.metadata: dict[str, dict[str, str]] = {
@@ -233,7 +231,10 @@ class Recording:
         if decoder is None:
             schema = self._index.schemas.get(channel.schema_id)
             decoder = self._protobuf.decoder_for(channel.message_encoding, schema)
-            decoder = decoder or self._ros.decoder_for(channel.message_encoding, schema)
+            if decoder is None and channel.message_encoding == "cdr":
+                from mcap_ros2.decoder import DecoderFactory as Ros  # noqa: PLC0415 - rarely met
+
+                decoder = Ros().decoder_for(channel.message_encoding, schema)
             if decoder is None:
                 decoder = json.loads if channel.message_encoding == "json" else bytes
             self._decoders[channel.id] = decoder

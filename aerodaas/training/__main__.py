@@ -24,6 +24,7 @@ _Work = Annotated[Path, typer.Option(help="Folder of pictures and checkpoints.")
 _Out = Annotated[Path, typer.Option(help="Folder of the models and their cards.")]
 _Worlds = Annotated[int, typer.Option(help="Worlds to train on, of 20 pictures each.")]
 _Steps = Annotated[int, typer.Option(help="Steps of training, of 32 pictures each.")]
+_Halved = Annotated[int, typer.Option(help="Of these, the first ones, on halved pictures.")]
 _Seed = Annotated[int, typer.Option(help="Seed of weights and order.")]
 _Start = Annotated[
     Path | None, typer.Option(help="Weights to begin with (weights.pt of an earlier run).")
@@ -36,7 +37,7 @@ _WORK, _OUT = Path("runs/training"), DETECTOR.parent
 
 
 @app.command()
-def render(work: _Work = _WORK, worlds: _Worlds = 600, held_out: int = 45) -> None:
+def render(work: _Work = _WORK, worlds: _Worlds = 600, held_out: int = 30) -> None:
     """Render the pictures, those to train on and those held out; resumes."""
     for name, first, count in (("train", 0, worlds), ("held-out", HELD_OUT, held_out)):
         with Progress(console=_console) as bar:
@@ -57,6 +58,7 @@ def detector(
     out: _Out = _OUT,
     worlds: _Worlds = 600,
     steps: _Steps = 7600,
+    halved: _Halved = 4400,
     seed: _Seed = 1,
     start: _Start = None,
     photographs: _Photographs = None,
@@ -68,8 +70,8 @@ def detector(
 
     render(work, worlds)
     places = pipeline.Places(work, out, photographs, labels)
-    recipe = train.Recipe(steps=steps, seed=seed, start=start)
-    _watch(pipeline.trained(places, recipe), steps)
+    recipe = train.Recipe(steps=steps, halved=halved, seed=seed, start=start)
+    _watch(pipeline.trained(places, recipe, "detector"), steps)
     _console.print(pipeline.make_detector(places, recipe).figures)
 
 
@@ -78,18 +80,22 @@ def pose(
     work: _Work = _WORK,
     out: _Out = _OUT,
     worlds: _Worlds = 600,
-    steps: _Steps = 7600,
+    steps: _Steps = 4000,
     seed: _Seed = 1,
     start: _Start = None,
 ) -> None:
-    """The same for the pose model: one network is trained for both, once."""
+    """The same for the pose model, which goes on from the detector's weights."""
     _require_torch()
     from aerodaas.training import pipeline, train  # noqa: PLC0415 - they need PyTorch
 
     render(work, worlds)
     places = pipeline.Places(work, out)
-    recipe = train.Recipe(steps=steps, seed=seed, start=start)
-    _watch(pipeline.trained(places, recipe), steps)
+    begin = start or places.run("detector") / "weights.pt"
+    if not begin.exists():
+        _console.print(f"there is no {begin}; train the detector first", markup=False)
+        raise typer.Exit(1)
+    recipe = train.Recipe(steps=steps, rate=1.5e-3, postures=True, seed=seed, start=begin)
+    _watch(pipeline.trained(places, recipe, "pose"), steps)
     _console.print(pipeline.make_pose(places, recipe).figures)
 
 

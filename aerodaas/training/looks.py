@@ -116,7 +116,8 @@ class VariousLooks(Looks):
     def tower(self, thing: Thing) -> TowerLook:
         """Build a tower, painted in bands, in one colour, or bare."""
         rng = rng_of(thing)
-        steel = (rng.uniform(0.3, 0.8),) * 3
+        grey = rng.uniform(0.3, 0.8)
+        steel = (grey, grey, grey)
         kinds = (
             ((0.86, 0.16, 0.12), (0.95, 0.95, 0.95)),
             ((0.95, 0.40, 0.10), (0.92, 0.92, 0.90)),

@@ -32,32 +32,31 @@ class Places:
     labels: Path | None = None
     """JSON, {file: [left, top, right, bottom]} of the vest in each photograph."""
 
-    @property
-    def weights(self) -> Path:
-        """The mean weights of the latest checkpoint."""
-        return self.work / "run" / "weights.pt"
+    def run(self, name: str) -> Path:
+        """Folder of the checkpoints of the model called `name`."""
+        return self.work / name
 
 
-def trained(places: Places, recipe: Recipe) -> Iterator[Progress]:
-    """Train both models' common network, unless it has been for that many steps already."""
-    torch.set_num_threads(max(1, torch.get_num_threads()))
-    yield from train(Pictures(places.work / "train"), recipe, places.work / "run")
+def trained(places: Places, recipe: Recipe, name: str) -> Iterator[Progress]:
+    """Train the model called `name`, unless it has been for that many steps already."""
+    yield from train(Pictures(places.work / "train"), recipe, places.run(name))
 
 
 def make_detector(places: Places, recipe: Recipe) -> Card:
     """Export the detector and write its card."""
     calibration, test = _held_out(places)
     path = places.out / "detector.onnx"
-    export_detector(places.weights, path, _UNCALIBRATED)
+    weights = places.run("detector") / "weights.pt"
+    export_detector(weights, path, _UNCALIBRATED)
     ranked = rankings(path, calibration)
     thresholds = [min(max(r.best_threshold, 0.02), 0.98) for r in ranked.values()]
-    export_detector(places.weights, path, thresholds)
+    export_detector(weights, path, thresholds)
     card = Card(
         "Detector",
         "Finds hazard vests, people, cars and lattice towers. Ultralytics layout, detect: "
         f"1 x 8 x 2100 for {SIZE} x {SIZE} pixels. Scores are shifted, class by class, so that "
         f"{NOMINAL_SCORE} is the best threshold (F1) on rendered pictures.",
-        _recipe_rows(places, recipe),
+        _recipe_rows(places, recipe, "detector"),
     )
     card.figures["Held-out pictures"] = f"{len(test)}, of other worlds; things of 8 pixels and more"
     for label, ranking in rankings(path, test).items():
@@ -76,15 +75,16 @@ def make_pose(places: Places, recipe: Recipe) -> Card:
     """Export the pose model and write its card."""
     calibration, test = _held_out(places)
     path = places.out / "pose.onnx"
-    export_pose(places.weights, path, _UNCALIBRATED)
+    weights = places.run("pose") / "weights.pt"
+    export_pose(weights, path, _UNCALIBRATED)
     threshold = rankings(path, calibration)["person"].best_threshold
-    export_pose(places.weights, path, [min(max(threshold, 0.02), 0.98)] * 4)
+    export_pose(weights, path, [min(max(threshold, 0.02), 0.98)] * 4)
     card = Card(
         "Pose",
         "Finds people and the 17 keypoints of COCO. Ultralytics layout, pose: 1 x 56 x 2100 for "
         f"{SIZE} x {SIZE} pixels; a keypoint's confidence is that of its being seen. Scores are "
         f"shifted so that {NOMINAL_SCORE} is the best threshold (F1) on rendered pictures.",
-        _recipe_rows(places, recipe),
+        _recipe_rows(places, recipe, "pose"),
     )
     card.figures["Held-out pictures"] = f"{len(test)}, of worlds not trained on"
     card.figures["mAP50 of boxes"] = _precision(rankings(path, test)["person"])
@@ -105,13 +105,19 @@ def _precision(ranking: Ranking) -> str:
     return f"{ranking.average_precision:.3f} ({ranking.things} things)"
 
 
-def _recipe_rows(places: Places, recipe: Recipe) -> dict[str, str]:
-    kept = torch.load(places.work / "run" / "training.pt", weights_only=True, map_location="cpu")
-    where = "a GPU" if torch.cuda.is_available() else "one core"
+def _recipe_rows(places: Places, recipe: Recipe, name: str) -> dict[str, str]:
+    kept = torch.load(places.run(name) / "training.pt", weights_only=True, map_location="cpu")
+    steps = f"{kept['step']} of {recipe.batch} pictures"
+    if recipe.postures:
+        steps = f"{steps} cut around people, from the detector's weights on"
+    else:
+        steps = f"{steps}, {min(recipe.halved, kept['step'])} of them on halved ones"
+    threads = torch.get_num_threads()
+    where = "a GPU" if torch.cuda.is_available() else f"a CPU, {threads} thread(s)"
     return {
         "Pictures": f"{len(Pictures(places.work / 'train'))}, rendered; no photograph",
         "Seed": str(recipe.seed),
-        "Steps": f"{kept['step']} of {recipe.batch} pictures at {recipe.size[1]} x {recipe.size[0]}",
+        "Steps": steps,
         "Time": f"{kept['seconds'] / 60:.0f} min on {where}",
     }
 

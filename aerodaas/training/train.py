@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from aerodaas.training.augment import augmented
+from aerodaas.training.augment import augmented, centred
 from aerodaas.training.dataset import Pictures, Sample
 from aerodaas.training.labelling import KEYPOINTS
 from aerodaas.training.loss import Targets, losses
@@ -43,6 +43,8 @@ class Recipe:
     decay: float = 0.03
     size: tuple[int, int] = (192, 320)
     """Height and width to train at: most cameras' pictures leave no more of the square."""
+    postures: bool = False
+    """Learn from cuts around people, and the keypoints above all; the size is then 160 x 160."""
     seed: int = 1
     start: Path | None = None
     """Weights to begin with, instead of random ones."""
@@ -99,13 +101,14 @@ def train(pictures: Pictures, recipe: Recipe, folder: Path) -> Iterator[Progress
         for group in optimiser.param_groups:
             group["lr"] = recipe.rate * _schedule(step, recipe.steps)
         size, draw = _source(pictures, recipe, step, rng)
-        samples = [augmented(draw, size, rng) for _ in range(recipe.batch)]
+        make = centred if recipe.postures else augmented
+        samples = [make(draw, size, rng) for _ in range(recipe.batch)]
         inputs, targets = batch_of(samples, device)
         with torch.autocast(device.type, torch.bfloat16):
             outputs = network(inputs)
         parts = losses(outputs, targets, size)
         optimiser.zero_grad(set_to_none=True)
-        parts.total.backward()
+        (parts.posture if recipe.postures else parts.total).backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 10.0)
         optimiser.step()
         step += 1
@@ -122,6 +125,8 @@ def _source(
     pictures: Pictures, recipe: Recipe, step: int, rng: np.random.Generator
 ) -> tuple[tuple[int, int], Callable[[], Sample]]:
     """Size to train at, and what draws a picture for it."""
+    if recipe.postures:
+        return (160, 160), lambda: pictures[int(rng.integers(len(pictures)))]
     height, width = recipe.size
     if step < recipe.halved:
         return (height // 2, width // 2), lambda: pictures.halved(int(rng.integers(len(pictures))))

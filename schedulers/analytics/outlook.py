@@ -25,9 +25,9 @@ PROBE_EVERY = NANOSECONDS
 """Least time between two tasks sent only to see whether the cloud is back."""
 _CROWDED = 0.9
 """Share of the slots in use at which the rest is kept for the best."""
-_OVERDUE = 4.0
+_OVERDUE = 3.0
 """Standard deviations beyond the mean after which an answer is overdue, ..."""
-_GRACE = 100 * MILLISECOND
+_GRACE = 50 * MILLISECOND
 """... and this much more."""
 _SILENT = 2
 """Overdue answers in a row after which the cloud counts as silent."""

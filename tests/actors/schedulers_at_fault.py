@@ -26,7 +26,8 @@ class _Faulty(Fifo):
         """Count, and go wrong at the sixth."""
         self.arrivals += 1
         if self.arrivals > _GOOD:
-            return self._go_wrong(task, now)
+            decisions: Iterable[Decision] = self._go_wrong(task, now)
+            return decisions
         return super().task_arrived(task, now)
 
     def _go_wrong(self, task: Task, now: int) -> Any:  # noqa: ANN401

@@ -25,9 +25,7 @@ def test_a_quantile_is_one_of_the_values_that_enough_do_not_exceed(
     assert len(smaller) < share * len(values) + 1e-9
 
 
-@given(
-    st.floats(1e-4, 1.0), st.floats(1e4, 1e9), st.lists(st.integers(20_000, 10**7), min_size=1)
-)
+@given(st.floats(1e-4, 1.0), st.floats(1e4, 1e9), st.lists(st.integers(20_000, 10**7), min_size=1))
 def test_a_link_is_known_by_what_it_carried(
     latency: float, bandwidth: float, sizes: list[int]
 ) -> None:

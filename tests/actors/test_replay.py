@@ -34,7 +34,7 @@ from aerodaas.analytics.onnx.detector import OnnxDetector
 from aerodaas.data import Detection
 from aerodaas.errors import RecordingError
 from aerodaas.recording.difference import difference
-from aerodaas.recording.pace import read_pace
+from aerodaas.recording.pace_reader import read_pace
 from aerodaas.recording.reader import Recording
 from aerodaas.run import Run
 
@@ -135,9 +135,7 @@ def test_a_flight_in_lockstep_repeats_every_decision(surveyed: Run, flyer: Flyer
     assert [one["driver"] for one in content["robots"]] == ["replayed"] * 2
 
 
-def test_a_mission_that_goes_elsewhere_ends_with_the_recording(
-    surveyed: Run, flyer: Flyer
-) -> None:
+def test_a_mission_that_goes_elsewhere_ends_with_the_recording(surveyed: Run, flyer: Flyer) -> None:
     """Another waypoint than the one recorded is never reached; the replay ends all the same."""
     assert surveyed.recording is not None
     second = again(flyer, surveyed, lambda env: survey(env, first=-40.0))

@@ -78,7 +78,6 @@ def test_unknown_channel_names_its_neighbours(recorded: Path, tmp_path: Path) ->
 
 def test_video_plays_at_the_pictures_times(recorded: Path, tmp_path: Path) -> None:
     """Every frame is there, as H.264, as long as the flight, with the boxes drawn in."""
-    pytest.importorskip("av")
     with Recording.open(recorded) as recording:
         pictures = recording.topics["/tello/camera/image"].count
         (path,) = write_videos(recording, tmp_path)
@@ -130,7 +129,6 @@ def test_nothing_is_overwritten(recorded: Path, tmp_path: Path) -> None:
 
 def test_recording_without_pictures(tmp_path: Path) -> None:
     """Asking for a video of nothing is answered, and leaves nothing behind."""
-    pytest.importorskip("av")
     path = tmp_path / "flight.mcap"
     record(path, SyntheticFlight(frames=1, rate=2), config=RecordingConfig(images="none"))
     with Recording.open(path) as recording, pytest.raises(RecordingError, match="no pictures"):

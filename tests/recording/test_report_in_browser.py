@@ -16,10 +16,8 @@ from synthetic_flight import SyntheticFlight, record
 from aerodaas.recording.comparison import write_comparison
 from aerodaas.recording.report import write_report
 
-BROWSER = next(
-    (found for name in ("chromium", "chromium-browser", "google-chrome") if (found := shutil.which(name))),
-    None,
-)  # fmt: skip
+NAMES = ("chromium", "chromium-browser", "google-chrome")
+BROWSER = next((found for found in map(shutil.which, NAMES) if found), None)
 PROBE = """
 <script>
 window.addEventListener("load", () => {

@@ -77,7 +77,7 @@ def test_farm_survey(url: str) -> None:
     try:
         finish(flight)
         assert set(flight.status.visited) == {"wp1", "wp2", "wp3", "wp4"}
-        assert flight.states[:3] == [S.TAKING_OFF, S.HOLDING, S.ENROUTE]
+        assert {S.TAKING_OFF, S.ENROUTE, S.LOITERING} <= set(flight.states)
         home = flight.vehicle.read().odometry.position
         assert float(np.linalg.norm(home[:2])) < 1.5
     finally:

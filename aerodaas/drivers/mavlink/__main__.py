@@ -22,6 +22,7 @@ def main(
     url: Annotated[str, typer.Argument(help="As in the environment file.")] = "udpin:0.0.0.0:14540",
     system: Annotated[int | None, typer.Option(help="The vehicle's system id.")] = None,
     timeout: Annotated[float, typer.Option(help="Seconds to wait for its HEARTBEAT.")] = 10.0,
+    *,
     set_failsafes: Annotated[
         bool, typer.Option("--set-failsafes", help="Set the failsafes that are found unsafe.")
     ] = False,

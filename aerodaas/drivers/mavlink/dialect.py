@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import importlib
 import struct
 from typing import Any, ClassVar
 
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
 __all__ = ["EventMessage", "mavlink"]
+
+mavlink: Any = importlib.import_module("pymavlink.dialects.v20.ardupilotmega")
+"""What both autopilots speak: the common messages and ArduPilot's own. It has no types."""
 
 
 class EventMessage(mavlink.MAVLink_message):  # type: ignore[misc]

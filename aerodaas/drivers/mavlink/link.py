@@ -77,7 +77,7 @@ class MavlinkLink:
         on_turn: Callable[[float], None],
         healthy: Callable[[float], bool],
     ) -> None:
-        """Prepare the link of robot `name`; nothing is opened yet. Raises ConfigError for a bad key."""
+        """Prepare the link of robot `name`; raises ConfigError for a bad key. Opens nothing."""
         self.counts = LinkCounts()
         self.failure: Exception | None = None
         """What ended the thread, which nothing should."""

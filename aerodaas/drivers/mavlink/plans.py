@@ -6,6 +6,7 @@ import queue
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from aerodaas.drivers.mavlink.dialect import mavlink
@@ -100,18 +101,16 @@ def download(
         items: list[Item] = []
         for index in range(total):
             ask = mavlink.MAVLink_mission_request_int_message(*target, index, kind)
-            reply = _ask(
-                link,
-                inbox,
-                ask,
-                kind,
-                lambda one, index=index: one.get_type() == "MISSION_ITEM_INT" and one.seq == index,
-            )
+            reply = _ask(link, inbox, ask, kind, partial(_is_item, index))
             values = (reply.param1, reply.param2, reply.param3, reply.param4)
             items.append(Item(reply.command, values, reply.x, reply.y, reply.z, reply.frame))
             progress(index + 1, total)
     link.send(mavlink.MAVLink_mission_ack_message(*target, mavlink.MAV_MISSION_ACCEPTED, kind))
     return items
+
+
+def _is_item(index: int, message: Any) -> bool:  # noqa: ANN401 - pymavlink has no types
+    return bool(message.get_type() == "MISSION_ITEM_INT" and message.seq == index)
 
 
 def _ask(

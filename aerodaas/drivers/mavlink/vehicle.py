@@ -17,7 +17,7 @@ from aerodaas.drivers.mavlink.climb import Climb
 from aerodaas.drivers.mavlink.commander import Commander, Outcome
 from aerodaas.drivers.mavlink.connecting import Connection, establish
 from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.finder import Finder
+from aerodaas.drivers.mavlink.finder import Finder, Found
 from aerodaas.drivers.mavlink.frames import LocalFrame
 from aerodaas.drivers.mavlink.guidance import MovingTarget
 from aerodaas.drivers.mavlink.link import MavlinkLink, Message
@@ -25,8 +25,8 @@ from aerodaas.drivers.mavlink.parameters import Parameters
 from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.plans import Item, Progress, download, upload
 from aerodaas.drivers.mavlink.rates import RateKeeper
-from aerodaas.drivers.mavlink.settings import mavlink_settings
 from aerodaas.drivers.mavlink.setpoint import position_message, velocity_message
+from aerodaas.drivers.mavlink.settings import mavlink_settings
 from aerodaas.drivers.mavlink.telemetry import Telemetry
 from aerodaas.drivers.mavlink.watchdog import Watchdog
 from aerodaas.drivers.setpoints import require_finite
@@ -74,7 +74,7 @@ class MavlinkVehicle:
         self._name = robot.id
         self._settings = settings = mavlink_settings(robot)
         home = environment.home
-        self._home = home and GeodeticOrigin(home.latitude, home.longitude, home.altitude)
+        self._home = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
         if settings.frame == "home" and self._home is None:
             raise ConfigError(f'{robot.id}: "frame": "home" needs a home in the environment file')
         limits = robot.limits
@@ -129,16 +129,12 @@ class MavlinkVehicle:
             self._settings,
             on_message=self._take,
             on_turn=self._turned,
-            healthy=lambda now: self._watchdog.healthy(now),
+            healthy=self._watchdog.healthy,
         )
         link.open()
         self._link = link
         try:
-            deadline = time.monotonic() + timeout
-            while (found := self._finder.found) is None:
-                if time.monotonic() >= deadline:
-                    raise VehicleError(f"{self._name}: {self._finder.explain(link.counts)}")
-                self._pause()
+            found = self._find(link, time.monotonic() + timeout)
             target = (found.system, found.component)
             link.adopt(*target)
             with self._lock:
@@ -158,6 +154,13 @@ class MavlinkVehicle:
         except BaseException:
             self.close()
             raise
+
+    def _find(self, link: MavlinkLink, deadline: float) -> Found:
+        while (found := self._finder.found) is None:
+            if time.monotonic() >= deadline:
+                raise VehicleError(f"{self._name}: {self._finder.explain(link.counts)}")
+            self._pause()
+        return found
 
     def _pause(self) -> None:
         self._watchdog.feed()

@@ -23,6 +23,7 @@ VITALS = json_schema(
     memory_mb="number",
     machine_cpu="number",
     machine_memory="number",
+    gpus={"type": "array", "items": {"type": "object"}},
 )
 
 
@@ -43,6 +44,7 @@ def vitals(item: Vitals, message: Message[Any], session: Session) -> Iterator[En
         "memory_mb": item.memory / 1e6,
         "machine_cpu": item.machine_cpu,
         "machine_memory": item.machine_memory,
+        "gpus": [{"busy": gpu.busy, "memory": gpu.memory} for gpu in item.gpus],
     }
     # An actor that was restarted begins to count anew.
     if took > 0 and used >= 0:

@@ -30,12 +30,8 @@ def write_videos(recording: Recording, folder: Path, *, overlays: bool = True) -
     """Write an MP4 for each camera into `folder`; returns the files.
 
     With `overlays`, detections, the mission's time and its state are drawn in. Raises
-    RecordingError without PyAV, for a recording without pictures, and for a file in the way.
+    RecordingError for a recording without pictures, and for a file in the way.
     """
-    try:
-        import av  # noqa: F401, PLC0415 - an extra
-    except ImportError:
-        raise RecordingError('videos need PyAV: pip install "aerodaas[video]"') from None
     writers: dict[str, _Video] = {}
     found = detections_by_frame(recording) if overlays else {}
     flight = Flight.read(recording)
@@ -70,7 +66,7 @@ class _Video:
     """One MP4 file."""
 
     def __init__(self, path: Path, first: Frame) -> None:
-        import av  # noqa: PLC0415 - an extra
+        import av  # noqa: PLC0415 - 30 MB that reports do without
 
         self.path = path
         self._frame = av.VideoFrame

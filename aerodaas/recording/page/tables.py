@@ -50,9 +50,9 @@ def sections(summary: FlightSummary) -> Iterator[str]:
         head = ["stream", "count", "median (ms)", "99th perc.", "overhead"]
         yield section("Latency since capture", table(head, rows))
     if summary.reasons:
-        rows = [(*said.split(": ", 1), count) for said, count in summary.reasons.items()]
+        why = [(*said.split(": ", 1), count) for said, count in summary.reasons.items()]
         head = ["decision or outcome", "reason", "tasks"]
-        yield section("Why the scheduler decided so", table(head, rows), wide=True)
+        yield section("Why the scheduler decided so", table(head, why), wide=True)
     if summary.alerts:
         yield section("Alerts", table(["at (s)", "kind", "text"], _alerts(summary)))
     if summary.drops:

@@ -37,6 +37,16 @@ def loads_figure(flight: Flight) -> Figure:
             label=f"{label} (right)",
         )
         lines.append(line)
+    for number, (name, gpu) in enumerate(flight.gpus.items()):
+        (line,) = share.plot(
+            gpu.time,
+            [100 * busy for busy in gpu.cpu],
+            color="black",
+            linestyle=("-.", ":", "--")[number % 3],
+            linewidth=1.2,
+            label=f"GPU {name if len(flight.machines) > 1 else name.rpartition(' ')[2]} (right)",
+        )
+        lines.append(line)
     share.set(ylim=(0, 105), ylabel="Whole machine (%)")
     share.set_zorder(cores.get_zorder() - 1)
     cores.patch.set_visible(False)

@@ -199,9 +199,7 @@ class EmulatedAutopilot:
         elif kind == "HEARTBEAT" and isinstance(firmware, EmulatedArduPilot):
             firmware.hear_heartbeat(message)
 
-    def _acknowledge(self, message: Any, result: int | None) -> None:  # noqa: ANN401
-        if result is None:
-            return
+    def _acknowledge(self, message: Any, result: int) -> None:  # noqa: ANN401
         peer = (message.get_srcSystem(), message.get_srcComponent())
         for _ in range(2 if self.options.family == "px4" else 1):
             self._say(mavlink.MAVLink_command_ack_message(message.command, result, 0, 0, *peer))

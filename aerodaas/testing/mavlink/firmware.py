@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import Any, ClassVar
+from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
 import shapely
@@ -19,8 +19,8 @@ from aerodaas.vehicle import VehicleMode
 
 __all__ = ["Firmware", "Result"]
 
-Result = int | None
-"""MAV_RESULT; None where the family does not answer at all."""
+Result: TypeAlias = Any
+"""A MAV_RESULT, of which pymavlink tells no type."""
 
 _OK = mavlink.MAV_RESULT_ACCEPTED
 _IGNORE_PLACE, _IGNORE_VELOCITY, _IGNORE_YAW, _IGNORE_RATE = 0b111, 0b111000, 1 << 10, 1 << 11

@@ -81,7 +81,8 @@ class MavFlight:
 
     def enu(self, ned: Vector) -> Vector:
         """A place of its own NED frame in ENU."""
-        return enu_to_ned(ned) + self._shift
+        place: Vector = enu_to_ned(ned) + self._shift
+        return place
 
     @property
     def altitude(self) -> float:

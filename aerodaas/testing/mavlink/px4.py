@@ -12,7 +12,6 @@ from aerodaas.testing.mavlink.firmware import Firmware, Result
 from aerodaas.testing.mavlink.flight import MavFlight
 from aerodaas.testing.mavlink.options import AutopilotOptions
 from aerodaas.testing.mavlink.store import ParameterStore
-from aerodaas.vehicle import VehicleMode
 
 __all__ = ["EmulatedPX4"]
 
@@ -49,7 +48,7 @@ class EmulatedPX4(Firmware):
             "NAV_DLL_ACT": 0.0,
             "GF_ACTION": 2.0,
             "GF_MAX_VER_DIST": 0.0,
-            "MPC_XY_VEL_MAX": 12.0,
+            "MIS_TAKEOFF_ALT": 2.5,
         }
         integers = {"COM_LOW_BAT_ACT", "COM_OBL_RC_ACT", "NAV_DLL_ACT", "GF_ACTION"}
         super().__init__(options, flight, say, ParameterStore(values, integers, bytewise=True))
@@ -79,7 +78,8 @@ class EmulatedPX4(Firmware):
         if number == mavlink.MAV_CMD_NAV_TAKEOFF:
             if frame not in {None, mavlink.MAV_FRAME_GLOBAL}:
                 return mavlink.MAV_RESULT_DENIED
-            self._altitude = values[6]
+            default = self.flight.altitude + self.parameters.values["MIS_TAKEOFF_ALT"]
+            self._altitude = values[6] if math.isfinite(values[6]) else default
             return self._set_mode(_AUTO, _TAKE_OFF)
         sub = {mavlink.MAV_CMD_NAV_LAND: _LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _RETURN}
         if number in sub:

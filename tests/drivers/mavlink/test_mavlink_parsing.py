@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,11 +21,11 @@ from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 WANTED = frozenset({0, 30, 32, 77, 253, 410})
 
 
-def decoder() -> Any:  # noqa: ANN401
-    """pymavlink's decoding, with None for what is none."""
+def decoder() -> Callable[[bytearray], Any]:
+    """Decoding by pymavlink, with None for what is none."""
     mav = mavlink.MAVLink(None, 1, 1)
 
-    def decode(frame: bytearray) -> object | None:
+    def decode(frame: bytearray) -> Any:  # noqa: ANN401
         try:
             return mav.decode(frame)
         except mavlink.MAVError:
@@ -80,7 +81,12 @@ def test_what_nobody_wants_is_not_decoded() -> None:
     mav = mavlink.MAVLink(None, 1, 1)
     other = mavlink.MAVLink_vfr_hud_message(1, 2, 3, 4, 5, 6).pack(mav)
     decoded: list[bytearray] = []
-    framer = Framer(WANTED, lambda frame: decoded.append(frame) or frame)
+
+    def decode(frame: bytearray) -> bytearray:
+        decoded.append(frame)
+        return frame
+
+    framer = Framer(WANTED, decode)
     assert len(list(framer.feed(other + packets(1)[0] + other))) == 1
     assert len(decoded) == 1
 
@@ -157,7 +163,7 @@ def test_events_are_told_by_their_names() -> None:
     assert len(reader.objections) == 2
     take("commander_arming_check_summary", 8)
     take("commander_health_summary", 8)
-    assert reader.objections == ()
+    assert not reader.objections
 
 
 def test_an_event_travels() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import queue
@@ -129,7 +130,9 @@ class Ear:
 
     def acknowledge(self, number: int, result: int, now: float) -> None:
         """Answer."""
-        self.commander.take(mavlink.MAVLink_command_ack_message(number, result, 0, 0, 245, 191), now)
+        self.commander.take(
+            mavlink.MAVLink_command_ack_message(number, result, 0, 0, 245, 191), now
+        )
 
 
 TAKE_OFF = Order(mavlink.MAV_CMD_NAV_TAKEOFF, (0.0,) * 7, "take off")
@@ -260,18 +263,19 @@ def test_a_plan_of_qgroundcontrol_becomes_waypoints(tmp_path: Path) -> None:
 @given(
     st.recursive(
         st.none() | st.floats() | st.text(max_size=5) | st.sampled_from(["mission", "items"]),
-        lambda inner: st.lists(inner, max_size=3)
-        | st.dictionaries(
-            st.sampled_from(["mission", "items", "type", "params", "plannedHomePosition"]), inner
+        lambda inner: (
+            st.lists(inner, max_size=3)
+            | st.dictionaries(
+                st.sampled_from(["mission", "items", "type", "params", "plannedHomePosition"]),
+                inner,
+            )
         ),
         max_leaves=12,
     )
 )
 def test_what_is_no_plan_is_refused(tmp_path_factory: pytest.TempPathFactory, content: Any) -> None:  # noqa: ANN401
-    """Any JSON: ConfigError that names the file, or an empty plan."""
+    """Any JSON: ConfigError, or an empty plan."""
     path = tmp_path_factory.mktemp("plans") / "x.plan"
     path.write_text(json.dumps(content))
-    try:
-        read_plan(path, GeodeticOrigin(0.0, 0.0))
-    except ConfigError as error:
-        assert "x.plan" in str(error)
+    with contextlib.suppress(ConfigError):
+        assert not read_plan(path, GeodeticOrigin(0.0, 0.0)).waypoints

@@ -17,6 +17,8 @@ from aerodaas.errors import VehicleError
 from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot
 from aerodaas.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
 
+pytestmark = pytest.mark.slow
+
 FAMILIES = ("px4", "ardupilot")
 AHEAD = VelocitySetpoint(np.array([0.5, 0.0, 0.0]))
 
@@ -144,7 +146,7 @@ def test_reconnecting_in_flight_takes_off_no_second_time(family: str) -> None:
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_an_uploaded_fence_is_enforced(family: str) -> None:
-    """Uploaded with its action; crossing it, the vehicle protects itself and the mission is told."""
+    """Uploaded with its action: crossing it, the vehicle protects itself, and we are told."""
     limits = {"geofence": {"polygon": [[-4, -4], [4, -4], [4, 4], [-4, 4]], "ceiling": 20}}
     options = AutopilotOptions(family=family)  # type: ignore[arg-type]
     with flight(options, fence="return", limits=limits) as pair:

@@ -44,6 +44,7 @@ def test_it_is_a_vehicle_with_honest_capabilities() -> None:
         vehicle.read()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_whole_flight(family: str) -> None:
     """Up, to a place in ENU wherever its own frame begins, a velocity, and down."""
@@ -80,6 +81,7 @@ def test_a_whole_flight(family: str) -> None:
         assert pair.autopilot.firmware.motions == ["arm", "take off", "follow", "land"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_whole_flight_over_a_bad_link(family: str) -> None:
     """With 30 % loss, doubled, late and overtaking packets it still arms and takes off once."""
@@ -98,6 +100,7 @@ def test_a_whole_flight_over_a_bad_link(family: str) -> None:
     assert motions.count("take off") == 1
 
 
+@pytest.mark.slow
 def test_the_speed_asked_for_is_kept() -> None:
     """Neither autopilot takes a speed with a place, so the target itself moves at it."""
     with flight(AutopilotOptions(family="px4")) as pair:
@@ -111,6 +114,7 @@ def test_the_speed_asked_for_is_kept() -> None:
         assert 0.8 < fastest < 1.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_what_is_sent_is_clipped_and_said(family: str) -> None:
     """`send` returns the setpoint as it went out."""
@@ -144,6 +148,7 @@ def test_nothing_is_flown_from_the_ground() -> None:
         assert pair.commands(mavlink.MAV_CMD_DO_SET_MODE) == 0
 
 
+@pytest.mark.slow
 def test_setpoints_come_before_the_mode() -> None:
     """PX4 is asked for offboard only after more than a second of setpoints."""
     with flight(AutopilotOptions(family="px4")) as pair:
@@ -165,6 +170,7 @@ def test_setpoints_come_before_the_mode() -> None:
         assert len(asked) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("family", "words"),
     [("px4", "estimator hor pos not stable"), ("ardupilot", "PreArm: Need Position Estimate")],
@@ -231,6 +237,7 @@ def test_others_are_not_flown(
         assert kinds <= {"HEARTBEAT"}
 
 
+@pytest.mark.slow
 def test_two_vehicles_on_one_port_are_told_apart() -> None:
     """Each system id has its own driver's ear; a second driver hears through the first."""
     first, second = free_port(), free_port()
@@ -309,9 +316,17 @@ def test_settings_are_checked_by_name(settings: dict[str, object], complaint: st
         MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
 
 
+def test_a_camera_without_a_stream_is_none() -> None:
+    """MAVLink has no pictures of its own, so that such a camera can only be left out."""
+    sensors = [{"id": "bare"}, {"id": "rtsp", "settings": {"path": "rtsp://10.0.0.2/eye"}}]
+    robot = RobotConfig.model_validate({"id": "m", "driver": "mavlink", "sensors": sensors})
+    environment = EnvironmentConfig(robots=[robot])
+    assert [environment.has_pictures(sensor) for sensor in robot.sensors] == [False, True]
+    simulated = EnvironmentConfig(robots=[robot.model_copy(update={"driver": "simulated"})])
+    assert all(simulated.has_pictures(sensor) for sensor in robot.sensors)
+
+
 def test_home_frame_needs_a_home() -> None:
     """Said when the vehicle is built, not in flight."""
     with pytest.raises(ConfigError, match="needs a home"):
         vehicle_at(1, frame="home")
-
-

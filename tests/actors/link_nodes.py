@@ -1,0 +1,91 @@
+"""Sends frames from an edge node to two processes of a cloud node, and prints what arrived.
+
+A program of its own, for a process has one Ray: `python link_nodes.py`.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(Path(__file__).parent)]
+os.environ["PYTHONPATH"] = os.pathsep.join(sys.path[:3])
+os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
+
+import numpy as np  # noqa: E402 - workers import from where this process does
+import ray  # noqa: E402
+from ray._private.internal_api import node_stats  # noqa: E402
+from ray.cluster_utils import Cluster  # noqa: E402
+from test_sites import Desk, Mean  # noqa: E402
+
+from aerodaas.actors._cloud import Executor  # noqa: E402
+from aerodaas.actors.cluster import Place, options_for  # noqa: E402
+from aerodaas.actors.executor import CloudExecutor  # noqa: E402
+from aerodaas.data import Frame, Header  # noqa: E402
+from aerodaas.status import Message  # noqa: E402
+
+FRAMES = 12
+
+
+def executor(model: str) -> Executor:
+    """A process of its own on the cloud node, as an analysis with its own packages has."""
+    remote: Any = ray.remote(CloudExecutor)
+    options = options_for(Place("cloud"), restarts=0)
+    handle = remote.options(**options, max_concurrency=6).remote()
+    works = ray.put({model: Mean()})
+    ray.get(handle.prepare.remote(works), timeout=200)
+    return Executor("cloud", handle, [works], frozenset({model}), 4, "none")
+
+
+def noise(message: Message[Frame]) -> Message[Frame]:
+    """The message with a picture that no store shares with another's."""
+    random = np.random.default_rng(message.seq)
+    item = Frame(Header(*message.header), random.integers(0, 255, (360, 640, 3), np.uint8))
+    fields = (message.stream, message.seq, message.stamp, message.header, message.captured)
+    return Message(*fields, message.hops, item)
+
+
+def arrived(node: dict[str, Any]) -> int:
+    """Bytes that were ever written into a node's object store."""
+    stats = node_stats(node["NodeManagerAddress"], node["NodeManagerPort"], False)  # noqa: FBT003
+    return int(stats.store_stats.cumulative_created_bytes)
+
+
+def main() -> None:
+    """Send, count, print."""
+    small = {"num_cpus": 1, "object_store_memory": 100 * 2**20}
+    cluster = Cluster()
+    cluster.add_node(resources={"edge": 1}, include_dashboard=False, **small)
+    cluster.add_node(resources={"cloud": 1}, **small)
+    ray.init(address=cluster.address, logging_level="ERROR", log_to_driver=False)
+    try:
+        (cloud,) = [node for node in ray.nodes() if "cloud" in node["Resources"]]
+        desk = Desk(executor("one"), executor("two"))
+        before = arrived(cloud)
+        for _ in range(FRAMES):
+            message = noise(desk.frame())
+            desk.send("one", message)
+            desk.send("two", message)
+            desk.answers(2)
+        desk.look_until(lambda: desk.sites.values()["cloud"]["latency_ms"] > 0)
+        time.sleep(0.5)
+        told = {
+            "bytes": arrived(cloud) - before,
+            "frame": 360 * 640 * 3,
+            "sites": desk.sites.values(),
+            "here": ray.get_runtime_context().get_node_id() != cloud["NodeID"],
+        }
+        desk.sites.finish(1.0)
+    finally:
+        ray.shutdown()
+        cluster.shutdown()
+    print(json.dumps(told))  # noqa: T201 - what the test reads
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,206 @@
+"""Executors in the cloud as the dispatcher sees them: real processes, without a flight."""
+
+from __future__ import annotations
+
+import threading
+import time
+import uuid
+from collections.abc import Callable, Iterator
+from typing import Any, ClassVar
+
+import numpy as np
+import pytest
+import ray
+
+from aerodaas import Analytics, Frame
+from aerodaas.actors._cloud import CloudAnswer, Executor
+from aerodaas.actors._sites import Sites
+from aerodaas.actors.executor import CloudExecutor
+from aerodaas.analytics.base import Context, TimedContext
+from aerodaas.clock import NANOSECONDS, host_time_ns
+from aerodaas.data import Header
+from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
+from aerodaas.status import Message
+
+
+class Mean(Analytics[dict[str, Any]]):
+    """Says what it saw, and how long it might have taken."""
+
+    accepts: ClassVar[tuple[type, ...]] = (Frame,)
+    produces: ClassVar[type] = dict
+
+    def __init__(self, *, slow: float = 0.0, fails: bool = False) -> None:
+        self._slow = slow
+        self._fails = fails
+        self._inside = 0
+        self._most = 0
+
+    def process(self, item: Frame, context: Context) -> dict[str, Any]:
+        """Take the mean."""
+        self._inside += 1
+        self._most = max(self._most, self._inside)
+        time.sleep(self._slow)
+        self._inside -= 1
+        if self._fails:
+            raise ZeroDivisionError("a bug of the user's own")
+        left = context.time_left() if isinstance(context, TimedContext) else None
+        return {"mean": float(item.image.mean()), "left": left, "most": self._most}
+
+
+@pytest.fixture
+def started(runtime: None) -> Iterator[Callable[..., Executor]]:  # noqa: ARG001 - needs Ray
+    """Starts executors, and ends them."""
+    handles = []
+
+    def start(
+        site: str = "cloud", slots: int = 4, compression: str = "auto", **works: Analytics[Any]
+    ) -> Executor:
+        remote: Any = ray.remote(CloudExecutor)
+        handle = remote.options(num_cpus=0, max_concurrency=slots + 2, max_restarts=-1).remote()
+        handles.append(handle)
+        given = ray.put(works)
+        ray.get(handle.prepare.remote(given), timeout=120)
+        return Executor(site, handle, [given], frozenset(works), slots, compression)
+
+    yield start
+    for handle in handles:
+        ray.kill(handle)
+
+
+class Desk:
+    """Sends frames and waits for answers, as the dispatcher does."""
+
+    def __init__(self, *executors: Executor, timeout: float = 60.0) -> None:
+        self._called = threading.Event()
+        self.sites = Sites(executors, int(timeout * NANOSECONDS), self._called.set)
+        self._numbers = iter(range(10**6))
+        self._stream = f"drone/{uuid.uuid4().hex}"
+
+    def frame(self, shade: int = 100) -> Message[Frame]:
+        """A frame's message."""
+        number = next(self._numbers)
+        image = np.full((180, 320, 3), shade, np.uint8)
+        header = Header(number, number, "drone/camera")
+        item = Frame(header, image)
+        return Message(self._stream, number, number, header, host_time_ns(), (), item)
+
+    def send(self, model: str, message: Message[Frame], budget: float = 30.0) -> Task:
+        """Send a task."""
+        profile = Profile(model, 1.0, NANOSECONDS, 100 * MILLISECOND, 300 * MILLISECOND)
+        task = Task(next(self._numbers), profile, 0, NANOSECONDS)
+        self.sites.send(task, message, host_time_ns(), budget)
+        return task
+
+    def answers(self, count: int) -> list[CloudAnswer]:
+        """Wait for so many answers."""
+        found: list[CloudAnswer] = []
+        end = time.monotonic() + 120
+        while len(found) < count:
+            assert time.monotonic() < end, f"only {found}"
+            self._called.wait(0.1)
+            self._called.clear()
+            found += self.sites.answers(host_time_ns())
+        return found
+
+    def look_until(self, holds: Callable[[], bool]) -> None:
+        """Look after the sites, as the dispatcher does between messages."""
+        end = time.monotonic() + 120
+        while not holds():
+            assert time.monotonic() < end, self.sites.values()
+            self.sites.probe(host_time_ns())
+            time.sleep(0.05)
+
+
+def test_a_frame_is_sent_once_however_many_want_it(started: Callable[..., Executor]) -> None:
+    """Each answer says how its frame came; only the first execution of a frame sent anything."""
+    desk = Desk(started(one=Mean(), two=Mean()))
+    frames = [desk.frame(shade) for shade in (10, 200)]
+    for frame in frames:
+        for model in ("one", "two"):
+            desk.send(model, frame)
+    found = desk.answers(4)
+    assert not any(one.error or one.lost or one.timed_out for one in found)
+    assert sorted(round(a.message.item["mean"]) for a in found if a.message) == [10, 10, 200, 200]
+    assert all(one.way.endswith(" to cloud") for one in found)
+    sent = [one.figures["sent_kb"] for one in found if one.figures]
+    assert sum(size > 0 for size in sent) == len(frames)
+    values = desk.sites.values()["cloud"]
+    assert sum(values["frames"].values()) == len(frames)
+    desk.sites.finish(1.0)
+
+
+def test_uncompressed_where_that_is_asked_for(started: Callable[..., Executor]) -> None:
+    """The picture arrives bit by bit as it was."""
+    desk = Desk(started(one=Mean(), compression="none"))
+    desk.send("one", desk.frame())
+    (answer,) = desk.answers(1)
+    assert answer.way == "raw to cloud"
+    assert answer.figures is not None
+    assert answer.figures["sent_kb"] > 320 * 180 * 3 / 1e3
+    desk.sites.finish(1.0)
+
+
+def test_what_a_node_costs_becomes_known(started: Callable[..., Executor]) -> None:
+    """Its link by pings before any frame, an analysis by its executions."""
+    desk = Desk(started(slow=Mean(slow=0.3)))
+    assert desk.sites.expected("slow") is None
+    desk.look_until(lambda: desk.sites.values()["cloud"]["latency_ms"] > 0)
+    desk.look_until(lambda: desk.sites.values()["cloud"]["bandwidth_mbit"] < float("inf"))
+    assert desk.sites.values()["cloud"]["frames"] == {}
+    desk.send("slow", desk.frame())
+    (answer,) = desk.answers(1)
+    assert answer.figures is not None
+    assert answer.figures["work_ms"] >= 300
+    expected = desk.sites.expected("slow")
+    assert expected is not None
+    assert expected >= 0.3
+    desk.sites.finish(1.0)
+
+
+def test_an_analysis_runs_one_at_a_time_and_knows_its_time(
+    started: Callable[..., Executor],
+) -> None:
+    """Unless it says that threads may share it, whatever the slots."""
+    desk = Desk(started(slow=Mean(slow=0.1)))
+    for _ in range(4):
+        desk.send("slow", desk.frame(), budget=50.0)
+    found = [answer.message.item for answer in desk.answers(4) if answer.message]
+    assert [one["most"] for one in found] == [1] * 4
+    assert all(0 < one["left"] < 50.0 for one in found)
+    desk.sites.finish(1.0)
+
+
+def test_failures_are_told_with_their_reason(started: Callable[..., Executor]) -> None:
+    """A bug in the analysis, and an analysis that nobody there runs."""
+    desk = Desk(started(broken=Mean(fails=True)))
+    desk.send("broken", desk.frame())
+    desk.send("unheard_of", desk.frame())
+    errors = {answer.task.profile.model: answer.error for answer in desk.answers(2)}
+    assert errors["broken"] == "ZeroDivisionError: a bug of the user's own"
+    assert errors["unheard_of"] == "nothing in the cloud runs it"
+    desk.sites.finish(1.0)
+
+
+@pytest.mark.slow
+def test_of_two_the_quicker_is_used_and_the_other_when_it_is_gone(
+    started: Callable[..., Executor],
+) -> None:
+    """Both are tried; then the one that answers first. Its slots go with it, and come back."""
+    quick, slow = started("near", one=Mean()), started("far", one=Mean(slow=1.0))
+    desk = Desk(slow, quick)
+    assert desk.sites.slots == 8
+    for _ in range(4):
+        desk.send("one", desk.frame())
+        desk.answers(1)
+    desk.send("one", desk.frame())
+    assert desk.answers(1)[0].way.endswith(" to near")
+    ray.kill(quick.handle, no_restart=False)
+    desk.send("one", desk.frame())
+    while not (answer := desk.answers(1)[0]).lost:
+        desk.send("one", desk.frame())
+    assert desk.sites.slots == 4
+    desk.send("one", desk.frame())
+    answer = desk.answers(1)[0]
+    assert answer.way.endswith(" to far")
+    desk.look_until(lambda: desk.sites.slots == 8)
+    desk.sites.finish(1.0)

@@ -1,0 +1,91 @@
+"""The models that ship find what they are for, in worlds that they were not trained on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import onnxruntime as ort
+import pytest
+
+from aerodaas.analytics.models import DETECTOR, DETECTOR_CLASSES, POSE
+from aerodaas.analytics.onnx.detector import OnnxDetector
+from aerodaas.analytics.vip_detection import VipDetectionAnalytics
+from aerodaas.data import Frame, Header
+from aerodaas.training.evaluate import keypoint_ranking, rankings
+from aerodaas.training.rendering import HELD_OUT, render_world
+
+PHOTOGRAPHS = sorted((Path(__file__).parents[3] / "shared" / "data" / "frames").glob("*.jpg"))
+FRESH = HELD_OUT + 500
+"""Seeds from here on were neither trained on nor measured with."""
+
+
+@pytest.mark.parametrize("path", [DETECTOR, POSE], ids=["detector", "pose"])
+def test_files_are_small_and_told_apart_by_their_metadata(path: Path) -> None:
+    """As Ultralytics writes it, so that other tools read them, too."""
+    assert path.stat().st_size < 5_000_000
+    session = ort.InferenceSession(str(path), providers=["CPUExecutionProvider"])
+    metadata = session.get_modelmeta().custom_metadata_map
+    assert metadata["task"] == ("detect" if path == DETECTOR else "pose")
+    assert metadata["author"] == "AeroDaaS"
+    assert metadata["imgsz"] == "[320, 320]"
+    rows = 8 if path == DETECTOR else 56
+    assert session.get_outputs()[0].shape == [1, rows, 2100]
+
+
+@pytest.mark.parametrize("path", [DETECTOR, POSE], ids=["detector", "pose"])
+def test_each_has_a_card_with_figures(path: Path) -> None:
+    """What it was trained on, and how well it does."""
+    card = path.with_suffix(".md").read_text(encoding="utf-8")
+    for row in ("Seed", "Pictures", "mAP50", "Time per 1280 x 720 frame"):
+        assert f"| {row}" in card
+
+
+def test_the_detector_is_the_default() -> None:
+    """Of any detector, and of the vest's."""
+    assert OnnxDetector().names == DETECTOR_CLASSES
+    assert VipDetectionAnalytics().classes == ["vest"]
+
+
+def test_a_model_of_ones_own_keeps_all_its_classes() -> None:
+    """Only of the shipped one is the vest chosen."""
+    assert VipDetectionAnalytics(POSE).classes is None
+
+
+@pytest.mark.slow
+def test_things_are_found_in_fresh_worlds() -> None:
+    """Average precision at an IoU of 0.5 over sixty pictures."""
+    samples = [sample for seed in range(FRESH, FRESH + 6) for sample in render_world(seed, 10)]
+    precision = {
+        label: ranking.average_precision for label, ranking in rankings(DETECTOR, samples).items()
+    }
+    assert precision["vest"] > 0.5
+    assert min(precision.values()) > 0.25
+    assert keypoint_ranking(POSE, samples).average_precision > 0.0
+
+
+@pytest.mark.skipif(not PHOTOGRAPHS, reason="the photographs are not beside this checkout")
+def test_the_vest_is_found_in_photographs() -> None:
+    """No photograph was trained on. A box counts if its middle is as lime as the vest."""
+    detector = VipDetectionAnalytics()
+    detector.open()
+    found = 0
+    boxes = 0
+    for path in PHOTOGRAPHS:
+        image = np.asarray(cv2.imread(str(path)), np.uint8)
+        seen = list(detector.detect([Frame(Header(0, 0, path.name), image)])[0])
+        boxes += len(seen)
+        found += any(is_lime(image, item.box) for item in seen)
+    assert found >= 23
+    assert boxes - found <= 5
+
+
+def is_lime(image: np.ndarray, box: tuple[float, float, float, float]) -> bool:
+    """Whether half of the box's inner part is yellow-green, or washed out by the sun."""
+    left, top, right, bottom = box
+    wide, tall = (right - left) / 4, (bottom - top) / 4
+    inner = image[int(top + tall) : int(bottom - tall), int(left + wide) : int(right - wide)]
+    hue, saturation, value = cv2.cvtColor(inner, cv2.COLOR_BGR2HSV).transpose(2, 0, 1)
+    lime = (hue > 28) & (hue < 78) & (saturation > 35) & (value > 90)
+    return bool(lime.mean() > 0.5)
