@@ -21,7 +21,8 @@ class PersonFollowAnalytics(FollowAnalytics):
 class VipFollowAnalytics(FollowAnalytics):
     """Follows a person by the hazard vest, from 2 m at a height of 1.5 m as in the paper.
 
-    A vest's outline is about 0.6 m tall and 0.43 m wide, and is all in the picture at that distance.
+    A vest's outline is about 0.6 m tall and 0.43 m wide, and is all in the picture at that
+    distance.
     """
 
     def __init__(
