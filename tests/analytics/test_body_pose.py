@@ -127,6 +127,7 @@ def test_who_wears_the_vest_counts() -> None:
     wearer = body(Posture(raised=1.0), ahead=5.0, left=2.0)
     other = body(Posture(), ahead=3.0)
     u, v = wearer.centre
+    result = None
     vest = Detection((u - 20, v - 60, u + 20, v), "vest", 0.8)
     for _ in range(8):
         assert watch.see(1, vest) is None
