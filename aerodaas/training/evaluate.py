@@ -16,9 +16,9 @@ from aerodaas.analytics.models import DETECTOR_CLASSES
 from aerodaas.analytics.onnx.detector import OnnxDetector
 from aerodaas.data import Detections, Frame, Header
 from aerodaas.training.dataset import Sample
-from aerodaas.training.metrics import Floats, Ranking, overlap, similarity
+from aerodaas.training.metrics import Floats, Ranking, overlap, similarity, strays
 
-__all__ = ["Sightings", "keypoint_ranking", "milliseconds", "rankings", "sightings"]
+__all__ = ["Sightings", "keypoint_ranking", "milliseconds", "rankings", "sightings", "thresholds"]
 
 _LEAST = 0.01
 """Score of the weakest detection that counts for average precision."""
@@ -63,6 +63,23 @@ def rankings(model: Path, samples: Iterable[Sample]) -> dict[str, Ranking]:
             scores, boxes = _boxes(found, label)
             ranking.add(np.array(scores), overlap(boxes, truth), _large(truth))
     return result
+
+
+def thresholds(model: Path, samples: Sequence[Sample], most_false: float) -> dict[str, float]:
+    """Return the lowest score of each class with at most `most_false` stray boxes per picture."""
+    detector = _opened(model, _LEAST)
+    astray: dict[str, list[float]] = {label: [] for label in detector.names}
+    for sample in samples:
+        found = _find(detector, sample)
+        for label, scores in astray.items():
+            truth = sample.boxes[sample.kinds == DETECTOR_CLASSES.index(label)].astype(float)
+            given, boxes = _boxes(found, label)
+            scores.extend(np.array(given)[strays(boxes, truth)].tolist())
+    allowed = int(most_false * len(samples))
+    return {
+        label: sorted([*scores, *[_LEAST] * (allowed + 1)], reverse=True)[allowed]
+        for label, scores in astray.items()
+    }
 
 
 def keypoint_ranking(model: Path, samples: Iterable[Sample]) -> Ranking:
