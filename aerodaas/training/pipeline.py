@@ -76,9 +76,10 @@ def make_detector(places: Places, recipe: Recipe) -> Card:
         card.figures[f"mAP50, {label}"] = _precision(ranking)
         card.figures[f"mAP50, {label}, as the simulator shows it"] = _precision(plain[label])
     if places.photographs is not None and places.labels is not None:
-        seen = sightings(path, places.photographs, places.labels, "vest", NOMINAL_SCORE)
+        seen = sightings(path, places.photographs, places.labels, NOMINAL_SCORE)
         card.figures["Photographs with the vest found"] = f"{seen.found} of {seen.pictures}"
-        card.figures["False vest boxes in all of them"] = str(seen.false)
+        card.figures["Boxes beside it in all of them"] = str(seen.false)
+        card.figures["Boxes on a vest already found"] = str(seen.doubled)
     _finish(card, path)
     return card
 
