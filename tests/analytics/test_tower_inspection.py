@@ -154,7 +154,7 @@ def test_a_tower_that_disappears_ends_the_inspection() -> None:
 
 
 def test_boxes_of_parts_of_the_tower_draw_it_no_nearer() -> None:
-    """Half of the boxes end far above the foot, so that the tower seems far away."""
+    """Half of the boxes end above the foot, so that the tower seems farther away."""
     site = Site((25.0, 0.0), np.array([0.0, 0.0, 3.0]))
     whole = site.look
 
@@ -163,7 +163,7 @@ def test_boxes_of_parts_of_the_tower_draw_it_no_nearer() -> None:
         if site.time < 1.0 or random.random() < 0.5:
             return seen
         parts = [
-            replace(one, box=(*one.box[:3], one.box[1] + 0.7 * (one.box[3] - one.box[1])))
+            replace(one, box=(*one.box[:3], one.box[1] + 0.9 * (one.box[3] - one.box[1])))
             for one in seen
         ]
         return replace(seen, items=tuple(parts))
