@@ -27,7 +27,12 @@ SCENARIO: dict[str, Any] = {
             "kind": "person",
             "id": "vip",
             "vest": "yellow",
-            "motion": {"points": [[3, 0], [12, 0], [16, 4]], "speed": 0.5, "start": 6},
+            "motion": {
+                "points": [[3, 0], [12, 0], [16, 4], [20, 4]],
+                "speed": 0.5,
+                "start": 6,
+                "end": "vanish",  # a hand that nobody notices must not keep the drone up for ever
+            },
             "gestures": [{"kind": "hand_raised", "start": RAISED}],
         },
         {"kind": "building", "id": "hall", "at": [40, 6], "yaw": 80},
