@@ -157,7 +157,7 @@ class Flight:
         """
         self._prepare(list(self._members.values()), progress)
         for reference in self._opening:
-            ray.get(reference, timeout=_PREPARE_TIMEOUT)
+            self._ask(reference, _PREPARE_TIMEOUT)
         self._origin = host_time_ns()
         # Those that only listen go first, so that nobody speaks to an empty room.
         for member in reversed(self._members.values()):
@@ -294,8 +294,9 @@ class Flight:
                 names = ", ".join(sorted(member.name for member in waiting.values()))
                 raise MissionError(f"{names} not ready within {_PREPARE_TIMEOUT:.0f} s")
             member = waiting.pop(ready[0])
-            member.info = self._ask(ready[0])
-            _require_clock(member.name, member.info, began)
+            info: ActorInfo = self._ask(ready[0])
+            _require_clock(member.name, info, began)
+            member.info = info
             progress(member.name)
         self._connect(members)
 
@@ -380,9 +381,9 @@ class Flight:
                     self._note("actor_back", f"{member.name} is back after {absence:.1f} s")
 
     @staticmethod
-    def _ask(reference: Any) -> Any:  # noqa: ANN401 - whatever the actor returns
+    def _ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN401 - as it says
         try:
-            return ray.get(reference, timeout=_ANSWER_TIMEOUT)
+            return ray.get(reference, timeout=timeout)
         except RayTaskError as error:
             cause = error.cause
             if isinstance(cause, AeroDaaSError):
@@ -393,7 +394,7 @@ class Flight:
             reason = str(error).strip().splitlines()[-1]
             raise MissionError(f"an actor died: {reason}") from None
         except ray.exceptions.GetTimeoutError:
-            raise MissionError(f"an actor did not answer within {_ANSWER_TIMEOUT:.0f} s") from None
+            raise MissionError(f"an actor did not answer within {timeout:.0f} s") from None
 
 
 def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
