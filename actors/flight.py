@@ -294,8 +294,9 @@ class Flight:
                 names = ", ".join(sorted(member.name for member in waiting.values()))
                 raise MissionError(f"{names} not ready within {_PREPARE_TIMEOUT:.0f} s")
             member = waiting.pop(ready[0])
-            member.info = self._ask(ready[0])
-            _require_clock(member.name, member.info, began)
+            info: ActorInfo = self._ask(ready[0])
+            _require_clock(member.name, info, began)
+            member.info = info
             progress(member.name)
         self._connect(members)
 

@@ -178,12 +178,13 @@ class Pilot:
     def listen(self, now: int) -> None:
         """Have the mission hear what counts before `now`."""
         for message, at in self._arrivals.before(now):
+            item: Any = message.item
             header = message.header
             self._heard.append(Heard(message.stream, header.source, header.stamp, at))
             if message.stream in self.spec.navigation:
-                self.handle(StreamItem(message.stream, message.item, header), at)
+                self.handle(StreamItem(message.stream, item, header), at)
             else:
-                self.handle(message.item, at)
+                self.handle(item, at)
 
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
         """One turn of the setpoint loop; publishes what was decided."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
+import numpy as np
 from typing_extensions import Self
 
 from aerodaas.analytics.base import Analytics, Context
@@ -30,6 +31,8 @@ _TEXTS = {
 }
 _VEST_AGE = 1.0
 """Seconds for which the boxes of vests tell who wears one."""
+_SAME_BODY = 0.6
+"""Two boxes of which the smaller lies in the other by more than this share are of one body."""
 _MOST_PEOPLE = 100
 """A pose model's own limit is far above what can be told apart in a picture."""
 
@@ -196,7 +199,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self.unusable += len(found) - len(usable)
         middle = found.width / 2
         usable.sort(key=lambda one: _off_centre(one, middle))
-        items = (replace(one, label="person") for one in usable[:_MOST_PEOPLE])
+        items = (replace(one, label="person") for one in _once(usable[:_MOST_PEOPLE]))
         return self.tracker.update(replace(found, items=tuple(items)))
 
     def _choose(self, people: Detections) -> Detection | None:
@@ -206,7 +209,14 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
                 return None
             return _wearer(people, vests, self.vest_labels)
         mine = next((one for one in people if one.track_id == self.person), None)
-        if mine is not None or self.tracker.find(self.person) is not None:
+        known = self.tracker.find(self.person)
+        if mine is None and known is not None:
+            # A body that is found in another extent, without its legs, is the same body.
+            last = known.detection
+            mine = max(people, key=lambda one: _shared(one, last), default=None)
+            mine = mine if mine is not None and _shared(mine, last) > _SAME_BODY else None
+            self.person = self.person if mine is None else mine.track_id
+        if mine is not None or known is not None:
             return mine
         middle = people.width / 2
         nearest = min(people, key=lambda one: _off_centre(one, middle), default=None)
@@ -248,6 +258,28 @@ def _is_usable(one: Detection) -> bool:
         and all(map(math.isfinite, one.box))
         and one.area > 0
     )
+
+
+def _once(people: Sequence[Detection]) -> list[Detection]:
+    """Each body once, by the box with the most of its points: pose models box parts of it, too."""
+    best = sorted(people, key=lambda one: -_support(one))
+    kept: list[Detection] = []
+    for one in best:
+        if all(_shared(one, other) <= _SAME_BODY for other in kept):
+            kept.append(one)
+    return kept
+
+
+def _support(one: Detection) -> float:
+    points = one.keypoints
+    return 0.0 if points is None else float(np.nan_to_num(points[:, 2], posinf=0.0).sum())
+
+
+def _shared(one: Detection, other: Detection) -> float:
+    """Part of the smaller box that lies in the other."""
+    width = min(one.box[2], other.box[2]) - max(one.box[0], other.box[0])
+    height = min(one.box[3], other.box[3]) - max(one.box[1], other.box[1])
+    return max(0.0, width) * max(0.0, height) / max(min(one.area, other.area), 1e-9)
 
 
 def _off_centre(one: Detection, middle: float) -> float:

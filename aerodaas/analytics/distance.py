@@ -17,7 +17,7 @@ __all__ = ["SIZES", "DistanceAnalytics"]
 
 SIZES: Mapping[str, TargetSize] = {
     "person": TargetSize(1.7, 0.55),
-    "vest": TargetSize(0.65, 0.45),
+    "vest": TargetSize(0.6, 0.43),
     "car": TargetSize(1.5, 1.8, widest=4.2),
 }
 """Heights and widths in metres of what the shipped detector finds."""

@@ -20,7 +20,7 @@ __all__ = ["Machine", "run"]
 
 # The shell is the machine's first process: it reaps those that lose their parents.
 _INIT = "echo ready; while :; do sleep 3600 & wait; done"
-_TIMEOUT = 120.0
+_TIMEOUT = 300.0
 _DYING_SECONDS = 5.0
 
 

@@ -99,6 +99,8 @@ class LocalNetwork:
         label = f"ad{self._id}{len(self.far)}"
         link: Link = self._link(label, self._switch, machine, f"{address}/24")
         self._stack.callback(link.close)
+        # Leads nowhere further; Ray takes the way to the Internet for a host's own address.
+        machine.run("ip", "route", "add", "default", "via", self.host)
         link.shape(Shape())
         self.far[name] = Far(name, address, machine, link, Shape())
         return self.far[name]

@@ -14,6 +14,8 @@ from aerodaas.simulation.world import Thing, World
 
 __all__ = ["DetectorEyes", "Eyes", "TruthEyes", "box_in_picture"]
 
+_OUTLINE = np.array([0.92, 0.95])
+"""Width and height of a person's or vest's outline in parts of the box in space around it."""
 _SMALLEST = 4.0
 """Pixels; no detector finds less."""
 
@@ -77,7 +79,10 @@ class TruthEyes:
         items = []
         if edges is not None and not missed:
             size = [camera.width, camera.height] * 2
-            noisy = np.clip(np.array(edges) + errors * (edges[3] - edges[1]), 0, size)
+            low, high = np.array(edges[:2]), np.array(edges[2:])
+            middle, half = (low + high) / 2, _OUTLINE * (high - low) / 2
+            outline = np.concatenate([middle - half, middle + half])
+            noisy = np.clip(outline + errors * (edges[3] - edges[1]), 0, size)
             left, top, right, bottom = noisy.tolist()
             if min(right - left, bottom - top) > _SMALLEST:
                 items.append(Detection((left, top, right, bottom), self._label, 0.9))

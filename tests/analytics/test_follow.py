@@ -94,7 +94,7 @@ def test_it_keeps_2_m_from_a_walking_person(
     follow: FollowAnalytics = PersonFollowAnalytics()
     if kind == "vest":
         world.label, world.target_base = "vest", 0.9
-        world.target_height, world.target_width = 0.65, 0.42
+        world.target_height, world.target_width = 0.6, 0.4
         follow = VipFollowAnalytics()
     distances = world.run(follow, 60)
     tail = np.array(distances[int(20 * rate) :])
@@ -328,7 +328,7 @@ def test_a_target_that_loses_its_track_is_found_where_it_stands() -> None:
     world = Shaken(
         circle(0.5),
         np.array([0.0, 0.0, 1.5]),
-        target_height=0.65,
+        target_height=0.6,
         target_width=0.42,
         target_base=0.9,
         label="vest",

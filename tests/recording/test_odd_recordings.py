@@ -65,7 +65,7 @@ def test_pictures_alone_are_no_flight(tmp_path: Path) -> None:
     )
     with Recording.open(path) as recording:
         assert len(list(frames(recording))) > 5
-        with pytest.raises(RecordingError, match="pictures"):
+        with pytest.raises(RecordingError, match="where on the globe"):
             write_gpx(recording, tmp_path)
     with pytest.raises(RecordingError, match="holds no flight"):
         write_report(path, tmp_path / "report")
