@@ -32,14 +32,18 @@ from aerodaas.status import Message  # noqa: E402
 FRAMES = 12
 
 
-def executor(model: str) -> Executor:
-    """A process of its own on the cloud node, as an analysis with its own packages has."""
+def executors(*models: str) -> list[Executor]:
+    """Processes of their own on the cloud node, as analyses with their own packages have."""
     remote: Any = ray.remote(CloudExecutor)
     options = options_for(Place("cloud"), restarts=0)
-    handle = remote.options(**options, max_concurrency=6).remote()
-    works = ray.put({model: Mean()})
-    ray.get(handle.prepare.remote(works), timeout=200)
-    return Executor("cloud", handle, [works], frozenset({model}), 4, "none")
+    made, ready = [], []
+    for model in models:
+        handle = remote.options(**options, max_concurrency=6).remote()
+        works = ray.put({model: Mean()})
+        ready.append(handle.prepare.remote(works))
+        made.append(Executor("cloud", handle, [works], frozenset({model}), 4, "none"))
+    ray.get(ready, timeout=200)
+    return made
 
 
 def noise(message: Message[Frame]) -> Message[Frame]:
@@ -65,7 +69,7 @@ def main() -> None:
     ray.init(address=cluster.address, logging_level="ERROR", log_to_driver=False)
     try:
         (cloud,) = [node for node in ray.nodes() if "cloud" in node["Resources"]]
-        desk = Desk(executor("one"), executor("two"))
+        desk = Desk(*executors("one", "two"))
         before = arrived(cloud)
         for _ in range(FRAMES):
             message = noise(desk.frame())
