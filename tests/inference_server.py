@@ -99,7 +99,7 @@ class Serving:
         return self._reply(name, np.asarray(found), as_bytes=bool(size))
 
     def _reply(self, name: str, found: Any, *, as_bytes: bool) -> Response:  # noqa: ANN401
-        output = {"name": "output0", "datatype": "FP32", "shape": list(found.shape)}
+        output: dict[str, Any] = {"name": "output0", "datatype": "FP32", "shape": list(found.shape)}
         if not as_bytes:
             output["data"] = found.ravel().tolist()
             return Response(json.dumps({"model_name": name, "outputs": [output]}))

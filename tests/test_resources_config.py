@@ -45,8 +45,8 @@ def test_an_endpoint_may_be_changed_from_the_command_line() -> None:
     """As any other setting."""
     config = validated(file(compute=[FN]), "environment.json")
     changed = overridden(config, {"fn.endpoint.timeout": 0.5, "fn.executors": 9})
-    (resource,) = changed.compute
-    assert not isinstance(resource, str)
+    resource = changed.compute[0]
+    assert isinstance(resource, ComputeConfig)
     assert resource.endpoint is not None
     assert (resource.endpoint.timeout, resource.executors) == (0.5, 9)
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from fractions import Fraction
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import cv2
 import numpy as np
@@ -19,6 +19,7 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.errors import RecordingError
 
 if TYPE_CHECKING:
+    from av.video.codeccontext import VideoCodecContext
     from av.video.frame import VideoFrame
 
 __all__ = ["H264Decoder", "H264Encoder", "is_key_frame", "require_encoder"]
@@ -56,7 +57,7 @@ class H264Encoder:
 
         self.size = width, height
         self._border = height % 2, width % 2
-        codec = av.CodecContext.create(_ENCODER, "w")
+        codec = cast("VideoCodecContext", av.CodecContext.create(_ENCODER, "w"))
         codec.width, codec.height = width + width % 2, height + height % 2
         codec.pix_fmt = "yuv420p"
         codec.time_base = Fraction(1, _TICKS)

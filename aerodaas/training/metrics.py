@@ -38,7 +38,7 @@ def strays(boxes: Floats, things: Floats) -> NDArray[np.bool_]:
     """Which of `boxes` (n, 4) have their middle on none of `things` (m, 4)."""
     middle = (boxes[:, None, :2] + boxes[:, None, 2:]) / 2
     on = ((middle >= things[None, :, :2]) & (middle <= things[None, :, 2:])).all(axis=-1)
-    return np.asarray(~on.any(axis=1))
+    return np.asarray(~np.any(on, axis=1))
 
 
 @dataclass

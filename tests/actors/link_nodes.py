@@ -6,6 +6,7 @@ A program of its own, for a process has one Ray: `python link_nodes.py`.
 from __future__ import annotations
 
 import json
+import logging
 import os
 import sys
 import time
@@ -62,11 +63,11 @@ def arrived(node: dict[str, Any]) -> int:
 
 def main() -> None:
     """Send, count, print."""
-    small = {"num_cpus": 1, "object_store_memory": 100 * 2**20}
+    small: dict[str, Any] = {"num_cpus": 1, "object_store_memory": 100 * 2**20}
     cluster = Cluster()
     cluster.add_node(resources={"edge": 1}, include_dashboard=False, **small)
     cluster.add_node(resources={"cloud": 1}, **small)
-    ray.init(address=cluster.address, logging_level="ERROR", log_to_driver=False)
+    ray.init(address=cluster.address, logging_level=logging.ERROR, log_to_driver=False)
     try:
         (cloud,) = [node for node in ray.nodes() if "cloud" in node["Resources"]]
         desk = Desk(*executors("one", "two"))

@@ -91,6 +91,7 @@ def test_what_was_not_chosen_is_measured_again_now_and_then() -> None:
     coder = Coder()
     before = coder.costs(scene(), CODINGS["auto"])["jpeg"].size
     noise = frame(np.random.default_rng(2).integers(0, 255, (360, 640, 3), np.uint8))
+    after = before
     for _ in range(200):
         after = coder.costs(noise, CODINGS["auto"])["jpeg"].size
     assert after > before

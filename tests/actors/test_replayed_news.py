@@ -80,7 +80,7 @@ def test_a_plan_comes_at_the_turn_at_which_it_came() -> None:
     assert not planner.answered
     planner.turn(150)
     assert planner.poll() is not None
-    assert planner.answered
+    assert bool(planner.answered)
     planner.turn(200)
     planner.submit(request())
     assert planner.poll() is not None

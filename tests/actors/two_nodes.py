@@ -65,7 +65,7 @@ def deployed(env: Environment) -> None:
 def main() -> None:
     """Fly, and print where everything was and what came of it."""
     flyer = Flyer(Path(sys.argv[1]))
-    small = {"num_cpus": 1, "object_store_memory": 80 * 2**20}
+    small: dict[str, Any] = {"num_cpus": 1, "object_store_memory": 80 * 2**20}
     cluster = Cluster()
     cluster.add_node(resources={"edge": 1}, node_name="edge-a", include_dashboard=False, **small)
     for name in ("edge-b", "cloud-a", "cloud-b"):

@@ -127,7 +127,7 @@ def test_threads_share_one_analysis_and_its_connections(
         ThreadPoolExecutor(8) as pool,
     ):
         found = list(pool.map(lambda f: analysis.process(f, Hurried()), frames))  # type: ignore[arg-type]
-    assert [one.items for one in found] == wanted
+    assert [one.items for one in found if one] == wanted
     assert 1 <= len(served.connections) <= 4
 
 
