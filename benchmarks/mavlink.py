@@ -10,6 +10,7 @@ at which packets arrive at the autopilot's port, stamped by the kernel.
 from __future__ import annotations
 
 import multiprocessing
+import random
 import socket
 import struct
 import threading
@@ -82,8 +83,8 @@ def main(
     report = Report("mavlink", UNITS, packages=["pymavlink", "opencv-python-headless"])
     report.note(
         "median and p99: how far each setpoint comes from 50 ms after the one before. command: "
-        "from a navigation item's arrival at the mission to the first packet that carries it. "
-        "driver: CPU of the link's thread and of read and send."
+        "from a navigation item's arrival, at any moment between two turns of the 20 Hz loop, to "
+        "the first packet that carries it. driver: CPU of the link's thread and of read and send."
     )
     for case, busy in (("alone", False), ("with 720p analysis", True)):
         if load or not busy:
@@ -136,10 +137,19 @@ def _fly(port: int, tap: socket.socket, tap_port: int, seconds: float) -> dict[s
     vehicle.use_clock(clock)
     mission.handle(OpenStream(_STREAM), clock.now())
     mission.handle(Start(), clock.now())
+    draw = random.Random(0).random
     due, sign, given = time.monotonic(), 1.0, []
     measured_from: float | None = None
     before = 0.0
     while measured_from is None or time.monotonic() - measured_from < seconds:
+        # Navigation comes at any moment between two turns.
+        time.sleep(max(0.0, due - _PERIOD * draw() - time.monotonic()))
+        if measured_from is not None:
+            sign = -sign
+            given.append((time.time(), sign))
+            item = VelocityCommand(yaw_rate=0.2 * sign, valid_for=2.0)
+            navigation = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [item])
+            mission.handle(StreamItem(_STREAM, navigation), clock.now())
         time.sleep(max(0.0, due - time.monotonic()))
         now = time.monotonic()
         due += _PERIOD * max(1, int((now - due) / _PERIOD) + 1)
@@ -148,16 +158,9 @@ def _fly(port: int, tap: socket.socket, tap_port: int, seconds: float) -> dict[s
             MissionState.PREFLIGHT,
             MissionState.TAKING_OFF,
         }
-        if flying:
-            if measured_from is None:
-                measured_from = now + _WARM_UP
-                before = vehicle.spent + _thread_time(wire)
-            if int((now - measured_from) / 1.0) != int((now - measured_from - _PERIOD) / 1.0):
-                sign = -sign
-                given.append((time.time(), sign))
-            item = VelocityCommand(forward=0.2 * sign, valid_for=2.0)
-            navigation = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [item])
-            mission.handle(StreamItem(_STREAM, navigation), clock.now())
+        if flying and measured_from is None:
+            measured_from = now + _WARM_UP
+            before = vehicle.spent + _thread_time(wire)
         loop.turn(clock.now())
     spent = vehicle.spent + _thread_time(wire) - before
     stopping.set()
@@ -177,7 +180,8 @@ def _figures(
     late = 1e3 * np.abs(np.diff(stamps) - _PERIOD)
     delays = []
     for asked, sign in given:
-        carried = [stamp for stamp, speed in arrivals if stamp >= asked and speed * sign > 0.0]
+        # Counter-clockwise is negative on the wire.
+        carried = [stamp for stamp, rate in arrivals if stamp >= asked and rate * sign < 0.0]
         if carried and asked > start:
             delays.append(1e3 * (carried[0] - asked))
     return {
@@ -222,7 +226,7 @@ def _tap() -> socket.socket:
 def _listen(
     tap: socket.socket, arrivals: list[tuple[float, float]], stopping: threading.Event
 ) -> None:
-    """Kernel stamps and speeds of all setpoints."""
+    """Kernel stamps and yaw rates of all setpoints."""
     mav = mavlink.MAVLink(None, 1, 1)
     wanted = frozenset({mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_LOCAL_NED})
     framer = Framer(wanted, mav.decode)
@@ -233,7 +237,7 @@ def _listen(
             continue
         whole, nanoseconds = struct.unpack("qq", ancillary[0][2][:16])
         stamp = whole + nanoseconds / NANOSECONDS
-        arrivals += [(stamp, float(getattr(one, "vy", 0.0))) for one in framer.feed(content)]
+        arrivals += [(stamp, float(getattr(one, "yaw_rate", 0.0))) for one in framer.feed(content)]
 
 
 def _emulate(family: str, port: int, stop: Event) -> None:

@@ -80,7 +80,7 @@ def main(
     console = Console(width=max(150, Console().width), highlight=False)
     results = []
     with ThreadPoolExecutor(at_once) as pool:
-        for result in pool.map(lambda one: _fly(*one, folder, speed), wanted):
+        for result in pool.map(lambda one: _fly(one[0], one[1], folder, speed), wanted):
             results.append(result)
             _tell(console, result)
             if result.ok and keep is None:

@@ -20,6 +20,7 @@ from aerodaas.navigation.command_shaper import CommandShaper
 from aerodaas.navigation.control import braking_speed
 from aerodaas.navigation.follow_controller import Observation
 from aerodaas.navigation.follow_settings import FollowLimits
+from aerodaas.navigation.sighting import Sighting
 from aerodaas.navigation.target_motion import TargetMotion
 from aerodaas.waypoints import DEFAULT_PRIORITY, VelocityCommand
 
@@ -38,6 +39,8 @@ _LEVEL = 0.3
 _REACTION = 0.6
 """Seconds from a picture to the drone's answer."""
 _SEARCH_RATE = 0.3
+_FARTHER = 1.25
+"""Times its known distance; a tower that seems farther is seen in part."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +139,8 @@ class InspectionController:
         sighting = seen.sighting
         if sighting is None or not 0.0 <= sighting.distance <= self.plan.farthest:
             return
+        if self._seems_farther(sighting, seen):
+            return
         self._seen = seen.stamp
         if sighting.bound or seen.at_capture is None:
             return
@@ -148,6 +153,13 @@ class InspectionController:
                 self.motion.observe(sighting, seen.at_capture, seen.stamp)
             if len(self._sightings) >= _CONFIRMED:
                 self.phase, self._began = InspectionPhase.APPROACHING, seen.stamp
+
+    def _seems_farther(self, sighting: Sighting, seen: Observation) -> bool:
+        """Tell whether a sighting must be of a part of the tower: it stands, and seemed nearer."""
+        if self.phase is InspectionPhase.WAITING or sighting.bound or seen.at_capture is None:
+            return False
+        known = self.motion.relative_to(seen.at_capture, seen.stamp)
+        return known is not None and sighting.distance > _FARTHER * known[0].distance
 
     def _advance(self, distance: float, height: float, stamp: int) -> None:
         plan = self.plan

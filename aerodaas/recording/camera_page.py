@@ -108,7 +108,7 @@ class CameraPage:
             if camera is None or not camera.frames:
                 return None
             stamp = max(camera.found or camera.frames)
-            image = camera.frames[stamp].copy()
+            image: NDArray[np.uint8] = camera.frames[stamp].copy()
             found = [one for items in camera.found.get(stamp, {}).values() for one in items]
             state = self._states.get(source.partition("/")[0], "")
         draw_detections(image, found)

@@ -95,6 +95,8 @@ class Gesture(_Strict):
     kind: Literal["hand_raised", "fallen"]
     start: Annotated[float, Field(ge=0)]
     duration: Length = 1_000.0
+    forward: bool = False
+    """Who falls falls on the face, not on the back."""
     jitter: Annotated[float, Field(ge=0, le=1_000)] = 0.0
     """Seconds by which the seed may shift the start, at most."""
 

@@ -112,6 +112,8 @@ class Posture:
     """How far the right hand is raised, 0 to 1."""
     fallen: float = 0.0
     """How far the body has fallen over, 0 to 1."""
+    forward: bool = False
+    """It falls on its face, not on its back."""
 
 
 def joints(height: float, posture: Posture) -> NDArray[np.float64]:
@@ -132,7 +134,7 @@ def joints(height: float, posture: Posture) -> NDArray[np.float64]:
     body = np.array([place[name] for name in JOINTS])
     body[:, 2] += _ANKLE - min(place["left_ankle"][2], place["right_ankle"][2])
     if posture.fallen > 0.0:
-        angle = -posture.fallen * math.pi / 2
+        angle = posture.fallen * math.pi / 2 * (1.0 if posture.forward else -1.0)
         body = body @ rotation_from_rpy(0.0, angle, 0.0).T
         body[:, 2] += _LYING * posture.fallen
     return np.asarray(body * (height / _REFERENCE_HEIGHT))

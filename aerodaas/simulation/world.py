@@ -130,7 +130,8 @@ class Thing:
             fall = _smooth((time - gesture.start - gesture.duration) / _GESTURE_TIME)
             done[gesture.kind] = max(done[gesture.kind], rise - fall)
         stepping = min(1.0, speed / _BRISK) ** 0.5
-        return Posture(travelled, stepping, done["hand_raised"], done["fallen"])
+        forward = any(one.forward for one in self.gestures if one.kind == "fallen")
+        return Posture(travelled, stepping, done["hand_raised"], done["fallen"], forward)
 
     def joints(self, time: float) -> NDArray[np.float64]:
         """Joints of a person at `time`, rows as in `skeleton.JOINTS`, ENU metres."""

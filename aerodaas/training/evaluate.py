@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from aerodaas.analytics.models import DETECTOR_CLASSES
 from aerodaas.analytics.onnx.detector import OnnxDetector
+from aerodaas.analytics.vip_detection import VipDetectionAnalytics
 from aerodaas.data import Detections, Frame, Header
 from aerodaas.training.dataset import Sample
-from aerodaas.training.metrics import Floats, Ranking, overlap, similarity
+from aerodaas.training.metrics import Floats, Ranking, overlap, similarity, strays
 
-__all__ = ["Sightings", "keypoint_ranking", "milliseconds", "rankings", "sightings"]
+__all__ = ["Sightings", "keypoint_ranking", "milliseconds", "rankings", "sightings", "thresholds"]
 
 _LEAST = 0.01
 """Score of the weakest detection that counts for average precision."""
@@ -32,8 +33,8 @@ _SMALL_PERSON = 20.0
 _TIMED_RUNS = 200
 
 
-def _opened(model: Path, min_score: float, classes: Sequence[str] | None = None) -> OnnxDetector:
-    detector = OnnxDetector(model, min_score=min_score, classes=classes, threads=1)
+def _opened(model: Path, min_score: float) -> OnnxDetector:
+    detector = OnnxDetector(model, min_score=min_score, threads=1)
     detector.open()
     return detector
 
@@ -65,6 +66,23 @@ def rankings(model: Path, samples: Iterable[Sample]) -> dict[str, Ranking]:
     return result
 
 
+def thresholds(model: Path, samples: Sequence[Sample], most_false: float) -> dict[str, float]:
+    """Return the lowest score of each class with at most `most_false` stray boxes per picture."""
+    detector = _opened(model, _LEAST)
+    astray: dict[str, list[float]] = {label: [] for label in detector.names}
+    for sample in samples:
+        found = _find(detector, sample)
+        for label, scores in astray.items():
+            truth = sample.boxes[sample.kinds == DETECTOR_CLASSES.index(label)].astype(float)
+            given, boxes = _boxes(found, label)
+            scores.extend(np.array(given)[strays(boxes, truth)].tolist())
+    allowed = int(most_false * len(samples))
+    return {
+        label: sorted([*scores, *[_LEAST] * (allowed + 1)], reverse=True)[allowed]
+        for label, scores in astray.items()
+    }
+
+
 def keypoint_ranking(model: Path, samples: Iterable[Sample]) -> Ranking:
     """Rank the people that a pose model finds, alike if their keypoints are (COCO's OKS)."""
     detector = _opened(model, _LEAST)
@@ -92,12 +110,15 @@ class Sightings:
     """Pictures in which a box's middle lies on the thing."""
     false: int
     """Boxes elsewhere."""
+    doubled: int
+    """Boxes on a thing that another box has found, too."""
 
 
-def sightings(model: Path, folder: Path, labels: Path, label: str, min_score: float) -> Sightings:
-    """Try photographs in `folder`; `labels` is JSON, {file: [left, top, right, bottom]}."""
-    detector = _opened(model, min_score, [label])
-    found = false = 0
+def sightings(model: Path, folder: Path, labels: Path, min_score: float) -> Sightings:
+    """Look for vests in photographs; `labels` is JSON, {file: [left, top, right, bottom]}."""
+    detector = VipDetectionAnalytics(model, classes=["vest"], min_score=min_score, threads=1)
+    detector.open()
+    found = false = doubled = 0
     truth = json.loads(labels.read_text(encoding="utf-8"))
     for name, (left, top, right, bottom) in truth.items():
         image = np.asarray(cv2.imread(str(folder / name)), np.uint8)
@@ -108,7 +129,8 @@ def sightings(model: Path, folder: Path, labels: Path, label: str, min_score: fl
         hits = [left <= u <= right and top <= v <= bottom for u, v in middles]
         found += any(hits)
         false += len(hits) - sum(hits)
-    return Sightings(len(truth), found, false)
+        doubled += max(0, sum(hits) - 1)
+    return Sightings(len(truth), found, false, doubled)
 
 
 def milliseconds(model: Path) -> float:

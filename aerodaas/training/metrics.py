@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["SIGMAS", "Floats", "Ranking", "overlap", "similarity"]
+__all__ = ["SIGMAS", "Floats", "Ranking", "overlap", "similarity", "strays"]
 
 Floats = NDArray[np.float64]
 
@@ -32,6 +32,13 @@ def similarity(found: Floats, truth: Floats, areas: Floats) -> Floats:
     inside = truth[None, :, :, 2] > 0
     like = np.where(inside, np.exp(-away / scale), 0.0).sum(axis=-1)
     return np.asarray(like / np.maximum(inside.sum(axis=-1), 1))
+
+
+def strays(boxes: Floats, things: Floats) -> NDArray[np.bool_]:
+    """Which of `boxes` (n, 4) have their middle on none of `things` (m, 4)."""
+    middle = (boxes[:, None, :2] + boxes[:, None, 2:]) / 2
+    on = ((middle >= things[None, :, :2]) & (middle <= things[None, :, 2:])).all(axis=-1)
+    return np.asarray(~on.any(axis=1))
 
 
 @dataclass
@@ -85,12 +92,3 @@ class Ranking:
         places = np.searchsorted(recall, np.linspace(0, 1, 101))
         padded = np.append(envelope, 0.0)
         return float(padded[np.minimum(places, len(envelope))].mean())
-
-    @property
-    def best_threshold(self) -> float:
-        """Score at which the F1 measure is highest."""
-        if not self.scores:
-            return 0.5
-        recall, precision, scores = self._curve()
-        f1 = 2 * recall * precision / np.maximum(recall + precision, 1e-9)
-        return float(scores[int(f1.argmax())])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -151,6 +151,26 @@ def test_a_tower_that_disappears_ends_the_inspection() -> None:
         assert site.distance > 8.0 - 0.3
         assert early == (not inspect.taken)
         assert "inspection_cut_short" in [alert.kind for alert in site.alerts]
+
+
+def test_boxes_of_parts_of_the_tower_draw_it_no_nearer() -> None:
+    """Half of the boxes end above the foot, so that the tower seems farther away."""
+    site = Site((25.0, 0.0), np.array([0.0, 0.0, 3.0]))
+    whole = site.look
+
+    def look(random: np.random.Generator) -> Detections:
+        seen = whole(random)
+        if site.time < 1.0 or random.random() < 0.5:
+            return seen
+        parts = [
+            replace(one, box=(*one.box[:3], one.box[1] + 0.9 * (one.box[3] - one.box[1])))
+            for one in seen
+        ]
+        return replace(seen, items=tuple(parts))
+
+    site.look = look  # type: ignore[method-assign]
+    nearest = site.run(TowerInspectionAnalytics(top=6.0), 120)
+    assert nearest > 8.0 - 0.5
 
 
 def test_time_bounds_it() -> None:

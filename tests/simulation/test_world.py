@@ -158,6 +158,14 @@ def test_a_walk_rests_where_it_says() -> None:
     assert resting.at(reached + 14.0).x == pytest.approx(plain.at(reached + 4.0).x, abs=0.02)
 
 
+def test_one_may_fall_on_the_face() -> None:
+    """The head lies ahead of the feet then, else behind them; both lie on the ground."""
+    for forward in (True, False):
+        body = joints(1.75, Posture(fallen=1.0, forward=forward))
+        assert bool(body[JOINTS.index("head"), 0] > body[JOINTS.index("left_ankle"), 0]) is forward
+        assert -0.1 < body[:, 2].min() < body[:, 2].max() < 0.5
+
+
 def test_a_seed_displaces_a_walk_but_not_its_start() -> None:
     """Within the jitter; the same seed gives the same way."""
     motion = Motion(points=[(0, 0), (10, 0), (10, 10)], jitter=1.0, variation=0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aerodaas.training.metrics import Ranking, overlap, similarity
+from aerodaas.training.metrics import Ranking, overlap, similarity, strays
 
 ALL = np.ones(2, dtype=bool)
 
@@ -21,7 +21,6 @@ def test_a_perfect_detector_has_precision_one() -> None:
     ranking = Ranking([], [])
     ranking.add(np.array([0.9, 0.8]), np.eye(2), ALL)
     assert ranking.average_precision == pytest.approx(1.0)
-    assert ranking.best_threshold == 0.8
 
 
 def test_a_false_box_before_the_second_thing_costs_a_sixth() -> None:
@@ -29,6 +28,13 @@ def test_a_false_box_before_the_second_thing_costs_a_sixth() -> None:
     ranking = Ranking([], [])
     ranking.add(np.array([0.9, 0.8, 0.7]), np.array([[1, 0], [0, 0], [0, 1.0]]), ALL)
     assert ranking.average_precision == pytest.approx((51 + 50 * 2 / 3) / 101)
+
+
+def test_a_box_is_astray_if_its_middle_is_on_nothing() -> None:
+    """However large it is, and whether or not another box is there already."""
+    boxes = np.array([[0, 0, 10, 10], [-20, -20, 30, 30], [8, 8, 20, 20]], dtype=float)
+    assert strays(boxes, np.array([[4, 4, 12, 12.0]])).tolist() == [False, False, True]
+    assert strays(boxes, np.zeros((0, 4))).all()
 
 
 def test_a_thing_found_twice_counts_once() -> None:

@@ -79,8 +79,6 @@ class MavlinkLink:
     ) -> None:
         """Prepare the link of robot `name`; raises ConfigError for a bad key. Opens nothing."""
         self.counts = LinkCounts()
-        self.failure: Exception | None = None
-        """What ended the thread, which nothing should."""
         self.target: tuple[int, int] | None = None
         """System and component of the vehicle, once it is known."""
         self._name = name

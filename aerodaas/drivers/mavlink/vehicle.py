@@ -177,6 +177,7 @@ class MavlinkVehicle:
             while self._phase.shown is not FlightMode.LAND and time.monotonic() < deadline:
                 self._pause()
         link.close()
+        self._connection = None
 
     def _ours_in_the_air(self) -> bool:
         phase = self._phase
@@ -424,7 +425,7 @@ class MavlinkVehicle:
     @property
     def connected(self) -> bool:
         """Whether there is a connected vehicle."""
-        return self._connection is not None and self._link is not None
+        return self._connection is not None
 
     @property
     def telemetry(self) -> Telemetry:

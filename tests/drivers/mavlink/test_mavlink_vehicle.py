@@ -79,6 +79,9 @@ def test_a_whole_flight(family: str) -> None:
         assert not landed.armed
         assert abs(landed.odometry.height) < 0.1
         assert pair.autopilot.firmware.motions == ["arm", "take off", "follow", "land"]
+        vehicle.close()
+        with pytest.raises(VehicleError, match="not connected"):
+            vehicle.read()
 
 
 @pytest.mark.slow
