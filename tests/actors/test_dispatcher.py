@@ -53,7 +53,7 @@ def _values(env: Environment) -> dict[str, Any]:
     return run.reports()["dispatcher"].values
 
 
-def _until(env: Environment, holds: Callable[[dict[str, Any]], bool], seconds: float = 40) -> None:
+def _until(env: Environment, holds: Callable[[dict[str, Any]], bool], seconds: float = 120) -> None:
     """Wait until the dispatcher's figures satisfy `holds`."""
     end = time.monotonic() + seconds
     while not holds(_values(env)):
