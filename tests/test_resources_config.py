@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from aerodaas.config import validated
+from aerodaas.config import ComputeConfig, validated
 from aerodaas.errors import ConfigError
 from aerodaas.overrides import located, overridden
 

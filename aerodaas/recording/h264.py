@@ -54,6 +54,7 @@ class H264Encoder:
         Sizes that are odd grow by a pixel, for colours have half the resolution.
         """
         import av  # noqa: PLC0415 - as above
+        from av.error import FFmpegError  # noqa: PLC0415
 
         self.size = width, height
         self._border = height % 2, width % 2
@@ -77,7 +78,7 @@ class H264Encoder:
         self._codec = codec
         self._frame = av.VideoFrame
         self._key_type = 1
-        self._error = av.error.FFmpegError
+        self._error = FFmpegError
         self._last = -1
         self._next_key: int | None = None
 

@@ -24,7 +24,9 @@ def field(shape: tuple[int, int], cells: float, rng: np.random.Generator) -> NDA
     height, width = shape
     size = max(2, round(cells)), max(2, round(cells * height / width))
     coarse = rng.standard_normal((size[1], size[0]), dtype=np.float32)
-    return np.asarray(cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC))
+    return np.asarray(
+        cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC), np.float32
+    )
 
 
 def backdrop(shape: tuple[int, int], rng: np.random.Generator) -> Picture:

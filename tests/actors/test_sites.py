@@ -165,7 +165,9 @@ def test_an_analysis_runs_one_at_a_time_and_knows_its_time(
     desk = Desk(started(slow=Mean(slow=0.1)))
     for _ in range(4):
         desk.send("slow", desk.frame(), budget=50.0)
-    found = [answer.message.item for answer in desk.answers(4) if answer.message and answer.message.item]
+    found = [
+        answer.message.item for answer in desk.answers(4) if answer.message and answer.message.item
+    ]
     assert [one["most"] for one in found] == [1] * 4
     assert all(0 < one["left"] < 50.0 for one in found)
     desk.sites.finish(1.0)

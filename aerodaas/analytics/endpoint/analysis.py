@@ -166,7 +166,7 @@ class _TensorAnalysis(_EndpointAnalysis):
     """By the Open Inference Protocol."""
 
     def _check(self, connection: Connection) -> None:
-        called = self._endpoint.models.get(self.name, self.work.model_name)
+        called = self._endpoint.models.get(self.name) or self.work.model_name
         self._spec, self._outputs = self.work.signature
         self._model = EndpointModel(connection, called)
         self._model.check([self._spec], self._outputs)
