@@ -37,8 +37,9 @@ def similarity(found: Floats, truth: Floats, areas: Floats) -> Floats:
 def strays(boxes: Floats, things: Floats) -> NDArray[np.bool_]:
     """Which of `boxes` (n, 4) have their middle on none of `things` (m, 4)."""
     middle = (boxes[:, None, :2] + boxes[:, None, 2:]) / 2
-    on = ((middle >= things[None, :, :2]) & (middle <= things[None, :, 2:])).all(axis=-1)
-    return np.asarray(~np.any(on, axis=1))
+    low, high = things[None, :, :2], things[None, :, 2:]
+    on = np.asarray((middle >= low) & (middle <= high), dtype=bool)
+    return ~np.any(np.all(on, axis=-1), axis=1)
 
 
 @dataclass

@@ -42,7 +42,7 @@ class Recipe:
     rate: float = 2e-3
     decay: float = 0.03
     size: tuple[int, int] = (192, 320)
-    """Height and width to train at: most cameras' pictures leave no more of the square."""
+    """Height and width to train at, multiples of 64: most pictures leave no more of the square."""
     postures: bool = False
     """Learn from cuts around people, and the keypoints above all; the size is then 160 x 160."""
     seed: int = 1

@@ -18,7 +18,7 @@ from aerodaas.training.network import Eyes, anchors_of
 from aerodaas.training.rendering import render_shards
 from aerodaas.training.train import Recipe, train
 
-RECIPE = Recipe(steps=4, halved=2, batch=2, size=(64, 96))
+RECIPE = Recipe(steps=4, halved=2, batch=2, size=(64, 128))
 
 
 @pytest.fixture(scope="module")
