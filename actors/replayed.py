@@ -10,7 +10,7 @@ from typing import Any
 from aerodaas.actors.session import Session
 from aerodaas.clock import NANOSECONDS
 from aerodaas.data import Header
-from aerodaas.navigation.planner import InlinePlanner, Plan, Planner, PlanRequest
+from aerodaas.navigation.planner import InlinePlanner, Plan, Planner, PlanRequest, solve
 from aerodaas.plugins import load_plugin
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.status import Heard, Message
@@ -18,7 +18,7 @@ from aerodaas.vehicle import PlayedVehicle, VehicleState
 
 __all__ = ["Arrivals", "RecordedWork", "WatchedPlanner", "as_planned"]
 
-_LONGEST_PLANNING = 2 * NANOSECONDS
+_LONGEST_PLANNING = 10 * NANOSECONDS
 """Mission time within which a recorded plan is taken for the answer to a request."""
 
 
@@ -103,29 +103,48 @@ def as_planned(scheduler: TrajectoryScheduler, turns: Sequence[int]) -> Planner:
     return _RecordedPlanner(scheduler, turns) if turns else InlinePlanner(scheduler)
 
 
-class _RecordedPlanner(InlinePlanner):
-    """Plans on the spot and keeps each plan back until the turn at which one had come."""
+class _RecordedPlanner:
+    """Plans on the spot and keeps each plan back until the turn at which one had come.
+
+    As `BackgroundPlanner`, it makes one plan at a time; of requests that wait, it keeps the newest.
+    """
 
     def __init__(self, scheduler: TrajectoryScheduler, turns: Sequence[int]) -> None:
-        super().__init__(scheduler)
         self.now = 0
+        self._scheduler = scheduler
         self._turns = deque(turns)
-        self._plans: deque[tuple[int, Plan]] = deque()
+        self._made: tuple[int, Plan] | None = None
+        self._waiting: PlanRequest | None = None
+
+    @property
+    def replans_on_arrival(self) -> bool:
+        """Whether the scheduler wants to be asked again after each arrival."""
+        return self._scheduler.replans_on_arrival
 
     def submit(self, request: PlanRequest) -> None:
         """Plan now, for later."""
-        super().submit(request)
-        plan = super().poll()
+        self._waiting = request
+        if self._made is None:
+            self._begin()
+
+    def poll(self) -> Plan | None:
+        """Return the plan once it is due, and begin with the request that waits."""
+        if self._made is None or self._made[0] > self.now:
+            return None
+        _, plan = self._made
+        self._made = None
+        self._begin()
+        return plan
+
+    def _begin(self) -> None:
+        request, self._waiting = self._waiting, None
+        if request is None:
+            return
         while self._turns and self._turns[0] < self.now:
             self._turns.popleft()
         known = self._turns and self._turns[0] - self.now <= _LONGEST_PLANNING
-        if plan is not None:
-            self._plans.append((self._turns.popleft() if known else self.now, plan))
-
-    def poll(self) -> Plan | None:
-        """Return a plan that is due."""
-        due = self._plans and self._plans[0][0] <= self.now
-        return self._plans.popleft()[1] if due else None
+        due = self._turns.popleft() if known else self.now
+        self._made = due, solve(self._scheduler, request)
 
 
 class RecordedWork:

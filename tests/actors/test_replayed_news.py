@@ -85,3 +85,20 @@ def test_a_plan_comes_at_the_turn_at_which_it_came() -> None:
     planner.submit(request())
     assert planner.poll() is not None
     assert planner.poll() is None
+
+
+def test_of_requests_that_wait_the_newest_is_answered() -> None:
+    """Three requests had two answers in flight, and have so again."""
+    planner = as_planned(OrderedScheduler(), (150, 300))
+    watched = WatchedPlanner(planner)
+    watched.turn(100)
+    asked = [request() for _ in range(3)]
+    for one in asked:
+        watched.submit(one)
+    answers = {}
+    for turn in (100, 150, 200, 300, 350):
+        watched.turn(turn)
+        plan = watched.poll()
+        if plan is not None:
+            answers[turn] = plan.request
+    assert answers == {150: asked[0], 300: asked[2]}
