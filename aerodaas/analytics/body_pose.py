@@ -14,7 +14,6 @@ from typing_extensions import Self
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.debounce import Debounce
 from aerodaas.analytics.gestures import GESTURE_MODEL, POINTS, GestureClassifier
-from aerodaas.analytics.models import POSE
 from aerodaas.analytics.tracking import Tracker
 from aerodaas.clock import seconds
 from aerodaas.config import RuntimeEnvConfig
@@ -50,10 +49,10 @@ def fallen(result: object) -> bool:
 class BodyPoseEmergencyAnalytics(Analytics[Detections]):
     """Watches one person's body: a raised hand lands the drone, a fall alerts people.
 
-    Analyse a pose model's stream, or the camera's: then the pose model that ships runs as an
-    analysis of its own, called `body_pose`, which an analytics scheduler may schedule. A gesture
-    counts once `needed` of the last `of` frames show it for `hold` seconds. The landing is a
-    `trigger` of the robot whose camera it is; set others with the conditions `hand_raised` and
+    Analyse a pose model's stream, or the camera's: then a `PoseAnalytics` runs as an analysis of
+    its own, called `body_pose`, which an analytics scheduler may schedule. A gesture counts once
+    `needed` of the last `of` frames show it for `hold` seconds. The landing is a `trigger` of the
+    robot whose camera it is; set others with the conditions `hand_raised` and
     `fallen` of this module::
 
         pose = BodyPoseEmergencyAnalytics(lands=False).deploy(edge)
@@ -146,9 +145,9 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
     def _poses_in(self, camera: AeroStreamData[Frame]) -> AeroStreamData[Detections]:
         """Run a pose model on `camera`: an analysis of its own, so that it can be scheduled."""
         # onnxruntime takes its time to load.
-        from aerodaas.analytics.onnx.detector import OnnxDetector  # noqa: PLC0415
+        from aerodaas.analytics.pose import PoseAnalytics  # noqa: PLC0415
 
-        detector = self.detector or OnnxDetector(POSE)
+        detector = self.detector or PoseAnalytics()
         detector.name = detector.name or "body_pose"
         stream = detector.beside(self).analyse(camera)
         self._poses, self.detector = stream.name, None
