@@ -65,6 +65,6 @@ def _figures(places: Places) -> dict[str, str]:
             f"{exact.correct(part, 0.2):.3f} ({exact.correct(part, 0.1):.3f}); "
             f"trusted: {share:.0%}, median error of these {error:.3f}"
         )
-    result["Time per person, one core"] = f"{one:.1f} ms; of five in a frame {each:.1f} ms"
+    result["Time per person, one core"] = f"{one:.1f} ms; of five in a frame {each:.1f} ms each"
     result["File"] = f"{path.stat().st_size / 1e6:.1f} MB"
     return result
