@@ -35,7 +35,7 @@ def keypoints(posture: Posture, ahead: float, turn: float, up: float) -> np.ndar
 
 @given(
     turn=st.floats(-math.pi, math.pi),
-    ahead=st.floats(3.5, 8.0),
+    ahead=st.floats(5.0, 8.0),
     up=st.floats(1.3, 2.0),
     forward=st.booleans(),
 )
