@@ -18,6 +18,7 @@ from .followers import (
 from .gps_logger import GpsLoggerAnalytics as GpsLoggerAnalytics
 from .monitoring import MonitoringAnalytics as MonitoringAnalytics
 from .onnx.detector import OnnxDetector as OnnxDetector
+from .pose import PoseAnalytics as PoseAnalytics
 from .remote.analytics import RemoteAnalytics as RemoteAnalytics
 from .synthetic import SyntheticAnalytics as SyntheticAnalytics
 from .tower_inspection import TowerInspectionAnalytics as TowerInspectionAnalytics

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 from typing_extensions import Self
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.debounce import Debounce
 from aerodaas.analytics.gestures import GESTURE_MODEL, POINTS, GestureClassifier
-from aerodaas.analytics.models import POSE
+from aerodaas.analytics.lying import lies
 from aerodaas.analytics.tracking import Tracker
 from aerodaas.clock import seconds
 from aerodaas.config import RuntimeEnvConfig
@@ -33,6 +34,8 @@ _VEST_AGE = 1.0
 """Seconds for which the boxes of vests tell who wears one."""
 _SAME_BODY = 0.6
 """Two boxes of which the smaller lies in the other by more than this share are of one body."""
+_SHOULDERS, _ARMS = slice(5, 7), slice(7, 11)
+"""Rows of COCO's keypoints; the arms are elbows and wrists."""
 _MOST_PEOPLE = 100
 """A pose model's own limit is far above what can be told apart in a picture."""
 
@@ -50,10 +53,10 @@ def fallen(result: object) -> bool:
 class BodyPoseEmergencyAnalytics(Analytics[Detections]):
     """Watches one person's body: a raised hand lands the drone, a fall alerts people.
 
-    Analyse a pose model's stream, or the camera's: then the pose model that ships runs as an
-    analysis of its own, called `body_pose`, which an analytics scheduler may schedule. A gesture
-    counts once `needed` of the last `of` frames show it for `hold` seconds. The landing is a
-    `trigger` of the robot whose camera it is; set others with the conditions `hand_raised` and
+    Analyse a pose model's stream, or the camera's: then a `PoseAnalytics` runs as an analysis of
+    its own, called `body_pose`, which an analytics scheduler may schedule. A gesture counts once
+    `needed` of the last `of` frames show it for `hold` seconds. The landing is a `trigger` of the
+    robot whose camera it is; set others with the conditions `hand_raised` and
     `fallen` of this module::
 
         pose = BodyPoseEmergencyAnalytics(lands=False).deploy(edge)
@@ -146,9 +149,9 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
     def _poses_in(self, camera: AeroStreamData[Frame]) -> AeroStreamData[Detections]:
         """Run a pose model on `camera`: an analysis of its own, so that it can be scheduled."""
         # onnxruntime takes its time to load.
-        from aerodaas.analytics.onnx.detector import OnnxDetector  # noqa: PLC0415
+        from aerodaas.analytics.pose import PoseAnalytics  # noqa: PLC0415
 
-        detector = self.detector or OnnxDetector(POSE)
+        detector = self.detector or PoseAnalytics()
         detector.name = detector.name or "body_pose"
         stream = detector.beside(self).analyse(camera)
         self._poses, self.detector = stream.name, None
@@ -177,7 +180,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         stamp = found.header.stamp
         people = self._people(found)
         chosen = self._choose(people)
-        gesture = self._gesture(chosen)
+        gesture = self._gesture(chosen, found)
         for name, event in self._events.items():
             event.update(stamp, gesture is not None and gesture[0] == name)
             if event.began:
@@ -223,11 +226,18 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self.person = None if nearest is None else nearest.track_id
         return nearest
 
-    def _gesture(self, chosen: Detection | None) -> tuple[str, float] | None:
+    def _gesture(self, chosen: Detection | None, found: Detections) -> tuple[str, float] | None:
         if chosen is None or chosen.keypoints is None:
             return None
+        least = self.classifier.min_confidence
         (told,) = self.classifier.classify([chosen.keypoints])
-        return told if told is not None and told[1] >= self.min_probability else None
+        if lies(chosen.keypoints, found, least):
+            return "fallen", max(self.min_probability, told[1] if told is not None else 0.0)
+        if told is None or told[1] < self.min_probability:
+            return None
+        if told[0] == "hand_raised" and not _arm_is_up(chosen.keypoints, least):
+            return None
+        return told
 
     def _explain(self, item: Detections, context: Context) -> None:
         if self._told:
@@ -280,6 +290,13 @@ def _shared(one: Detection, other: Detection) -> float:
     width = min(one.box[2], other.box[2]) - max(one.box[0], other.box[0])
     height = min(one.box[3], other.box[3]) - max(one.box[1], other.box[1])
     return max(0.0, width) * max(0.0, height) / max(min(one.area, other.area), 1e-9)
+
+
+def _arm_is_up(points: NDArray[np.float32], least: float) -> bool:
+    """Whether an elbow or wrist is seen above a shoulder: those that are not seen show nothing."""
+    seen = points[:, 2] >= least
+    shoulders, arms = points[_SHOULDERS][seen[_SHOULDERS]], points[_ARMS][seen[_ARMS]]
+    return bool(len(shoulders) and len(arms) and arms[:, 1].min() < shoulders[:, 1].max())
 
 
 def _off_centre(one: Detection, middle: float) -> float:

@@ -71,7 +71,7 @@ def detector(
     render(work, worlds)
     places = pipeline.Places(work, out, photographs, labels)
     recipe = train.Recipe(steps=steps, halved=halved, seed=seed, start=start)
-    _watch(pipeline.trained(places, recipe, "detector"), steps)
+    _watch(pipeline.trained(places, recipe), steps)
     _console.print(pipeline.make_detector(places, recipe).figures)
 
 
@@ -82,21 +82,16 @@ def pose(
     worlds: _Worlds = 600,
     steps: _Steps = 4000,
     seed: _Seed = 1,
-    start: _Start = None,
 ) -> None:
-    """The same for the pose model, which goes on from the detector's weights."""
+    """The same for the keypoints of people, which learn from cuts around them."""
     _require_torch()
-    from aerodaas.training import pipeline, train  # noqa: PLC0415 - they need PyTorch
+    from aerodaas.training import pipeline, pose_pipeline, pose_train  # noqa: PLC0415
 
     render(work, worlds)
     places = pipeline.Places(work, out)
-    begin = start or places.run("detector") / "weights.pt"
-    if not begin.exists():
-        _console.print(f"there is no {begin}; train the detector first", markup=False)
-        raise typer.Exit(1)
-    recipe = train.Recipe(steps=steps, rate=1.5e-3, postures=True, seed=seed, start=begin)
-    _watch(pipeline.trained(places, recipe, "pose"), steps)
-    _console.print(pipeline.make_pose(places, recipe).figures)
+    recipe = pose_train.PoseRecipe(steps=steps, seed=seed)
+    _watch(pose_pipeline.trained_pose(places, recipe), steps)
+    _console.print(pose_pipeline.make_pose(places, recipe).figures)
 
 
 app.command("gestures")(gestures.main)

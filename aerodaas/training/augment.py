@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from aerodaas.training.dataset import Sample
 
-__all__ = ["FLIPPED", "augmented", "centred", "placed", "spoiled"]
+__all__ = ["FLIPPED", "augmented", "placed", "spoiled"]
 
 Picture = NDArray[np.uint8]
 
@@ -26,13 +26,6 @@ _LEAST_SIDE, _LEAST_SHARE = 3.0, 0.3
 """A box cut at the picture's edge stays if this many pixels and this share of it remain."""
 
 _MOSAIC = 0.2
-_TALL = 40.0
-"""Pixels of a person to learn postures from, at least."""
-
-_MOST = 8
-"""Keypoints, more than which must be in the picture."""
-
-_TRIES = 20
 
 
 def augmented(
@@ -59,33 +52,6 @@ def augmented(
     else:
         sample = _warped(draw(), size, rng)
     return Sample(spoiled(sample.image, rng), sample.kinds, sample.boxes, sample.keypoints)
-
-
-def centred(draw: Callable[[], Sample], size: tuple[int, int], rng: np.random.Generator) -> Sample:
-    """Make one picture of `size` (height, width) around a person of a picture that `draw` gives.
-
-    Pictures without a person of some size are passed over.
-    """
-    for _ in range(_TRIES):
-        sample = draw()
-        sides = (sample.boxes[:, 2:] - sample.boxes[:, :2]).max(axis=1, initial=0.0)
-        chosen = np.flatnonzero(
-            (sides >= _TALL) & ((sample.keypoints[..., 2] > 0).sum(axis=1) > _MOST)
-        )
-        if len(chosen):
-            person = int(chosen[rng.integers(len(chosen))])
-            zoom = min(2.0, rng.uniform(0.4, 1.05) * min(size) / float(sides[person]))
-            mirror = bool(rng.integers(2))
-            across = -zoom if mirror else zoom
-            left, top, right, bottom = sample.boxes[person].tolist()
-            middle = np.array([(left + right) / 2 * across, (top + bottom) / 2 * zoom])
-            wanted = np.array([size[1], size[0]]) * (0.5 + rng.normal(0.0, 0.08, 2))
-            offset = wanted - middle
-            matrix = np.array([[across, 0.0, offset[0]], [0.0, zoom, offset[1]]])
-            found = placed(sample, matrix, size, mirror=mirror)
-            image = spoiled(found.image, rng)
-            return Sample(image, found.kinds, found.boxes, found.keypoints)
-    return augmented(draw, size, rng)
 
 
 def placed(

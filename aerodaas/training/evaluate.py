@@ -17,18 +17,15 @@ from aerodaas.analytics.onnx.detector import OnnxDetector
 from aerodaas.analytics.vip_detection import VipDetectionAnalytics
 from aerodaas.data import Detections, Frame, Header
 from aerodaas.training.dataset import Sample
-from aerodaas.training.metrics import Floats, Ranking, overlap, similarity, strays
+from aerodaas.training.metrics import Floats, Ranking, overlap, strays
 
-__all__ = ["Sightings", "keypoint_ranking", "milliseconds", "rankings", "sightings", "thresholds"]
+__all__ = ["Sightings", "milliseconds", "rankings", "sightings", "thresholds"]
 
 _LEAST = 0.01
 """Score of the weakest detection that counts for average precision."""
 
 _SMALL = 8.0
 """Pixels: what is narrower or lower in the network's input need not be found."""
-
-_SMALL_PERSON = 20.0
-"""The same for keypoints."""
 
 _TIMED_RUNS = 200
 
@@ -81,24 +78,6 @@ def thresholds(model: Path, samples: Sequence[Sample], most_false: float) -> dic
         label: sorted([*scores, *[_LEAST] * (allowed + 1)], reverse=True)[allowed]
         for label, scores in astray.items()
     }
-
-
-def keypoint_ranking(model: Path, samples: Iterable[Sample]) -> Ranking:
-    """Rank the people that a pose model finds, alike if their keypoints are (COCO's OKS)."""
-    detector = _opened(model, _LEAST)
-    result = Ranking([], [])
-    for sample in samples:
-        people = (sample.kinds == DETECTOR_CLASSES.index("person")) & (
-            sample.keypoints[..., 2].max(axis=1) > 0
-        )
-        boxes = sample.boxes[people].astype(float)
-        truth = sample.keypoints[people].astype(float)
-        found = list(_find(detector, sample))
-        points = np.array([item.keypoints for item in found], dtype=float).reshape(-1, 17, 3)
-        areas = np.prod(boxes[:, 2:] - boxes[:, :2], axis=1)
-        scores = np.array([item.score for item in found])
-        result.add(scores, similarity(points, truth, areas), _large(boxes, _SMALL_PERSON))
-    return result
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""From weights to the ONNX files that ship, laid out as Ultralytics exports are."""
+"""From weights to the ONNX files that ship; the detector is laid out as Ultralytics' are."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from torch import Tensor, nn
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
 from aerodaas.analytics.models import DETECTOR_CLASSES
-from aerodaas.training.labelling import KEYPOINTS
-from aerodaas.training.network import STRIDES, Eyes, anchors_of, decode_boxes, decode_points
+from aerodaas.training.network import STRIDES, Eyes, anchors_of, decode_boxes
 
-__all__ = ["NOMINAL_SCORE", "SIZE", "export_detector", "export_pose"]
+__all__ = ["NOMINAL_SCORE", "SIZE", "export_detector", "fused", "save_onnx"]
 
 SIZE = 320
 """Pixels of the square input."""
@@ -42,22 +41,6 @@ class _Detector(nn.Module):
         return torch.cat([boxes, (logits + self.shifts).sigmoid()], 1)
 
 
-class _Pose(_Detector):
-    """Boxes, person scores and keypoints, (1, 5 + 51, n)."""
-
-    def forward(self, pixels: Tensor) -> Tensor:
-        """Find people and their joints."""
-        maps = self.network.maps(pixels)
-        raw = _joined(self.network.boxes, maps)
-        person = DETECTOR_CLASSES.index("person")
-        logits = _joined(self.network.kinds, maps)[:, person : person + 1]
-        points = decode_points(_joined(self.network.points, maps), self.centres, self.strides)
-        points = torch.cat([points[:, :, :2], points[:, :, 2:].sigmoid()], 2)
-        boxes = _centred(decode_boxes(raw, self.centres, self.strides))
-        scores = (logits + self.shifts[:, person : person + 1]).sigmoid()
-        return torch.cat([boxes, scores, points.flatten(1, 2)], 1)
-
-
 def _logit(share: float) -> float:
     return math.log(share / (1 - share))
 
@@ -71,14 +54,14 @@ def _centred(boxes: Tensor) -> Tensor:
     return torch.cat([(low + high) / 2, high - low], 1)
 
 
-def _fused(module: nn.Module) -> nn.Module:
-    """The same with each batch norm folded into the convolution before it."""
+def fused(module: nn.Module) -> nn.Module:
+    """Fold each batch norm of `module` into the convolution before it; returns it."""
     for name, child in module.named_children():
         if isinstance(child, nn.Sequential) and len(child) > 1 and _foldable(child):
             folded = fuse_conv_bn_eval(child[0], child[1])
             setattr(module, name, nn.Sequential(folded, *child[2:]))
         else:
-            setattr(module, name, _fused(child))
+            setattr(module, name, fused(child))
     return module
 
 
@@ -89,32 +72,44 @@ def _foldable(child: nn.Sequential) -> bool:
 def export_detector(weights: Path, path: Path, thresholds: list[float]) -> None:
     """Write the detector; `thresholds` are the classes' best scores, made `NOMINAL_SCORE`."""
     names = dict(enumerate(DETECTOR_CLASSES))
-    _export(_Detector(_load(weights), thresholds), path, {"task": "detect", "names": str(names)})
-
-
-def export_pose(weights: Path, path: Path, thresholds: list[float]) -> None:
-    """Write the pose model, with the person's threshold made `NOMINAL_SCORE`."""
-    pose = {"task": "pose", "names": str({0: "person"}), "kpt_shape": str([KEYPOINTS, 3])}
-    _export(_Pose(_load(weights), thresholds), path, pose)
+    metadata = {
+        "task": "detect",
+        "names": str(names),
+        "stride": str(max(STRIDES)),
+        "batch": "1",
+        "imgsz": str([SIZE, SIZE]),
+    }
+    picture = torch.zeros(1, 3, SIZE, SIZE)
+    save_onnx(_Detector(_load(weights), thresholds), path, ("images", "output0"), picture, metadata)
 
 
 def _load(weights: Path) -> Eyes:
     network = Eyes()
     network.load_state_dict(torch.load(weights, weights_only=True, map_location="cpu"))
-    fused = _fused(network.eval())
-    if not isinstance(fused, Eyes):
-        raise TypeError("folding keeps the network's class")
-    return fused
+    fused(network.eval())
+    return network
 
 
-def _export(model: nn.Module, path: Path, metadata: dict[str, str]) -> None:
-    picture = torch.zeros(1, 3, SIZE, SIZE)
+def save_onnx(
+    model: nn.Module,
+    path: Path,
+    ports: tuple[str, str],
+    example: Tensor,
+    metadata: dict[str, str],
+    *,
+    varying: bool = False,
+) -> None:
+    """Write `model` with one input and one output, called `ports`, and `metadata`.
+
+    `varying`: the first axis of both is free.
+    """
     torch.onnx.export(
         model.eval(),
-        (picture,),
+        (example,),
         str(path),
-        input_names=["images"],
-        output_names=["output0"],
+        input_names=[ports[0]],
+        output_names=[ports[1]],
+        dynamic_axes={port: {0: "count"} for port in ports} if varying else None,
         opset_version=17,
         dynamo=False,
     )
@@ -123,9 +118,6 @@ def _export(model: nn.Module, path: Path, metadata: dict[str, str]) -> None:
         "description": "AeroDaaS, trained on rendered pictures",
         "author": "AeroDaaS",
         "license": "Apache-2.0",
-        "stride": str(max(STRIDES)),
-        "batch": "1",
-        "imgsz": str([SIZE, SIZE]),
         **metadata,
     }
     onnx.helper.set_model_props(file, properties)

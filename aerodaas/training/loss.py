@@ -54,11 +54,6 @@ class Losses:
         return 7.5 * self.box + 1.0 * self.kind + 3.0 * self.place + 0.6 * self.seen
 
     @property
-    def posture(self) -> Tensor:
-        """Weighted sum for a network that shall above all place keypoints."""
-        return 3.0 * self.box + 0.5 * self.kind + 8.0 * self.place + 1.0 * self.seen
-
-    @property
     def figures(self) -> tuple[float, ...]:
         """The four parts as numbers."""
         return tuple(part.item() for part in (self.box, self.kind, self.place, self.seen))

@@ -1,4 +1,4 @@
-"""Train, export, measure, and write the card: what the commands do."""
+"""Train, export and measure the detector, and write its card: what the command does."""
 
 from __future__ import annotations
 
@@ -11,18 +11,17 @@ import torch
 from aerodaas.training.card import Card, write_card
 from aerodaas.training.dataset import Pictures, Sample
 from aerodaas.training.evaluate import (
-    keypoint_ranking,
     milliseconds,
     rankings,
     sightings,
     thresholds,
 )
-from aerodaas.training.export import NOMINAL_SCORE, SIZE, export_detector, export_pose
+from aerodaas.training.export import NOMINAL_SCORE, SIZE, export_detector
 from aerodaas.training.metrics import Ranking
 from aerodaas.training.rendering import HELD_OUT, render_world
 from aerodaas.training.train import Progress, Recipe, train
 
-__all__ = ["Places", "make_detector", "make_pose", "trained"]
+__all__ = ["Places", "make_detector", "spent", "trained"]
 
 _FALSE_PER_PICTURE = 0.1
 """Boxes of each class beside everything, in rendered pictures, that the threshold allows."""
@@ -50,9 +49,9 @@ class Places:
         return self.work / name
 
 
-def trained(places: Places, recipe: Recipe, name: str) -> Iterator[Progress]:
-    """Train the model called `name`, unless it has been for that many steps already."""
-    yield from train(Pictures(places.work / "train"), recipe, places.run(name))
+def trained(places: Places, recipe: Recipe) -> Iterator[Progress]:
+    """Train the detector, unless it has been for that many steps already."""
+    yield from train(Pictures(places.work / "train"), recipe, places.run("detector"))
 
 
 def make_detector(places: Places, recipe: Recipe) -> Card:
@@ -68,7 +67,7 @@ def make_detector(places: Places, recipe: Recipe) -> Card:
         "Finds hazard vests, people, cars and lattice towers. Ultralytics layout, detect: "
         f"1 x 8 x 2100 for {SIZE} x {SIZE} pixels. Scores are shifted, class by class, so that "
         f"{NOMINAL_SCORE} leaves one box in ten rendered pictures beside everything.",
-        _recipe_rows(places, recipe, "detector"),
+        _recipe_rows(places, recipe),
     )
     card.figures["Held-out pictures"] = f"{len(test)}, of other worlds; things of 8 pixels and more"
     plain = rankings(path, _plain())
@@ -80,28 +79,6 @@ def make_detector(places: Places, recipe: Recipe) -> Card:
         card.figures["Photographs with the vest found"] = f"{seen.found} of {seen.pictures}"
         card.figures["Boxes beside it in all of them"] = str(seen.false)
         card.figures["Boxes on a vest already found"] = str(seen.doubled)
-    _finish(card, path)
-    return card
-
-
-def make_pose(places: Places, recipe: Recipe) -> Card:
-    """Export the pose model and write its card."""
-    calibration, test = _held_out(places)
-    path = places.out / "pose.onnx"
-    weights = places.run("pose") / "weights.pt"
-    export_pose(weights, path, _UNCALIBRATED)
-    chosen = thresholds(path, calibration, _FALSE_PER_PICTURE)
-    export_pose(weights, path, [min(chosen["person"], _HIGHEST)] * 4)
-    card = Card(
-        "Pose",
-        "Finds people and the 17 keypoints of COCO. Ultralytics layout, pose: 1 x 56 x 2100 for "
-        f"{SIZE} x {SIZE} pixels; a keypoint's confidence is that of its being seen. Scores are "
-        f"shifted so that {NOMINAL_SCORE} leaves one box in ten renders beside everything.",
-        _recipe_rows(places, recipe, "pose"),
-    )
-    card.figures["Held-out pictures"] = f"{len(test)}, of worlds not trained on"
-    card.figures["mAP50 of boxes"] = _precision(rankings(path, test)["person"])
-    card.figures["mAP50 of keypoints (OKS)"] = _precision(keypoint_ranking(path, test))
     _finish(card, path)
     return card
 
@@ -124,21 +101,22 @@ def _precision(ranking: Ranking) -> str:
     return f"{ranking.average_precision:.3f} ({ranking.things} things)"
 
 
-def _recipe_rows(places: Places, recipe: Recipe, name: str) -> dict[str, str]:
-    kept = torch.load(places.run(name) / "training.pt", weights_only=True, map_location="cpu")
-    steps = f"{kept['step']} of {recipe.batch} pictures"
-    if recipe.postures:
-        steps = f"{steps} cut around people, from the detector's weights on"
-    else:
-        steps = f"{steps}, {min(recipe.halved, kept['step'])} of them on halved ones"
-    threads = torch.get_num_threads()
-    where = "a GPU" if torch.cuda.is_available() else f"a CPU, {threads} thread(s)"
+def _recipe_rows(places: Places, recipe: Recipe) -> dict[str, str]:
+    kept = torch.load(places.run("detector") / "training.pt", weights_only=True, map_location="cpu")
+    halved = min(recipe.halved, kept["step"])
     return {
         "Pictures": f"{len(Pictures(places.work / 'train'))}, rendered; no photograph",
         "Seed": str(recipe.seed),
-        "Steps": steps,
-        "Time": f"{kept['seconds'] / 60:.0f} min on {where}",
+        "Steps": f"{kept['step']} of {recipe.batch} pictures, {halved} of them on halved ones",
+        "Time": spent(kept["seconds"]),
     }
+
+
+def spent(seconds: float) -> str:
+    """What a training took, and on what."""
+    threads = torch.get_num_threads()
+    where = "a GPU" if torch.cuda.is_available() else f"a CPU, {threads} thread(s)"
+    return f"{seconds / 60:.0f} min on {where}"
 
 
 def _finish(card: Card, path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The training loop: one network for boxes and keypoints."""
+"""The training loop of the detector, and what other loops share with it."""
 
 from __future__ import annotations
 
@@ -12,15 +12,25 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
-from aerodaas.training.augment import augmented, centred
+from aerodaas.training.augment import augmented
 from aerodaas.training.dataset import Pictures, Sample
 from aerodaas.training.labelling import KEYPOINTS
 from aerodaas.training.loss import Targets, losses
 from aerodaas.training.network import Eyes
 
-__all__ = ["Progress", "Recipe", "batch_of", "train"]
+__all__ = [
+    "Progress",
+    "Recipe",
+    "batch_of",
+    "follow",
+    "keep",
+    "optimiser_of",
+    "resume",
+    "schedule",
+    "train",
+]
 
 _WARM_UP = 150
 """Steps over which the rate of learning rises."""
@@ -43,8 +53,6 @@ class Recipe:
     decay: float = 0.03
     size: tuple[int, int] = (192, 320)
     """Height and width to train at, multiples of 64: most pictures leave no more of the square."""
-    postures: bool = False
-    """Learn from cuts around people, and the keypoints above all; the size is then 160 x 160."""
     seed: int = 1
     start: Path | None = None
     """Weights to begin with, instead of random ones."""
@@ -91,32 +99,31 @@ def train(pictures: Pictures, recipe: Recipe, folder: Path) -> Iterator[Progress
     if recipe.start is not None:
         network.load_state_dict(torch.load(recipe.start, weights_only=True, map_location=device))
     mean = copy.deepcopy(network).eval()
-    optimiser = _optimiser(network, recipe)
-    step, before = _resume(folder, network, mean, optimiser)
+    optimiser = optimiser_of(network, recipe.rate, recipe.decay)
+    step, before = resume(folder, network, mean, optimiser)
     begun = time.monotonic()
     rng = np.random.default_rng([recipe.seed, step])
     sums: list[tuple[float, ...]] = []
     while step < recipe.steps:
         network.train()
         for group in optimiser.param_groups:
-            group["lr"] = recipe.rate * _schedule(step, recipe.steps)
+            group["lr"] = recipe.rate * schedule(step, recipe.steps)
         size, draw = _source(pictures, recipe, step, rng)
-        make = centred if recipe.postures else augmented
-        samples = [make(draw, size, rng) for _ in range(recipe.batch)]
+        samples = [augmented(draw, size, rng) for _ in range(recipe.batch)]
         inputs, targets = batch_of(samples, device)
         with torch.autocast(device.type, torch.bfloat16):
             outputs = network(inputs)
         parts = losses(outputs, targets, size)
         optimiser.zero_grad(set_to_none=True)
-        (parts.posture if recipe.postures else parts.total).backward()
+        parts.total.backward()
         torch.nn.utils.clip_grad_norm_(network.parameters(), 10.0)
         optimiser.step()
         step += 1
-        _follow(mean, network, min(_MEMORY, (1 + step) / (10 + step)))
+        follow(mean, network, min(_MEMORY, (1 + step) / (10 + step)))
         sums.append(parts.figures)
         if step % _KEEP_EVERY == 0 or step == recipe.steps:
             seconds = before + time.monotonic() - begun
-            _keep(folder, (step, seconds), network, mean, optimiser)
+            keep(folder, (step, seconds), network, mean, optimiser)
             yield Progress(step, tuple(np.mean(sums, axis=0).tolist()), seconds)
             sums.clear()
 
@@ -125,26 +132,24 @@ def _source(
     pictures: Pictures, recipe: Recipe, step: int, rng: np.random.Generator
 ) -> tuple[tuple[int, int], Callable[[], Sample]]:
     """Size to train at, and what draws a picture for it."""
-    if recipe.postures:
-        return (160, 160), lambda: pictures[int(rng.integers(len(pictures)))]
     height, width = recipe.size
     if step < recipe.halved:
         return (height // 2, width // 2), lambda: pictures.halved(int(rng.integers(len(pictures))))
     return (height, width), lambda: pictures[int(rng.integers(len(pictures)))]
 
 
-def _optimiser(network: Eyes, recipe: Recipe) -> torch.optim.Optimizer:
+def optimiser_of(network: nn.Module, rate: float, decay: float) -> torch.optim.Optimizer:
     """AdamW that lets biases and norms be."""
     matrices = [p for p in network.parameters() if p.ndim > 1]
     others = [p for p in network.parameters() if p.ndim <= 1]
     groups = [
-        {"params": matrices, "weight_decay": recipe.decay},
+        {"params": matrices, "weight_decay": decay},
         {"params": others, "weight_decay": 0.0},
     ]
-    return torch.optim.AdamW(groups, lr=recipe.rate, betas=(0.9, 0.99))
+    return torch.optim.AdamW(groups, lr=rate, betas=(0.9, 0.99))
 
 
-def _schedule(step: int, steps: int) -> float:
+def schedule(step: int, steps: int) -> float:
     """Rise, then fall as a cosine to a hundredth."""
     if step < _WARM_UP:
         return (step + 1) / _WARM_UP
@@ -153,7 +158,8 @@ def _schedule(step: int, steps: int) -> float:
 
 
 @torch.no_grad()
-def _follow(mean: Eyes, network: Eyes, memory: float) -> None:
+def follow(mean: nn.Module, network: nn.Module, memory: float) -> None:
+    """Move the running mean of the weights; `memory` (0 to 1) of it stays."""
     state = network.state_dict()
     for name, value in mean.state_dict().items():
         if value.dtype.is_floating_point:
@@ -162,13 +168,14 @@ def _follow(mean: Eyes, network: Eyes, memory: float) -> None:
             value.copy_(state[name])
 
 
-def _keep(
+def keep(
     folder: Path,
     progress: tuple[int, float],
-    network: Eyes,
-    mean: Eyes,
+    network: nn.Module,
+    mean: nn.Module,
     optimiser: torch.optim.Optimizer,
 ) -> None:
+    """Write the checkpoint: `progress` is the step and the seconds since the very beginning."""
     folder.mkdir(parents=True, exist_ok=True)
     everything = {
         "step": progress[0],
@@ -183,9 +190,10 @@ def _keep(
         partial.rename(folder / name)
 
 
-def _resume(
-    folder: Path, network: Eyes, mean: Eyes, optimiser: torch.optim.Optimizer
+def resume(
+    folder: Path, network: nn.Module, mean: nn.Module, optimiser: torch.optim.Optimizer
 ) -> tuple[int, float]:
+    """Load the checkpoint, if there is one; returns its step and seconds, or zeros."""
     path = folder / "training.pt"
     if not path.exists():
         return 0, 0.0

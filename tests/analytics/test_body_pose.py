@@ -292,3 +292,14 @@ def test_an_event_has_its_frames_and_its_time(
             assert event.began
         if before and not active:
             assert not any(window)
+
+
+def test_a_hand_that_is_not_seen_is_not_raised() -> None:
+    """Hips and legs alone, as of one whose trunk is hidden, land nothing."""
+    one = body(Posture(raised=1.0), ahead=4.0)
+    assert one.keypoints is not None
+    points = one.keypoints.copy()
+    points[:11, 2] = 0.1
+    watch = Watch()
+    assert not hand_raised(watch.see(12, replace(one, keypoints=points)))
+    assert watch.alerts == []

@@ -11,7 +11,7 @@ import torch
 from aerodaas.analytics.models import DETECTOR_CLASSES
 from aerodaas.analytics.onnx.detector import OnnxDetector
 from aerodaas.training.dataset import Pictures
-from aerodaas.training.export import export_detector, export_pose
+from aerodaas.training.export import export_detector
 from aerodaas.training.loss import overlaps
 from aerodaas.training.metrics import overlap
 from aerodaas.training.network import Eyes, anchors_of
@@ -40,14 +40,12 @@ def test_a_finished_training_is_not_repeated(work: Path) -> None:
 
 @pytest.mark.slow
 def test_what_is_exported_is_what_the_detector_reads(work: Path, tmp_path: Path) -> None:
-    """Names, size and keypoints stand in the files."""
+    """Names and size stand in the file."""
     weights = work / "run" / "weights.pt"
     export_detector(weights, tmp_path / "detector.onnx", [0.3] * 4)
-    export_pose(weights, tmp_path / "pose.onnx", [0.3] * 4)
-    assert OnnxDetector(tmp_path / "detector.onnx").names == DETECTOR_CLASSES
-    pose = OnnxDetector(tmp_path / "pose.onnx")
-    assert pose.names == ("person",)
-    assert pose.size == (320, 320)
+    detector = OnnxDetector(tmp_path / "detector.onnx")
+    assert detector.names == DETECTOR_CLASSES
+    assert detector.size == (320, 320)
 
 
 def test_the_network_has_one_cell_per_anchor() -> None:
