@@ -26,7 +26,7 @@ _LONGEST = 2.2
 _LOW = 0.75
 """Metres: the head of one who sits or crouches is higher."""
 
-_HIPS_LOW = (0.65, 0.4)
+_HIPS_LOW = (0.7, 0.51)
 """Metres above ankles and above knees; the hips of one who stands are higher."""
 
 _PAIR = 2

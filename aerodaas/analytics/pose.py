@@ -27,6 +27,9 @@ _ABOVE, _BELOW = 0.55, 1.6
 _LYING = 3.0
 """A lying person's length in lengths of the vest, at most."""
 
+_SAME, _SMALLER = 0.6, 0.35
+"""Boxes of one body share this much of the smaller one, which has this much of the other's area."""
+
 _TRUSTED = 0.35
 """Confidence of keypoints that say how far a body reaches."""
 
@@ -42,8 +45,8 @@ class PoseAnalytics(Analytics[Detections]):
 
     The detector gives boxes of people, and of vests: a vest in no person's box shows where
     somebody must be. The keypoint network then looks at a square cut around each, all in one run,
-    at the `most` largest only. Runs in the detector's process; the analytics scheduler takes both
-    networks for one task.
+    at the `most` largest only. Boxes of one body, with an arm and without, count as one. Runs in
+    the detector's process; the analytics scheduler takes both networks for one task.
     """
 
     accepts: ClassVar[tuple[type, ...]] = (Frame,)
@@ -97,7 +100,7 @@ class PoseAnalytics(Analytics[Detections]):
     def detect(self, frame: Frame) -> Detections:
         """Find the people in `frame`, with keypoints of (17, 3): u, v, confidence."""
         found = self.detector.detect([frame])[0]
-        people = list(found.labelled(*_PEOPLE))
+        people = _merged(found.labelled(*_PEOPLE))
         for vest in found.labelled(*_VESTS):
             if not any(_holds(person.box, vest.centre) for person in people):
                 people.append(self._wearer(frame, vest))
@@ -120,6 +123,29 @@ class PoseAnalytics(Analytics[Detections]):
         size = (frame.width, frame.height)
         box = _clipped(_extent(joints) or guess, size)
         return Detection(box, _PEOPLE[0], vest.score)
+
+
+def _merged(people: Sequence[Detection]) -> list[Detection]:
+    """Each body once, in the box around all that were found of it; best first."""
+    kept: list[Detection] = []
+    for one in people:
+        same = next((at for at, other in enumerate(kept) if _alike(one.box, other.box)), None)
+        if same is None:
+            kept.append(one)
+            continue
+        low = np.minimum(one.box, kept[same].box)[:2].tolist()
+        high = np.maximum(one.box, kept[same].box)[2:].tolist()
+        kept[same] = Detection((*low, *high), kept[same].label, kept[same].score)
+    return kept
+
+
+def _alike(one: Box, other: Box) -> bool:
+    """Whether most of the smaller box lies in the other, and it is not much smaller."""
+    width = min(one[2], other[2]) - max(one[0], other[0])
+    height = min(one[3], other[3]) - max(one[1], other[1])
+    inner = max(0.0, width) * max(0.0, height)
+    areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (one, other)]
+    return inner > _SAME * min(areas) and min(areas) > _SMALLER * max(areas)
 
 
 def body_around(vest: Box) -> Box:

@@ -112,6 +112,15 @@ def test_a_vest_stands_for_the_person_who_has_no_box() -> None:
     assert [one.box for one in posing(vest, person).detect(GREY_FRAME)] == [person.box]
 
 
+def test_two_boxes_of_one_body_are_one() -> None:
+    """With an arm and without; one far behind stays another."""
+    trunk = Detection((280.0, 85.0, 370.0, 350.0), "person", 0.5)
+    arm = Detection((255.0, 40.0, 380.0, 300.0), "person", 0.4)
+    behind = Detection((290.0, 90.0, 310.0, 140.0), "person", 0.3)
+    found = posing(trunk, arm, behind).detect(GREY_FRAME)
+    assert [one.box for one in found] == [(255.0, 40.0, 380.0, 350.0), behind.box]
+
+
 def test_nobody_is_no_error() -> None:
     """Of a grey picture, of no pixels at all, and by the detector that ships."""
     pose = PoseAnalytics(threads=1)
