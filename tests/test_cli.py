@@ -287,7 +287,7 @@ def test_a_cluster_that_is_not_there(aerodaas: Commands, address: str) -> None:
         env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
     )
     assert ended.stderr.startswith(f"error: no Ray cluster answers at {address}: [Errno 111]")
-    assert "check the address" in ended.stderr
+    assert "check address and port" in ended.stderr
     assert ended.stderr.count("\n") == 1
     assert ended.returncode == 1
 

@@ -224,7 +224,7 @@ def test_an_analysis_that_dies_is_restarted(flyer: Flyer) -> None:
         drone_of(env).end_mission()
     flight = recorded(env.launch())
     assert flight.robots["drone"].outcome.startswith("landed: ")
-    assert [kind for _, kind, _ in flight.alerts] == ["actor_lost"]
+    assert [kind for _, kind, _ in flight.alerts] == ["actor_lost", "actor_back"]
 
 
 def newest(stream: AeroStreamData[int]) -> int:

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from aerodaas.analytics.models import DETECTOR, POSE
-
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
 from missions.catalogue import MISSIONS
@@ -20,20 +18,10 @@ SLOWEST = 1800
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(SLOWEST)]
 
-NEEDS = {
-    "situation_awareness": (DETECTOR, POSE),
-    "vehicle_tracking": (DETECTOR,),
-    "search_and_rescue": (DETECTOR,),
-    "tower_inspection": (DETECTOR,),
-}
-
 
 @pytest.mark.parametrize("name", sorted(MISSIONS))
 def test_the_mission_meets_its_criteria(name: str, tmp_path: Path) -> None:
     """By the command line, the remote user being a process of its own."""
-    missing = [path.name for path in NEEDS.get(name, ()) if not path.exists()]
-    if missing:
-        pytest.skip(f"the networks are made by a release: {', '.join(missing)} is not in this tree")
     mission = MISSIONS[name]
     flown = fly(mission, SEED, tmp_path, timeout=SLOWEST - 120)
     assert flown.code == 0, flown.output
