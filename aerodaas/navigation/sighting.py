@@ -1,10 +1,10 @@
 """Where a detected object of known size stands, seen from a level drone.
 
-The size of a box tells the distance of an object whose size is known. A box that the picture's
-edge cuts is too small, so that the distance read from it is an upper bound: the object may stand
-nearer, never farther. Taking such a bound for the distance would fly the drone into a person who
-stands so near that the feet are out of the picture, which with a level camera of the Tello's
-kind is so within 3 m.
+The size of a box tells the distance of an object whose size is known, never beyond where the ray
+through its lower edge meets the ground. A box that the picture's edge cuts is too small, so that
+the distance read from it is an upper bound: the object may stand nearer, never farther. Taking such
+a bound for the distance would fly the drone into a person who stands so near that the feet are out
+of the picture, which with a level camera of the Tello's kind is so within 3 m.
 """
 
 from __future__ import annotations
@@ -96,6 +96,7 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     cut_v = top < margin_v or bottom > detections.height - margin_v or by_height > _HIDDEN * at_most
     cut_u = left < margin_u or right > detections.width - margin_u
     measured = by_height if not cut_v else min(by_height, by_width)
+    measured = min(measured, _reach(ray(u, bottom), detections))
     direction = np.array([math.cos(bearing), math.sin(bearing)])
     # From the lens to the body's centre.
     place = measured * direction + (level @ np.array(camera.mount))[:2]
@@ -105,6 +106,22 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
         bound=cut_v and cut_u,
         width=None if cut_u or cut_v else by_height * breadth,
     )
+
+
+def _reach(lowest: Vector, detections: Detections) -> float:
+    """Metres from the lens to where the ray through a box's lower edge meets the ground.
+
+    Nothing stands below the ground, so no target is farther: one that lies there looks small, which
+    its size alone would take for far away. Where the ground falls off the target is only thought
+    nearer than it is; infinite where the height is not known or the ray does not go down.
+    """
+    camera, odometry = detections.camera, detections.odometry
+    if camera is None or odometry is None:
+        return math.inf
+    height, slope = float(odometry.position[2]) + camera.mount[2], _slope(lowest)
+    if not (math.isfinite(height) and height > 0.0 and slope < -_SMALLEST_SLOPE):
+        return math.inf
+    return -height / slope
 
 
 def _azimuth(ray: Vector) -> float:

@@ -162,3 +162,32 @@ def test_a_box_that_says_nothing_gives_no_sighting(box: Box) -> None:
     assert sight(detections[0], detections, PERSON) is None
     uncalibrated = found((500, 100, 560, 300), None)
     assert sight(uncalibrated[0], uncalibrated, PERSON) is None
+
+
+@given(
+    distance=st.floats(2.6, 12),
+    thickness=st.floats(0.15, 0.5),
+    eye=st.floats(0.8, 3.0),
+    pitch=st.floats(0.0, 0.4),
+)
+@settings(max_examples=100, deadline=None)
+def test_who_lies_on_the_ground_is_not_thought_far_away(
+    distance: float, thickness: float, eye: float, pitch: float
+) -> None:
+    """Seen from the side, lying, somebody's box is a fraction of the height assumed."""
+    model = camera(pitch)
+    corners = [
+        np.array([distance, side, up - eye]) for side in (-0.85, 0.85) for up in (0, thickness)
+    ]
+    pixels = [model.project(corner) for corner in corners]
+    us, vs = [u for u, _, _ in pixels], [v for _, v, _ in pixels]
+    assume(min(us) > 40 and max(us) < WIDE - 40 and min(vs) > 22 and max(vs) < TALL - 22)
+    detections = found((min(us), min(vs), max(us), max(vs)), model)
+    assert detections.odometry is not None
+    aloft = replace(detections.odometry, position=np.array([5.0, -3.0, eye]))
+    seen = sight(detections[0], replace(detections, odometry=aloft), PERSON)
+    assert seen is not None
+    assert seen.distance <= distance * 1.001
+    assert seen.distance >= distance * PERSON.width / 1.7 * 0.99, (
+        "as near as the width would have it"
+    )
