@@ -24,6 +24,9 @@ _MARGIN = 0.03
 of the picture end up to 18 of 720 pixels short of its edge (three YOLO models, 36 real frames)."""
 _HIDDEN = 1.3
 """Where height and width disagree by more than this, part of the height must be hidden."""
+_LIES = 0.8
+"""A box that meets the ground this much nearer than its size says is of somebody who lies there:
+whoever gets up again may do so nearer than what is seen of them, as feet stand before a chest."""
 _SMALLEST_SLOPE = 1e-3
 _NARROWEST, _WIDEST = 0.6, 1.6
 
@@ -52,7 +55,7 @@ class Sighting:
     distance: float
     """Metres along the ground from the body's centre."""
     bound: bool = False
-    """The target stands at `distance` or nearer: the picture's edges cut it on all measures."""
+    """It stands at `distance` or nearer: the picture's edges cut it on all measures, or it lies."""
     width: float | None = None
     """The target's width in metres, where the whole of it was seen."""
 
@@ -96,14 +99,16 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     cut_v = top < margin_v or bottom > detections.height - margin_v or by_height > _HIDDEN * at_most
     cut_u = left < margin_u or right > detections.width - margin_u
     measured = by_height if not cut_v else min(by_height, by_width)
-    measured = min(measured, _reach(ray(u, bottom), detections))
+    reach = _reach(ray(u, bottom), detections)
+    lies = reach < _LIES * measured
+    measured = min(measured, reach)
     direction = np.array([math.cos(bearing), math.sin(bearing)])
     # From the lens to the body's centre.
     place = measured * direction + (level @ np.array(camera.mount))[:2]
     return Sighting(
         bearing=math.atan2(place[1], place[0]),
         distance=float(np.hypot(*place)),
-        bound=cut_v and cut_u,
+        bound=lies or (cut_v and cut_u),
         width=None if cut_u or cut_v else by_height * breadth,
     )
 
