@@ -100,7 +100,7 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     cut_u = left < margin_u or right > detections.width - margin_u
     measured = by_height if not cut_v else min(by_height, by_width)
     reach = _reach(ray(u, bottom), detections)
-    lies = reach < _LIES * measured
+    lies = reach < _LIES * by_height
     measured = min(measured, reach)
     direction = np.array([math.cos(bearing), math.sin(bearing)])
     # From the lens to the body's centre.
