@@ -13,8 +13,9 @@ from flying import Flyer
 
 _ROOT = Path(__file__).resolve().parents[1]
 
-# The training itself needs PyTorch, which flying does not: without it, its test does not exist.
-collect_ignore = [] if importlib.util.find_spec("torch") else ["training/test_training_run.py"]
+# The training itself needs PyTorch, which flying does not: without it, its tests do not exist.
+_TRAINING = ["training/test_training_run.py", "training/test_pose_training.py"]
+collect_ignore = [] if importlib.util.find_spec("torch") else _TRAINING
 
 
 @pytest.fixture(scope="session")
