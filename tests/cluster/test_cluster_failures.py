@@ -24,7 +24,7 @@ pytestmark = [
     pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
 ]
 unproven = pytest.mark.xfail(
-    reason="flown safely, but not yet seen to meet all of this since executors were reworked",
+    reason="not yet seen to meet all of this since executors were reworked",
     strict=False,
 )
 _HERE = Path(__file__).resolve().parent
