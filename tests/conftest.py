@@ -11,11 +11,23 @@ from pathlib import Path
 import pytest
 from flying import Flyer
 
+from aerodaas.options import RunOptions, current_options
+
 _ROOT = Path(__file__).resolve().parents[1]
 
 # The training itself needs PyTorch, which flying does not: without it, its tests do not exist.
 _TRAINING = ["training/test_training_run.py", "training/test_pose_training.py"]
 collect_ignore = [] if importlib.util.find_spec("torch") else _TRAINING
+
+
+@pytest.fixture(autouse=True)
+def _no_options_left_over() -> Iterator[None]:
+    """What a command line asked for holds for its own run, not for the tests that follow."""
+    token = current_options.set(RunOptions())
+    arguments, places = list(sys.argv), list(sys.path)
+    yield
+    current_options.reset(token)
+    sys.argv[:], sys.path[:] = arguments, places
 
 
 @pytest.fixture(scope="session")

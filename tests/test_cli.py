@@ -7,7 +7,7 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,6 @@ from flying import FLAT, robot
 
 from aerodaas.cli import main
 from aerodaas.doctor import examine
-from aerodaas.options import current_options
 from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
 
@@ -87,17 +86,13 @@ def aerodaas(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
-) -> Iterator[Commands]:
+) -> Commands:
     """The command line, in a folder with an environment file."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(sys, "argv", sys.argv)
-    monkeypatch.setattr(sys, "path", list(sys.path))
     monkeypatch.delenv("RAY_ADDRESS", raising=False)
-    before = current_options.get()
     commands = Commands(tmp_path, capsys)
     commands.write("environment.json", json.dumps(CONTENT))
-    yield commands
-    current_options.set(before)
+    return commands
 
 
 BAD_WORDS: dict[str, tuple[list[str], str]] = {

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.testing.channel import Channel
 from aerodaas.testing.tello import EmulatedTello, Impairment, TelloOptions
-from aerodaas.testing.tello.channel import Channel
 from aerodaas.testing.tello.flight import TelloFlight
 from aerodaas.testing.tello.sdk import TelloSdk
 from aerodaas.vehicle import VehicleMode

@@ -54,12 +54,12 @@ def tello() -> Iterator[EmulatedTello]:
 
 
 @pytest.fixture
-def environment(tello: EmulatedTello, tmp_path: Path) -> Iterator[Environment]:
+def environment(tello: EmulatedTello, tmp_path: Path) -> Environment:
     """The environment with the robot's driver changed, and told where loopback's Tello is."""
     path = tmp_path / "environment.json"
     path.write_text(json.dumps(ENVIRONMENT))
-    token = current_options.set(RunOptions(view=False, record=tmp_path / "flight"))
-    yield Environment(
+    current_options.set(RunOptions(view=False, record=tmp_path / "flight"))
+    return Environment(
         path,
         overrides={
             "drone.driver": "tello",
@@ -71,7 +71,6 @@ def environment(tello: EmulatedTello, tmp_path: Path) -> Iterator[Environment]:
             "eye.settings": {"video_port": free_port()},
         },
     )
-    current_options.reset(token)
 
 
 def test_a_waypoint_mission(environment: Environment, tello: EmulatedTello) -> None:

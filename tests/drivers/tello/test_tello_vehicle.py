@@ -342,7 +342,8 @@ def test_two_tellos_on_one_host_with_the_default_ports() -> None:
             vehicles[-1].connect()
         charges = [vehicle.read().battery.fraction for vehicle in vehicles]
         vehicles[0].take_off(1.0)
-        wait_for(lambda: one.mode is VehicleMode.HOLDING)
+        wait_for(lambda: vehicles[0].read().mode is VehicleMode.HOLDING)
+        assert one.mode is not VehicleMode.GROUNDED
         assert other.mode is VehicleMode.GROUNDED
         for vehicle in vehicles:
             vehicle.close()
