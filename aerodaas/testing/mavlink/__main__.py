@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import time
 from typing import Annotated
 
 import typer
 
+from aerodaas.testing.emulated import watch
 from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot, Impairment
 
 
@@ -39,13 +39,7 @@ def main(
     )
     with EmulatedAutopilot(options) as autopilot:
         typer.echo(f"emulated {family} sends to {host}:{port}, listens at {autopilot.port}")
-        mode = None
-        while True:
-            if autopilot.mode is not mode:
-                mode = autopilot.mode
-                x, y, z = autopilot.truth.position
-                typer.echo(f"{mode.value} at ({x:.1f}, {y:.1f}, {z:.1f}) m")
-            time.sleep(0.2)
+        watch(autopilot)
 
 
 if __name__ == "__main__":

@@ -5,55 +5,46 @@ from __future__ import annotations
 import contextlib
 import selectors
 import socket
-import threading
 import time
-from types import TracebackType
 from typing import Any
 
-from typing_extensions import Self
-
-from aerodaas.data import Odometry
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.signing import sign_with
 from aerodaas.simulation.dynamics import STEP
+from aerodaas.testing.channel import Channel, Impairment
+from aerodaas.testing.emulated import LONGEST_LEAP, EmulatedVehicle
 from aerodaas.testing.mavlink.ardupilot import EmulatedArduPilot
 from aerodaas.testing.mavlink.firmware import Firmware
 from aerodaas.testing.mavlink.flight import MavFlight
 from aerodaas.testing.mavlink.options import AutopilotOptions
 from aerodaas.testing.mavlink.px4 import EmulatedPX4
-from aerodaas.testing.tello.channel import Channel
-from aerodaas.testing.tello.options import Impairment
-from aerodaas.vehicle import VehicleMode
 
 __all__ = ["EmulatedAutopilot"]
 
 _TURN = 0.01
 _LARGEST = 65535
-_LONGEST_LEAP = 0.2
-"""Seconds of flight at most in one turn: a host that was held up does not catch up."""
 _HEARTBEAT = 1.0
 _PLANS = {"MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_COUNT", "MISSION_ITEM_INT"}
 
 
-class EmulatedAutopilot:
+class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
     """PX4 or ArduCopter on loopback, from `start` (or `with`) to `stop`.
 
     It sends to `options.peer` at once, and to everybody who has spoken to it since.
     """
+
+    kind = "emulated-autopilot"
 
     def __init__(self, options: AutopilotOptions | None = None) -> None:
         """Open a port of its own."""
         self.options = options or AutopilotOptions()
         self.heard: list[tuple[float, Any]] = []
         """Every message that arrived whole, with its monotonic second."""
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.settimeout(0.0)
-        self._socket.bind(("127.0.0.1", 0))
-        self.port: int = self._socket.getsockname()[1]
-        """Where it listens."""
+        opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        opened.settimeout(0.0)
+        opened.bind(("127.0.0.1", 0))
+        super().__init__(opened, MavFlight(self.options))
         self._peers: set[tuple[str, int]] = {self.options.peer}
-        self._lock = threading.RLock()
-        self._flight = MavFlight(self.options)
         kind = EmulatedPX4 if self.options.family == "px4" else EmulatedArduPilot
         self.firmware: Firmware = kind(self.options, self._flight, self._say)
         self._mav: Any = mavlink.MAVLink(None, self.options.system, 1)
@@ -65,20 +56,6 @@ class EmulatedAutopilot:
         self._down = Channel(self.options.downlink, f"{seed}/down", self._transmit)
         self._due: dict[int, float] = {}
         self._beat_due = 0.0
-        self._stopping = threading.Event()
-        self._thread: threading.Thread | None = None
-
-    @property
-    def truth(self) -> Odometry:
-        """Exact state of motion."""
-        with self._lock:
-            return self._flight.truth
-
-    @property
-    def mode(self) -> VehicleMode:
-        """What its body is doing."""
-        with self._lock:
-            return self._flight.mode
 
     @property
     def armed(self) -> bool:
@@ -116,30 +93,6 @@ class EmulatedAutopilot:
             for peer in self._peers:
                 self._transmit(content, peer)
 
-    def start(self) -> None:
-        """Switch it on."""
-        self._thread = threading.Thread(target=self._run, name="emulated-autopilot", daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Switch it off."""
-        self._stopping.set()
-        if self._thread is not None:
-            self._thread.join()
-        self._socket.close()
-
-    def __enter__(self) -> Self:
-        self.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.stop()
-
     def _run(self) -> None:
         last = time.monotonic()
         with selectors.DefaultSelector() as selector:
@@ -152,7 +105,7 @@ class EmulatedAutopilot:
                     self._up.turn(now)
                     steps = int((now - last) / STEP)
                     last += steps * STEP
-                    self.firmware.advance(min(steps * STEP, _LONGEST_LEAP))
+                    self.firmware.advance(min(steps * STEP, LONGEST_LEAP))
                     self._report(now)
                     self._down.turn(now)
 

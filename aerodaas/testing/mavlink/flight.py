@@ -9,12 +9,12 @@ import numpy as np
 from aerodaas.data import Odometry
 from aerodaas.geometry import GeodeticOrigin, Vector, enu_to_ned, wrap_angle
 from aerodaas.simulation.airframe import Airframe
-from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Steer
+from aerodaas.simulation.autopilot import FlightLimits, Steer
 from aerodaas.simulation.dynamics import STEP, Multirotor
 from aerodaas.simulation.noise import SensorNoise
 from aerodaas.simulation.wind import Wind
+from aerodaas.testing.emulated import EmulatedFlight
 from aerodaas.testing.mavlink.options import AutopilotOptions
-from aerodaas.vehicle import VehicleMode
 
 __all__ = ["GuidedTarget", "MavFlight"]
 
@@ -40,14 +40,14 @@ class GuidedTarget:
         self.yaw_rate = yaw_rate
 
 
-class MavFlight:
-    """Body, motion and battery; time moves in `advance`."""
+class MavFlight(EmulatedFlight):
+    """Body, motion and battery of a multicopter; time moves in `advance`."""
 
     def __init__(self, options: AutopilotOptions) -> None:
         """Stand where `options` say."""
         airframe = Airframe(battery=options.battery)
         yaw = wrap_angle(math.radians(options.start_yaw))
-        self._rotor = Multirotor(
+        rotor = Multirotor(
             airframe,
             Wind(options.wind, options.gust, f"{options.seed}/wind", STEP),
             max_acceleration=_ACCELERATION,
@@ -56,18 +56,12 @@ class MavFlight:
             yaw=yaw,
         )
         self._noise = SensorNoise(options.noise, f"{options.seed}/noise")
-        self._exact = SensorNoise(0.0, "")
         limits = FlightLimits(_SPEED, _CLIMB, _ACCELERATION, 2.0)
-        self._autopilot = Autopilot(airframe, self._rotor, self._noise, limits)
+        super().__init__(airframe, rotor, limits, self._noise)
         self._shift = np.array(options.estimator_origin)
         latitude, longitude, self._sea_level = options.origin
         self.origin = GeodeticOrigin(latitude, longitude)
         self.target: GuidedTarget | None = None
-
-    @property
-    def truth(self) -> Odometry:
-        """Exact state of motion, ENU."""
-        return self._exact.odometry(self._rotor.motion())
 
     @property
     def believed(self) -> Odometry:
@@ -92,21 +86,6 @@ class MavFlight:
     def rise_to(self, altitude: float) -> float:
         """Metres from here up to an altitude above mean sea level."""
         return altitude - self.altitude
-
-    @property
-    def mode(self) -> VehicleMode:
-        """What the body's own autopilot is doing."""
-        return self._autopilot.mode
-
-    @property
-    def flying(self) -> bool:
-        """True while the rotors carry it."""
-        return self._autopilot.flying
-
-    @property
-    def charge(self) -> float:
-        """Of the battery, 0 to 1."""
-        return self._autopilot.battery.fraction
 
     @property
     def voltage(self) -> float:

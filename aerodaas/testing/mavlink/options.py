@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from aerodaas.testing.tello.options import Impairment
+from aerodaas.testing.channel import Impairment
 
 __all__ = ["AutopilotOptions"]
 

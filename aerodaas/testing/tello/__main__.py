@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import time
 from typing import Annotated, Literal
 
 import typer
 
 from aerodaas.errors import AeroDaaSError
+from aerodaas.testing.emulated import watch
 from aerodaas.testing.tello import EmulatedTello, Impairment, TelloOptions, VideoOptions
 
 
@@ -57,13 +57,7 @@ def main(
         raise typer.Exit(error.exit_code) from None
     typer.echo(f"emulated Tello at {address}:{tello.port}")
     with tello:
-        mode = None
-        while True:
-            if tello.mode is not mode:
-                mode = tello.mode
-                x, y, z = tello.truth.position
-                typer.echo(f"{mode.value} at ({x:.1f}, {y:.1f}, {z:.1f}) m")
-            time.sleep(0.2)
+        watch(tello)
 
 
 def _one_of(value: int, one: Literal[20], other: Literal[30]) -> Literal[20, 30]:

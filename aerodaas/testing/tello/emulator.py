@@ -5,19 +5,15 @@ from __future__ import annotations
 import contextlib
 import logging
 import selectors
-import threading
 import time
-from types import TracebackType
 
-from typing_extensions import Self
-
-from aerodaas.data import Odometry
 from aerodaas.drivers.tello.sockets import bound_socket, datagrams
 from aerodaas.errors import VehicleError
 from aerodaas.simulation.dynamics import STEP
-from aerodaas.testing.tello.channel import Channel
+from aerodaas.testing.channel import Channel, Impairment
+from aerodaas.testing.emulated import LONGEST_LEAP, EmulatedVehicle
 from aerodaas.testing.tello.flight import TelloFlight
-from aerodaas.testing.tello.options import Impairment, TelloOptions
+from aerodaas.testing.tello.options import TelloOptions
 from aerodaas.testing.tello.sdk import Outcome, TelloSdk
 from aerodaas.testing.tello.video import VideoStream
 from aerodaas.vehicle import VehicleMode
@@ -28,32 +24,29 @@ _log = logging.getLogger(__name__)
 
 _TURN = 0.02
 _STATE_PERIOD = 0.1
-_LONGEST_LEAP = 0.2
-"""Seconds of flight at most in one turn: a host that was held up does not catch up."""
 _SILENCE = 15.0
 """Seconds without a command after which a flying Tello lands."""
 _HOT = 90.0
 """Degrees Celsius at which `takeoff` is refused."""
 
 
-class EmulatedTello:
+class EmulatedTello(EmulatedVehicle[TelloFlight]):
     """A Tello on loopback, from `start` (or `with`) to `stop`.
 
     It replies to whoever spoke last, as the real one does, and sends state and video there.
     """
+
+    kind = "emulated-tello"
 
     def __init__(self, options: TelloOptions | None = None) -> None:
         """Open the command port, so that `port` is known at once; raises VehicleError if taken."""
         self.options = options or TelloOptions()
         self.heard: list[tuple[float, str]] = []
         """Every command that arrived, with its monotonic second."""
-        self._socket = bound_socket(
+        opened = bound_socket(
             "emulated Tello", self.options.port, address=self.options.address, raises=VehicleError
         )
-        self.port: int = self._socket.getsockname()[1]
-        """Where it listens for commands."""
-        self._lock = threading.Lock()
-        self._flight = TelloFlight(self.options)
+        super().__init__(opened, TelloFlight(self.options))
         self._sdk = TelloSdk(self.options, self._flight)
         seed = self.options.seed
         self._ears = Channel(self.options.commands, f"{seed}/commands", self._obey)
@@ -63,21 +56,7 @@ class EmulatedTello:
         self._awaiting: tuple[str, int] | None = None
         """Who gets `ok` once the motion under way is done."""
         self._idle_since = time.monotonic()
-        self._stopping = threading.Event()
-        self._thread: threading.Thread | None = None
         self._video: VideoStream | None = None
-
-    @property
-    def truth(self) -> Odometry:
-        """Exact state of motion."""
-        with self._lock:
-            return self._flight.truth
-
-    @property
-    def mode(self) -> VehicleMode:
-        """What it is doing."""
-        with self._lock:
-            return self._flight.mode
 
     def spoil(
         self,
@@ -95,31 +74,9 @@ class EmulatedTello:
             if impairment is not None:
                 channel.impairment = impairment
 
-    def start(self) -> None:
-        """Switch it on."""
-        self._thread = threading.Thread(target=self._run, name="emulated-tello", daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Switch it off."""
-        self._stopping.set()
-        if self._thread is not None:
-            self._thread.join()
+    def _release(self) -> None:
         if self._video is not None:
             self._video.stop()
-        self._socket.close()
-
-    def __enter__(self) -> Self:
-        self.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.stop()
 
     def _run(self) -> None:
         began = time.monotonic()
@@ -136,7 +93,7 @@ class EmulatedTello:
                 steps = int((now - began) / STEP) - flown
                 flown += steps
                 with self._lock:
-                    self._flight.advance(min(steps * STEP, _LONGEST_LEAP))
+                    self._flight.advance(min(steps * STEP, LONGEST_LEAP))
                 self._conclude(now)
                 if now >= state_due:
                     state_due = now + _STATE_PERIOD

@@ -6,13 +6,12 @@ import math
 
 import numpy as np
 
-from aerodaas.data import Odometry
 from aerodaas.geometry import enu_to_body, wrap_angle
 from aerodaas.simulation.airframe import Airframe
-from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
+from aerodaas.simulation.autopilot import FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, Multirotor
-from aerodaas.simulation.noise import SensorNoise
 from aerodaas.simulation.wind import Wind
+from aerodaas.testing.emulated import EmulatedFlight
 from aerodaas.testing.tello.options import TelloOptions
 from aerodaas.vehicle import VehicleMode
 
@@ -32,7 +31,7 @@ _SEA_LEVEL = 100.0
 _THERE, _FACING = 0.1, math.radians(3.0)
 
 
-class TelloFlight:
+class TelloFlight(EmulatedFlight):
     """Body, autopilot, battery and state string; time moves in `advance`."""
 
     def __init__(self, options: TelloOptions) -> None:
@@ -56,7 +55,7 @@ class TelloFlight:
         yaw = math.radians(options.start_yaw)
         self._switched_on_yaw = yaw - math.radians(options.switched_on_yaw)
         wind = Wind(options.wind, options.gust, f"{options.seed}/wind", STEP)
-        self._rotor = Multirotor(
+        rotor = Multirotor(
             airframe,
             wind,
             max_acceleration=_ACCELERATION,
@@ -65,33 +64,12 @@ class TelloFlight:
             yaw=wrap_angle(yaw),
         )
         limits = FlightLimits(_SPEED, 2.0, _ACCELERATION, 1.0)
-        self._exact = SensorNoise(0.0, "")
-        self._autopilot = Autopilot(airframe, self._rotor, self._exact, limits)
+        super().__init__(airframe, rotor, limits)
         self._sticks: tuple[float, float, float, float] | None = None
         self._goal: Goto | None = None
         self._turning = 0.0
         self._motors = 0.0
         self._time = 0.0
-
-    @property
-    def truth(self) -> Odometry:
-        """Exact state of motion."""
-        return self._exact.odometry(self._rotor.motion())
-
-    @property
-    def mode(self) -> VehicleMode:
-        """What the autopilot is doing."""
-        return self._autopilot.mode
-
-    @property
-    def flying(self) -> bool:
-        """True while the rotors carry it."""
-        return self._autopilot.flying
-
-    @property
-    def charge(self) -> float:
-        """Of the battery, 0 to 1."""
-        return self._autopilot.battery.fraction
 
     @property
     def settled(self) -> bool:

@@ -5,23 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-__all__ = ["Impairment", "TelloOptions", "VideoOptions"]
+from aerodaas.testing.channel import Impairment
 
-
-@dataclass(frozen=True)
-class Impairment:
-    """What a radio link does to packets: shares of 0 to 1, seconds."""
-
-    loss: float = 0.0
-    duplicates: float = 0.0
-    late: float = 0.0
-    """Share of the packets that come `lateness` seconds after the others."""
-    lateness: float = 1.0
-    delay: float = 0.0
-    jitter: float = 0.0
-    """Drawn evenly from 0 to this and added to `delay`; packets may overtake each other."""
-    garbled: float = 0.0
-    """Share in which bytes are replaced or cut off."""
+__all__ = ["TelloOptions", "VideoOptions"]
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ import av
 from av.video.codeccontext import VideoCodecContext
 
 from aerodaas.data import Odometry
-from aerodaas.testing.tello.channel import Channel
+from aerodaas.testing.channel import Channel
 from aerodaas.testing.tello.options import TelloOptions, VideoOptions
 from aerodaas.testing.tello.pictures import picture_source
 
