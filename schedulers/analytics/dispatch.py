@@ -167,7 +167,8 @@ class Dispatch:
         undecided = self.undecided
         for decision in decisions:
             if isinstance(decision, WakeAt):
-                if decision.at < now:
+                # Said so that NaN, which no timer would ever reach, is refused, too.
+                if not now <= decision.at:
                     raise self._refusal(decision, f"it lies in the past, now is {now}")
                 self._host.wake_at(decision.at)
                 continue
@@ -176,6 +177,8 @@ class Dispatch:
             task = decision.task
             if undecided.get(task.id) is not task:
                 raise self._refusal(decision, "the task never arrived or was decided before")
+            if not isinstance(decision.reason, str):
+                raise self._refusal(decision, f"its reason {decision.reason!r} is no text")
             if isinstance(decision, RunOnEdge):
                 self._run_edge(decision, now)
             elif isinstance(decision, SendToCloud):
