@@ -14,7 +14,6 @@ from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.errors import AeroDaaSError
 
-
 _SETTLING = 2.0
 """Seconds in which the slowest of its messages have come."""
 

@@ -59,8 +59,8 @@ class EmulatedTello(EmulatedVehicle[TelloFlight]):
         self._video: VideoStream | None = None
 
     @property
-    def film_began(self) -> int | None:
-        """When the film under way began, nanoseconds of the host's clock; None without one."""
+    def film_began(self) -> float | None:
+        """Monotonic second at which the film under way began; None without one."""
         video = self._video
         return None if video is None else video.began
 

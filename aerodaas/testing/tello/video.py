@@ -14,7 +14,6 @@ from fractions import Fraction
 import av
 from av.video.codeccontext import VideoCodecContext
 
-from aerodaas.clock import host_time_ns
 from aerodaas.data import Odometry
 from aerodaas.testing.channel import Channel
 from aerodaas.testing.tello.options import TelloOptions, VideoOptions
@@ -45,9 +44,8 @@ class VideoStream:
         self._options = options
         self._peers = peers
         self._pose = pose
-        self.began: int | None = None
-        """When the film began, nanoseconds of the host's clock; the filmed world's time is zero
-        then."""
+        self.began: float | None = None
+        """Monotonic second at which the film began; the filmed world's time is zero then."""
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="emulated-video", daemon=True)
 
@@ -77,7 +75,7 @@ class VideoStream:
                 for index, peer in enumerate(self._peers)
             ]
             encoder = _encoder(video)
-            began, self.began = time.monotonic(), host_time_ns()
+            began = self.began = time.monotonic()
             index = 0
             while not self._stopping.is_set():
                 image = picture(time.monotonic() - began, self._pose())

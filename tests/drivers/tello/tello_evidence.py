@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import sys
 import threading
+import time
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from typing_extensions import Self
 
-from aerodaas.clock import NANOSECONDS, host_time_ns
-from aerodaas.recording.reader import Recording
 from aerodaas.testing.tello import EmulatedTello
 
 sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))
@@ -30,7 +29,7 @@ class Witness:
         """Watch `tello`."""
         self._tello = tello
         self._rows: list[tuple[float, ...]] = []
-        self._film_began = 0
+        self._film_began = 0.0
         self._leaving = threading.Event()
         self._thread = threading.Thread(target=self._watch, daemon=True)
 
@@ -45,8 +44,8 @@ class Witness:
     def evidence(self, recording: Path) -> Evidence:
         """The flight that was recorded, with the truth that was seen, by the film's own time."""
         believed = Evidence.read(recording)
-        with Recording.open(recording) as opened:
-            late = (opened.epoch_ns - self._film_began) / NANOSECONDS
+        risen = next(stamp for stamp, text in self._tello.heard if text == "takeoff")
+        late = risen - self._film_began - believed.bands("taking_off")[0].start
         robot, flight = believed.robot, believed.flight
         robot.bands = [
             replace(band, start=band.start + late, end=band.end + late) for band in robot.bands
@@ -58,7 +57,6 @@ class Witness:
     def _watch(self) -> None:
         while not self._leaving.wait(_PERIOD):
             self._film_began = self._tello.film_began or self._film_began
-            truth, now = self._tello.truth, host_time_ns()
             if self._film_began:
-                seconds = (now - self._film_began) / NANOSECONDS
+                truth, seconds = self._tello.truth, time.monotonic() - self._film_began
                 self._rows.append((seconds, *truth.position, *truth.velocity))
