@@ -12,6 +12,7 @@ from shapely import Point, Polygon
 
 from aerodaas.analytics.base import Context, NavigableAnalytics
 from aerodaas.analytics.boxes import BoxAnalytics
+from aerodaas.analytics.overlap import one_for_each
 from aerodaas.analytics.tracking import Tracker
 from aerodaas.data import Alert, Detection, Detections
 from aerodaas.errors import ConfigError
@@ -121,11 +122,13 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
 
     def _possible(self, item: Detections) -> Detections:
         """Leave out the boxes of what cannot be the target, so that no track takes them."""
-        if not self.choice.grounded:
-            return item
-        seen = ((box, sight(box, item, self.size)) for box in item)
-        kept = tuple(box for box, found in seen if found is None or not found.afloat)
-        return replace(item, items=kept)
+        boxes = [box for box in item if all(map(math.isfinite, box.box))]
+        if self.choice.grounded:
+            seen = [(box, sight(box, item, self.size)) for box in boxes]
+            boxes = [box for box, found in seen if found is None or not found.afloat]
+        if self.choice.shared < 1.0:
+            boxes = one_for_each(boxes, self.choice.shared)
+        return replace(item, items=tuple(boxes))
 
     def _target_in(self, tracked: Detections) -> Detection | None:
         """Find the target among the boxes of this frame; choose one where there is none."""

@@ -111,8 +111,9 @@ class CarFollowAnalytics(FollowAnalytics):
 
 _CAR_LOST = LostPolicy(coast=1.0, slow=2.0, hold=3.0, search=7.0)
 """A car that has turned away is gone sooner than it is found."""
-_CAR_CHOICE = TargetChoice(score=0.5, sure=0.3, looks=5, grounded=True)
-"""Windows look like cars, but hang on walls, and are seldom taken for one as surely."""
+_CAR_CHOICE = TargetChoice(score=0.5, sure=0.3, looks=5, grounded=True, shared=0.6)
+"""Windows look like cars, but hang on walls, and are seldom taken for one as surely; half a car
+looks like one, too."""
 _CAR_GAINS = FollowGains(distance=(0.5, 0.05, 0.0))
 _CAR_LIMITS = FollowLimits(backward=0.6, acceleration=0.8)
 """Gentle: a drone that pitches hard tilts a near car out of the picture."""
