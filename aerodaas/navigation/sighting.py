@@ -58,6 +58,8 @@ class Sighting:
     """It stands at `distance` or nearer: the picture's edges cut it on all measures, or it lies."""
     width: float | None = None
     """The target's width in metres, where the whole of it was seen."""
+    height: float | None = None
+    """Metres from home up to its middle, where it was seen from top to bottom."""
 
     @property
     def offset(self) -> Vector:
@@ -102,6 +104,9 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     reach = _reach(ray(u, bottom), detections)
     lies = reach < _LIES * by_height
     measured = min(measured, reach)
+    height = None
+    if odometry is not None and not cut_v:
+        height = odometry.height + camera.mount[2] + measured * _slope(middle)
     direction = np.array([math.cos(bearing), math.sin(bearing)])
     # From the lens to the body's centre.
     place = measured * direction + (level @ np.array(camera.mount))[:2]
@@ -110,6 +115,7 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
         distance=float(np.hypot(*place)),
         bound=lies or (cut_v and cut_u),
         width=None if cut_u or cut_v else by_height * breadth,
+        height=height,
     )
 
 
