@@ -103,7 +103,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if self._has_left():
             self._let_go(item, context)
         phase = self.controller.phase
-        detection = self._target_in(self.tracker.update(self._possible(item)))
+        tracked = self.tracker.update(self._possible(item))
+        detection = self._target_in(tracked)
         sighting = None if detection is None else self._sight(detection, item)
         state = context.vehicle()
         command = self.controller.step(
@@ -113,6 +114,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
                 at_capture=item.odometry,
                 now=None if state is None else state.odometry,
                 now_stamp=None if state is None else state.stamp,
+                others=self._others(tracked, detection),
             )
         )
         self._tell_changes(phase, item, context)
@@ -206,6 +208,11 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if sighting is not None and sighting.width is not None:
             self._width += _WIDTH_MEMORY * (sighting.width - self._width)
         return sighting
+
+    def _others(self, tracked: Detections, target: Detection | None) -> tuple[Sighting, ...]:
+        boxes = (box for box in tracked.labelled(*self.labels) if box is not target)
+        seen = (sight(box, tracked, self.size) for box in boxes)
+        return tuple(sighting for sighting in seen if sighting is not None)
 
     def _tell_changes(self, before: FollowPhase, item: Detections, context: Context) -> None:
         phase = self.controller.phase
