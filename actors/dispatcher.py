@@ -135,6 +135,8 @@ class DispatcherActor(StreamActor):
         self._complaints: deque[str] = deque(maxlen=_COMPLAINTS_KEPT)
         """Failures in the cloud that people were told of."""
         self._counts = _Counts()
+        self._cloud: Sites | None = None
+        self._lifelines: Lifelines | None = None
 
     def prepare(
         self,
@@ -165,6 +167,7 @@ class DispatcherActor(StreamActor):
 
     def _run(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first
+        assert self._lifelines is not None  # noqa: S101 - as above
         self._guarded("start", self._time())
         while not self.stopping:
             for message in self.inbox.receive(self._patience()):
@@ -483,7 +486,8 @@ class DispatcherActor(StreamActor):
         return 0.2
 
     def _close(self) -> None:
-        self._lifelines.end()
+        if self._lifelines is not None:
+            self._lifelines.end()
         if self._cloud is not None:
             self._cloud.finish(_LAST_ANSWERS)
         self._dispatch.close()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FollowGains", "FollowLimits", "LostPolicy"]
+__all__ = ["FollowGains", "FollowLimits", "LostPolicy", "TargetChoice"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +37,16 @@ class FollowLimits:
     """rad/s."""
     acceleration: float = 1.5
     """m/s^2 of the commanded velocity."""
+    braking: float = 2.5
+    """The same where the drone would else come too near."""
+    reaction_time: float = 0.5
+    """Seconds from a target's stop until the drone brakes: a frame at 5 a second, a detector's work
+    and the tilting of the airframe."""
     yaw_acceleration: float = 4.0
     """rad/s^2 of the commanded yaw rate."""
     nearest: float = 0.6
-    """Part of the wanted distance within which the drone never moves towards the target."""
+    """Part of the wanted distance within which the drone never moves towards the target; it comes
+    up no faster than it could stop there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,3 +63,21 @@ class LostPolicy:
     """Until here it turns in search, at 0.5 rad/s more than once around; then it gives up."""
     search_rate: float = 0.5
     """rad/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class TargetChoice:
+    """What it takes to be chosen as a target; one that is held is held on less."""
+
+    score: float = 0.0
+    """Least confidence of the box that is chosen; the detector's own threshold holds as well."""
+    sure: float = 0.0
+    """Confidence from which a box begins a track; below, it only continues one."""
+    looks: int = 2
+    """Frames in which it must have been seen."""
+    grounded: bool = False
+    """It stands on the ground: a box of its size that hangs in the air is something else. Not for
+    a part of a thing, such as a vest, nor where the ground is far from level."""
+    shared: float = 1.0
+    """Of two boxes that share more than this part of the smaller one, the better one counts; 1
+    counts both."""
