@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,6 +22,7 @@ from typing import Any
 from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor, failure_line
 from aerodaas.actors._cloud import CloudAnswer, Executor
+from aerodaas.actors._decisions import DECISIONS, Counts, DecisionLog
 from aerodaas.actors._estimates import Estimates
 from aerodaas.actors._fence import FencedDispatch
 from aerodaas.actors._lifeline import Life, Lifelines
@@ -29,9 +30,7 @@ from aerodaas.actors._sites import Sites
 from aerodaas.actors._way import Way
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.clock import NANOSECONDS, host_time_ns
-from aerodaas.data import Header
 from aerodaas.schedulers.analytics.base import (
-    MILLISECOND,
     AnalyticsScheduler,
     Decision,
     Drop,
@@ -45,14 +44,10 @@ from aerodaas.schedulers.analytics.base import (
     WakeAt,
 )
 from aerodaas.schedulers.analytics.edge_cloud import EdgeCloudEdf
-from aerodaas.schedulers.analytics.windows import QoeWindows
-from aerodaas.status import Decision as DecisionRecord
 from aerodaas.status import Message
 
-__all__ = ["DECISIONS", "DispatcherActor", "Managed", "done_stream", "task_stream"]
+__all__ = ["DispatcherActor", "Managed", "done_stream", "task_stream"]
 
-DECISIONS = "decisions"
-"""Stream of the scheduler's decisions and their outcomes."""
 _LAST_ANSWERS = 2.0
 """Seconds given to the cloud at the end of a run."""
 _COMPLAINTS_KEPT = 16
@@ -105,7 +100,6 @@ class DispatcherActor(StreamActor):
         super().__init__(session, "dispatcher", {**answers, **inputs})
         self._managed = managed
         self._by_done = {done_stream(one.stream): one for one in managed}
-        self._many = {one.stream for one in managed if len(one.inputs) > 1}
         self._resources = resources
         self._dispatch = FencedDispatch(scheduler, resources, self)
         self._dispatch.hurried = not session.lockstep
@@ -134,7 +128,7 @@ class DispatcherActor(StreamActor):
         """Models whose executor on the edge will not come back."""
         self._complaints: deque[str] = deque(maxlen=_COMPLAINTS_KEPT)
         """Failures in the cloud that people were told of."""
-        self._counts = _Counts()
+        self._counts = Counts()
         self._cloud: Sites | None = None
         self._lifelines: Lifelines | None = None
 
@@ -156,7 +150,8 @@ class DispatcherActor(StreamActor):
         return info
 
     def _open(self) -> None:
-        self._decisions = self.outlet(DECISIONS)
+        many = {one.stream for one in self._managed if len(one.inputs) > 1}
+        self._log = DecisionLog(self.outlet(DECISIONS), many)
         self._tasks = {one.stream: self.outlet(task_stream(one.stream)) for one in self._managed}
         self._acks = {
             one.stream: self.outlet(f"{ACKS}/{one.stream}")
@@ -315,7 +310,7 @@ class DispatcherActor(StreamActor):
         oldest = next(iter(self._dispatch.undecided.values()), None)
         if oldest is None or self._replaced or now <= oldest.deadline + _FORGOTTEN:
             return
-        self._replace(f"left {self._label(oldest)} undecided beyond its deadline", now)
+        self._replace(f"left {self._log.label(oldest)} undecided beyond its deadline", now)
 
     def _settle(self) -> None:
         """Lockstep: let the scheduler's own time run on until every task is decided."""
@@ -381,7 +376,7 @@ class DispatcherActor(StreamActor):
             self._frames[task.id] = self._frames.pop(lost.id)
             self._second.add(task.id)
             self._counts.retried += 1
-            self._note(task, "retry", why, now)
+            self._log.note(task, "retry", why, now)
             self._guarded("arrived", task, now)
 
     # The host of `Dispatch`.
@@ -409,10 +404,10 @@ class DispatcherActor(StreamActor):
         task = decision.task
         if isinstance(decision, Drop):
             self._why[task.id] = decision.reason
-            self._note(task, "drop", decision.reason, now)
+            self._log.note(task, "drop", decision.reason, now)
         else:
             action = "edge" if isinstance(decision, RunOnEdge) else "cloud"
-            self._note(task, action, decision.reason, now)
+            self._log.note(task, action, decision.reason, now)
 
     def closed(self, result: Result) -> None:
         """Publish a task's result, if it came in time."""
@@ -439,7 +434,7 @@ class DispatcherActor(StreamActor):
         else:
             return
         totals = {"utility": result.utility, **self._counts.totals, **(figures or {})}
-        self._note(task, result.outcome.value, reason, result.finished, totals)
+        self._log.note(task, result.outcome.value, reason, result.finished, totals)
 
     def _publish(self, node: str, origin: Message[Any], item: Any) -> None:  # noqa: ANN401
         if item is not None or self.session.lockstep:
@@ -447,34 +442,6 @@ class DispatcherActor(StreamActor):
         if node in self._acks:
             done = ((origin.header.source, origin.header.stamp),)
             self._acks[node].derive(done, origin, host_time_ns(), origin.stamp)
-
-    def _label(self, task: Task) -> str:
-        """The analysis and the frame; also the camera, where the analysis watches several."""
-        model = task.profile.model
-        source = f"{task.source}:" if model in self._many else ""
-        return f"{model}#{source}{task.segment}"
-
-    def _note(
-        self,
-        task: Task,
-        action: str,
-        reason: str,
-        now: int,
-        totals: Mapping[str, float] | None = None,
-    ) -> None:
-        slack = task.deadline + task.reserve - now
-        waited = (now - task.arrival) / 1e6
-        # The tasks of a frame arrive at one moment; their numbers tell the order.
-        values = {"slack_ms": slack / 1e6, "waited_ms": waited, "number": float(task.id)}
-        if action in {"edge", "cloud"}:
-            values["edge_ms"] = task.profile.edge_time / MILLISECOND
-            values["cloud_ms"] = task.profile.cloud_time / MILLISECOND
-        if task.reserve:
-            values["reserve_ms"] = task.reserve / 1e6
-        values |= totals or {}
-        header = Header(self._decisions.sent, now, DECISIONS)
-        record = DecisionRecord(now, self._label(task), action, reason, values)
-        self._decisions.measure(record, header, host_time_ns())
 
     def _time(self, stamp: int = 0) -> int:
         self._now = max(self._now, stamp if self.session.lockstep else self.clock.now())
@@ -501,39 +468,4 @@ class DispatcherActor(StreamActor):
             "cloud_slots": self._dispatch.resources.cloud_slots,
             "reserve_ms": self._way.reserve(1 << 62) / 1e6,
             "sites": self._cloud.values() if self._cloud is not None else {},
-        }
-
-
-class _Counts:
-    """What a run is judged by, as in the lab."""
-
-    def __init__(self) -> None:
-        self.retried = 0
-        self._tasks = 0
-        self._outcomes: Counter[str] = Counter()
-        self._utility = 0.0
-        self._windows = QoeWindows()
-
-    def arrived(self, task: Task) -> None:
-        self._tasks += 1
-        self._windows.arrived(task)
-
-    def ended(self, result: Result) -> None:
-        self._outcomes[result.outcome.value] += 1
-        self._utility += result.utility
-        if result.outcome is Outcome.DONE:
-            self._windows.done(result.task)
-
-    @property
-    def totals(self) -> dict[str, float]:
-        """Utility so far."""
-        return {"qos_total": self._utility, "qoe_total": self._windows.utility}
-
-    def values(self) -> dict[str, Any]:
-        return {
-            "tasks": self._tasks,
-            "outcomes": dict(self._outcomes),
-            "retried": self.retried,
-            **self.totals,
-            "qoe_windows": self._windows.won,
         }

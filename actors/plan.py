@@ -6,11 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors._barrier import ACKS, paths
+from aerodaas.actors._decisions import DECISIONS
 from aerodaas.actors._names import state_stream
 from aerodaas.actors._offload import CloudProcess, allowed, cloud_processes, priced, short_name
 from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
 from aerodaas.actors.cluster import Place
-from aerodaas.actors.dispatcher import DECISIONS, Managed, done_stream, task_stream
+from aerodaas.actors.dispatcher import Managed, done_stream, task_stream
 from aerodaas.actors.drone import Conduct
 from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session

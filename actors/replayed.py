@@ -10,7 +10,14 @@ from typing import Any
 from aerodaas.actors.session import Session
 from aerodaas.clock import NANOSECONDS
 from aerodaas.data import Header
-from aerodaas.navigation.planner import InlinePlanner, Plan, Planner, PlanRequest, solve
+from aerodaas.navigation.planner import (
+    InlinePlanner,
+    Plan,
+    Planner,
+    PlanRequest,
+    SerialPlanner,
+    solve,
+)
 from aerodaas.plugins import load_plugin
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.status import Heard, Message
@@ -103,29 +110,14 @@ def as_planned(scheduler: TrajectoryScheduler, turns: Sequence[int]) -> Planner:
     return _RecordedPlanner(scheduler, turns) if turns else InlinePlanner(scheduler)
 
 
-class _RecordedPlanner:
-    """Plans on the spot and keeps each plan back until the turn at which one had come.
-
-    As `BackgroundPlanner`, it makes one plan at a time; of requests that wait, it keeps the newest.
-    """
+class _RecordedPlanner(SerialPlanner):
+    """Plans on the spot and keeps each plan back until the turn at which one had come."""
 
     def __init__(self, scheduler: TrajectoryScheduler, turns: Sequence[int]) -> None:
+        super().__init__(scheduler)
         self.now = 0
-        self._scheduler = scheduler
         self._turns = deque(turns)
         self._made: tuple[int, Plan] | None = None
-        self._waiting: PlanRequest | None = None
-
-    @property
-    def replans_on_arrival(self) -> bool:
-        """Whether the scheduler wants to be asked again after each arrival."""
-        return self._scheduler.replans_on_arrival
-
-    def submit(self, request: PlanRequest) -> None:
-        """Plan now, for later."""
-        self._waiting = request
-        if self._made is None:
-            self._begin()
 
     def poll(self) -> Plan | None:
         """Return the plan once it is due, and begin with the request that waits."""
@@ -133,13 +125,14 @@ class _RecordedPlanner:
             return None
         _, plan = self._made
         self._made = None
-        self._begin()
+        self._next()
         return plan
 
-    def _begin(self) -> None:
-        request, self._waiting = self._waiting, None
-        if request is None:
-            return
+    @property
+    def _busy(self) -> bool:
+        return self._made is not None
+
+    def _begin(self, request: PlanRequest) -> None:
         while self._turns and self._turns[0] < self.now:
             self._turns.popleft()
         known = self._turns and self._turns[0] - self.now <= _LONGEST_PLANNING

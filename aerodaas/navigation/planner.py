@@ -6,6 +6,7 @@ lockstep are deterministic; `BackgroundPlanner` plans on an executor while the d
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -14,7 +15,15 @@ from typing import Protocol
 from aerodaas.schedulers.waypoint.base import Situation, TrajectoryScheduler
 from aerodaas.waypoints import Waypoint
 
-__all__ = ["BackgroundPlanner", "InlinePlanner", "Plan", "PlanRequest", "Planner", "solve"]
+__all__ = [
+    "BackgroundPlanner",
+    "InlinePlanner",
+    "Plan",
+    "PlanRequest",
+    "Planner",
+    "SerialPlanner",
+    "solve",
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -80,18 +89,49 @@ def _objection(pending: Sequence[Waypoint], order: Sequence[Waypoint]) -> str:
     return f"its plan visits {', '.join(unknown)}, which nobody asked for" if unknown else ""
 
 
-class InlinePlanner:
-    """Plans while `submit` is called."""
+class _SchedulerPlanner:
+    """What planners with a scheduler share."""
 
     def __init__(self, scheduler: TrajectoryScheduler) -> None:
         """Plan with `scheduler`."""
         self._scheduler = scheduler
-        self._plan: Plan | None = None
 
     @property
     def replans_on_arrival(self) -> bool:
         """Whether the scheduler wants to be asked again after each arrival."""
         return self._scheduler.replans_on_arrival
+
+
+class SerialPlanner(_SchedulerPlanner, ABC):
+    """Makes one plan at a time; of the requests that wait, the newest is kept."""
+
+    _waiting: PlanRequest | None = None
+
+    def submit(self, request: PlanRequest) -> None:
+        """Plan as soon as the plan being made is done."""
+        self._waiting = request
+        if not self._busy:
+            self._next()
+
+    def _next(self) -> None:
+        request, self._waiting = self._waiting, None
+        if request is not None:
+            self._begin(request)
+
+    @property
+    @abstractmethod
+    def _busy(self) -> bool:
+        """Whether a plan is being made or has not been returned yet."""
+
+    @abstractmethod
+    def _begin(self, request: PlanRequest) -> None:
+        """Have this plan made."""
+
+
+class InlinePlanner(_SchedulerPlanner):
+    """Plans while `submit` is called."""
+
+    _plan: Plan | None = None
 
     def submit(self, request: PlanRequest) -> None:
         """Plan now."""
@@ -103,8 +143,8 @@ class InlinePlanner:
         return plan
 
 
-class BackgroundPlanner:
-    """Plans on an executor, one request at a time; of those that wait, the newest is kept.
+class BackgroundPlanner(SerialPlanner):
+    """Plans on an executor.
 
     A process keeps the setpoint loop free of the interpreter lock that long plans hold; the
     scheduler is sent there with each request and so must pickle. Without an executor, a thread is
@@ -113,23 +153,11 @@ class BackgroundPlanner:
 
     def __init__(self, scheduler: TrajectoryScheduler, executor: Executor | None = None) -> None:
         """Plan with `scheduler` on `executor`, which stays the caller's to shut down."""
-        self._scheduler = scheduler
+        super().__init__(scheduler)
         self._own = ThreadPoolExecutor(1, "planner") if executor is None else None
         self._executor = executor or self._own
         self._running: Future[Plan] | None = None
         self._request: PlanRequest | None = None
-        self._waiting: PlanRequest | None = None
-
-    @property
-    def replans_on_arrival(self) -> bool:
-        """Whether the scheduler wants to be asked again after each arrival."""
-        return self._scheduler.replans_on_arrival
-
-    def submit(self, request: PlanRequest) -> None:
-        """Plan as soon as the plan being made is done."""
-        self._waiting = request
-        if self._running is None:
-            self._start()
 
     def poll(self) -> Plan | None:
         """Return the plan that is ready, and start on the request that waits."""
@@ -144,8 +172,7 @@ class BackgroundPlanner:
             if error is None
             else Plan(request, request.pending, f"planning failed: {error}")
         )
-        if self._waiting is not None:
-            self._start()
+        self._next()
         return plan
 
     def close(self) -> None:
@@ -153,10 +180,12 @@ class BackgroundPlanner:
         if self._own is not None:
             self._own.shutdown(wait=False, cancel_futures=True)
 
-    def _start(self) -> None:
-        request, self._waiting = self._waiting, None
-        if request is None or self._executor is None:
-            return
+    @property
+    def _busy(self) -> bool:
+        return self._running is not None
+
+    def _begin(self, request: PlanRequest) -> None:
+        assert self._executor is not None  # noqa: S101 - given or own
         self._request = request
         try:
             self._running = self._executor.submit(solve, self._scheduler, request)

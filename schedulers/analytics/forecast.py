@@ -54,4 +54,4 @@ class Forecast:
             if at >= until:
                 return
             if stream.regular >= _REGULAR and at > given_up:
-                yield (at if at > now else now), source
+                yield (max(now, at)), source

@@ -112,8 +112,7 @@ class CloudOutlook:
         self._listen_at = 0.0
         if result.place is not Place.CLOUD or result.outcome in _UNANSWERED:
             return
-        if sent > self._answered:
-            self._answered = sent
+        self._answered = max(self._answered, sent)
         if self.silent_since is not None and sent >= self.silent_since:
             self.silent_since = None
         self.beliefs.observe(result.task.profile, result.finished - result.started, now)

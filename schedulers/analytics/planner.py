@@ -108,7 +108,7 @@ def _successors(
         if index == count:
             continue
         job = jobs[index]
-        begin = job.release if job.release > free else free
+        begin = max(free, job.release)
         if begin - free > gap:
             continue
         gain = job.benefit * chance(belief, job.deadline - begin) - job.loss

@@ -17,6 +17,7 @@ from aerodaas.schedulers.analytics.base import (
     Profile,
     Resources,
     Result,
+    RunOnEdge,
     Task,
 )
 from aerodaas.schedulers.analytics.edge_cloud import EdgeCloudEdf
@@ -54,9 +55,8 @@ class _Nonsense(AnalyticsScheduler):
         return self.answer(task)
 
 
-def _raising(_: Task) -> Iterator[Decision]:
-    raise ZeroDivisionError("in a generator")
-    yield
+def _raising(task: Task) -> Iterator[Decision]:
+    yield RunOnEdge(task, str(1 / (task.id - task.id)))
 
 
 @pytest.mark.parametrize(
@@ -67,7 +67,7 @@ def _raising(_: Task) -> Iterator[Decision]:
         (lambda _: "edge", SchedulerError, "'e': that is none of the decisions"),
         (lambda _: [None], SchedulerError, "None: that is none of the decisions"),
         (lambda t: [t], SchedulerError, "that is none of the decisions"),
-        (_raising, ZeroDivisionError, "in a generator"),
+        (_raising, ZeroDivisionError, "division"),
         (lambda _: sys.exit(1), SchedulerError, "tried to end the process"),
     ],
 )

@@ -163,8 +163,8 @@ def test_lost_executions_are_reported_as_such() -> None:
     ("answer", "slots", "words"),
     [
         (lambda _, now: WakeAt(now - 1), 1, "past"),
-        (lambda _, __: WakeAt(float("nan")), 1, "past"),
-        (lambda t, _: Drop(t, ["why"]), 1, "no text"),
+        (lambda _, __: WakeAt(float("nan")), 1, "past"),  # type: ignore[arg-type]
+        (lambda t, _: Drop(t, ["why"]), 1, "no text"),  # type: ignore[arg-type]
         (lambda _, __: RunOnEdge(_task(99)), 1, "never arrived"),
         (lambda t, _: SendToCloud(t), 0, "no cloud"),
         (lambda _, __: "edge", 1, "none of the decisions"),
