@@ -153,17 +153,17 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
 
         A drone that pitches shakes the picture more than a tracker of boxes can know.
         """
-        odometry, motion = item.odometry, self.controller.motion
-        expected = None if odometry is None else motion.relative_to(odometry, item.header.stamp)
+        odometry, controller = item.odometry, self.controller
+        expected = None if odometry is None else controller.expected(odometry, item.header.stamp)
         if self.target is None or expected is None:
             return None
-        reach = _REACH + _REACH_SHARE * expected[0].distance
+        reach = _REACH + _REACH_SHARE * expected.distance
         best = None
         for detection in found:
             sighting = sight(detection, item, self.size.with_width(self._width))
             if sighting is None:
                 continue
-            off = float(np.linalg.norm(sighting.offset - expected[0].offset))
+            off = float(np.linalg.norm(sighting.offset - expected.offset))
             if off <= reach:
                 best, reach = detection, off
         if best is not None and best.track_id is not None:

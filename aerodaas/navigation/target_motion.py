@@ -15,16 +15,26 @@ from aerodaas.clock import seconds
 from aerodaas.data import Odometry
 from aerodaas.navigation.sighting import Sighting
 
-__all__ = ["TargetMotion"]
+__all__ = ["TargetMotion", "seen_from"]
 
 _RANGE_NOISE, _SIDE_NOISE = 0.06, 0.02
 """Standard deviations along and across the line of sight, in parts of the distance."""
 _LEAST_NOISE = 0.03
 _ACCELERATION = 0.7
 """Standard deviation of a walking person's acceleration, m/s^2."""
+_SURPRISE = 4.0
+"""Squared Mahalanobis distance, of two degrees of freedom, from which the target must have changed
+its speed: one look in seven is as far off by chance, which costs a little smoothness."""
 _NEAREST = 0.1
 _FIRST_SPEED = 0.7
 """Standard deviation of a velocity not yet observed, m/s."""
+
+
+def seen_from(odometry: Odometry, place: tuple[float, float]) -> Sighting:
+    """How a place (metres east and north of home) lies from a drone at `odometry`."""
+    way = np.array(place) - odometry.position[:2]
+    bearing = math.remainder(math.atan2(way[1], way[0]) - odometry.yaw, math.tau)
+    return Sighting(bearing, float(np.hypot(*way)))
 
 
 class TargetMotion:
@@ -70,8 +80,11 @@ class TargetMotion:
             self._covariance[2:, 2:] = self._speed**2 * np.eye(2)
         else:
             self._advance(seconds(stamp - self._stamp))
+            surprise = place - self._state[:2]
+            if surprise @ np.linalg.inv(self._covariance[:2, :2] + noise) @ surprise > _SURPRISE:
+                self._doubt(seconds(stamp - self._stamp))
             gain = self._covariance[:, :2] @ np.linalg.inv(self._covariance[:2, :2] + noise)
-            self._state = self._state + gain @ (place - self._state[:2])
+            self._state = self._state + gain @ surprise
             self._covariance = self._covariance - gain @ self._covariance[:2]
         self._stamp = stamp
 
@@ -91,6 +104,14 @@ class TargetMotion:
         away = float(velocity @ along)
         left = float(along[0] * velocity[1] - along[1] * velocity[0])
         return Sighting(bearing, distance), away, left
+
+    def _doubt(self, dt: float) -> None:
+        """Know the velocity no better than at first: people stop and set out within a step."""
+        doubt = self._speed**2
+        self._covariance[2:, 2:] += doubt * np.eye(2)
+        self._covariance[:2, 2:] += doubt * dt * np.eye(2)
+        self._covariance[2:, :2] += doubt * dt * np.eye(2)
+        self._covariance[:2, :2] += doubt * dt**2 * np.eye(2)
 
     def _advance(self, dt: float) -> None:
         if self._state is None:
