@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -102,6 +102,7 @@ class Flight:
         self._helpers: list[Any] = []
         """Actors without streams, to be killed at the end."""
         self._detached = outlives_application()
+        self._job = ray.get_runtime_context().get_job_id()
         self._caretaker: Any = None
         self._opening: list[Any] = []
         session, edge = plan.session, Place()
@@ -180,6 +181,11 @@ class Flight:
             robots.update(self._ask(self._members[name].handle.robots.remote(newest)))
         over = all(self._members[name].report.phase in {"done", "failed"} for name in self._ids())
         return FlightState(robots, self.reports(), over)
+
+    @property
+    def reachable(self) -> bool:
+        """False once this process has left the cluster that the actors live in."""
+        return ray.is_initialized() and ray.get_runtime_context().get_job_id() == self._job
 
     def command(self, robot: str, command: Command) -> Answer:
         """Tell a robot's mission something."""
@@ -335,6 +341,10 @@ class Flight:
                 member.report = ray.get(reference)
             except RayActorError:
                 self._lost(member)
+            except RayTaskError as error:
+                # An actor that can't say how it fares is no reason to leave the drones alone.
+                reason = MissionError(f"no report from {member.name}: {error.cause}")
+                member.report = replace(member.report, error=reason)
 
     def _record_vitals(self) -> None:
         """Have the recorder note what each process takes; it alone could not ask other nodes."""

@@ -258,7 +258,7 @@ class Run:
 
     def abandon(self) -> None:
         """Land and stop: the application has ended without waiting."""
-        if not self._finished.is_set():
+        if not self._finished.is_set() and self._flight is not None and self._flight.reachable:
             self._land("the application ended")
             self._finish()
 

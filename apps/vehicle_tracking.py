@@ -14,7 +14,7 @@ def main() -> None:
     scheduler = env.trajectory_scheduler()
 
     camera = drone.get_sensor_by_id("cam1").get_data_stream()
-    cars = OnnxDetector(classes=["car"]).deploy(edge).analyse(camera)
+    cars = OnnxDetector(classes=["car"], min_score=0.15).deploy(edge).analyse(camera)
     follow = CarFollowAnalytics(distance=6, height=2.5, area=AREA).deploy(edge).analyse(cars)
 
     places = [(0, 12), (12, 0), (30, 8)]

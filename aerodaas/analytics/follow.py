@@ -5,18 +5,21 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from shapely import Point, Polygon
 
 from aerodaas.analytics.base import Context, NavigableAnalytics
 from aerodaas.analytics.boxes import BoxAnalytics
+from aerodaas.analytics.overlap import one_for_each
 from aerodaas.analytics.tracking import Tracker
 from aerodaas.data import Alert, Detection, Detections
 from aerodaas.errors import ConfigError
 from aerodaas.navigation.follow_controller import FollowController, FollowPhase, Observation
-from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
+from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
 from aerodaas.navigation.sighting import Sighting, TargetSize, sight
+from aerodaas.navigation.target_motion import TargetMotion
 from aerodaas.waypoints import DEFAULT_PRIORITY, AeroNavigation, NavigationType
 
 __all__ = ["FollowAnalytics"]
@@ -48,14 +51,17 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         gains: FollowGains | None = None,
         limits: FollowLimits | None = None,
         lost: LostPolicy | None = None,
+        motion: TargetMotion | None = None,
         area: Sequence[tuple[float, float]] | None = None,
+        choice: TargetChoice | None = None,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
         """Follow what carries one of `labels` from `distance`, flying at `height`, in metres.
 
         `target_height` and `target_width` are the size of the object itself, in metres. With an
         `area`, the corners of a polygon in metres east and north of home, a target that leaves it
-        is given up at once. Raises ConfigError for lengths that are not positive, and for an
+        is given up at once. `motion` says how it moves, `choice` what it takes to be followed.
+        Raises ConfigError for lengths that are not positive, and for an
         area that is none.
         """
         lengths = {
@@ -71,10 +77,19 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         super().__init__(labels, detector)
         self.area = None if area is None else _polygon(area)
         self.size = TargetSize(target_height, target_width)
+        self.choice = choice or TargetChoice()
         self.controller = FollowController(
-            distance, height, gains=gains, limits=limits, lost=lost, priority=priority
+            distance,
+            height,
+            gains=gains,
+            limits=limits,
+            lost=lost,
+            motion=motion,
+            priority=priority,
         )
-        self.tracker = Tracker(max_age=self.controller.lost.slow)
+        self.tracker = Tracker(
+            max_age=self.controller.lost.slow, min_hits=self.choice.looks, sure=self.choice.sure
+        )
         self.target: int | None = None
         """Track that is followed."""
         self._width = target_width
@@ -88,7 +103,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if self._has_left():
             self._let_go(item, context)
         phase = self.controller.phase
-        tracked = self.tracker.update(item)
+        tracked = self.tracker.update(self._possible(item))
         detection = self._target_in(tracked)
         sighting = None if detection is None else self._sight(detection, item)
         state = context.vehicle()
@@ -107,6 +122,16 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             return None
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
 
+    def _possible(self, item: Detections) -> Detections:
+        """Leave out the boxes of what cannot be the target, so that no track takes them."""
+        boxes = [box for box in item if all(map(math.isfinite, box.box))]
+        if self.choice.grounded:
+            seen = [(box, sight(box, item, self.size)) for box in boxes]
+            boxes = [box for box, found in seen if found is None or not found.afloat]
+        if self.choice.shared < 1.0:
+            boxes = one_for_each(boxes, self.choice.shared)
+        return replace(item, items=tuple(boxes))
+
     def _target_in(self, tracked: Detections) -> Detection | None:
         """Find the target among the boxes of this frame; choose one where there is none."""
         found = tracked.labelled(*self.labels)
@@ -116,7 +141,12 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             mine = self._found_where_expected(found, tracked)
         if mine is not None or not self._may_choose():
             return mine
-        trusted = [item for item in trusted if self._is_inside(item, tracked)]
+        least = self.choice.score
+        trusted = [
+            item
+            for item in trusted
+            if item.score >= least and self._is_inside(item, tracked) and self._is_new(item, tracked)
+        ]
         if not trusted:
             return None
         chosen = max(trusted, key=lambda item: item.area * item.score)
@@ -133,6 +163,13 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self.controller.give_up()
         text = f"The {' or '.join(self.labels)} has left the area; following ends."
         context.alert(Alert(item.header, "target_left_area", text))
+
+    def _is_new(self, detection: Detection, item: Detections) -> bool:
+        """Tell whether it shows enough to be a first target; one that was lost is taken as it is."""
+        if not self.choice.whole or self.target is not None:
+            return True
+        sighting = sight(detection, item, self.size)
+        return sighting is not None and sighting.width is not None
 
     def _is_inside(self, detection: Detection, item: Detections) -> bool:
         """Tell whether it may be followed: it is in the area, if there is one."""
@@ -177,7 +214,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
 
     def _sight(self, detection: Detection, item: Detections) -> Sighting | None:
         sighting = sight(detection, item, self.size.with_width(self._width))
-        if sighting is not None and sighting.width is not None and self.size.widest is None:
+        if sighting is not None and sighting.width is not None:
             self._width += _WIDTH_MEMORY * (sighting.width - self._width)
         return sighting
 

@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.follow import FollowAnalytics
 from aerodaas.interfaces import IEnvironment
-from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
+from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
 from aerodaas.navigation.sighting import TargetSize
+from aerodaas.navigation.target_motion import TargetMotion
 from aerodaas.waypoints import DEFAULT_PRIORITY
 
 __all__ = ["CarFollowAnalytics", "PersonFollowAnalytics", "VipFollowAnalytics"]
@@ -37,6 +38,7 @@ class VipFollowAnalytics(FollowAnalytics):
         gains: FollowGains | None = None,
         limits: FollowLimits | None = None,
         lost: LostPolicy | None = None,
+        choice: TargetChoice | None = None,
         priority: int = DEFAULT_PRIORITY,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
@@ -54,6 +56,7 @@ class VipFollowAnalytics(FollowAnalytics):
             gains=gains,
             limits=limits,
             lost=lost,
+            choice=choice or _VEST_CHOICE,
             priority=priority,
             detector=detector,
         )
@@ -80,6 +83,7 @@ class CarFollowAnalytics(FollowAnalytics):
         gains: FollowGains | None = None,
         limits: FollowLimits | None = None,
         lost: LostPolicy | None = None,
+        choice: TargetChoice | None = None,
         priority: int = DEFAULT_PRIORITY,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
@@ -96,14 +100,27 @@ class CarFollowAnalytics(FollowAnalytics):
             target_height=target_height,
             target_width=target_width,
             area=area,
-            gains=gains,
-            limits=limits,
+            gains=gains or _CAR_GAINS,
+            limits=limits or _CAR_LIMITS,
             lost=lost or _CAR_LOST,
+            motion=TargetMotion(acceleration=_CAR_ACCELERATION),
+            choice=choice or _CAR_CHOICE,
             priority=priority,
             detector=detector,
         )
         self.size = TargetSize(target_height, target_width, widest=target_length)
 
 
-_CAR_LOST = LostPolicy(hold=2.5, search=7.0)
+_VEST_CHOICE = TargetChoice(score=0.6, sure=0.4, looks=3, whole=True)
+"""A wall in the sun may look a little like a vest, right before the camera and for a moment; nobody
+should end a search for that."""
+_CAR_LOST = LostPolicy(coast=1.0, slow=2.0, hold=3.0, search=7.0)
 """A car that has turned away is gone sooner than it is found."""
+_CAR_CHOICE = TargetChoice(score=0.5, sure=0.3, looks=5, grounded=True, shared=0.6)
+"""Windows look like cars, but hang on walls, and are seldom taken for one as surely; half a car
+looks like one, too."""
+_CAR_GAINS = FollowGains(distance=(0.5, 0.05, 0.0))
+_CAR_LIMITS = FollowLimits(backward=0.6, acceleration=0.8)
+"""Gentle: a drone that pitches hard tilts a near car out of the picture."""
+_CAR_ACCELERATION = 0.3
+"""Standard deviation of a car's acceleration among people, m/s^2."""

@@ -2,7 +2,8 @@
 
 Each target has a Kalman filter of its box. The nearest pairs of targets and detections are
 joined first (greedy global nearest neighbour), by likelihood, so that a young, vague track does
-not take the detection of a well-known one. The optimal assignment differs from this only in
+not take the detection of a well-known one. Detections that are unsure may only continue a track,
+after the sure ones (ByteTrack, Zhang et al. 2022). The optimal assignment differs from this only in
 crowds, and would need scipy.
 """
 
@@ -46,10 +47,14 @@ class Track:
 class Tracker:
     """Keeps the identity of every target."""
 
-    def __init__(self, *, max_age: float = 1.0, min_hits: int = 2) -> None:
-        """Forget a target unseen for `max_age` seconds; trust it once seen `min_hits` times."""
+    def __init__(self, *, max_age: float = 1.0, min_hits: int = 2, sure: float = 0.0) -> None:
+        """Forget a target unseen for `max_age` seconds; trust it once seen `min_hits` times.
+
+        Detections that score below `sure` continue tracks, but begin none.
+        """
         self.max_age = max_age
         self.min_hits = min_hits
+        self.sure = sure
         self.tracks: list[Track] = []
         """All that are not lost, those that are out of sight among them."""
         self._stamp: int | None = None
@@ -72,7 +77,7 @@ class Tracker:
         owners = self._associate(items)
         self.tracks = [track for track in self.tracks if track.age <= self.max_age]
         named = [
-            replace(item, track_id=track.id if track.hits >= self.min_hits else None)
+            replace(item, track_id=track.id if track and track.hits >= self.min_hits else None)
             for item, track in zip(items, owners, strict=True)
         ]
         return replace(detections, items=tuple(named))
@@ -81,22 +86,24 @@ class Tracker:
         """Return the track of this id; None if there is none or it was lost."""
         return next((track for track in self.tracks if track.id == track_id), None)
 
-    def _associate(self, items: Sequence[Detection]) -> list[Track]:
-        """Give each detection its track: one that is known, or a new one."""
+    def _associate(self, items: Sequence[Detection]) -> list[Track | None]:
+        """Give each detection its track: one that is known, or a new one if it is sure."""
         pairs = sorted(
-            (cost, row, column)
+            (item.score < self.sure, cost, row, column)
             for row, track in enumerate(self.tracks)
             for column, item in enumerate(items)
             if (cost := _cost(track, item)) is not None
         )
         owners: dict[int, Track] = {}
         taken: set[int] = set()
-        for _, row, column in pairs:
+        for *_, row, column in pairs:
             if row not in taken and column not in owners:
                 taken.add(row)
                 owners[column] = self.tracks[row]
         for column, item in enumerate(items):
             track = owners.get(column)
+            if track is None and item.score < self.sure:
+                continue
             if track is None:
                 track = owners[column] = Track(self._next_id, item, BoxFilter(item.box), hits=0)
                 self._next_id += 1
@@ -106,7 +113,7 @@ class Tracker:
             track.detection = replace(item, track_id=track.id)
             track.hits += 1
             track.age = 0.0
-        return [owners[column] for column in range(len(items))]
+        return [owners.get(column) for column in range(len(items))]
 
 
 class TrackingAnalytics(Analytics[Detections]):

@@ -76,9 +76,13 @@ class FollowController:
         gains: FollowGains | None = None,
         limits: FollowLimits | None = None,
         lost: LostPolicy | None = None,
+        motion: TargetMotion | None = None,
         priority: int = DEFAULT_PRIORITY,
     ) -> None:
-        """Wait for a first sighting. Distances in metres, both above zero."""
+        """Wait for a first sighting of what moves as `motion` says, by default as people do.
+
+        Distances in metres, both above zero.
+        """
         self.distance = distance
         self.height = height
         self.gains = gains or FollowGains()
@@ -86,7 +90,7 @@ class FollowController:
         self.lost = lost or LostPolicy()
         self.priority = priority
         self.phase = FollowPhase.WAITING
-        self.motion = TargetMotion()
+        self.motion = motion or TargetMotion()
         limits = self.limits
         self._distance_pid = _pid(self.gains.distance, -limits.backward, limits.forward)
         self._yaw_pid = _pid(self.gains.yaw, -limits.yaw_rate, limits.yaw_rate)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["FollowGains", "FollowLimits", "LostPolicy"]
+__all__ = ["FollowGains", "FollowLimits", "LostPolicy", "TargetChoice"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,3 +63,23 @@ class LostPolicy:
     """Until here it turns in search, at 0.5 rad/s more than once around; then it gives up."""
     search_rate: float = 0.5
     """rad/s."""
+
+
+@dataclass(frozen=True, slots=True)
+class TargetChoice:
+    """What it takes to be chosen as a target; one that is held is held on less."""
+
+    score: float = 0.0
+    """Least confidence of the box that is chosen; the detector's own threshold holds as well."""
+    sure: float = 0.0
+    """Confidence from which a box begins a track; below, it only continues one."""
+    looks: int = 2
+    """Frames in which it must have been seen."""
+    grounded: bool = False
+    """It stands on the ground: a box of its size that hangs in the air is something else. Not for
+    a part of a thing, such as a vest, nor where the ground is far from level."""
+    whole: bool = False
+    """The first look at it shows all of it: of what fills the picture, the size is not known."""
+    shared: float = 1.0
+    """Of two boxes that share more than this part of the smaller one, the better one counts; 1
+    counts both."""

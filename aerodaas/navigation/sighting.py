@@ -27,6 +27,9 @@ _HIDDEN = 1.3
 _LIES = 0.8
 """A box that meets the ground this much nearer than its size says is of somebody who lies there:
 whoever gets up again may do so nearer than what is seen of them, as feet stand before a chest."""
+_AFLOAT, _TILTED = 1.5, 0.05
+"""What is afloat meets the ground so many times farther than its size says, and by more than an
+attitude that is 3 degrees wrong would make it."""
 _SMALLEST_SLOPE = 1e-3
 _NARROWEST, _WIDEST = 0.6, 1.6
 
@@ -42,7 +45,8 @@ class TargetSize:
 
     def with_width(self, width: float) -> TargetSize:
         """The same with a width that was measured, kept within reason of the one assumed here."""
-        bounded = min(max(width, _NARROWEST * self.width), _WIDEST * self.width)
+        most = max(_WIDEST * self.width, self.widest or 0.0)
+        bounded = min(max(width, _NARROWEST * self.width), most)
         return TargetSize(self.height, bounded, self.widest)
 
 
@@ -60,6 +64,9 @@ class Sighting:
     """The target's width in metres, where the whole of it was seen."""
     height: float | None = None
     """Metres from home up to its middle, where it was seen from top to bottom."""
+    afloat: bool = False
+    """Its size says that it is far nearer than where the ground lies below it: it stands on none,
+    or is larger than assumed."""
 
     @property
     def offset(self) -> Vector:
@@ -116,6 +123,7 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
         bound=lies or (cut_v and cut_u),
         width=None if cut_u or cut_v else by_height * breadth,
         height=height,
+        afloat=_is_afloat(ray(u, bottom), by_height, detections),
     )
 
 
@@ -133,6 +141,18 @@ def _reach(lowest: Vector, detections: Detections) -> float:
     if not (math.isfinite(height) and height > 0.0 and slope < -_SMALLEST_SLOPE):
         return math.inf
     return -height / slope
+
+
+def _is_afloat(lowest: Vector, distance: float, detections: Detections) -> bool:
+    """Tell whether what is `distance` away has its lower edge, along `lowest`, above the ground."""
+    camera, odometry = detections.camera, detections.odometry
+    if camera is None or odometry is None:
+        return False
+    height = float(odometry.position[2]) + camera.mount[2]
+    if not (math.isfinite(height) and height > 0.0 and distance > 0.0):
+        return False
+    ground, edge = -height / distance, _slope(lowest)
+    return edge > ground / _AFLOAT and edge > ground + _TILTED
 
 
 def _azimuth(ray: Vector) -> float:

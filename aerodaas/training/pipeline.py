@@ -17,9 +17,10 @@ from aerodaas.training.evaluate import (
     thresholds,
 )
 from aerodaas.training.export import NOMINAL_SCORE, SIZE, export_detector
+from aerodaas.training.loop import Progress
 from aerodaas.training.metrics import Ranking
 from aerodaas.training.rendering import HELD_OUT, render_world
-from aerodaas.training.train import Progress, Recipe, train
+from aerodaas.training.train import Recipe, train
 
 __all__ = ["Places", "make_detector", "spent", "trained"]
 

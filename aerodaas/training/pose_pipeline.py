@@ -9,12 +9,12 @@ import torch
 from aerodaas.analytics.body_cut import CUT
 from aerodaas.training.card import Card, write_card
 from aerodaas.training.dataset import Pictures
+from aerodaas.training.loop import Progress
 from aerodaas.training.pipeline import Places, spent
 from aerodaas.training.pose_cuts import People
 from aerodaas.training.pose_evaluate import PARTS, milliseconds_per_person, placing
 from aerodaas.training.pose_export import export_pose
 from aerodaas.training.pose_train import PoseRecipe, train_pose
-from aerodaas.training.train import Progress
 
 __all__ = ["make_pose", "trained_pose"]
 

@@ -1,29 +1,21 @@
-"""The training loop of the keypoint network."""
+"""The keypoint network's training: cuts of people, and what is lost on them."""
 
 from __future__ import annotations
 
-import copy
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-import cv2
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional
 
+from aerodaas.training.loop import Course, Progress, learn
 from aerodaas.training.pose_cuts import Cut, People
 from aerodaas.training.pose_network import STRIDE, Joints, places
-from aerodaas.training.train import Progress, follow, keep, optimiser_of, resume, schedule
 
 __all__ = ["PoseRecipe", "train_pose"]
-
-_MEMORY = 0.998
-"""Of the running mean of weights, per step."""
-
-_KEEP_EVERY = 250
 
 _BLUR = 1.1
 """Cells: standard deviation of the joint in its heat map."""
@@ -36,52 +28,30 @@ _NEAR = 0.1
 
 
 @dataclass(frozen=True)
-class PoseRecipe:
-    """All that a training depends on, beside the pictures."""
+class PoseRecipe(Course):
+    """What the keypoint network's training depends on, beside the people."""
 
     steps: int = 4000
-    batch: int = 32
-    rate: float = 2e-3
-    decay: float = 0.03
-    seed: int = 1
+    memory: float = 0.998
+    clip: float = 5.0
 
 
 def train_pose(people: People, recipe: PoseRecipe, folder: Path) -> Iterator[Progress]:
-    """Train from where `folder` has a checkpoint, or from the start; yields as it goes.
-
-    The mean of the weights is kept in `folder/weights.pt`, everything else beside it.
-    """
+    """Train, or go on with it, in `folder`; yields as it goes."""
     torch.manual_seed(recipe.seed)
-    cv2.setNumThreads(0)
-    device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    network = Joints().to(device=device, memory_format=torch.channels_last)
-    mean = copy.deepcopy(network).eval()
-    optimiser = optimiser_of(network, recipe.rate, recipe.decay)
-    step, before = resume(folder, network, mean, optimiser)
-    begun = time.monotonic()
-    rng = np.random.default_rng([recipe.seed, step])
-    sums: list[tuple[float, ...]] = []
-    while step < recipe.steps:
-        network.train()
-        for group in optimiser.param_groups:
-            group["lr"] = recipe.rate * schedule(step, recipe.steps)
+    network = Joints()
+
+    def loss(
+        _: int, rng: np.random.Generator, device: torch.device
+    ) -> tuple[Tensor, tuple[float, ...]]:
         cuts = [people.cut(int(rng.integers(len(people))), rng) for _ in range(recipe.batch)]
         pixels, points, sizes = (part.to(device) for part in _batch(cuts))
         with torch.autocast(device.type, torch.bfloat16):
             maps, found = network(pixels.contiguous(memory_format=torch.channels_last))
         where, whether = _losses(maps.float(), found.float(), points, sizes)
-        optimiser.zero_grad(set_to_none=True)
-        (where + whether).backward()
-        torch.nn.utils.clip_grad_norm_(network.parameters(), 5.0)
-        optimiser.step()
-        step += 1
-        follow(mean, network, min(_MEMORY, (1 + step) / (10 + step)))
-        sums.append((float(where.detach()), float(whether.detach())))
-        if step % _KEEP_EVERY == 0 or step == recipe.steps:
-            seconds = before + time.monotonic() - begun
-            keep(folder, (step, seconds), network, mean, optimiser)
-            yield Progress(step, tuple(np.mean(sums, axis=0).tolist()), seconds)
-            sums.clear()
+        return where + whether, (float(where.detach()), float(whether.detach()))
+
+    yield from learn(network, loss, recipe, folder)
 
 
 def _batch(cuts: list[Cut]) -> tuple[Tensor, Tensor, Tensor]:

@@ -16,9 +16,14 @@ import schedulers_at_fault
 from flying import Flyer, hop, robot
 
 from aerodaas import Environment
+from aerodaas.actors.dispatcher import DispatcherActor
+from aerodaas.actors.session import Session
 from aerodaas.analytics import SyntheticAnalytics
+from aerodaas.config import EnvironmentConfig
 from aerodaas.recording.reader import Recording
 from aerodaas.run import Run
+from aerodaas.schedulers.analytics.base import Resources
+from aerodaas.schedulers.analytics.dems import Dems
 
 _CAMERA = {"driver": "simulated", "settings": {"width": 64, "height": 36}}
 
@@ -101,6 +106,16 @@ def _require_one_end_each(run: Run) -> Counter[str]:
     assert sum(values["outcomes"].values()) == len(ends)
     assert 0 <= values["tasks"] - len(ends) <= 8
     return Counter(one["action"] for one in ends)
+
+
+def test_it_tells_how_it_fares_before_it_is_set_up() -> None:
+    """Ray has restarted it, and the application asks before it has prepared it anew."""
+    environment = EnvironmentConfig.model_validate({"robots": [robot()]})
+    actor = DispatcherActor(Session(environment), Dems(), (), Resources())
+    report = actor.report()
+    assert report.phase == "new"
+    assert report.values["tasks"] == 0
+    assert actor.stop().error is None
 
 
 @pytest.mark.slow

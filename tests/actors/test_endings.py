@@ -135,3 +135,13 @@ def test_an_application_that_raises_in_flight(tmp_path: Path, ending: str, messa
     assert "Traceback" not in said
     assert process.returncode in {1, 2}
     landed(tmp_path)
+
+
+def test_an_application_that_leaves_the_cluster_first(tmp_path: Path) -> None:
+    """There is nobody left to talk to: it ends, and starts no other Ray to look for its drone."""
+    leaving = "import ray; ray.shutdown()"
+    with running(tmp_path, leaving) as process:
+        _, said = process.communicate(timeout=60)
+    assert "Traceback" not in said
+    assert "local Ray instance" not in said
+    assert process.returncode == 0

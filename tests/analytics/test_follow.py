@@ -338,3 +338,59 @@ def test_a_target_that_loses_its_track_is_found_where_it_stands() -> None:
     distances = world.run(VipFollowAnalytics(), 30)
     assert world.alerts == []
     assert np.mean(np.abs(np.array(distances[80:]) - 2.0) < 0.4) > 0.9
+
+
+def test_a_car_from_its_side_is_held_where_the_picture_cuts_it() -> None:
+    """Its length, once seen whole, is known: a cut box is not that of a narrow car nearby."""
+    world = Shaken(
+        lambda _: (11.0, 0.0),
+        np.array([0.0, 0.0, 2.5]),
+        target_height=1.5,
+        target_width=4.2,
+        label="car",
+        rate=15.0,
+        noise=0.01,
+    )
+    distances = np.array(world.run(CarFollowAnalytics(), 30))
+    assert world.alerts == []
+    assert np.ptp(distances[-150:]) < 0.5
+    assert np.abs(distances[-150:] - 6.0).max() < 1.0
+
+
+def test_what_hangs_in_the_air_is_no_car() -> None:
+    """A window of a car's outline, up on a wall, is left alone; the car on the ground is not."""
+    world = car_world(lambda _: (12.0, 0.0))
+    world.target_base = 1.5
+    world.run(CarFollowAnalytics(), 4)
+    assert world.commands == [None] * len(world.commands)
+    world.target_base = 0.0
+    world.run(CarFollowAnalytics(), 4)
+    assert world.commands[-1] is not None
+
+
+class Unsure(World):
+    """A detector whose confidence changes with time."""
+
+    def look(self, random: np.random.Generator) -> Detections:
+        """Score 0.9 from 3 s to 6 s, and hardly anything before and after."""
+        seen = super().look(random)
+        score = 0.9 if 3 < self.time < 6 else 0.2
+        return replace(seen, items=tuple(replace(item, score=score) for item in seen))
+
+
+def test_a_car_is_chosen_when_sure_and_held_when_unsure() -> None:
+    """Confidence decides what is followed, not whether the following goes on."""
+    world = Unsure(
+        lambda time: (10 + 0.5 * time, 0.0),
+        np.array([0.0, 0.0, 2.5]),
+        target_height=1.5,
+        target_width=1.8,
+        label="car",
+        noise=0.01,
+        rate=5.0,
+    )
+    distances = world.run(CarFollowAnalytics(), 40)
+    assert world.commands[: round(3 * world.rate)] == [None] * round(3 * world.rate)
+    assert None not in world.commands[round(5 * world.rate) :]
+    assert world.alerts == []
+    assert np.abs(np.array(distances[-50:]) - 6.0).max() < 0.5

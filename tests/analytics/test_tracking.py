@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -129,3 +130,22 @@ def test_the_analysis_reads_boxes_and_travels_to_its_actor() -> None:
     stream = analysis.analyse(AeroStreamData(graph, "boxes", Detections))
     assert stream.item is Detections
     assert pickle.loads(pickle.dumps(analysis)).tracker.tracks == []  # noqa: S301
+
+
+def unsure(found: Detections, *places: int) -> Detections:
+    """The same frame, in which the boxes at `places` are hardly told from nothing."""
+    items = [replace(item, score=0.2) if i in places else item for i, item in enumerate(found)]
+    return replace(found, items=tuple(items))
+
+
+def test_the_unsure_continue_a_track_and_begin_none() -> None:
+    """Nor do they take a track from a sure box, however well they fit."""
+    tracker = Tracker(sure=0.5)
+    for step in range(3):
+        found = tracker.update(unsure(detections(step, [person(300), person(900)]), 1))
+    assert ids(found) == [1, None]
+    found = tracker.update(unsure(detections(3, [person(300), person(900)]), 0, 1))
+    assert ids(found) == [1, None]
+    found = tracker.update(unsure(detections(4, [person(300), person(306)]), 0))
+    assert ids(found) == [None, 1]
+    assert len(tracker.tracks) == 1

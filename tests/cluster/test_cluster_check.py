@@ -27,7 +27,6 @@ SLOW = [
     pytest.mark.slow,
     pytest.mark.timeout(280),
     needs_root,
-    pytest.mark.xfail(reason="not yet seen to pass as a whole", strict=False),
 ]
 # Shifts the clock of whoever is started with it; the kernel has no namespace for that.
 AHEAD = """

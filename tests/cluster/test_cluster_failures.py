@@ -23,10 +23,6 @@ pytestmark = [
     pytest.mark.timeout(240),
     pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
 ]
-unproven = pytest.mark.xfail(
-    reason="not yet seen to meet all of this since executors were reworked",
-    strict=False,
-)
 _HERE = Path(__file__).resolve().parent
 _ROOT = _HERE.parents[1]
 
@@ -87,7 +83,6 @@ def test_a_tenth_of_the_bandwidth_and_400_ms_more(watched: Watched) -> None:
     told.each_counted_once()
 
 
-@unproven
 def test_the_cloud_is_cut_off_for_ten_seconds(watched: Watched) -> None:
     """The edge goes on alone; afterwards the cloud is used again."""
     with watched.flying():
@@ -123,7 +118,6 @@ def test_an_analysis_is_killed(watched: Watched) -> None:
     assert any("glance is back after" in text for text in told.alerts("actor_back"))
 
 
-@unproven
 def test_an_analysis_hangs(watched: Watched) -> None:
     """People are told, the cloud takes over, and what hung is used again once it answers."""
     with watched.flying():
@@ -176,7 +170,6 @@ def test_the_recorder_is_killed(watched: Watched) -> None:
     assert any("recorder is back after" in text for text in second.alerts("actor_back"))
 
 
-@unproven
 def test_the_heads_control_service_restarts(watched: Watched) -> None:
     """Actors that run go on without it; it comes back with what it knew."""
     with watched.flying():
@@ -192,7 +185,6 @@ def test_the_heads_control_service_restarts(watched: Watched) -> None:
     assert {"edge", "cloud"} <= set(ray.cluster_resources())
 
 
-@unproven
 def test_the_object_store_is_full(watched: Watched) -> None:
     """Somebody's data fills it; frames to the cloud may fail, nothing else does."""
     with watched.flying():
@@ -209,7 +201,6 @@ def test_the_object_store_is_full(watched: Watched) -> None:
     assert not told.alerts("scheduler_failed")
 
 
-@unproven
 def test_the_edges_disk_is_full(edge_cloud: EdgeCloud, tmp_path: Path) -> None:
     """The recording stops and says so; the flight does not."""
     disk = tmp_path / "disk"
@@ -231,7 +222,6 @@ def test_the_edges_disk_is_full(edge_cloud: EdgeCloud, tmp_path: Path) -> None:
         subprocess.run(["umount", str(disk)], check=True)  # noqa: S607
 
 
-@unproven
 def test_a_cloud_node_is_killed(watched: Watched) -> None:
     """Its work goes to the edge at once, and to another cloud node when Ray has noticed."""
     with watched.flying():
@@ -247,7 +237,6 @@ def test_a_cloud_node_is_killed(watched: Watched) -> None:
     told.each_counted_once()
 
 
-@unproven
 def test_the_cloud_is_cut_off_for_good(watched: Watched) -> None:
     """The mission ends on the edge alone; the last of this module, for the cloud stays away."""
     with watched.flying():

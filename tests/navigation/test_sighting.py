@@ -200,3 +200,40 @@ def test_who_seems_far_but_lies_near_is_not_approached() -> None:
     assert seen is not None
     assert seen.bound
     assert 3.0 < seen.distance < 4.5
+
+
+CAR = TargetSize(1.5, 1.8, widest=4.2)
+
+
+@given(
+    distance=st.floats(5, 30),
+    base=st.one_of(st.just(0.0), st.floats(1.5, 4.0)),
+    tilt=st.floats(-0.1, 0.1),
+    error=st.floats(-0.01, 0.01),
+)
+@settings(max_examples=100, deadline=None)
+def test_what_stands_is_told_from_what_hangs_in_the_air(
+    distance: float, base: float, tilt: float, error: float
+) -> None:
+    """By a car's lower edge, though the drone knows its pitch to half a degree only."""
+    model = camera(0.2)
+    turn = rotation_from_rpy(0.0, tilt, 0.0)
+    eye = 2.5
+    corners = [(distance, side, up - eye) for side in (-0.9, 0.9) for up in (base, base + 1.5)]
+    pixels = np.array([model.project(turn.T @ np.array(corner)) for corner in corners])
+    left, top = pixels[:, :2].min(axis=0).tolist()
+    right, bottom = pixels[:, :2].max(axis=0).tolist()
+    assume(top > 0 and bottom < TALL)
+    pose = Odometry(np.array([0.0, 0.0, eye]), np.zeros(3), 0.0, pitch=tilt + error)
+    item = Detection((left, top, right, bottom), "car", 0.9)
+    detections = Detections(Header(0, 0, "cam"), (item,), WIDE, TALL, model, pose)
+    seen = sight(item, detections, CAR)
+    assert seen is not None
+    assert seen.afloat is (base > 0.0)
+
+
+def test_the_length_of_a_car_may_be_its_width() -> None:
+    """From its side it is wider than any car from behind, but not than it is long."""
+    assert CAR.with_width(4.1).width == pytest.approx(4.1)
+    assert CAR.with_width(9.0).width == pytest.approx(4.2)
+    assert PERSON.with_width(9.0).width == pytest.approx(0.8)
