@@ -22,9 +22,6 @@ _RANGE_NOISE, _SIDE_NOISE = 0.06, 0.02
 _LEAST_NOISE = 0.03
 _ACCELERATION = 0.7
 """Standard deviation of a walking person's acceleration, m/s^2."""
-_SURPRISE = 4.0
-"""Squared Mahalanobis distance, of two degrees of freedom, from which the target must have changed
-its speed: one look in seven is as far off by chance, which costs a little smoothness."""
 _NEAREST = 0.1
 _FIRST_SPEED = 0.7
 """Standard deviation of a velocity not yet observed, m/s."""
@@ -80,11 +77,8 @@ class TargetMotion:
             self._covariance[2:, 2:] = self._speed**2 * np.eye(2)
         else:
             self._advance(seconds(stamp - self._stamp))
-            surprise = place - self._state[:2]
-            if surprise @ np.linalg.inv(self._covariance[:2, :2] + noise) @ surprise > _SURPRISE:
-                self._doubt(seconds(stamp - self._stamp))
             gain = self._covariance[:, :2] @ np.linalg.inv(self._covariance[:2, :2] + noise)
-            self._state = self._state + gain @ surprise
+            self._state = self._state + gain @ (place - self._state[:2])
             self._covariance = self._covariance - gain @ self._covariance[:2]
         self._stamp = stamp
 
@@ -104,14 +98,6 @@ class TargetMotion:
         away = float(velocity @ along)
         left = float(along[0] * velocity[1] - along[1] * velocity[0])
         return Sighting(bearing, distance), away, left
-
-    def _doubt(self, dt: float) -> None:
-        """Know the velocity no better than at first: people stop and set out within a step."""
-        doubt = self._speed**2
-        self._covariance[2:, 2:] += doubt * np.eye(2)
-        self._covariance[:2, 2:] += doubt * dt * np.eye(2)
-        self._covariance[2:, :2] += doubt * dt * np.eye(2)
-        self._covariance[:2, :2] += doubt * dt**2 * np.eye(2)
 
     def _advance(self, dt: float) -> None:
         if self._state is None:
