@@ -62,11 +62,11 @@ class Sighting:
     """It stands at `distance` or nearer: the picture's edges cut it on all measures, or it lies."""
     width: float | None = None
     """The target's width in metres, where the whole of it was seen."""
-    height: float | None = None
-    """Metres from home up to its middle, where it was seen from top to bottom."""
     afloat: bool = False
     """Its size says that it is far nearer than where the ground lies below it: it stands on none,
     or is larger than assumed."""
+    height: float | None = None
+    """Metres from home up to its middle, where it was seen from top to bottom."""
 
     @property
     def offset(self) -> Vector:
@@ -122,8 +122,8 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
         distance=float(np.hypot(*place)),
         bound=lies or (cut_v and cut_u),
         width=None if cut_u or cut_v else by_height * breadth,
-        height=height,
         afloat=_is_afloat(ray(u, bottom), by_height, detections),
+        height=height,
     )
 
 

@@ -428,6 +428,14 @@ def test_who_stops_short_is_not_come_near(
     assert np.abs(np.array(distances[-round(2 * rate) :]) - 2.0).max() < 0.3
 
 
+@pytest.mark.parametrize("gap", [0.5, 1.0])
+def test_who_stops_while_out_of_sight_is_not_come_near(gap: float) -> None:
+    """A follower that goes on as the target walked would be upon it when it looks again."""
+    world = vest_world(lambda time: (4 + 1.1 * min(max(time - 6, 0), 6), 0.0), 5.0)
+    world.hidden = lambda time: 12 < time < 12 + gap
+    assert min(world.run(VipFollowAnalytics(), 20)) > 1.1
+
+
 @dataclass
 class Falling(World):
     """Falls forward, away from the drone, at a time: the vest goes down and a metre ahead."""
