@@ -24,7 +24,7 @@ from aerodaas.navigation.approach import ApproachLimit
 from aerodaas.navigation.command_shaper import CommandShaper
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
 from aerodaas.navigation.sighting import Sighting
-from aerodaas.navigation.target_motion import TargetMotion
+from aerodaas.navigation.target_motion import TargetMotion, seen_from
 from aerodaas.navigation.upright import Upright
 from aerodaas.waypoints import DEFAULT_PRIORITY, VelocityCommand
 
@@ -100,6 +100,8 @@ class FollowController:
         self._stamp: int | None = None
         self._seen: int | None = None
         self._last: Sighting | None = None
+        self._stood: tuple[float, float] | None = None
+        """East and north of home where the target stood before it fell."""
         self._braking = False
 
     def step(self, seen: Observation) -> VelocityCommand | None:
@@ -125,6 +127,13 @@ class FollowController:
         self.phase = FollowPhase.WAITING
         self._forget()
 
+    def expected(self, odometry: Odometry, stamp: int) -> Sighting | None:
+        """Where the target should be in a picture taken at `odometry`; None if that is unknown."""
+        predicted = self.motion.relative_to(odometry, stamp)
+        if predicted is not None:
+            return predicted[0]
+        return None if self._stood is None else seen_from(odometry, self._stood)
+
     def _take_in(self, sighting: Sighting, seen: Observation) -> None:
         self._seen, self._last = seen.stamp, sighting
         if seen.at_capture is None:
@@ -132,9 +141,11 @@ class FollowController:
         if sighting.height is not None and not self._upright.keeps(
             sighting.height, sighting.distance, seen.stamp
         ):
+            self._stood = self.motion.place or self._stood
             self.motion.reset()
             self._last = replace(sighting, bound=True)
         elif not sighting.bound:
+            self._stood = None
             self.motion.observe(sighting, seen.at_capture, seen.stamp)
 
     def _next_phase(self, stamp: int) -> FollowPhase:
@@ -150,7 +161,7 @@ class FollowController:
         return next((phase for until, phase in phases if unseen <= until), FollowPhase.WAITING)
 
     def _forget(self) -> None:
-        self._seen = self._last = None
+        self._seen = self._last = self._stood = None
         self._shaper.reset()
         self._approach.reset()
         self._upright.reset()
@@ -201,6 +212,10 @@ class FollowController:
         predicted = None
         if now is not None and not last.bound:
             predicted = self.motion.relative_to(now, stamp)
+        if now is not None and last.bound and self._stood is not None:
+            # Whoever lies there has their feet about where they stood, and may get up on them.
+            feet = seen_from(now, self._stood).distance
+            last = replace(last, distance=min(last.distance, feet))
         return predicted or (last, 0.0, 0.0)
 
     def _command(

@@ -78,6 +78,8 @@ class TargetChoice:
     grounded: bool = False
     """It stands on the ground: a box of its size that hangs in the air is something else. Not for
     a part of a thing, such as a vest, nor where the ground is far from level."""
+    whole: bool = False
+    """The first look at it shows all of it: of what fills the picture, the size is not known."""
     shared: float = 1.0
     """Of two boxes that share more than this part of the smaller one, the better one counts; 1
     counts both."""

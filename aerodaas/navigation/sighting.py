@@ -113,7 +113,7 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     measured = min(measured, reach)
     height = None
     if odometry is not None and not cut_v:
-        height = odometry.height + camera.mount[2] + measured * _slope(middle)
+        height = odometry.height + camera.mount[2] + by_height * _slope(middle)
     direction = np.array([math.cos(bearing), math.sin(bearing)])
     # From the lens to the body's centre.
     place = measured * direction + (level @ np.array(camera.mount))[:2]
