@@ -102,5 +102,8 @@ class _Thinker:
                 )
             except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
                 self._answers.put((None, error, 0.0))
+            except SystemExit:
+                refused = SchedulerError(f"{event.__name__} tried to end the process")
+                self._answers.put((None, refused, 0.0))
             else:
                 self._answers.put((answer, None, time.perf_counter() - began))

@@ -101,7 +101,8 @@ class DispatcherActor(StreamActor):
         """Belong to `session`; without a cloud, `resources` has no slots there."""
         inputs = dict.fromkeys((s for one in managed for s in one.inputs), FRAME_DEPTH)
         answers = dict.fromkeys((done_stream(one.stream) for one in managed), MESSAGE_DEPTH)
-        super().__init__(session, "dispatcher", {**inputs, **answers})
+        # Of what comes together, ends are told before arrivals, as in the lab.
+        super().__init__(session, "dispatcher", {**answers, **inputs})
         self._managed = managed
         self._by_done = {done_stream(one.stream): one for one in managed}
         self._many = {one.stream for one in managed if len(one.inputs) > 1}
@@ -170,6 +171,7 @@ class DispatcherActor(StreamActor):
         self._guarded("start", self._time())
         while not self.stopping:
             for message in self.inbox.receive(self._patience()):
+                self._wake_scheduler()
                 self._take(message)
             for model, life in self._lifelines.news():
                 self._executor_is(model, life, self._time())
@@ -248,10 +250,8 @@ class DispatcherActor(StreamActor):
 
     def _catch_up(self) -> None:
         """Real time: timers that are due, answers from the cloud, executions that hang."""
+        self._wake_scheduler()
         now = self._time()
-        while self._timers and self._timers[0] <= now:
-            self._way.delayed(now - heapq.heappop(self._timers))
-            self._guarded("timer", now)
         if self._cloud is not None:
             self._hear_from(self._cloud, now)
         running = self._dispatch.running
@@ -263,6 +263,12 @@ class DispatcherActor(StreamActor):
             self._guarded("finished", running, now, Outcome.FAILED)
         elif running is None:
             self._require_decisions(now)
+
+    def _wake_scheduler(self) -> None:
+        """Real time: tell of the timers that are due, before anything that came after them."""
+        while not self.session.lockstep and self._timers and self._timers[0] <= self._time():
+            self._way.delayed(self._now - heapq.heappop(self._timers))
+            self._guarded("timer", self._now)
 
     def _patience_with(self, profile: Profile) -> int:
         """How long an execution on the edge may take, nanoseconds."""
@@ -458,7 +464,8 @@ class DispatcherActor(StreamActor):
     ) -> None:
         slack = task.deadline + task.reserve - now
         waited = (now - task.arrival) / 1e6
-        values = {"slack_ms": slack / 1e6, "waited_ms": waited}
+        # The tasks of a frame arrive at one moment; their numbers tell the order.
+        values = {"slack_ms": slack / 1e6, "waited_ms": waited, "number": float(task.id)}
         if action in {"edge", "cloud"}:
             values["edge_ms"] = task.profile.edge_time / MILLISECOND
             values["cloud_ms"] = task.profile.cloud_time / MILLISECOND

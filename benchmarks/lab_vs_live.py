@@ -14,8 +14,6 @@ from __future__ import annotations
 import json as json_module
 import tempfile
 import time
-from dataclasses import dataclass, field
-from itertools import compress
 from pathlib import Path
 from typing import Annotated
 
@@ -27,10 +25,10 @@ from rich.progress import track
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.clock import NANOSECONDS
-from aerodaas.commands.flown_workload import flown_workload
+from aerodaas.commands.flown_tasks import Flown
+from aerodaas.commands.flown_workload import flown_trace, flown_workload
 from aerodaas.options import RunOptions, current_options
-from aerodaas.recording.reader import Recording
-from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
+from aerodaas.schedulers.analytics.base import MILLISECOND, Place, Profile
 from aerodaas.schedulers.analytics.profiles import ACTIVE, PASSIVE, PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.metrics import Score, score
@@ -42,6 +40,7 @@ from aerodaas.schedulers.lab.times import ExecutionTimes
 UNITS = {
     "completion": "%",
     "utility": "1/s",
+    "QoE": "1/s",
     "late": "%",
     "dropped": "%",
     "on edge": "%",
@@ -120,90 +119,36 @@ def fly(
     return folder / "run" / "flight.mcap"
 
 
-@dataclass
-class Live:
-    """What a recording says of a flight's tasks."""
-
-    arrived: dict[str, int] = field(default_factory=dict)
-    """By task, as are all of these; nanoseconds."""
-    place: dict[str, str] = field(default_factory=dict)
-    took: dict[str, int] = field(default_factory=dict)
-    outcome: dict[str, str] = field(default_factory=dict)
-
-    @classmethod
-    def read(cls, path: Path) -> Live:
-        """Read a recording."""
-        live = cls()
-        began: dict[str, int] = {}
-        with Recording.open(path) as opened:
-            for record in opened.records(schemas=["aerodaas.Decision"]):
-                value = record.value
-                task, action, stamp = value["task"], value["action"], value["stamp"]
-                arrival = stamp - round(value["values"]["waited_ms"] * MILLISECOND)
-                live.arrived.setdefault(task, arrival)
-                if action in {"edge", "cloud"}:
-                    live.place[task], began[task] = action, stamp
-                elif action in {"done", "late"}:
-                    live.place[task] = value["reason"].partition(":")[0]
-                    # A busy recorder may have lost the decision.
-                    if task in began:
-                        live.took[task] = stamp - began[task]
-                live.outcome[task] = action
-        return live
-
-    def beyond(self, profiles: dict[str, Profile], place: str) -> list[float]:
-        """Milliseconds beyond its nominal time that each execution took."""
-        found = []
-        for task, took in self.took.items():
-            if self.place[task] == place:
-                profile = profiles[_model(task)]
-                nominal = profile.edge_time if place == "edge" else profile.cloud_time
-                found.append((took - nominal) / MILLISECOND)
-        return found
-
-    def judged(self, until: int) -> list[bool]:
-        """Whether each task, in order of arrival, came before `until` and its end is known."""
-        return [
-            self.arrived[task] < until and self.outcome[task] not in {"edge", "cloud", "retry"}
-            for task in sorted(self.arrived, key=self.arrived.__getitem__)
-        ]
-
-    def score(self, profiles: dict[str, Profile], judged: list[bool]) -> Score:
-        """Judge tasks as the lab does."""
-        score = Score()
-        ordered = sorted(self.arrived, key=self.arrived.__getitem__)
-        for task in compress(ordered, judged):
-            profile, place = profiles[_model(task)], self.place.get(task)
-            done = self.outcome[task] == "done"
-            ran = self.outcome[task] in {"done", "late", "timeout", "failed"}
-            cost = profile.edge_cost if place == "edge" else profile.cloud_cost
-            score.tasks += 1
-            score.done += done
-            score.late += ran and not done
-            score.dropped += not ran
-            score.on_edge += ran and place == "edge"
-            score.qos += profile.benefit * done - cost * ran
-        return score
+def beyond(flown: Flown, place: Place) -> list[float]:
+    """Milliseconds beyond its nominal time that each execution took."""
+    found = []
+    for task in flown.tasks:
+        if task.place is place and task.took is not None:
+            profile = flown.models[task.model]
+            nominal = profile.edge_time if place is Place.EDGE else profile.cloud_time
+            found.append((task.took - nominal) / MILLISECOND)
+    return found
 
 
-def _model(task: str) -> str:
-    return task.partition("#")[0].rpartition("/")[2].upper()
+def compared(flown: Flown, scheduler: str) -> tuple[Score, Score]:
+    """The flight's score and the lab's, of the tasks whose end the flight has seen."""
+    sample = SamplePath.draw(flown_workload(flown), 0, 0, ExecutionTimes(), Network())
+    live = flown_trace(flown, sample.tasks)
+    lab = simulate(sample, load_scheduler(scheduler), flown.resources)
+    end = sample.tasks[-1].arrival - _TAIL
+    judged = {result.task for result in live.results if result.task.arrival < end}
+    tasks = [task for task in sample.tasks if task in judged]
+    for trace in (live, lab):
+        trace.results = [result for result in trace.results if result.task in judged]
+    return score(tasks, live), score(tasks, lab)
 
 
-def simulated(path: Path, scheduler: str, judged: list[bool]) -> Score:
-    """What the lab makes of a recorded flight, by the tasks that are to be judged."""
-    workload, resources = flown_workload(path)
-    sample = SamplePath.draw(workload, 0, 0, ExecutionTimes(), Network())
-    trace = simulate(sample, load_scheduler(scheduler), resources)
-    trace.results = [result for result in trace.results if judged[result.task.id]]
-    return score([task for task in sample.tasks if judged[task.id]], trace)
-
-
-def _figures(found: Score, seconds: float, beyond: list[float]) -> dict[str, float]:
-    p50, p95 = np.percentile(beyond, [50, 95]) if beyond else (0.0, 0.0)
+def _figures(found: Score, seconds: float, ways: list[float]) -> dict[str, float]:
+    p50, p95 = np.percentile(ways, [50, 95]) if ways else (0.0, 0.0)
     return {
         "completion": 100 * found.completion,
         "utility": found.qos / seconds,
+        "QoE": found.qoe / seconds,
         "late": 100 * found.late / found.tasks,
         "dropped": 100 * found.dropped / found.tasks,
         "on edge": 100 * found.on_edge / found.tasks,
@@ -219,6 +164,7 @@ def main(
     drones: Annotated[int, typer.Option(min=1, max=4, help="Drones on the edge.")] = 2,
     models: Annotated[str, typer.Option(help="P: four models; A: all six.")] = "A",
     seconds: Annotated[float, typer.Option(min=10, help="Seconds of each live run.")] = 60.0,
+    keep: Annotated[Path | None, typer.Option(help="New folder for the recordings.")] = None,
     json: Annotated[Path | None, typer.Option(help="Write the figures to this file.")] = None,
 ) -> None:
     """Compare completion and utility of live runs with the lab's on the same tasks.
@@ -226,28 +172,24 @@ def main(
     python benchmarks/lab_vs_live.py --schedulers ec_edf,dems --drones 2 --seconds 60
     """
     profiles = [PUBLISHED[model] for model in _WORKLOADS[models]]
-    by_name = {profile.model: profile for profile in profiles}
     report = Report("lab and live", UNITS, packages=["ray"])
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        before = Live.read(fly("ec_edf", drones, profiles, 15.0, {}, folder / "calibration"))
+        folder = keep or Path(name)
+        folder.mkdir(exist_ok=True)
+        before = Flown.read(fly("ec_edf", drones, profiles, 15.0, {}, folder / "calibration"))
         overhead = {
-            place: float(np.median(measured))
-            for place in ("edge", "cloud")
-            if (measured := before.beyond(by_name, place))
+            place.value: float(np.median(measured))
+            for place in (Place.EDGE, Place.CLOUD)
+            if (measured := beyond(before, place))
         }
         taken = ", ".join(f"{place} {took:.1f} ms" for place, took in overhead.items())
         report.note(f"median way to an executor and back, taken off the synthetic times: {taken}")
         for scheduler in track(schedulers.split(","), description="flying live"):
             path = fly(scheduler, drones, profiles, seconds, overhead, folder / scheduler)
-            live = Live.read(path)
-            began, end = min(live.arrived.values()), max(live.arrived.values()) - _TAIL
-            judged = live.judged(end)
-            flown = live.score(by_name, judged)
-            studied = simulated(path, scheduler, judged)
-            length = (end - began) / NANOSECONDS
-            beyond = live.beyond(by_name, "edge")
-            report.row(f"{scheduler}, live", _figures(flown, length, beyond))
+            seen = Flown.read(path)
+            flown, studied = compared(seen, scheduler)
+            length = (seen.tasks[-1].arrival - _TAIL - seen.tasks[0].arrival) / NANOSECONDS
+            report.row(f"{scheduler}, live", _figures(flown, length, beyond(seen, Place.EDGE)))
             report.row(f"{scheduler}, lab", _figures(studied, length, []))
             points = 100 * abs(studied.completion - flown.completion)
             share = 100 * abs(flown.qos / studied.qos - 1)

@@ -22,6 +22,7 @@ from typing import Annotated
 import cv2
 import numpy as np
 import typer
+from _ports import free_port
 from _report import Report
 
 from aerodaas.clock import NANOSECONDS, ScaledClock
@@ -95,7 +96,7 @@ def main(
 
 
 def _measure(family: str, seconds: float, *, busy: bool) -> dict[str, float]:
-    port, tap = _free_port(), _tap()
+    port, tap = free_port(), _tap()
     spawn = multiprocessing.get_context("spawn")
     stop = spawn.Event()
     tap_port = int(tap.getsockname()[1])
@@ -262,13 +263,6 @@ def _analyse(stop: Event) -> None:
         cv2.goodFeaturesToTrack(grey, 100, 0.01, 10)
         due += 1 / 30
         time.sleep(max(0.0, due - time.monotonic()))
-
-
-def _free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 if __name__ == "__main__":

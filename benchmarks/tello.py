@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json as json_format
 import os
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -19,6 +18,7 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
+from _ports import free_port
 from _report import Report
 
 from aerodaas.config import EnvironmentConfig, RobotConfig
@@ -51,7 +51,7 @@ def main(
         f"asked for {rate:g} times a second, from two seconds after the first on. The age counts "
         "from the picture's making, before encoding."
     )
-    ours, theirs = _free_port(), _free_port()
+    ours, theirs = free_port(), free_port()
     readers = {"ours": [sys.executable, str(_HERE / "_tello_ours.py"), str(ours)]}
     if djitellopy is not None:
         script = str(_HERE / "_tello_djitellopy.py")
@@ -125,7 +125,7 @@ def _connected(port: int, video: int) -> TelloVehicle:
             "settings": {
                 "address": "127.0.0.1",
                 "command_port": port,
-                "state_port": _free_port(),
+                "state_port": free_port(),
             },
             "sensors": [{"id": "camera", "settings": {"video_port": video}}],
         }
@@ -143,13 +143,6 @@ def _start(command: list[str]) -> subprocess.Popen[str]:
         cwd=_HERE.parent,
         env={**os.environ, "PYTHONPATH": str(_HERE.parent), "PYTHONUNBUFFERED": "1"},
     )
-
-
-def _free_port() -> int:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 if __name__ == "__main__":

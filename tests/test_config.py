@@ -137,3 +137,30 @@ def test_relative_paths_lead_where_the_file_lies(
 def test_the_environments_of_our_apps_are_valid(path: Path) -> None:
     """Every file that ships can be loaded."""
     assert EnvironmentConfig.load(path).robots
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        {"deadline": -5},
+        {"deadline": 0},
+        {"deadline": None},
+        {"deadline": float("nan")},
+        {"benefit": 0},
+        {"edge_time": -1},
+        {"cloud_cost": -1},
+        {"qoe_share": 1.5},
+    ],
+)
+def test_a_task_that_makes_no_sense_is_refused_by_its_place(task: dict[str, Any]) -> None:
+    """The message names the analysis and the figure."""
+    [name] = task
+    content = {"robots": [{"id": "drone"}], "schedulers": {"tasks": {"model": task}}}
+    with pytest.raises(ConfigError, match=rf"schedulers\.tasks\.model\.{name}"):
+        validated(content, "here")
+
+
+def test_a_task_without_a_deadline_has_a_second() -> None:
+    """Missing figures have a default that a scheduler can work with."""
+    content = {"robots": [{"id": "drone"}], "schedulers": {"tasks": {"model": {"benefit": 3}}}}
+    assert validated(content, "here").schedulers.tasks["model"].deadline == 1000

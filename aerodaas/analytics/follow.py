@@ -103,7 +103,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if self._has_left():
             self._let_go(item, context)
         phase = self.controller.phase
-        detection = self._target_in(self.tracker.update(self._possible(item)))
+        tracked = self.tracker.update(self._possible(item))
+        detection = self._target_in(tracked)
         sighting = None if detection is None else self._sight(detection, item)
         state = context.vehicle()
         command = self.controller.step(
@@ -113,6 +114,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
                 at_capture=item.odometry,
                 now=None if state is None else state.odometry,
                 now_stamp=None if state is None else state.stamp,
+                others=self._others(tracked, detection),
             )
         )
         self._tell_changes(phase, item, context)
@@ -141,7 +143,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             return mine
         least = self.choice.score
         trusted = [
-            item for item in trusted if item.score >= least and self._is_inside(item, tracked)
+            item
+            for item in trusted
+            if item.score >= least and self._is_inside(item, tracked) and self._is_new(item, tracked)
         ]
         if not trusted:
             return None
@@ -159,6 +163,13 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self.controller.give_up()
         text = f"The {' or '.join(self.labels)} has left the area; following ends."
         context.alert(Alert(item.header, "target_left_area", text))
+
+    def _is_new(self, detection: Detection, item: Detections) -> bool:
+        """Tell whether it shows enough to be a first target; one that was lost is taken as it is."""
+        if not self.choice.whole or self.target is not None:
+            return True
+        sighting = sight(detection, item, self.size)
+        return sighting is not None and sighting.width is not None
 
     def _is_inside(self, detection: Detection, item: Detections) -> bool:
         """Tell whether it may be followed: it is in the area, if there is one."""
@@ -179,17 +190,17 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
 
         A drone that pitches shakes the picture more than a tracker of boxes can know.
         """
-        odometry, motion = item.odometry, self.controller.motion
-        expected = None if odometry is None else motion.relative_to(odometry, item.header.stamp)
+        odometry, controller = item.odometry, self.controller
+        expected = None if odometry is None else controller.expected(odometry, item.header.stamp)
         if self.target is None or expected is None:
             return None
-        reach = _REACH + _REACH_SHARE * expected[0].distance
+        reach = _REACH + _REACH_SHARE * expected.distance
         best = None
         for detection in found:
             sighting = sight(detection, item, self.size.with_width(self._width))
             if sighting is None:
                 continue
-            off = float(np.linalg.norm(sighting.offset - expected[0].offset))
+            off = float(np.linalg.norm(sighting.offset - expected.offset))
             if off <= reach:
                 best, reach = detection, off
         if best is not None and best.track_id is not None:
@@ -206,6 +217,11 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if sighting is not None and sighting.width is not None:
             self._width += _WIDTH_MEMORY * (sighting.width - self._width)
         return sighting
+
+    def _others(self, tracked: Detections, target: Detection | None) -> tuple[Sighting, ...]:
+        boxes = (box for box in tracked.labelled(*self.labels) if box is not target)
+        seen = (sight(box, tracked, self.size) for box in boxes)
+        return tuple(sighting for sighting in seen if sighting is not None)
 
     def _tell_changes(self, before: FollowPhase, item: Detections, context: Context) -> None:
         phase = self.controller.phase

@@ -38,6 +38,7 @@ class VipFollowAnalytics(FollowAnalytics):
         gains: FollowGains | None = None,
         limits: FollowLimits | None = None,
         lost: LostPolicy | None = None,
+        choice: TargetChoice | None = None,
         priority: int = DEFAULT_PRIORITY,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
@@ -55,6 +56,7 @@ class VipFollowAnalytics(FollowAnalytics):
             gains=gains,
             limits=limits,
             lost=lost,
+            choice=choice or _VEST_CHOICE,
             priority=priority,
             detector=detector,
         )
@@ -109,6 +111,9 @@ class CarFollowAnalytics(FollowAnalytics):
         self.size = TargetSize(target_height, target_width, widest=target_length)
 
 
+_VEST_CHOICE = TargetChoice(score=0.5, sure=0.4, looks=3, whole=True)
+"""A wall in the sun may look a little like a vest, right before the camera and for a moment; nobody
+should end a search for that."""
 _CAR_LOST = LostPolicy(coast=1.0, slow=2.0, hold=3.0, search=7.0)
 """A car that has turned away is gone sooner than it is found."""
 _CAR_CHOICE = TargetChoice(score=0.5, sure=0.3, looks=5, grounded=True, shared=0.6)

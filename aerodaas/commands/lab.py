@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random
 from collections.abc import Sequence
 from math import isnan
 from pathlib import Path
@@ -26,6 +27,7 @@ from aerodaas.schedulers.lab import (
     load_workload,
     run_lab,
 )
+from aerodaas.schedulers.lab.metrics import Score, score
 from aerodaas.schedulers.lab.run import Spread
 from aerodaas.schedulers.lab.workload import SIX
 
@@ -125,7 +127,7 @@ def run(
     try:
         results: list[LabResult] = []
         names = [name.strip() for name in scheduler.split(",")]
-        loads, resources = _loads(workload, flown, duration)
+        loads, resources, as_flown = _loads(workload, flown, duration)
         if cloud_slots is not None:
             resources = Resources(cloud_slots=cloud_slots)
         spread, wanted = _spread(address, names)
@@ -145,6 +147,8 @@ def run(
                     spread=spread,
                     progress=lambda done, _: progress.update(bar, completed=done),  # noqa: B023
                 )
+            if as_flown is not None:
+                result.scores["as flown"] = [as_flown] * seeds
             results.append(result)
             _console.print(result_table(result))
             if plots is not None:
@@ -223,15 +227,19 @@ def _spread(
 
 def _loads(
     names: str, flown: Path | None, duration: float | None
-) -> tuple[list[Workload], Resources]:
+) -> tuple[list[Workload], Resources, Score | None]:
+    """The workloads, what there is to run them, and how a recorded flight itself did."""
     if flown is None:
         wanted = SIX if names == "six" else names.split(",")
-        return [_workload(name.strip(), duration) for name in wanted], Resources()
+        return [_workload(name.strip(), duration) for name in wanted], Resources(), None
     # Reading a recording takes libraries that simulating does not.
-    from aerodaas.commands.flown_workload import flown_workload  # noqa: PLC0415
+    from aerodaas.commands.flown_tasks import Flown  # noqa: PLC0415
+    from aerodaas.commands.flown_workload import flown_trace, flown_workload  # noqa: PLC0415
 
-    workload, resources = flown_workload(flown)
-    return [workload], resources
+    flight = Flown.read(flown)
+    workload = flown_workload(flight)
+    tasks = workload.tasks(0, random.Random())
+    return [workload], flight.resources, score(tasks, flown_trace(flight, tasks))
 
 
 def _progress() -> Progress:

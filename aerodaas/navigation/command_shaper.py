@@ -24,13 +24,23 @@ class CommandShaper:
         """Be at rest again."""
         self._velocity, self._yaw_rate = np.zeros(3), 0.0
 
+    def towards(self, bearing: float) -> float:
+        """The last command's speed in m/s in a direction of the body, positive to the left."""
+        return float(self._velocity[:2] @ (np.cos(bearing), np.sin(bearing)))
+
     def shape(
-        self, wanted: NDArray[np.float64], yaw_rate: float, dt: float, priority: int
+        self,
+        wanted: NDArray[np.float64],
+        yaw_rate: float,
+        dt: float,
+        priority: int,
+        *,
+        braking: bool = False,
     ) -> VelocityCommand:
         """Command for `wanted` (forward, left, up in m/s) and `yaw_rate` (rad/s).
 
-        `dt` is the time since the last command in seconds. Numbers that are not finite command
-        a stop, at once.
+        `dt` is the time since the last command in seconds; `braking` lets the velocity change
+        as fast as the limits say for that. Numbers that are not finite command a stop, at once.
         """
         limits = self.limits
         if not np.isfinite([*wanted, yaw_rate]).all():
@@ -42,7 +52,7 @@ class CommandShaper:
         if speed > fastest:
             flat = flat * fastest / speed
         change = np.array([*flat, climb]) - self._velocity
-        largest = limits.acceleration * dt
+        largest = (limits.braking if braking else limits.acceleration) * dt
         if (size := float(np.linalg.norm(change))) > largest:
             change = change * largest / size
         turn = _clip(yaw_rate, limits.yaw_rate) - self._yaw_rate

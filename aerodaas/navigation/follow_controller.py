@@ -20,10 +20,12 @@ from simple_pid import PID
 
 from aerodaas.clock import seconds
 from aerodaas.data import Odometry
+from aerodaas.navigation.approach import ApproachLimit
 from aerodaas.navigation.command_shaper import CommandShaper
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
 from aerodaas.navigation.sighting import Sighting
-from aerodaas.navigation.target_motion import TargetMotion
+from aerodaas.navigation.target_motion import TargetMotion, seen_from
+from aerodaas.navigation.upright import Upright
 from aerodaas.waypoints import DEFAULT_PRIORITY, VelocityCommand
 
 __all__ = ["FollowController", "FollowPhase", "Observation"]
@@ -59,6 +61,8 @@ class Observation:
     at_capture: Odometry | None = None
     now: Odometry | None = None
     now_stamp: int | None = None
+    others: tuple[Sighting, ...] = ()
+    """What else the frame shows that may be the target, or somebody like it."""
 
 
 class FollowController:
@@ -91,9 +95,14 @@ class FollowController:
         self._distance_pid = _pid(self.gains.distance, -limits.backward, limits.forward)
         self._yaw_pid = _pid(self.gains.yaw, -limits.yaw_rate, limits.yaw_rate)
         self._shaper = CommandShaper(limits)
+        self._approach = ApproachLimit(limits.nearest * distance, limits)
+        self._upright = Upright()
         self._stamp: int | None = None
         self._seen: int | None = None
         self._last: Sighting | None = None
+        self._stood: tuple[float, float] | None = None
+        """East and north of home where the target stood before it fell."""
+        self._braking = False
 
     def step(self, seen: Observation) -> VelocityCommand | None:
         """Command for one frame; None while there is no target and for stamps that run back."""
@@ -102,6 +111,8 @@ class FollowController:
         dt = _FIRST_STEP if self._stamp is None else seconds(seen.stamp - self._stamp)
         self._stamp = seen.stamp
         seen = _without_nonsense(seen)
+        shown = (*seen.others, *([seen.sighting] if seen.sighting is not None else []))
+        self._approach.see(shown, seen.at_capture)
         if seen.sighting is not None:
             self._take_in(seen.sighting, seen)
         self.phase = self._next_phase(seen.stamp)
@@ -116,9 +127,25 @@ class FollowController:
         self.phase = FollowPhase.WAITING
         self._forget()
 
+    def expected(self, odometry: Odometry, stamp: int) -> Sighting | None:
+        """Where the target should be in a picture taken at `odometry`; None if that is unknown."""
+        predicted = self.motion.relative_to(odometry, stamp)
+        if predicted is not None:
+            return predicted[0]
+        return None if self._stood is None else seen_from(odometry, self._stood)
+
     def _take_in(self, sighting: Sighting, seen: Observation) -> None:
         self._seen, self._last = seen.stamp, sighting
-        if seen.at_capture is not None and not sighting.bound:
+        if seen.at_capture is None:
+            return
+        if sighting.height is not None and not self._upright.keeps(
+            sighting.height, sighting.distance, seen.stamp
+        ):
+            self._stood = self.motion.place or self._stood
+            self.motion.reset()
+            self._last = replace(sighting, bound=True)
+        elif not sighting.bound:
+            self._stood = None
             self.motion.observe(sighting, seen.at_capture, seen.stamp)
 
     def _next_phase(self, stamp: int) -> FollowPhase:
@@ -134,8 +161,10 @@ class FollowController:
         return next((phase for until, phase in phases if unseen <= until), FollowPhase.WAITING)
 
     def _forget(self) -> None:
-        self._seen = self._last = None
+        self._seen = self._last = self._stood = None
         self._shaper.reset()
+        self._approach.reset()
+        self._upright.reset()
         self._reset()
 
     def _reset(self) -> None:
@@ -145,6 +174,7 @@ class FollowController:
 
     def _wanted(self, seen: Observation, dt: float) -> tuple[NDArray[np.float64], float]:
         """Velocity (forward, left) in m/s and yaw rate in rad/s that the phase asks for."""
+        self._braking = False
         if self.phase is FollowPhase.FOLLOWING:
             return self._follow(seen, dt)
         if self.phase is FollowPhase.SLOWING:
@@ -165,10 +195,13 @@ class FollowController:
         # Far away the integral would only wind up and carry the drone past its place.
         self._distance_pid.Ki = self.gains.distance[1] if abs(error) < _INTEGRAL_REACH else 0.0
         speed = float(self._distance_pid(-error, dt=dt) or 0.0) + away
-        too_near = target.bound or target.distance < self.limits.nearest * self.distance
-        if too_near and speed > 0:
+        safe = self._approach.speed(target, away, seen.now or seen.at_capture)
+        if target.bound:
+            safe = min(safe, 0.0)
+        self._braking = self._shaper.towards(target.bearing) > safe
+        if speed > safe and safe <= 0.0:
             self._distance_pid.reset()
-            speed = 0.0
+        speed = min(speed, safe)
         return speed * np.array([math.cos(target.bearing), math.sin(target.bearing)]), yaw_rate
 
     def _target(self, seen: Observation) -> tuple[Sighting, float, float]:
@@ -179,6 +212,10 @@ class FollowController:
         predicted = None
         if now is not None and not last.bound:
             predicted = self.motion.relative_to(now, stamp)
+        if now is not None and last.bound and self._stood is not None:
+            # Whoever lies there has their feet about where they stood, and may get up on them.
+            feet = seen_from(now, self._stood).distance
+            last = replace(last, distance=min(last.distance, feet))
         return predicted or (last, 0.0, 0.0)
 
     def _command(
@@ -192,7 +229,7 @@ class FollowController:
         wanted = np.array([*velocity, climb])
         if not np.isfinite([*wanted, yaw_rate]).all():
             self._reset()
-        return self._shaper.shape(wanted, yaw_rate, dt, self.priority)
+        return self._shaper.shape(wanted, yaw_rate, dt, self.priority, braking=self._braking)
 
 
 def _pid(gains: tuple[float, float, float], low: float, high: float) -> PID:
@@ -202,14 +239,19 @@ def _pid(gains: tuple[float, float, float], low: float, high: float) -> PID:
 
 def _without_nonsense(seen: Observation) -> Observation:
     """Leave out what holds a number that cannot be: it counts as not observed."""
-    sighting = seen.sighting
-    if sighting is not None and not (
-        abs(sighting.bearing) <= math.pi and 0.0 <= sighting.distance <= _FARTHEST
-    ):
-        sighting = None
+    sighting = seen.sighting if _can_be(seen.sighting) else None
+    others = tuple(filter(_can_be, seen.others))
     at_capture = seen.at_capture if _is_sane(seen.at_capture) else None
     now = seen.now if _is_sane(seen.now) else None
-    return replace(seen, sighting=sighting, at_capture=at_capture, now=now)
+    return replace(seen, sighting=sighting, at_capture=at_capture, now=now, others=others)
+
+
+def _can_be(sighting: Sighting | None) -> bool:
+    return (
+        sighting is not None
+        and abs(sighting.bearing) <= math.pi
+        and 0.0 <= sighting.distance <= _FARTHEST
+    )
 
 
 def _is_sane(odometry: Odometry | None) -> bool:

@@ -37,10 +37,16 @@ class FollowLimits:
     """rad/s."""
     acceleration: float = 1.5
     """m/s^2 of the commanded velocity."""
+    braking: float = 2.5
+    """The same where the drone would else come too near."""
+    reaction_time: float = 0.5
+    """Seconds from a target's stop until the drone brakes: a frame at 5 a second, a detector's work
+    and the tilting of the airframe."""
     yaw_acceleration: float = 4.0
     """rad/s^2 of the commanded yaw rate."""
     nearest: float = 0.6
-    """Part of the wanted distance within which the drone never moves towards the target."""
+    """Part of the wanted distance within which the drone never moves towards the target; it comes
+    up no faster than it could stop there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +78,8 @@ class TargetChoice:
     grounded: bool = False
     """It stands on the ground: a box of its size that hangs in the air is something else. Not for
     a part of a thing, such as a vest, nor where the ground is far from level."""
+    whole: bool = False
+    """The first look at it shows all of it: of what fills the picture, the size is not known."""
     shared: float = 1.0
     """Of two boxes that share more than this part of the smaller one, the better one counts; 1
     counts both."""

@@ -65,6 +65,8 @@ class Sighting:
     afloat: bool = False
     """Its size says that it is far nearer than where the ground lies below it: it stands on none,
     or is larger than assumed."""
+    height: float | None = None
+    """Metres from home up to its middle, where it was seen from top to bottom."""
 
     @property
     def offset(self) -> Vector:
@@ -109,6 +111,9 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     reach = _reach(ray(u, bottom), detections)
     lies = reach < _LIES * by_height
     measured = min(measured, reach)
+    height = None
+    if odometry is not None and not cut_v:
+        height = odometry.height + camera.mount[2] + by_height * _slope(middle)
     direction = np.array([math.cos(bearing), math.sin(bearing)])
     # From the lens to the body's centre.
     place = measured * direction + (level @ np.array(camera.mount))[:2]
@@ -118,6 +123,7 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
         bound=lies or (cut_v and cut_u),
         width=None if cut_u or cut_v else by_height * breadth,
         afloat=_is_afloat(ray(u, bottom), by_height, detections),
+        height=height,
     )
 
 

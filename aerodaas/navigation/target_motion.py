@@ -15,7 +15,7 @@ from aerodaas.clock import seconds
 from aerodaas.data import Odometry
 from aerodaas.navigation.sighting import Sighting
 
-__all__ = ["TargetMotion"]
+__all__ = ["TargetMotion", "seen_from"]
 
 _RANGE_NOISE, _SIDE_NOISE = 0.06, 0.02
 """Standard deviations along and across the line of sight, in parts of the distance."""
@@ -25,6 +25,13 @@ _ACCELERATION = 0.7
 _NEAREST = 0.1
 _FIRST_SPEED = 0.7
 """Standard deviation of a velocity not yet observed, m/s."""
+
+
+def seen_from(odometry: Odometry, place: tuple[float, float]) -> Sighting:
+    """How a place (metres east and north of home) lies from a drone at `odometry`."""
+    way = np.array(place) - odometry.position[:2]
+    bearing = math.remainder(math.atan2(way[1], way[0]) - odometry.yaw, math.tau)
+    return Sighting(bearing, float(np.hypot(*way)))
 
 
 class TargetMotion:

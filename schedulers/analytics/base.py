@@ -170,8 +170,8 @@ class Result:
 
     @property
     def utility(self) -> float:
-        """QoS utility: the gain if in time, minus the cost if it ran in vain, 0 if dropped."""
-        if self.outcome is Outcome.DROPPED:
+        """QoS utility: the gain if in time, minus the cost if it ran in vain, 0 if it never ran."""
+        if self.place is Place.NOWHERE:
             return 0.0
         profile = self.task.profile
         cost = profile.edge_cost if self.place is Place.EDGE else profile.cloud_cost

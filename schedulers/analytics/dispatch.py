@@ -154,31 +154,39 @@ class Dispatch:
                 return
 
     def _carry_out(self, decisions: Iterable[Decision] | None, now: int) -> None:
+        self._obey(decisions, now)
+        if self._ended:
+            self._tell_ends(now)
+
+    def _obey(self, decisions: Iterable[Decision] | None, now: int) -> None:
         if decisions is None:
             name = type(self.scheduler).__name__
             raise SchedulerError(
                 f"{name} answered an event with None; return a list of decisions, or yield them"
             )
+        undecided = self.undecided
         for decision in decisions:
             if isinstance(decision, WakeAt):
-                if decision.at < now:
+                # Said so that NaN, which no timer would ever reach, is refused, too.
+                if not now <= decision.at:
                     raise self._refusal(decision, f"it lies in the past, now is {now}")
                 self._host.wake_at(decision.at)
                 continue
             if not isinstance(decision, (RunOnEdge, SendToCloud, Drop)):
                 raise self._refusal(decision, "that is none of the decisions of the protocol")
             task = decision.task
-            if self.undecided.get(task.id) is not task:
+            if undecided.get(task.id) is not task:
                 raise self._refusal(decision, "the task never arrived or was decided before")
+            if not isinstance(decision.reason, str):
+                raise self._refusal(decision, f"its reason {decision.reason!r} is no text")
             if isinstance(decision, RunOnEdge):
                 self._run_edge(decision, now)
             elif isinstance(decision, SendToCloud):
                 self._send(decision, now)
             else:
-                del self.undecided[task.id]
+                del undecided[task.id]
                 self._host.decided(decision, now)
                 self._host.closed(Result(task, Outcome.DROPPED, Place.NOWHERE, now, now))
-        self._tell_ends(now)
 
     def _run_edge(self, decision: RunOnEdge, now: int) -> None:
         task = decision.task
@@ -240,7 +248,7 @@ class Dispatch:
     def _tell_ends(self, now: int) -> None:
         while self._ended:
             result = self._ended.popleft()
-            self._carry_out(self.ask(self.scheduler.task_finished, result, now), now)
+            self._obey(self.ask(self.scheduler.task_finished, result, now), now)
 
     def _refusal(self, decision: object, why: str) -> SchedulerError:
         name = type(self.scheduler).__name__

@@ -16,7 +16,7 @@ _SLOWEST = 0.02
 """Least weight of a new observation: the estimates never stop following."""
 _DRIFT = (15.0 * MILLISECOND) ** 2 / NANOSECONDS
 """Variance that the shared delay gains per nanosecond: 15 ms after one second."""
-_OUTLIER = 4.0
+_LEAST_VARIANCE = MILLISECOND * MILLISECOND
 _CERTAIN = 4.0
 
 
@@ -50,28 +50,29 @@ class ExecutionBeliefs:
         model = self._model(profile)
         offset, variance, count = model
         error = taken - self._nominal(profile) - offset - self.delay
-        if self._shared:
+        if not self._shared:
+            error_left = error
+            self._cache.pop(profile.model, None)
+        else:
             self._uncertainty += _DRIFT * (now - self._at)
             self._at = now
             gain = self._uncertainty / (self._uncertainty + variance)
             self.delay += gain * error
             self._uncertainty *= 1 - gain
             error_left = error * (1 - gain)
-        else:
-            error_left = error
+            self._cache.clear()
         weight = max(1 / (count + _PRIOR_WEIGHT + 1), _SLOWEST)
         model[0] += weight * error_left
         model[1] += weight * (error * error - variance)
         model[2] += 1
-        self._cache.clear()
 
     def belief(self, profile: Profile) -> Belief:
         """The present belief about a model's execution time."""
         found = self._cache.get(profile.model)
         if found is None:
-            offset, variance, _ = self._model(profile)
+            offset, variance, _ = self._models.get(profile.model) or self._model(profile)
             mean = self._nominal(profile) + offset + self.delay
-            spread = variance + self._uncertainty + (MILLISECOND * MILLISECOND)
+            spread = variance + self._uncertainty + _LEAST_VARIANCE
             found = self._cache[profile.model] = Belief(mean, sqrt(spread))
         return found
 

@@ -48,9 +48,10 @@ class Forecast:
 
     def due(self, now: int, until: int) -> Iterator[tuple[int, str]]:
         """Times and sources of the arrivals expected before `until`, the next period's only."""
+        given_up = now - LATENESS
         for source, stream in self._streams.items():
             at = stream.last + stream.period
             if at >= until:
                 return
-            if stream.regular >= _REGULAR and at + LATENESS > now:
-                yield max(at, now), source
+            if stream.regular >= _REGULAR and at > given_up:
+                yield (at if at > now else now), source

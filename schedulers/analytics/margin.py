@@ -109,24 +109,29 @@ class Margin(AnalyticsScheduler):
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
         """Let the task wait for as long as that can pay, or send it as a probe."""
-        model = self._model(task.profile)
+        model = self._models.get(task.profile.model) or self._model(task.profile)
         model.quality.arrival(task.arrival)
         model.rate = model.rate * exp((model.seen - now) / _MEMORY) + 1 / _MEMORY
         model.seen = now
         self._stale |= not model.forecast.arrived(task.source, now)
-        self._fill_step(task)
+        if self._steps:
+            self._fill_step(task)
         self.cloud.listen(now)
         value = self._cloud_value(model, task, now)
         if (
-            task not in self._planned
-            and value <= 0
-            and self._is_cheapest(model)
+            value <= 0
             and self.cloud.wants_probe(now)
+            and task not in self._planned
+            and self._is_cheapest(model)
         ):
             self.cloud.sent(task, now)
             return [SendToCloud(task, "probe of the cloud")]
         model.waiting[task] = False
-        heappush(self._due, (self._due_at(model, task, now, value), task.id, task))
+        due = self._due_at(model, task, now, value)
+        if due <= now and not (self._due and self._due[0][0] <= due):
+            first = self._settle(model, task, value, due, now)
+            return [*first, *self._decide(now)]
+        heappush(self._due, (due, task.id, task))
         return self._decide(now)
 
     def timer(self, now: int) -> Iterable[Decision]:
@@ -146,19 +151,24 @@ class Margin(AnalyticsScheduler):
             kept = model.waiting[task]
             value = 0.0 if kept else self._cloud_value(model, task, now)
             due = self._due_at(model, task, now, value)
-            if due <= now and value > 0:
-                self._refresh(now)
-                if task not in self._planned:
-                    decisions.append(self._send(model, task, now))
-                    continue
-                model.waiting[task] = True
-                due = self._due_at(model, task, now, 0.0)
-            if due <= now:
-                decisions.append(self._drop(model, task))
-            else:
-                heappush(self._due, (due, task.id, task))
-        decisions.extend(self._wake_up(now))
+            decisions += self._settle(model, task, value, due, now)
+        decisions += self._wake_up(now)
         return decisions
+
+    def _settle(
+        self, model: _Model, task: Task, value: float, due: int, now: int
+    ) -> Iterable[Decision]:
+        """Let the task wait until it is due; if it is, keep it for the edge, send or drop it."""
+        if due <= now and value > 0:
+            self._refresh(now)
+            if task not in self._planned:
+                return (self._send(model, task, now),)
+            model.waiting[task] = True
+            due = self._due_at(model, task, now, 0.0)
+        if due <= now:
+            return (self._drop(model, task),)
+        heappush(self._due, (due, task.id, task))
+        return ()
 
     def executor_idle(self, now: int) -> Iterable[Decision]:
         """Follow the plan: run its first task, or wait for one that is due to arrive."""
@@ -252,6 +262,8 @@ class Margin(AnalyticsScheduler):
                 self._refresh(now)
                 if task not in self._planned:
                     yield self._send(model, task, now)
+            if not queue:
+                del self._hopeful[name]
 
     def _slot_worth(self, name: str) -> float:
         profile = self._models[name].profile

@@ -31,6 +31,7 @@ _GRACE = 50 * MILLISECOND
 """... and this much more."""
 _SILENT = 2
 """Overdue answers in a row after which the cloud counts as silent."""
+_UNANSWERED = (Outcome.FAILED, Outcome.TIMEOUT)
 
 
 class CloudOutlook:
@@ -70,17 +71,19 @@ class CloudOutlook:
 
     def value(self, profile: Profile, room: float, bonus: float = 0.0) -> float:
         """Expected utility of sending a task now that has `room` left; never below zero."""
-        if self.silent_since is not None or not self.resources.cloud_slots:
+        slots = self.resources.cloud_slots
+        if self.silent_since is not None or not slots:
             return 0.0
         benefit = profile.benefit + bonus
         if benefit <= profile.cloud_cost:
             return 0.0
         belief = self.beliefs.belief(profile)
-        room -= OVERHEAD + self._wait(belief.mean)
+        busy = len(self._sent)
+        room -= OVERHEAD if busy < slots else OVERHEAD + self._wait(belief.mean)
         gain = benefit * chance(belief, room) - profile.cloud_cost
-        if self.slot_price > 0 and self.crowded:
+        if self.slot_price > 0 and busy >= _CROWDED * slots:
             gain -= self.slot_price * belief.mean
-        return max(0.0, gain)
+        return gain if gain > 0 else 0.0
 
     def patience(self, profile: Profile, worth: float, rate: float) -> float:
         """Room below which waiting no longer pays, nanoseconds.
@@ -107,11 +110,10 @@ class CloudOutlook:
         """Learn from a task that came back, was lost or never started."""
         sent = self._sent.pop(result.task, now)
         self._listen_at = 0.0
-        if result.place is not Place.CLOUD or result.outcome is Outcome.FAILED:
+        if result.place is not Place.CLOUD or result.outcome in _UNANSWERED:
             return
-        if result.outcome is Outcome.TIMEOUT:
-            return
-        self._answered = max(self._answered, sent)
+        if sent > self._answered:
+            self._answered = sent
         if self.silent_since is not None and sent >= self.silent_since:
             self.silent_since = None
         self.beliefs.observe(result.task.profile, result.finished - result.started, now)

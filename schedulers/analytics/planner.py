@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from heapq import nlargest
 from math import inf
@@ -61,22 +61,24 @@ def plan(
     beam: list[_State] = [(0.0, start, 0, None)]
     longest = max((len(lane.jobs) for lane in lanes), default=0)
     digits = longest.bit_length()
+    places = [(number * digits, lane) for number, lane in enumerate(lanes)]
     best_merit = -inf
     best: _Chain = None
     while beam:
         grown: dict[int, _State] = {}
         for state in beam:
-            ended = True
-            for successor in _successors(state, lanes, digits, price, gap):
-                ended = False
+            successors = _successors(state, places, (1 << digits) - 1, price, gap)
+            for successor in successors:
                 merit, free, taken, chain = successor
                 if free >= until:
                     if merit > best_merit:
                         best_merit, best = merit, chain
+                    continue
                 # Of two ways to the same merit, the one that is done earlier leaves more room.
-                elif taken not in grown or (grown[taken][0], -grown[taken][1]) < (merit, -free):
+                rival = grown.get(taken)
+                if rival is None or (rival[0], -rival[1]) < (merit, -free):
                     grown[taken] = successor
-            if ended:
+            if not successors:
                 merit = state[0] - price * _IDLE_SHARE * (until - state[1])
                 if merit > best_merit:
                     best_merit, best = merit, state[3]
@@ -90,13 +92,12 @@ def plan(
 
 
 def _successors(
-    state: _State, lanes: Sequence[Lane], digits: int, price: float, gap: float
-) -> Iterator[_State]:
+    state: _State, places: Sequence[tuple[int, Lane]], mask: int, price: float, gap: float
+) -> list[_State]:
+    """What each lane's next job makes of `state`; a lane's place is that of its digit, in bits."""
     merit, free, taken, chain = state
-    mask = (1 << digits) - 1
-    shift = -digits
-    for lane in lanes:
-        shift += digits
+    found: list[_State] = []
+    for shift, lane in places:
         jobs, belief = lane.jobs, lane.time
         mean = belief.mean
         count = len(jobs)
@@ -107,11 +108,14 @@ def _successors(
         if index == count:
             continue
         job = jobs[index]
-        begin = max(free, job.release)
+        begin = job.release if job.release > free else free
         if begin - free > gap:
             continue
         gain = job.benefit * chance(belief, job.deadline - begin) - job.loss
         if gain > 0:
             end = begin + mean
             after = taken + (index + 1 - position << shift)
-            yield (merit + gain - price * (end - free), end, after, (chain, begin, lane, job))
+            found.append(
+                (merit + gain - price * (end - free), end, after, (chain, begin, lane, job))
+            )
+    return found

@@ -59,7 +59,7 @@ class QualityWatch:
         return self._worth
 
     def _marginal_bonus(self) -> float:
-        total = max(self.before, self.arrived)
+        total = self.before if self.before > self.arrived else self.arrived
         others = total - self.done - self.missed - 1
         needed = self.goal.share * total - self.done
         if needed <= 0 or needed > others + 1:

@@ -19,14 +19,16 @@ class QoeWindows:
 
     def arrived(self, task: Task) -> None:
         """Count a task; one whose model has no goal does not count."""
-        if (goal := task.profile.qoe) is not None:
-            self._goals[task.profile.model] = goal
-            self._arrived[task.profile.model, task.arrival // goal.window] += 1
+        profile = task.profile
+        if (goal := profile.qoe) is not None:
+            self._goals[profile.model] = goal
+            self._arrived[profile.model, task.arrival // goal.window] += 1
 
     def done(self, task: Task) -> None:
         """Count a task that finished in time."""
-        if (goal := task.profile.qoe) is not None:
-            self._done[task.profile.model, task.arrival // goal.window] += 1
+        profile = task.profile
+        if (goal := profile.qoe) is not None:
+            self._done[profile.model, task.arrival // goal.window] += 1
 
     @property
     def utility(self) -> float:

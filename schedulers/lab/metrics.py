@@ -69,24 +69,21 @@ def score(tasks: Sequence[Task], trace: Trace) -> Score:
         stolen=trace.reasons[STOLEN],
         tasks_by_model=dict(Counter(task.profile.model for task in tasks)),
     )
+    edge, cloud, in_time = Place.EDGE, Place.CLOUD, Outcome.DONE
+    on_edge = [result for result in trace.results if result.place is edge]
+    in_cloud = [result for result in trace.results if result.place is cloud]
     done: Counter[str] = Counter()
-    for result in trace.results:
-        profile = result.task.profile
-        total.qos += result.utility
-        if result.outcome is Outcome.DONE:
-            done[profile.model] += 1
-        elif result.place is not Place.NOWHERE:
-            total.late += 1
-        if result.place is Place.EDGE:
-            total.on_edge += 1
-            total.edge_busy += result.finished - result.started
-            total.cost += profile.edge_cost
-        elif result.place is Place.CLOUD:
-            total.in_cloud += 1
-            total.cloud_busy += result.finished - result.started
-            total.cost += profile.cloud_cost
+    for ran in (on_edge, in_cloud):
+        total.qos += sum([result.utility for result in ran])
+        done.update([r.task.profile.model for r in ran if r.outcome is in_time])
+    total.on_edge, total.in_cloud = len(on_edge), len(in_cloud)
+    total.edge_busy = sum([result.finished - result.started for result in on_edge])
+    total.cloud_busy = sum([result.finished - result.started for result in in_cloud])
+    total.cost = sum([result.task.profile.edge_cost for result in on_edge])
+    total.cost += sum([result.task.profile.cloud_cost for result in in_cloud])
     total.done_by_model = dict(done)
     total.done = sum(done.values())
+    total.late = len(on_edge) + len(in_cloud) - total.done
     total.dropped = total.tasks - total.done - total.late
     total.qoe = _bonuses(tasks, trace)
     return total

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gc
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
@@ -150,13 +152,26 @@ def run_lab(
     )
 
 
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Keep the garbage collector away from tasks and results, which live until the end anyway."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
 def _one_part(study: _Study, part: tuple[int, int]) -> tuple[int, list[Score], float]:
     seed, edge = part
-    path = SamplePath.draw(study.workload, edge, seed, study.times, study.network)
-    scores = [
-        score(path.tasks, simulate(path, load_scheduler(wanted), study.resources))
-        for wanted in study.schedulers
-    ]
+    with _uncollected():
+        path = SamplePath.draw(study.workload, edge, seed, study.times, study.network)
+        scores = [
+            score(path.tasks, simulate(path, load_scheduler(wanted), study.resources))
+            for wanted in study.schedulers
+        ]
     return seed, scores, clairvoyant_bound(path) if study.bound else 0.0
 
 

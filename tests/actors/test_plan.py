@@ -13,8 +13,10 @@ from aerodaas import Environment
 from aerodaas.actors.cluster import Place
 from aerodaas.actors.plan import FlightPlan, make_plan
 from aerodaas.actors.session import Session
-from aerodaas.errors import GraphError
+from aerodaas.analytics import SyntheticAnalytics
+from aerodaas.errors import GraphError, SchedulerError
 from aerodaas.graph import AeroStreamData
+from aerodaas.schedulers.analytics.registry import load_scheduler
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 10, "settings": {"width": 64, "height": 36}}
 ODOMETRY = {"id": "odom", "type": "odometry", "rate": 10}
@@ -55,6 +57,28 @@ def test_nothing_flies_without_navigation(environment: Environment) -> None:
     """The remedy is named."""
     with pytest.raises(GraphError, match=r"drone\.navigate"):
         plan(environment)
+
+
+@pytest.mark.parametrize(
+    ("compute", "costs"),
+    [
+        (CONTENT["compute"], {"edge_cost": 3, "cloud_cost": 2}),
+        ([{"id": "edge"}], {"edge_cost": 3}),  # the cloud would pay, but there is none
+    ],
+)
+def test_what_costs_more_than_its_worth_everywhere_is_refused(
+    tmp_path: Path, compute: list[dict[str, str]], costs: dict[str, float]
+) -> None:
+    """Before anything flies, by the analysis' name."""
+    tasks = {"model": {"benefit": 2, **costs}}
+    content = {**CONTENT, "compute": compute, "schedulers": {"tasks": tasks}}
+    env = Environment(Flyer(tmp_path).write(content))
+    model = SyntheticAnalytics("model", 10, 20).deploy(env.get_compute_resource_by_id("edge"))
+    model.analyse(camera(env))
+    env.get_robot_by_id("drone").navigate(hop((1, 0)))
+    session, scheduler = Session(env.config, None), env.trajectory_scheduler()
+    with pytest.raises(SchedulerError, match="'drone/model' costs at least its benefit of 2"):
+        make_plan(session, env.graph, env.compute(), scheduler, load_scheduler("dems"))
 
 
 def test_light_analyses_share_an_actor_by_place(environment: Environment) -> None:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 import pickle
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pytest
 from follow_world import TELLO, Path, Snapshot, World
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.analytics.follow import FollowAnalytics
@@ -394,3 +394,98 @@ def test_a_car_is_chosen_when_sure_and_held_when_unsure() -> None:
     assert None not in world.commands[round(5 * world.rate) :]
     assert world.alerts == []
     assert np.abs(np.array(distances[-50:]) - 6.0).max() < 0.5
+
+
+def vest_world(target: Path, rate: float) -> World:
+    """A vest of an upright person, 4 m ahead, seen as a good detector would."""
+    return World(
+        target,
+        np.array([0.0, 0.0, 1.5]),
+        target_height=0.6,
+        target_width=0.43,
+        target_base=0.85,
+        label="vest",
+        rate=rate,
+        noise=0.01,
+    )
+
+
+@given(
+    speed=st.floats(0.2, 1.1),
+    walk=st.floats(6.0, 14.0),
+    rate=st.sampled_from([5.0, 10.0, 15.0]),
+    seed=st.integers(0, 1000),
+)
+@example(speed=1.1, walk=10.0, rate=5.0, seed=0)
+@settings(max_examples=20, deadline=None)
+def test_who_stops_short_is_not_come_near(
+    speed: float, walk: float, rate: float, seed: int
+) -> None:
+    """Within a step, from a brisk walk: the drone, 2 m behind, stops before 1.1 m."""
+    world = vest_world(lambda time: (4 + speed * min(max(time - 6, 0), walk), 0.0), rate)
+    distances = world.run(VipFollowAnalytics(), 6 + walk + 8, seed)
+    assert min(distances) > 1.1
+    assert np.abs(np.array(distances[-round(2 * rate) :]) - 2.0).max() < 0.3
+
+
+@pytest.mark.parametrize("gap", [0.5, 1.0])
+def test_who_stops_while_out_of_sight_is_not_come_near(gap: float) -> None:
+    """A follower that goes on as the target walked would be upon it when it looks again."""
+    world = vest_world(lambda time: (4 + 1.1 * min(max(time - 6, 0), 6), 0.0), 5.0)
+    world.hidden = lambda time: 12 < time < 12 + gap
+    assert min(world.run(VipFollowAnalytics(), 20)) > 1.1
+
+
+@dataclass
+class Falling(World):
+    """Falls forward, away from the drone, at a time: the vest goes down and a metre ahead."""
+
+    falls: float = 12.0
+
+    def box(self) -> tuple[float, float, float, float] | None:
+        """The vest as it is at the time; its feet stay where the target is."""
+        share = min(max((self.time - self.falls) / 0.6, 0.0), 1.0)
+        feet, base, height = self.target, self.target_base, self.target_height
+        east, north = feet(self.time)
+        self.target = lambda _: (east + 1.1 * share, north)
+        self.target_base = base * (1 - share)
+        self.target_height = height * (1 - share) + 0.25 * share
+        try:
+            return super().box()
+        finally:
+            self.target, self.target_base, self.target_height = feet, base, height
+
+
+@pytest.mark.parametrize("rate", [5.0, 10.0])
+def test_a_fall_is_not_taken_for_walking(rate: float) -> None:
+    """The drone does not fly after the chest, over the feet."""
+    upright = vest_world(lambda time: (4 + 0.7 * min(max(time - 6, 0), 6), 0.0), rate)
+    world = Falling(**{one.name: getattr(upright, one.name) for one in fields(upright)})
+    distances = world.run(VipFollowAnalytics(), 22)
+    assert min(distances) > 1.1
+    assert distances[-1] < 2.4
+
+
+def test_somebody_who_cannot_be_told_from_the_target_is_not_flown_into() -> None:
+    """A box too far from where the target should be is not the target, but in the way."""
+    follow = PersonFollowAnalytics()
+    commands = []
+    for step in range(40):
+        near = [Detection((500, 10, 900, 719), "person", 0.9)] if step > 25 else []
+        state = Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), 0.0)
+        item = frame(step, person(600, 700), *near, odometry=state)
+        result = follow.process(item, Snapshot(item.header.stamp, state, []))
+        commands.append(result.commands[0].forward if result else 0.0)
+    assert max(commands[20:25]) > 0.5
+    assert max(commands[32:]) <= 0.0
+
+
+def test_a_wall_that_looks_like_a_vest_for_a_moment_is_not_followed() -> None:
+    """Unsure, or cut by the picture's edges: what ends a search must be seen well."""
+    wall = Detection((0.0, 40.0, 400.0, 720.0), "vest", 0.56)
+    unsure = Detection((500.0, 200.0, 600.0, 340.0), "vest", 0.38)
+    for box in (wall, unsure):
+        follow = VipFollowAnalytics()
+        for step in range(10):
+            item = frame(step, box)
+            assert follow.process(item, Snapshot(item.header.stamp, None, [])) is None

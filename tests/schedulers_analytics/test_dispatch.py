@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 
 import pytest
@@ -118,6 +119,26 @@ def test_the_cloud_queue_keeps_order_and_gives_up_at_the_latest_start() -> None:
     assert [r.task.id for r in scheduler.heard] == [0, 2, 1]
 
 
+def test_a_crowd_that_gives_up_at_once_ends_one_by_one() -> None:
+    """A thousand tasks wait for one slot until it is too late for all of them."""
+    crowd = 1000
+    scheduler = _Scripted(*([lambda t, _: SendToCloud(t, "", 10)] * crowd))
+    dispatch, host = _dispatch_of(scheduler)
+    tasks = [_task(number) for number in range(crowd)]
+    for one in tasks:
+        dispatch.arrived(one, 0)
+    dispatch.finished(tasks[0], 50)
+    assert [r.task.id for r in host.results] == list(range(crowd))
+    assert Counter(r.outcome for r in host.results)[Outcome.DROPPED] == crowd - 1
+    assert sorted(r.task.id for r in scheduler.heard) == list(range(crowd))
+
+
+def test_what_never_ran_costs_nothing() -> None:
+    """Whatever its end is called."""
+    one = Result(_task(0), Outcome.FAILED, Place.NOWHERE, 5, 5)
+    assert one.utility == 0
+
+
 def test_results_after_the_deadline_are_late_and_cost_their_price() -> None:
     """A late result earns nothing; its cost stays."""
     dispatch, host = _dispatch_of(_Scripted(lambda t, _: SendToCloud(t)))
@@ -142,6 +163,8 @@ def test_lost_executions_are_reported_as_such() -> None:
     ("answer", "slots", "words"),
     [
         (lambda _, now: WakeAt(now - 1), 1, "past"),
+        (lambda _, __: WakeAt(float("nan")), 1, "past"),
+        (lambda t, _: Drop(t, ["why"]), 1, "no text"),
         (lambda _, __: RunOnEdge(_task(99)), 1, "never arrived"),
         (lambda t, _: SendToCloud(t), 0, "no cloud"),
         (lambda _, __: "edge", 1, "none of the decisions"),

@@ -7,7 +7,7 @@ import shlex
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -51,13 +51,17 @@ def autopilot(named: str) -> Iterator[str]:
         process.wait()
 
 
-def robot_at(url: str, **limits: Any) -> RobotConfig:  # noqa: ANN401
-    """The robot that flies what is found at `url`."""
+def robot_at(
+    url: str,
+    settings: Mapping[str, str] | None = None,
+    **limits: Any,  # noqa: ANN401
+) -> RobotConfig:
+    """The robot that flies what is found at `url`; `settings` of its driver go on top."""
     return RobotConfig.model_validate(
         {
             "id": "drone",
             "driver": "mavlink",
-            "settings": {"url": url, "ready_timeout": 120.0},
+            "settings": {"url": url, "ready_timeout": 120.0, **(settings or {})},
             "limits": {
                 "cruise_speed": 2.0,
                 "takeoff_height": 3.0,
@@ -75,10 +79,16 @@ def robot_at(url: str, **limits: Any) -> RobotConfig:  # noqa: ANN401
 class SitlFlight:
     """One mission on its way."""
 
-    def __init__(self, url: str, *commands: Command, **limits: Any) -> None:  # noqa: ANN401
+    def __init__(
+        self,
+        url: str,
+        *commands: Command,
+        settings: Mapping[str, str] | None = None,
+        **limits: Any,  # noqa: ANN401
+    ) -> None:
         """Connect through a relay that can be cut, and start the mission of `commands`."""
         self.relay = Relay(url)
-        robot = robot_at(self.relay.url, **limits)
+        robot = robot_at(self.relay.url, settings, **limits)
         self.vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
         try:
             self._connect(robot, commands)

@@ -1,4 +1,7 @@
-"""A program that flies until it is killed: `sitl_victim.py URL`; says when it is on its way."""
+"""A program that flies until it is killed, and says when it is on its way.
+
+sitl_victim.py URL [SETTING=VALUE ...]
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,8 @@ from aerodaas.waypoints import AeroNavigation, NavigationType, Waypoint
 
 if __name__ == "__main__":
     far = AeroNavigation(NavigationType.DISTANCE_DRIVEN, [Waypoint("far", 0, 80, 3.0)])
-    flight = SitlFlight(sys.argv[1], AddNavigation(far))
+    settings = dict(word.split("=") for word in sys.argv[2:])
+    flight = SitlFlight(sys.argv[1], AddNavigation(far), settings=settings)
     flight.run_to(MissionState.ENROUTE)
     sys.stdout.write("enroute\n")
     sys.stdout.flush()

@@ -179,9 +179,9 @@ def test_link_cut(url: str, duration: float) -> None:
         flight.close()
 
 
-def test_process_killed(url: str) -> None:
-    """Killed in flight, nobody takes off again; the vehicle lands, returns, or holds for us."""
-    command = [sys.executable, str(HERE / "sitl_victim.py"), url]
+def kill_in_flight(url: str, *settings: str) -> None:
+    """Kill a program that flies, four seconds on its way, and wait eight seconds more."""
+    command = [sys.executable, str(HERE / "sitl_victim.py"), url, *settings]
     victim = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     assert victim.stdout is not None
     assert victim.stdout.readline().strip() == "enroute"
@@ -189,6 +189,32 @@ def test_process_killed(url: str) -> None:
     victim.send_signal(signal.SIGKILL)
     victim.wait()
     time.sleep(8.0)
+
+
+def test_killed_as_its_ground_station(url: str) -> None:
+    """With its failsafes set by us, nobody needs to come: it goes home, or lands, by itself."""
+    kill_in_flight(url, "role=ground_station", "failsafes=set")
+    robot = robot_at(url)
+    vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
+    vehicle.connect(30.0)
+    try:
+        seen: list[VehicleMode] = []
+        end = time.monotonic() + 180.0
+        while (state := vehicle.read()).armed:
+            if not seen or seen[-1] is not state.mode:
+                seen.append(state.mode)
+            assert time.monotonic() < end, seen
+            time.sleep(0.1)
+        place = state.odometry.position.round(1)
+        print(f"\nkilled as ground station: {[mode.value for mode in seen]}, down at {place}")  # noqa: T201
+        assert set(seen) <= {VehicleMode.RETURNING, VehicleMode.LANDING, VehicleMode.FAILSAFE}
+    finally:
+        vehicle.close()
+
+
+def test_process_killed(url: str) -> None:
+    """Killed in flight, nobody takes off again; the vehicle lands, returns, or holds for us."""
+    kill_in_flight(url)
     robot = robot_at(url)
     vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
     vehicle.connect(30.0)

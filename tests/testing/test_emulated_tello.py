@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import socket
 import time
 from collections.abc import Iterator
@@ -10,8 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.config import EnvironmentConfig
 from aerodaas.testing.channel import Channel
-from aerodaas.testing.tello import EmulatedTello, Impairment, TelloOptions
+from aerodaas.testing.tello import EmulatedTello, Impairment, TelloOptions, VideoOptions
 from aerodaas.testing.tello.flight import TelloFlight
 from aerodaas.testing.tello.sdk import TelloSdk
 from aerodaas.vehicle import VehicleMode
@@ -137,6 +139,30 @@ def test_low_battery_refuses_take_off(client: socket.socket) -> None:
             client.sendto(text, ("127.0.0.1", tello.port))
             replies.append(client.recv(100))
     assert replies == [b"ok", b"5", b"error Motor stop"]
+
+
+def test_it_takes_the_place_of_an_environments_robot() -> None:
+    """It stands, looks and films as the file says, and stays the Tello that it was otherwise."""
+    environment = EnvironmentConfig.model_validate(
+        {
+            "robots": [
+                {
+                    "id": "tello",
+                    "start": [1, 2, 0],
+                    "start_yaw": 90,
+                    "sensors": [{"id": "eye", "settings": {"pitch": 12}}],
+                }
+            ],
+            "simulation": {"world": "rescue", "seed": 3, "wind": [0.3, 0.2, 0], "gust": 0.2},
+        }
+    )
+    options = TelloOptions(battery=0.5, video=VideoOptions(rate=10.0)).placed(environment)
+    truth = TelloFlight(options).truth
+    assert tuple(truth.position) == (1, 2, 0)
+    assert truth.yaw == pytest.approx(math.pi / 2)
+    assert (options.battery, options.seed, options.wind[0], options.gust) == (0.5, 3, 0.3, 0.2)
+    video = options.video
+    assert (video.world, video.seed, video.pitch, video.rate) == ("rescue", 3, 12.0, 10.0)
 
 
 def test_a_channel_loses_doubles_and_delays_by_its_seed() -> None:

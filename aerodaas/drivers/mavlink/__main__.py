@@ -10,7 +10,7 @@ import typer
 from aerodaas.config import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.connecting import Connection
 from aerodaas.drivers.mavlink.parameters import Parameters, unsafe_parameters
-from aerodaas.drivers.mavlink.settings import mavlink_settings
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.errors import AeroDaaSError
 
@@ -23,6 +23,10 @@ def main(
     system: Annotated[int | None, typer.Option(help="The vehicle's system id.")] = None,
     timeout: Annotated[float, typer.Option(help="Seconds to wait for its HEARTBEAT.")] = 10.0,
     *,
+    as_station: Annotated[
+        bool,
+        typer.Option("--ground-station", help='Judge it as if flown in "role": "ground_station".'),
+    ] = False,
     set_failsafes: Annotated[
         bool, typer.Option("--set-failsafes", help="Set the failsafes that are found unsafe.")
     ] = False,
@@ -35,7 +39,9 @@ def main(
         vehicle.connect(timeout)
         time.sleep(_SETTLING)
         _tell(vehicle)
-        _judge(vehicle.connection, robot, fix=set_failsafes)
+        # Judged by the role, but never in it: leaving would then be a loss of the ground station.
+        role = MavlinkSettings(role="ground_station" if as_station else "companion")
+        _judge(vehicle.connection, role, fix=set_failsafes)
     except AeroDaaSError as error:
         typer.echo(error, err=True)
         raise typer.Exit(error.exit_code) from None
@@ -57,15 +63,17 @@ def _tell(vehicle: MavlinkVehicle) -> None:
         typer.echo(f"would not take off: {reason}")
 
 
-def _judge(connection: Connection, robot: RobotConfig, *, fix: bool) -> None:
+def _judge(connection: Connection, settings: MavlinkSettings, *, fix: bool) -> None:
     parameters = Parameters(connection.link, connection.autopilot)
-    found = unsafe_parameters(parameters, connection.autopilot, mavlink_settings(robot))
+    found = unsafe_parameters(parameters, connection.autopilot, settings)
     for unsafe in found:
         if fix:
             parameters.set(unsafe.failsafe.name, unsafe.failsafe.safe)
         typer.echo(f"{unsafe.text}{': set' if fix else ''}")
+    if settings.role == "companion" and connection.autopilot.orphaned:
+        typer.echo(connection.autopilot.orphaned)
     if not found:
-        typer.echo("failsafes: nothing to complain about")
+        typer.echo("failsafes: no parameter is unsafe")
     elif not fix:
         typer.echo("--set-failsafes sets them")
 

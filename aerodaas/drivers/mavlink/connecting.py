@@ -160,6 +160,8 @@ def _see_to_failsafes(
 ) -> None:
     if settings.failsafes == "ignore":
         return
+    if autopilot.orphaned and settings.role == "companion":
+        _log.warning("%s: %s: %s", name, autopilot.name, autopilot.orphaned)
     parameters = Parameters(link, autopilot)
     for unsafe in unsafe_parameters(parameters, autopilot, settings):
         if settings.failsafes == "set":

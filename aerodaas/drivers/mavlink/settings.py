@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from aerodaas.config import RobotConfig
 from aerodaas.errors import ConfigError
@@ -13,6 +13,9 @@ __all__ = ["KEY_VARIABLE", "MavlinkSettings", "mavlink_settings"]
 
 KEY_VARIABLE = "AERODAAS_MAVLINK_KEY"
 """Environment variable that may hold the signing key, as 64 hexadecimal digits."""
+
+_STATION = 255
+"""The system id by which autopilots know their ground station, unless they were told another."""
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Identity = Annotated[int, Field(ge=1, le=255)]
@@ -29,13 +32,12 @@ class MavlinkSettings(BaseModel):
     system: Identity | None = None
     """The vehicle's system id; None takes the first multicopter that is heard."""
     own_system: Identity = 245
-    """Our own system id. Ground stations are 255."""
+    """Our own system id; 255 by default in the role of the ground station."""
     own_component: Identity = 191
     """Our own component id; 191 is an onboard computer."""
     role: Literal["companion", "ground_station"] = "companion"
-    """What our heartbeats say that we are. As a ground station (with `own_system` 255) their end
-    triggers the autopilot's ground-station failsafe; beside a real ground station they hide that
-    it is lost."""
+    """What our heartbeats say that we are. As a ground station their end triggers the autopilot's
+    ground-station failsafe; beside a real ground station they hide that it is lost."""
     frame: Literal["start", "home"] = "start"
     """How local coordinates are pinned: the place where it is armed is the robot's `start`, or
     the autopilot's global position is laid over the environment's `home` (global waypoints)."""
@@ -56,6 +58,12 @@ class MavlinkSettings(BaseModel):
     """m/s that the vehicle itself can do horizontally."""
     max_climb: Positive = 3.0
     """m/s that the vehicle itself can do vertically."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _numbered_by_role(cls, content: Any) -> Any:  # noqa: ANN401 - anything may be in the file
+        station = isinstance(content, dict) and content.get("role") == "ground_station"
+        return {"own_system": _STATION, **content} if station else content
 
 
 def mavlink_settings(robot: RobotConfig) -> MavlinkSettings:

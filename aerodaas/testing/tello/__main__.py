@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
+from aerodaas.config import EnvironmentConfig
 from aerodaas.errors import AeroDaaSError
+from aerodaas.overrides import located
 from aerodaas.testing.emulated import watch
 from aerodaas.testing.tello import EmulatedTello, Impairment, TelloOptions, VideoOptions
 
@@ -17,6 +20,13 @@ def main(
     sdk: Annotated[int, typer.Option(help="20 or 30; SDK 2.0 does not know `port`.")] = 30,
     battery: Annotated[float, typer.Option(help="Charge, 0 to 1.")] = 0.9,
     source: Annotated[str, typer.Option(help="What it films: world or clock.")] = "world",
+    env: Annotated[
+        Path | None,
+        typer.Option(
+            help="Environment file in whose simulated world it takes the first robot's place; "
+            "stands for --world and --seed."
+        ),
+    ] = None,
     world: Annotated[str, typer.Option(help="World of the simulator.")] = "field",
     seed: Annotated[int, typer.Option(help="Of the world and of the link.")] = 0,
     width: Annotated[int, typer.Option(help="Pixels of the video.")] = 960,
@@ -51,6 +61,8 @@ def main(
         ),
     )
     try:
+        if env is not None:
+            options = options.placed(located(EnvironmentConfig.load(env), env.parent))
         tello = EmulatedTello(options)
     except AeroDaaSError as error:
         typer.echo(error, err=True)

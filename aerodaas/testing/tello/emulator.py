@@ -58,6 +58,12 @@ class EmulatedTello(EmulatedVehicle[TelloFlight]):
         self._idle_since = time.monotonic()
         self._video: VideoStream | None = None
 
+    @property
+    def film_began(self) -> float | None:
+        """Monotonic second at which the film under way began; None without one."""
+        video = self._video
+        return None if video is None else video.began
+
     def spoil(
         self,
         *,

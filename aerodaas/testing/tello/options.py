@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from aerodaas.config import EnvironmentConfig
+from aerodaas.drivers.tello.settings import tello_camera_settings
 from aerodaas.testing.channel import Impairment
 
 __all__ = ["TelloOptions", "VideoOptions"]
@@ -26,6 +28,8 @@ class VideoOptions:
     bit_rate: int = 4_000_000
     horizontal_fov: float = 55.2
     """Degrees."""
+    pitch: float = 0.0
+    """Degrees downwards that it looks."""
     copies: tuple[tuple[str, int], ...] = ()
     """Further addresses and ports that get each video packet, to compare clients."""
 
@@ -63,3 +67,21 @@ class TelloOptions:
     states: Impairment = field(default_factory=Impairment)
     video_link: Impairment = field(default_factory=Impairment)
     video: VideoOptions = field(default_factory=VideoOptions)
+
+    def placed(self, environment: EnvironmentConfig) -> TelloOptions:
+        """The same Tello in place of the environment's first robot, in the world simulated there.
+
+        World, seed, wind, where it stands and how its camera is mounted come from `environment`.
+        """
+        robot, simulation = environment.robots[0], environment.simulation
+        cameras = [sensor for sensor in robot.sensors if sensor.type == "camera"]
+        pitch = tello_camera_settings(cameras[0]).pitch if cameras else self.video.pitch
+        return replace(
+            self,
+            start=robot.start,
+            start_yaw=robot.start_yaw,
+            wind=simulation.wind,
+            gust=simulation.gust,
+            seed=simulation.seed,
+            video=replace(self.video, world=simulation.world, seed=simulation.seed, pitch=pitch),
+        )

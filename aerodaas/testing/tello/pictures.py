@@ -37,6 +37,7 @@ def picture_source(video: VideoOptions) -> Iterator[PictureSource]:
             "height": video.height,
             "horizontal_fov": video.horizontal_fov,
             "mount": (0.035, 0.0, 0.0),
+            "pitch": video.pitch,
         },
     )
     world = SimulationConfig(world=video.world, seed=video.seed)

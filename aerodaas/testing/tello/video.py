@@ -44,6 +44,8 @@ class VideoStream:
         self._options = options
         self._peers = peers
         self._pose = pose
+        self.began: float | None = None
+        """Monotonic second at which the film began; the filmed world's time is zero then."""
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="emulated-video", daemon=True)
 
@@ -73,7 +75,7 @@ class VideoStream:
                 for index, peer in enumerate(self._peers)
             ]
             encoder = _encoder(video)
-            began = time.monotonic()
+            began = self.began = time.monotonic()
             index = 0
             while not self._stopping.is_set():
                 image = picture(time.monotonic() - began, self._pose())

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from mavlink_flights import flight
+from numpy.typing import NDArray
 
 from aerodaas.config import GeofenceConfig
 from aerodaas.drivers.mavlink.ardupilot import ArduPilot
@@ -73,6 +74,50 @@ def test_the_moving_target_keeps_to_its_speed(goal: Any, speed: float, waits: li
         assert float(np.linalg.norm(seen.position)) <= 1.0 + 1.2 * speed + 1e-6
         assert np.linalg.norm(seen.position) <= np.linalg.norm(goal) + 1e-6
         before = seen.position
+
+
+def flown_by_lag(goal: float, speed: float, lag: float) -> NDArray[np.float64]:
+    """Place and speed of an autopilot on a straight way, one row each 10 ms.
+
+    It adds what draws it to the target to the velocity that it was sent, as PX4 does, takes that
+    up after `lag` seconds, and hears of the target a tenth of a second late.
+    """
+    target = MovingTarget(3.0, 1.5)
+    here = moving = 0.0
+    sent: list[tuple[float, float]] = []
+    track = []
+    for turn in range(round(20 * (goal / speed + 15))):
+        seen = target.towards(
+            np.array([goal, 0.0, 0.0]),
+            None,
+            speed,
+            vehicle=np.array([here, 0.0, 0.0]),
+            velocity=np.array([moving, 0.0, 0.0]),
+            facing=0.0,
+            now=100.0 + turn / 20,
+        )
+        sent.append((float(seen.position[0]), float(seen.velocity[0])))
+        place, velocity = sent[max(0, turn - 2)]
+        for _ in range(5):
+            wanted = velocity + 0.95 * (place - here)
+            moving += 0.01 * max(-3.0, min(3.0, (wanted - moving) / lag))
+            here += 0.01 * moving
+            track.append((here, moving))
+    return np.array(track)
+
+
+@settings(deadline=None)
+@given(st.floats(2.0, 15.0), st.floats(0.5, 3.0), st.floats(0.1, 0.8))
+def test_a_vehicle_that_follows_late_is_slow_where_it_arrives(
+    goal: float, speed: float, lag: float
+) -> None:
+    """Never faster than asked, hardly beyond the place, and slow where a landing may follow."""
+    track = flown_by_lag(goal, speed, lag)
+    assert track[:, 1].max() < 1.05 * speed
+    assert track[:, 0].max() < goal + 0.2
+    assert track[-1] == pytest.approx([goal, 0.0], abs=0.05)
+    near = int(np.argmax(track[:, 0] > goal - 0.3))
+    assert track[near, 1] < 0.9
 
 
 MODES = list(FlightMode)

@@ -169,7 +169,6 @@ def test_a_ground_station_that_falls_silent_brings_it_home() -> None:
     with flight(
         AutopilotOptions(family="ardupilot"),
         role="ground_station",
-        own_system=255,
         failsafes="set",
     ) as pair:
         pair.guide()

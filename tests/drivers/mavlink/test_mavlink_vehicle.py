@@ -296,6 +296,7 @@ def test_unsafe_failsafes_are_reported_or_set(
     with flight(options) as pair:
         assert f"{name} is 0" in caplog.text
         assert pair.autopilot.firmware.parameters.values[name] == 0.0
+        assert ("if this process dies it hovers" in caplog.text) == (family == "ardupilot")
     with flight(options, failsafes="set") as pair:
         assert pair.autopilot.firmware.parameters.values[name] == safe
         assert pair.vehicle.parameters.get("NO_SUCH_THING") is None

@@ -1,0 +1,80 @@
+"""The limit of approach: whoever keeps it stops before the least distance, whatever they follow."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerodaas.data import Odometry
+from aerodaas.navigation.approach import ApproachLimit, closing_speed
+from aerodaas.navigation.follow_settings import FollowLimits
+from aerodaas.navigation.sighting import Sighting
+
+LIMITS = FollowLimits()
+GAPS = st.floats(-3.0, 30.0)
+AT_ORIGIN = Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), 0.0)
+
+
+def limit() -> ApproachLimit:
+    """One that keeps 1.2 m."""
+    return ApproachLimit(1.2, LIMITS)
+
+
+@given(gap=GAPS, deceleration=st.floats(0.5, 5.0), reaction=st.floats(0.1, 1.0))
+def test_a_drone_at_the_limit_stops_within_the_gap(
+    gap: float, deceleration: float, reaction: float
+) -> None:
+    """It flies on for the reaction time and then brakes; without room it backs away."""
+    speed = closing_speed(gap, deceleration, reaction)
+    if gap < 0:
+        assert speed < 0
+    else:
+        assert speed * reaction + speed**2 / (2 * deceleration) <= gap + 1e-9
+
+
+@given(nearer=GAPS, farther=GAPS)
+def test_more_room_allows_no_less_speed(nearer: float, farther: float) -> None:
+    """Also across the border, where it is zero."""
+    nearer, farther = sorted((nearer, farther))
+    assert closing_speed(nearer, 2.5, 0.5) <= closing_speed(farther, 2.5, 0.5)
+    assert closing_speed(0.0, 2.5, 0.5) == 0.0
+
+
+@given(distance=st.floats(0.0, 20.0), away=st.floats(0.0, 3.0))
+def test_nothing_is_gained_by_a_target_that_walks_away(distance: float, away: float) -> None:
+    """It may stop this moment."""
+    target = Sighting(0.0, distance)
+    assert limit().speed(target, away, AT_ORIGIN) == limit().speed(target, 0.0, AT_ORIGIN)
+
+
+def test_a_target_that_comes_nearer_is_given_way() -> None:
+    """By its own speed."""
+    target = Sighting(0.0, 1.2)
+    assert limit().speed(target, -0.6, AT_ORIGIN) == pytest.approx(-0.6)
+
+
+@pytest.mark.parametrize("odometry", [AT_ORIGIN, None])
+@pytest.mark.parametrize(("bearing", "limits"), [(0.3, True), (-0.3, True), (1.4, False)])
+def test_somebody_else_in_the_way_counts(
+    odometry: Odometry | None, bearing: float, *, limits: bool
+) -> None:
+    """Who stands aside does not."""
+    approach = limit()
+    free = approach.speed(Sighting(0.0, 4.0), 0.0, odometry)
+    approach.see([Sighting(bearing, 1.3)], odometry)
+    assert (approach.speed(Sighting(0.0, 4.0), 0.0, odometry) < 0.3 < free) is limits
+
+
+def test_they_stay_where_they_were_while_the_drone_flies_and_sees_nothing() -> None:
+    """A drone that has come a metre nearer has a metre less to go."""
+    approach = limit()
+    approach.see([Sighting(0.0, 2.4)], AT_ORIGIN)
+    approach.see([], AT_ORIGIN)
+    moved = Odometry(np.array([1.0, 0.0, 1.5]), np.zeros(3), 0.0)
+    found = approach.speed(Sighting(0.0, 5.0), 1.0, moved)
+    assert found == pytest.approx(closing_speed(0.2, LIMITS.braking, LIMITS.reaction_time))
+    assert math.isfinite(found)

@@ -1,0 +1,38 @@
+"""The target's motion: learnt from a walk, and unlearnt as soon as the walker stops."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.data import Odometry
+from aerodaas.navigation.sighting import Sighting
+from aerodaas.navigation.target_motion import TargetMotion, seen_from
+
+STOP = 25
+
+
+def away_after_stop(looks: int, rate: float = 5.0) -> float:
+    """The speed believed so many looks after a walker at 1 m/s stood still."""
+    motion = TargetMotion()
+    for number in range(STOP + looks + 1):
+        walked = min(number, STOP) / rate
+        state = Odometry(np.array([walked, 0.0, 1.5]), np.zeros(3), 0.0)
+        stamp = round(number / rate * NANOSECONDS)
+        motion.observe(Sighting(0.0, 2.0), state, stamp)
+    found = motion.relative_to(state, stamp)
+    assert found is not None
+    return found[1]
+
+
+def test_a_walk_is_learnt() -> None:
+    """To the speed, so that it is followed without lag."""
+    assert away_after_stop(0) == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_place_is_seen_as_it_lies() -> None:
+    """To the left of a drone that looks north is west."""
+    drone = Odometry(np.array([1.0, 0.0, 1.5]), np.zeros(3), np.pi / 2)
+    found = seen_from(drone, (-2.0, 0.0))
+    assert (found.bearing, found.distance) == (pytest.approx(np.pi / 2), pytest.approx(3.0))
