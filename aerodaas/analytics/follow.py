@@ -6,6 +6,7 @@ import logging
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import ClassVar
 
 import numpy as np
 from shapely import Point, Polygon
@@ -38,6 +39,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
     first target is seen, and after one was given up, it commands nothing, so that other
     navigation goes on. The camera must be calibrated (`horizontal_fov` of the sensor).
     """
+
+    falls: ClassVar[bool] = True
+    """Whether a target may fall: a change of its height is then no motion along the ground."""
 
     def __init__(
         self,
@@ -145,7 +149,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         trusted = [
             item
             for item in trusted
-            if item.score >= least and self._is_inside(item, tracked) and self._is_new(item, tracked)
+            if item.score >= least
+            and self._is_inside(item, tracked)
+            and self._is_new(item, tracked)
         ]
         if not trusted:
             return None
@@ -165,7 +171,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         context.alert(Alert(item.header, "target_left_area", text))
 
     def _is_new(self, detection: Detection, item: Detections) -> bool:
-        """Tell whether it shows enough to be a first target; one that was lost is taken as it is."""
+        """Tell whether it shows enough to be a first target; a lost one is taken as it is."""
         if not self.choice.whole or self.target is not None:
             return True
         sighting = sight(detection, item, self.size)
@@ -216,10 +222,13 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         sighting = sight(detection, item, self.size.with_width(self._width))
         if sighting is not None and sighting.width is not None:
             self._width += _WIDTH_MEMORY * (sighting.width - self._width)
+        if sighting is not None and not self.falls:
+            sighting = replace(sighting, height=None)
         return sighting
 
     def _others(self, tracked: Detections, target: Detection | None) -> tuple[Sighting, ...]:
-        boxes = (box for box in tracked.labelled(*self.labels) if box is not target)
+        sure = (box for box in tracked.labelled(*self.labels) if box.score >= self.choice.sure)
+        boxes = (box for box in sure if box is not target)
         seen = (sight(box, tracked, self.size) for box in boxes)
         return tuple(sighting for sighting in seen if sighting is not None)
 

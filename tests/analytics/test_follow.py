@@ -489,3 +489,12 @@ def test_a_wall_that_looks_like_a_vest_for_a_moment_is_not_followed() -> None:
         for step in range(10):
             item = frame(step, box)
             assert follow.process(item, Snapshot(item.header.stamp, None, [])) is None
+
+
+def test_a_car_whose_box_flickers_does_not_fall() -> None:
+    """A box that is sometimes too tall moves the middle of a car, which stays on its wheels."""
+    world = car_world(lambda time: (9 + 0.5 * time, 0.0))
+    world.rate, world.noise = 15.0, 0.12
+    distances = world.run(CarFollowAnalytics(), 60)
+    assert world.alerts == []
+    assert np.abs(np.array(distances[-450:]) - 6.0).max() < 1.0

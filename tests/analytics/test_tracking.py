@@ -141,11 +141,11 @@ def unsure(found: Detections, *places: int) -> Detections:
 def test_the_unsure_continue_a_track_and_begin_none() -> None:
     """Nor do they take a track from a sure box, however well they fit."""
     tracker = Tracker(sure=0.5)
-    for step in range(3):
-        found = tracker.update(unsure(detections(step, [person(300), person(900)]), 1))
-    assert ids(found) == [1, None]
-    found = tracker.update(unsure(detections(3, [person(300), person(900)]), 0, 1))
-    assert ids(found) == [1, None]
-    found = tracker.update(unsure(detections(4, [person(300), person(306)]), 0))
-    assert ids(found) == [None, 1]
+    pair = [person(300), person(900)]
+    for step in range(2):
+        tracker.update(unsure(detections(step, pair), 1))
+    assert ids(tracker.update(unsure(detections(2, pair), 1))) == [1, None]
+    assert ids(tracker.update(unsure(detections(3, pair), 0, 1))) == [1, None]
+    both = unsure(detections(4, [person(300), person(306)]), 0)
+    assert ids(tracker.update(both)) == [None, 1]
     assert len(tracker.tracks) == 1
