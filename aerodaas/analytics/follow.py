@@ -12,11 +12,12 @@ from shapely import Point, Polygon
 
 from aerodaas.analytics.base import Context, NavigableAnalytics
 from aerodaas.analytics.boxes import BoxAnalytics
+from aerodaas.analytics.observing import observation
 from aerodaas.analytics.overlap import one_for_each
 from aerodaas.analytics.tracking import Tracker
 from aerodaas.data import Alert, Detection, Detections
 from aerodaas.errors import ConfigError
-from aerodaas.navigation.follow_controller import FollowController, FollowPhase, Observation
+from aerodaas.navigation.follow_controller import FollowController, FollowPhase
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
 from aerodaas.navigation.sighting import Sighting, TargetSize, sight
 from aerodaas.navigation.target_motion import TargetMotion
@@ -106,17 +107,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         tracked = self.tracker.update(self._possible(item))
         detection = self._target_in(tracked)
         sighting = None if detection is None else self._sight(detection, item)
-        state = context.vehicle()
-        command = self.controller.step(
-            Observation(
-                stamp=item.header.stamp,
-                sighting=sighting,
-                at_capture=item.odometry,
-                now=None if state is None else state.odometry,
-                now_stamp=None if state is None else state.stamp,
-                others=self._others(tracked, detection),
-            )
-        )
+        others = self._others(tracked, detection)
+        command = self.controller.step(observation(item, sighting, context, others))
         self._tell_changes(phase, item, context)
         if command is None:
             return None
@@ -145,7 +137,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         trusted = [
             item
             for item in trusted
-            if item.score >= least and self._is_inside(item, tracked) and self._is_new(item, tracked)
+            if item.score >= least
+            and self._is_inside(item, tracked)
+            and self._is_new(item, tracked)
         ]
         if not trusted:
             return None
@@ -165,7 +159,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         context.alert(Alert(item.header, "target_left_area", text))
 
     def _is_new(self, detection: Detection, item: Detections) -> bool:
-        """Tell whether it shows enough to be a first target; one that was lost is taken as it is."""
+        """Tell whether it shows enough to be a first target; who was lost is taken as it is."""
         if not self.choice.whole or self.target is not None:
             return True
         sighting = sight(detection, item, self.size)
