@@ -213,7 +213,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         return sighting
 
     def _others(self, tracked: Detections, target: Detection | None) -> tuple[Sighting, ...]:
-        boxes = (box for box in tracked.labelled(*self.labels) if box is not target)
+        least = self.choice.score
+        found = (box for box in tracked.labelled(*self.labels) if box is not target)
+        boxes = (box for box in found if box.score >= least)
         seen = (sight(box, tracked, self.size) for box in boxes)
         return tuple(sighting for sighting in seen if sighting is not None)
 
