@@ -44,7 +44,9 @@ def main(
         tasks = result.scores[name][0].tasks
         figures = (taken, cpu, tasks / 1e3, tasks / 1e3 / taken, taken / tasks * 1e6)
         report.row(f"{name} {case}", dict(zip(UNITS, figures, strict=True)))
-        per_task.setdefault(name, []).append((loads[case].edges, taken / tasks))
+        alone = jobs == 1 and spread is None
+        # Other work on the machine prolongs the wall time, but hardly the processor's.
+        per_task.setdefault(name, []).append((loads[case].edges, (cpu if alone else taken) / tasks))
     for name, grown in per_task.items():
         (least, first), (most, last) = grown[1], grown[-1]
         report.note(

@@ -42,8 +42,11 @@ def load_scheduler(
         return _build(_import(wanted), wanted)
     name = wanted.replace("-", "_").lower()
     idea = name.removesuffix(_PUBLISHED)
-    if name not in scheduler_names() and idea in scheduler_names() and idea != name:
-        return _build(_import(idea), wanted, published=True)
+    if idea != name:
+        # The names are read from every installed package, which takes milliseconds.
+        names = scheduler_names()
+        if name not in names and idea in names:
+            return _build(_import(idea), wanted, published=True)
     return _build(_import(name), wanted)
 
 

@@ -24,8 +24,8 @@ __all__ = ["MovingTarget", "Target"]
 _PULL = 1.0
 """1/s: the speed that either autopilot adds for each metre that it is behind its target (PX4's
 MPC_XY_P is 0.95, ArduCopter's PSC_POSXY_P is 1.0)."""
-_REACTION = 0.8
-"""Seconds from a target's velocity to the vehicle's: PX4's simulated quadrotor takes 0.45 to 0.6,
+_REACTION = 1.2
+"""Seconds from a target's velocity to the vehicle's: PX4's simulated quadrotor takes 0.5 to 1,
 and what it says of itself is a little old."""
 _BRAKING = 1.5
 """m/s² that a vehicle is counted on to brake with, half of what it could."""
