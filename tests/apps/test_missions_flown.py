@@ -21,7 +21,6 @@ pytestmark = [pytest.mark.slow, pytest.mark.timeout(SLOWEST)]
 
 
 SHORT = {
-    "situation_awareness": "where the person stops short at 1.2 m/s it comes to 0.94 m, not 1 m",
     "vehicle_tracking": "the car is seen in too few frames, lost and found again several times",
 }
 """What these flights are known to fall short in; nothing else of them is."""
