@@ -13,11 +13,12 @@ from shapely import Point, Polygon
 
 from aerodaas.analytics.base import Context, NavigableAnalytics
 from aerodaas.analytics.boxes import BoxAnalytics
+from aerodaas.analytics.observing import observation
 from aerodaas.analytics.overlap import one_for_each
 from aerodaas.analytics.tracking import Tracker
 from aerodaas.data import Alert, Detection, Detections
 from aerodaas.errors import ConfigError
-from aerodaas.navigation.follow_controller import FollowController, FollowPhase, Observation
+from aerodaas.navigation.follow_controller import FollowController, FollowPhase
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
 from aerodaas.navigation.sighting import Sighting, TargetSize, sight
 from aerodaas.navigation.target_motion import TargetMotion
@@ -110,17 +111,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         tracked = self.tracker.update(self._possible(item))
         detection = self._target_in(tracked)
         sighting = None if detection is None else self._sight(detection, item)
-        state = context.vehicle()
-        command = self.controller.step(
-            Observation(
-                stamp=item.header.stamp,
-                sighting=sighting,
-                at_capture=item.odometry,
-                now=None if state is None else state.odometry,
-                now_stamp=None if state is None else state.stamp,
-                others=self._others(tracked, detection),
-            )
-        )
+        others = self._others(tracked, detection)
+        command = self.controller.step(observation(item, sighting, context, others))
         self._tell_changes(phase, item, context)
         if command is None:
             return None
@@ -227,8 +219,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         return sighting
 
     def _others(self, tracked: Detections, target: Detection | None) -> tuple[Sighting, ...]:
-        sure = (box for box in tracked.labelled(*self.labels) if box.score >= self.choice.sure)
-        boxes = (box for box in sure if box is not target)
+        least = self.choice.score
+        found = (box for box in tracked.labelled(*self.labels) if box is not target)
+        boxes = (box for box in found if box.score >= least)
         seen = (sight(box, tracked, self.size) for box in boxes)
         return tuple(sighting for sighting in seen if sighting is not None)
 

@@ -13,11 +13,11 @@ import numpy as np
 
 from aerodaas.analytics.base import Context, NavigableAnalytics
 from aerodaas.analytics.boxes import BoxAnalytics
+from aerodaas.analytics.observing import observation
 from aerodaas.data import Alert, Detection, Detections, Frame
 from aerodaas.errors import ConfigError, GraphError
 from aerodaas.graph import AeroStreamData, Trigger
 from aerodaas.interfaces import IAeroData, IEnvironment
-from aerodaas.navigation.follow_controller import Observation
 from aerodaas.navigation.ground import GroundView
 from aerodaas.navigation.inspection import InspectionController, InspectionPhase, InspectionPlan
 from aerodaas.navigation.sighting import Sighting
@@ -127,16 +127,7 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         before = self.controller.phase
         found = boxes.labelled(*self.labels)
         sighting = self._sight(max(found, key=lambda item: item.area), boxes) if found else None
-        state = context.vehicle()
-        command = self.controller.step(
-            Observation(
-                stamp=boxes.header.stamp,
-                sighting=sighting,
-                at_capture=boxes.odometry,
-                now=None if state is None else state.odometry,
-                now_stamp=None if state is None else state.stamp,
-            )
-        )
+        command = self.controller.step(observation(boxes, sighting, context))
         self._tell_changes(before, boxes, context)
         if self.controller.picture_due is not None:
             self._take_picture(self.controller.picture_due)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from aerodaas.geometry import Vector
 from aerodaas.navigation.control import braking_speed
 from aerodaas.navigation.follow_settings import FollowLimits
 from aerodaas.navigation.sighting import Sighting
+from aerodaas.navigation.target_motion import seen_from
 
 __all__ = ["ApproachLimit", "closing_speed"]
 
@@ -43,16 +44,21 @@ class ApproachLimit:
         self.limits = limits
         self._places: list[Vector] = []
         self._sightings: list[Sighting] = []
+        self._target = False
+        """Whether the first of them is the target."""
 
     def reset(self) -> None:
         """Forget them all."""
         self._places, self._sightings = [], []
 
-    def see(self, sightings: Iterable[Sighting], at_capture: Odometry | None) -> None:
+    def see(
+        self, target: Sighting | None, others: Iterable[Sighting], at_capture: Odometry | None
+    ) -> None:
         """Take in everybody whom one picture shows; one that shows nobody changes nothing."""
-        seen = list(sightings)
+        seen = [*([] if target is None else [target]), *others]
         if not seen:
             return
+        self._target = target is not None
         self._sightings, self._places = seen, []
         if at_capture is not None:
             self._places = [_place(one, at_capture) for one in seen]
@@ -60,22 +66,28 @@ class ApproachLimit:
     def speed(self, towards: Sighting, away: float, now: Odometry | None) -> float:
         """Fastest speed in m/s towards `towards`, which moves away at `away` m/s.
 
-        Negative where the drone must back off. Only its coming nearer counts as motion.
+        Negative where the drone must back off from the target. Only its coming nearer counts as
+        motion. Others in the way stop the drone, but do not drive it back.
         """
-        distances = [towards.distance]
-        for place in self._places if now is not None else ():
-            assert now is not None  # noqa: S101 - for the type checkers
-            way = place - now.position[:2]
-            off = math.atan2(way[1], way[0]) - now.yaw - towards.bearing
-            if abs(math.remainder(off, math.tau)) <= _AHEAD:
-                distances.append(float(np.hypot(*way)))
-        if now is None:
-            off_way = (abs(one.bearing - towards.bearing) for one in self._sightings)
-            pairs = zip(off_way, self._sightings, strict=True)
-            distances += [one.distance for off, one in pairs if off <= _AHEAD]
-        gap = min(distances) - self.nearest
+        seen = list(self._distances(towards.bearing, now))
+        target = min([towards.distance, *(far for far, is_target in seen if is_target)])
+        others = [self._closing(far) for far, is_target in seen if not is_target]
+        speed = self._closing(target) + min(away, 0.0)
+        return min(speed, max(0.0, min(others))) if others else speed
+
+    def _closing(self, distance: float) -> float:
         limits = self.limits
-        return closing_speed(gap, limits.braking, limits.reaction_time) + min(away, 0.0)
+        return closing_speed(distance - self.nearest, limits.braking, limits.reaction_time)
+
+    def _distances(self, bearing: float, now: Odometry | None) -> Iterator[tuple[float, bool]]:
+        """How far each stands that is in the way, and whether it is the target."""
+        seen = self._sightings
+        if now is not None:
+            seen = [seen_from(now, (float(x), float(y))) for x, y in self._places]
+        for number, one in enumerate(seen):
+            off = abs(math.remainder(one.bearing - bearing, math.tau))
+            if off <= _AHEAD:
+                yield one.distance, self._target and number == 0
 
 
 def _place(sighting: Sighting, odometry: Odometry) -> Vector:

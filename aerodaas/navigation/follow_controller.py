@@ -111,8 +111,7 @@ class FollowController:
         dt = _FIRST_STEP if self._stamp is None else seconds(seen.stamp - self._stamp)
         self._stamp = seen.stamp
         seen = _without_nonsense(seen)
-        shown = (*seen.others, *([seen.sighting] if seen.sighting is not None else []))
-        self._approach.see(shown, seen.at_capture)
+        self._approach.see(seen.sighting, seen.others, seen.at_capture)
         if seen.sighting is not None:
             self._take_in(seen.sighting, seen)
         self.phase = self._next_phase(seen.stamp)

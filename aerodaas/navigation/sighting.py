@@ -88,6 +88,8 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     level = np.eye(3)
     if odometry is not None and math.isfinite(odometry.roll + odometry.pitch):
         level = rotation_from_rpy(odometry.roll, odometry.pitch, 0.0)
+    mount = level @ np.array(camera.mount)
+    lens = math.inf if odometry is None else odometry.height + float(mount[2])
     scale_u, scale_v = camera.width / detections.width, camera.height / detections.height
     u, v = detection.centre
 
@@ -108,50 +110,43 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     cut_v = top < margin_v or bottom > detections.height - margin_v or by_height > _HIDDEN * at_most
     cut_u = left < margin_u or right > detections.width - margin_u
     measured = by_height if not cut_v else min(by_height, by_width)
-    reach = _reach(ray(u, bottom), detections)
+    reach = _reach(ray(u, bottom), lens)
     lies = reach < _LIES * by_height
     measured = min(measured, reach)
     height = None
-    if odometry is not None and not cut_v:
-        height = odometry.height + camera.mount[2] + by_height * _slope(middle)
+    if math.isfinite(lens) and not cut_v:
+        height = lens + by_height * _slope(middle)
     direction = np.array([math.cos(bearing), math.sin(bearing)])
     # From the lens to the body's centre.
-    place = measured * direction + (level @ np.array(camera.mount))[:2]
+    place = measured * direction + mount[:2]
     return Sighting(
         bearing=math.atan2(place[1], place[0]),
         distance=float(np.hypot(*place)),
         bound=lies or (cut_v and cut_u),
         width=None if cut_u or cut_v else by_height * breadth,
-        afloat=_is_afloat(ray(u, bottom), by_height, detections),
+        afloat=_is_afloat(ray(u, bottom), by_height, lens),
         height=height,
     )
 
 
-def _reach(lowest: Vector, detections: Detections) -> float:
-    """Metres from the lens to where the ray through a box's lower edge meets the ground.
+def _reach(lowest: Vector, lens: float) -> float:
+    """Metres from the lens, `lens` metres up, to where the ray through a box's lower edge ends.
 
     Nothing stands below the ground, so no target is farther: one that lies there looks small, which
     its size alone would take for far away. Where the ground falls off the target is only thought
     nearer than it is; infinite where the height is not known or the ray does not go down.
     """
-    camera, odometry = detections.camera, detections.odometry
-    if camera is None or odometry is None:
+    slope = _slope(lowest)
+    if not (math.isfinite(lens) and lens > 0.0 and slope < -_SMALLEST_SLOPE):
         return math.inf
-    height, slope = float(odometry.position[2]) + camera.mount[2], _slope(lowest)
-    if not (math.isfinite(height) and height > 0.0 and slope < -_SMALLEST_SLOPE):
-        return math.inf
-    return -height / slope
+    return -lens / slope
 
 
-def _is_afloat(lowest: Vector, distance: float, detections: Detections) -> bool:
+def _is_afloat(lowest: Vector, distance: float, lens: float) -> bool:
     """Tell whether what is `distance` away has its lower edge, along `lowest`, above the ground."""
-    camera, odometry = detections.camera, detections.odometry
-    if camera is None or odometry is None:
+    if not (math.isfinite(lens) and lens > 0.0 and distance > 0.0):
         return False
-    height = float(odometry.position[2]) + camera.mount[2]
-    if not (math.isfinite(height) and height > 0.0 and distance > 0.0):
-        return False
-    ground, edge = -height / distance, _slope(lowest)
+    ground, edge = -lens / distance, _slope(lowest)
     return edge > ground / _AFLOAT and edge > ground + _TILTED
 
 

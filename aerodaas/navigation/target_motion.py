@@ -91,13 +91,12 @@ class TargetMotion:
         if self._state is None:
             return None
         velocity = self._state[2:]
-        place = self._state[:2] + velocity * seconds(stamp - self._stamp) - odometry.position[:2]
-        bearing = math.remainder(math.atan2(place[1], place[0]) - odometry.yaw, math.tau)
-        distance = float(np.hypot(*place))
-        along = place / max(distance, _NEAREST)
+        place = self._state[:2] + velocity * seconds(stamp - self._stamp)
+        found = seen_from(odometry, (float(place[0]), float(place[1])))
+        along = (place - odometry.position[:2]) / max(found.distance, _NEAREST)
         away = float(velocity @ along)
         left = float(along[0] * velocity[1] - along[1] * velocity[0])
-        return Sighting(bearing, distance), away, left
+        return found, away, left
 
     def _advance(self, dt: float) -> None:
         if self._state is None:

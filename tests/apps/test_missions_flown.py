@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from _pytest.mark import ParameterSet
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
@@ -20,20 +19,7 @@ SLOWEST = 1800
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(SLOWEST)]
 
 
-SHORT = {
-    "situation_awareness": "where the person stops short at 1.2 m/s it comes to 0.94 m, not 1 m",
-}
-"""What these flights are known to fall short in; nothing else of them is."""
-
-
-def marked(name: str) -> ParameterSet:
-    """The name of a mission, with what it is known to miss."""
-    if name not in SHORT:
-        return pytest.param(name)
-    return pytest.param(name, marks=pytest.mark.xfail(reason=SHORT[name], strict=False))
-
-
-@pytest.mark.parametrize("name", [marked(name) for name in sorted(MISSIONS)])
+@pytest.mark.parametrize("name", sorted(MISSIONS))
 def test_the_mission_meets_its_criteria(name: str, tmp_path: Path) -> None:
     """By the command line, the remote user being a process of its own."""
     mission = MISSIONS[name]

@@ -65,16 +65,25 @@ def test_somebody_else_in_the_way_counts(
     """Who stands aside does not."""
     approach = limit()
     free = approach.speed(Sighting(0.0, 4.0), 0.0, odometry)
-    approach.see([Sighting(bearing, 1.3)], odometry)
+    approach.see(None, [Sighting(bearing, 1.3)], odometry)
     assert (approach.speed(Sighting(0.0, 4.0), 0.0, odometry) < 0.3 < free) is limits
 
 
 def test_they_stay_where_they_were_while_the_drone_flies_and_sees_nothing() -> None:
     """A drone that has come a metre nearer has a metre less to go."""
     approach = limit()
-    approach.see([Sighting(0.0, 2.4)], AT_ORIGIN)
-    approach.see([], AT_ORIGIN)
+    approach.see(Sighting(0.0, 2.4), [], AT_ORIGIN)
+    approach.see(None, [], AT_ORIGIN)
     moved = Odometry(np.array([1.0, 0.0, 1.5]), np.zeros(3), 0.0)
     found = approach.speed(Sighting(0.0, 5.0), 1.0, moved)
     assert found == pytest.approx(closing_speed(0.2, LIMITS.braking, LIMITS.reaction_time))
     assert math.isfinite(found)
+
+
+def test_others_stop_the_drone_but_do_not_drive_it_back() -> None:
+    """Whoever is taken for a person by mistake must not push it into what it does not see."""
+    approach = limit()
+    approach.see(Sighting(0.0, 4.0), [Sighting(0.2, 0.5)], AT_ORIGIN)
+    assert approach.speed(Sighting(0.0, 4.0), 0.0, AT_ORIGIN) == 0.0
+    approach.see(Sighting(0.0, 0.5), [], AT_ORIGIN)
+    assert approach.speed(Sighting(0.0, 0.5), 0.0, AT_ORIGIN) < -1.0

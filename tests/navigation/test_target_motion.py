@@ -16,12 +16,12 @@ STOP = 25
 def away_after_stop(looks: int, rate: float = 5.0) -> float:
     """The speed believed so many looks after a walker at 1 m/s stood still."""
     motion = TargetMotion()
-    for number in range(STOP + looks + 1):
-        walked = min(number, STOP) / rate
-        state = Odometry(np.array([walked, 0.0, 1.5]), np.zeros(3), 0.0)
-        stamp = round(number / rate * NANOSECONDS)
+    stamps = [round(number / rate * NANOSECONDS) for number in range(STOP + looks + 1)]
+    places = [min(number, STOP) / rate for number in range(STOP + looks + 1)]
+    states = [Odometry(np.array([place, 0.0, 1.5]), np.zeros(3), 0.0) for place in places]
+    for state, stamp in zip(states, stamps, strict=True):
         motion.observe(Sighting(0.0, 2.0), state, stamp)
-    found = motion.relative_to(state, stamp)
+    found = motion.relative_to(states[-1], stamps[-1])
     assert found is not None
     return found[1]
 
@@ -35,4 +35,5 @@ def test_a_place_is_seen_as_it_lies() -> None:
     """To the left of a drone that looks north is west."""
     drone = Odometry(np.array([1.0, 0.0, 1.5]), np.zeros(3), np.pi / 2)
     found = seen_from(drone, (-2.0, 0.0))
-    assert (found.bearing, found.distance) == (pytest.approx(np.pi / 2), pytest.approx(3.0))
+    assert found.bearing == pytest.approx(np.pi / 2)
+    assert found.distance == pytest.approx(3.0)
