@@ -206,7 +206,7 @@ CAR = TargetSize(1.5, 1.8, widest=4.2)
 
 
 @given(
-    distance=st.floats(5, 30),
+    distance=st.floats(5, 20),
     base=st.one_of(st.just(0.0), st.floats(1.5, 4.0)),
     tilt=st.floats(-0.1, 0.1),
     error=st.floats(-0.01, 0.01),
