@@ -114,7 +114,7 @@ class CarFollowAnalytics(FollowAnalytics):
         self.size = TargetSize(target_height, target_width, widest=target_length)
 
 
-_VEST_CHOICE = TargetChoice(score=0.5, sure=0.4, looks=3, whole=True)
+_VEST_CHOICE = TargetChoice(score=0.5, sure=0.4, looks=5, whole=True)
 """A wall in the sun may look a little like a vest, right before the camera and for a moment; nobody
 should end a search for that."""
 _CAR_LOST = LostPolicy(coast=1.0, slow=2.0, hold=3.0, search=7.0)
