@@ -163,7 +163,7 @@ class Cloud:
             sent.parcel = self.parcels.pack(message)
             sent.began = time.perf_counter()
             execute, left = self.executor.handle.execute, until - time.monotonic()
-            reference = execute.remote(sent.task.profile.model, sent.parcel.reference, left)
+            reference = execute.remote(sent.task.profile.model, sent.parcel.content, left)
             sent.future = reference.future()
             sent.future.add_done_callback(lambda _: self._came_back(sent))
         except Exception as error:  # noqa: BLE001 - whatever it is, it must not be silence

@@ -35,8 +35,8 @@ _PATIENCE = 60.0
 class Parcel:
     """A frame on its way to a node."""
 
-    reference: Any
-    """Of the encoded message, in Ray's object store: whoever wants it there, it goes once."""
+    content: Any
+    """The encoded message or, so that it goes once to all who want it there, Ray's reference."""
     frame: Frame | None
     coding: Coding
     size: int
@@ -51,8 +51,12 @@ class Parcel:
 class Parcels:
     """Everything about the way to one node. `later` runs things in the thread that packs."""
 
-    def __init__(self, compression: str) -> None:
-        """`compression` is that of `ComputeConfig`."""
+    def __init__(self, compression: str, *, shared: bool) -> None:
+        """`compression` is that of `ComputeConfig`; `shared` if several there may want a frame.
+
+        A frame that is not shared travels in the call, which saves round trips.
+        """
+        self._shared = shared
         self.link = Link()
         self.chosen: dict[str, int] = {}
         """Frames sent, by coding."""
@@ -116,7 +120,7 @@ class Parcels:
 
     def _ping(self, executor: Any, size: int) -> None:  # noqa: ANN401
         # Random, so that no link compresses it.
-        data = ray.put(os.urandom(size)) if size else b""
+        data = self._content(os.urandom(size)) if size else b""
         began = time.perf_counter()
         self._pinging = executor.ping.remote(data).future()
 
@@ -139,8 +143,11 @@ class Parcels:
         data = encode_message(message)
         self.chosen[coding] = self.chosen.get(coding, 0) + 1
         self.bytes += len(data)
-        reference = ray.put(data)
-        return Parcel(reference, frame, coding, len(data), original or len(data), self._expected)
+        content = self._content(data)
+        return Parcel(content, frame, coding, len(data), original or len(data), self._expected)
+
+    def _content(self, data: bytes) -> Any:  # noqa: ANN401 - bytes, or a reference to them
+        return ray.put(data) if self._shared else data
 
 
 def _with_item(message: Message[Any], item: Any) -> Message[Any]:  # noqa: ANN401

@@ -98,6 +98,8 @@ def _settings() -> dict[str, Any]:
     os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
     # Ray would refuse a node whose Python differs in its patch level; a Jetson's always does.
     os.environ.setdefault("RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL", "minor")
+    # A frame goes in the call that it is for: a reference costs round trips.
+    os.environ.setdefault("RAY_max_direct_call_object_size", str(4 * 2**20))
     return {"logging_level": logging.ERROR, "log_to_driver": False, "namespace": _NAMESPACE}
 
 

@@ -36,6 +36,8 @@ fi
 # it. A day lets the drone come home by its own rules first.
 export RAY_gcs_rpc_server_reconnect_timeout_s="${RAY_gcs_rpc_server_reconnect_timeout_s:-86400}"
 export RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL=minor
+# A frame goes to the cloud in the call that it is for, instead of by a reference.
+export RAY_max_direct_call_object_size=4194304
 export RAY_AUTH_MODE="${RAY_AUTH_MODE:-token}"
 export RAY_USAGE_STATS_ENABLED=0
 

@@ -1,4 +1,8 @@
-"""The way to another node: one ObjectRef per message, a few under way, the newest kept back.
+"""The way to another node: a few messages under way, the newest kept back.
+
+What a call carries arrives with it, up to Ray's RAY_max_direct_call_object_size; what lies in the
+object store costs its reader four or five round trips more. So a message for one reader goes in
+the call, and one for several, which may share a node and a link, lies in the store.
 
 A link that is busy neither queues nor forgets the latest word: while deliveries are under way,
 one message waits for each reader, and a newer one takes its place.
@@ -20,14 +24,18 @@ UNDER_WAY = 2
 
 
 class _Parcel:
-    """A message on its way, put into the object store once for all who read it."""
+    """A message on its way, put into the object store once if several read it."""
 
-    def __init__(self, stream: str, data: bytes) -> None:
+    def __init__(self, stream: str, data: bytes, *, shared: bool) -> None:
         self.stream = stream
         self._data = data
+        self._shared = shared
         self._reference: ray.ObjectRef[bytes] | None = None
 
-    def reference(self) -> ray.ObjectRef[bytes]:
+    def content(self) -> bytes | ray.ObjectRef[bytes]:
+        """What the call is given."""
+        if not self._shared:
+            return self._data
         # Two threads may both put it; that costs a copy and harms nobody.
         if self._reference is None:
             self._reference = ray.put(self._data)
@@ -62,7 +70,7 @@ class RemoteReader:
                 self._waiting = parcel
 
     def _deliver(self, parcel: _Parcel) -> None:
-        done = self._actor.deliver.remote(parcel.stream, parcel.reference())
+        done = self._actor.deliver.remote(parcel.stream, parcel.content())
         done.future().add_done_callback(self._delivered)
 
     def _delivered(self, _: object) -> None:
@@ -77,6 +85,6 @@ class RemoteReader:
 
 def send_to(readers: list[RemoteReader], stream: str, encoded: Encoded) -> None:
     """Send a message to every reader; its arrays are copied, for they may change soon."""
-    parcel = _Parcel(stream, encoded.to_bytes())
+    parcel = _Parcel(stream, encoded.to_bytes(), shared=len(readers) > 1)
     for reader in readers:
         reader.send(parcel)

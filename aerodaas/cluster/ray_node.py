@@ -27,6 +27,8 @@ _SLIM = {
     # Workers started before anybody asks for them take 80 MB each.
     "RAY_enable_worker_prestart": "0",
     "RAY_prestart_worker_first_driver": "0",
+    # A frame goes in the call that it is for: a reference costs round trips.
+    "RAY_max_direct_call_object_size": "4194304",
 }
 
 

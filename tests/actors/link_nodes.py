@@ -56,7 +56,7 @@ def noise(message: Message[Frame]) -> Message[Frame]:
 
 def copies(desk: Desk) -> list[list[str]]:
     """Nodes that hold each of the newest frames, as Ray tells."""
-    references = [parcel.reference for parcel in desk.sites._parcels["cloud"]._parcels.values()]
+    references = [parcel.content for parcel in desk.sites._parcels["cloud"]._parcels.values()]
     located = ray.experimental.get_object_locations(references, timeout_ms=10_000)
     return [sorted(where["node_ids"]) for where in located.values()]
 

@@ -14,6 +14,7 @@ import ray
 
 from aerodaas import Analytics, Frame
 from aerodaas.actors._cloud import CloudAnswer, Executor
+from aerodaas.actors._parcels import Parcels
 from aerodaas.actors._sites import Sites
 from aerodaas.actors.executor import CloudExecutor
 from aerodaas.analytics.base import Context, TimedContext
@@ -207,3 +208,14 @@ def test_of_two_the_quicker_is_used_and_the_other_when_it_is_gone(
     assert answer.way.endswith(" to far")
     desk.look_until(lambda: desk.sites.slots == 8)
     desk.sites.finish(1.0)
+
+
+def test_a_frame_for_one_analysis_travels_in_its_call(runtime: None) -> None:  # noqa: ARG001
+    """A reference would cost round trips; it is for frames that several may want."""
+    image = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
+    frame = Frame(Header(1, 2, "camera"), image)
+    message: Message[Any] = Message("camera", 1, 2, frame.header, 3, (), frame)
+    alone = Parcels("none", shared=False).pack(message)
+    shared = Parcels("none", shared=True).pack(message)
+    assert isinstance(alone.content, bytes)
+    assert ray.get(shared.content) == alone.content
