@@ -48,7 +48,9 @@ def fly(cluster: EdgeCloud, words: dict[str, Any], edges: int) -> Counter[str]:
         said, _ = process.communicate()
         if process.returncode != 0:
             raise SystemExit(f"a flight failed with exit code {process.returncode}")
-        total.update(json.loads(said.splitlines()[-1]))
+        # Ray may write its own lines after the application's.
+        (told,) = (line for line in said.splitlines() if line.startswith("{"))
+        total.update(json.loads(told))
     return total
 
 
