@@ -21,7 +21,7 @@ from aerodaas.errors import ConfigError
 from aerodaas.navigation.follow_controller import FollowController, FollowPhase
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
 from aerodaas.navigation.sighting import Sighting, TargetSize, sight
-from aerodaas.navigation.target_motion import TargetMotion
+from aerodaas.navigation.target_motion import TargetMotion, place_of
 from aerodaas.waypoints import DEFAULT_PRIORITY, AeroNavigation, NavigationType
 
 __all__ = ["FollowAnalytics"]
@@ -29,6 +29,8 @@ __all__ = ["FollowAnalytics"]
 _log = logging.getLogger(__name__)
 _REACH, _REACH_SHARE = 0.3, 0.2
 """Metres, and parts of the distance, from where the target should stand to where it is seen."""
+_FALLEN = 1.3
+"""Metres from the feet to the chest of one who lies there; in any direction."""
 _WIDTH_MEMORY = 0.1
 """Weight of the newest look in the mean of the target's width: arms swing."""
 
@@ -176,9 +178,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         sighting, odometry = sight(detection, item, self.size), item.odometry
         if sighting is None or odometry is None:
             return False
-        heading = odometry.yaw + sighting.bearing
-        towards = np.array([math.cos(heading), math.sin(heading)])
-        place = odometry.position[:2] + sighting.distance * towards
+        place = place_of(sighting, odometry)
         return bool(np.isfinite(place).all() and self.area.covers(Point(*place)))
 
     def _found_where_expected(
@@ -199,6 +199,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             if sighting is None:
                 continue
             off = float(np.linalg.norm(sighting.offset - expected.offset))
+            if sighting.bound:
+                off = max(0.0, off - _FALLEN)
             if off <= reach:
                 best, reach = detection, off
         if best is not None and best.track_id is not None:
@@ -215,7 +217,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if sighting is not None and sighting.width is not None:
             self._width += _WIDTH_MEMORY * (sighting.width - self._width)
         if sighting is not None and not self.falls:
-            sighting = replace(sighting, height=None)
+            sighting = replace(sighting, top=None)
         return sighting
 
     def _others(self, tracked: Detections, target: Detection | None) -> tuple[Sighting, ...]:

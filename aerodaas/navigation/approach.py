@@ -5,14 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
-import numpy as np
-
 from aerodaas.data import Odometry
 from aerodaas.geometry import Vector
 from aerodaas.navigation.control import braking_speed
 from aerodaas.navigation.follow_settings import FollowLimits
 from aerodaas.navigation.sighting import Sighting
-from aerodaas.navigation.target_motion import seen_from
+from aerodaas.navigation.target_motion import place_of, seen_from
 
 __all__ = ["ApproachLimit", "closing_speed"]
 
@@ -61,7 +59,7 @@ class ApproachLimit:
         self._target = target is not None
         self._sightings, self._places = seen, []
         if at_capture is not None:
-            self._places = [_place(one, at_capture) for one in seen]
+            self._places = [place_of(one, at_capture) for one in seen]
 
     def speed(self, towards: Sighting, away: float, now: Odometry | None) -> float:
         """Fastest speed in m/s towards `towards`, which moves away at `away` m/s.
@@ -88,10 +86,3 @@ class ApproachLimit:
             off = abs(math.remainder(one.bearing - bearing, math.tau))
             if off <= _AHEAD:
                 yield one.distance, self._target and number == 0
-
-
-def _place(sighting: Sighting, odometry: Odometry) -> Vector:
-    heading = odometry.yaw + sighting.bearing
-    towards = np.array([math.cos(heading), math.sin(heading)])
-    place: Vector = odometry.position[:2] + sighting.distance * towards
-    return place

@@ -52,7 +52,7 @@ class CommandShaper:
         if speed > fastest:
             flat = flat * fastest / speed
         change = np.array([*flat, climb]) - self._velocity
-        largest = (limits.braking if braking else limits.acceleration) * dt
+        largest = (limits.stopping if braking else limits.acceleration) * dt
         if (size := float(np.linalg.norm(change))) > largest:
             change = change * largest / size
         turn = _clip(yaw_rate, limits.yaw_rate) - self._yaw_rate

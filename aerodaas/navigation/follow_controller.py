@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import enum
 import math
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +37,8 @@ _FIRST_STEP = 0.1
 _FARTHEST = 1000.0
 """Metres; no camera tells a person from farther away."""
 _FARTHEST_FROM_HOME = 1e5
+_TOPPLING = 0.4
+"""Seconds from a fall's begin until it is known for one."""
 _INTEGRAL_REACH = 1.2
 """Metres; a person who walks at 1 m/s is followed so far behind by the proportional part alone."""
 
@@ -102,6 +105,8 @@ class FollowController:
         self._last: Sighting | None = None
         self._stood: tuple[float, float] | None = None
         """East and north of home where the target stood before it fell."""
+        self._places: deque[tuple[int, tuple[float, float]]] = deque()
+        """Stamps, and where the target was then, of the last moments."""
         self._braking = False
 
     def step(self, seen: Observation) -> VelocityCommand | None:
@@ -137,15 +142,25 @@ class FollowController:
         self._seen, self._last = seen.stamp, sighting
         if seen.at_capture is None:
             return
-        if sighting.height is not None and not self._upright.keeps(
-            sighting.height, sighting.distance, seen.stamp
+        if sighting.top is not None and not self._upright.stands(
+            sighting.top, sighting.distance, seen.stamp
         ):
-            self._stood = self.motion.place or self._stood
+            self._stood = self._places[0][1] if self._places else self._stood
+            self._places.clear()
             self.motion.reset()
             self._last = replace(sighting, bound=True)
         elif not sighting.bound:
             self._stood = None
             self.motion.observe(sighting, seen.at_capture, seen.stamp)
+            self._remember_place(seen.stamp)
+
+    def _remember_place(self, stamp: int) -> None:
+        """Keep where the target was of late: the first picture of a fall looks like a long step."""
+        place = self.motion.place
+        if place is not None:
+            self._places.append((stamp, place))
+        while seconds(stamp - self._places[0][0]) > _TOPPLING:
+            self._places.popleft()
 
     def _next_phase(self, stamp: int) -> FollowPhase:
         if self._seen is None:
@@ -161,6 +176,7 @@ class FollowController:
 
     def _forget(self) -> None:
         self._seen = self._last = self._stood = None
+        self._places.clear()
         self._shaper.reset()
         self._approach.reset()
         self._upright.reset()
@@ -181,6 +197,9 @@ class FollowController:
             left = (self.lost.slow - unseen) / (self.lost.slow - self.lost.coast)
             velocity, yaw_rate = self._follow(seen, dt)
             return velocity * left, yaw_rate * left
+        if self._stood is not None:
+            # Whoever fell there gets up there: watch over them instead of turning away.
+            return self._follow(seen, dt)
         self._reset()
         if self.phase is FollowPhase.SEARCHING and self._last is not None:
             return np.zeros(2), math.copysign(self.lost.search_rate, self._last.bearing)
@@ -213,8 +232,10 @@ class FollowController:
             predicted = self.motion.relative_to(now, stamp)
         if now is not None and last.bound and self._stood is not None:
             # Whoever lies there has their feet about where they stood, and may get up on them.
-            feet = seen_from(now, self._stood).distance
-            last = replace(last, distance=min(last.distance, feet))
+            feet = seen_from(now, self._stood)
+            if self._seen != seen.stamp:
+                last = replace(feet, bound=True)
+            last = replace(last, distance=min(last.distance, feet.distance))
         return predicted or (last, 0.0, 0.0)
 
     def _command(

@@ -38,7 +38,10 @@ class FollowLimits:
     acceleration: float = 1.5
     """m/s^2 of the commanded velocity."""
     braking: float = 2.5
-    """The same where the drone would else come too near."""
+    """m/s^2 with which the drone is sure to stop: how fast it may come near is reckoned with it."""
+    stopping: float = 4.0
+    """m/s^2 of the commanded velocity where the drone would else come too near: the airframe does
+    what it can."""
     reaction_time: float = 0.5
     """Seconds from a target's stop until the drone brakes: a frame at 5 a second, a detector's work
     and the tilting of the airframe."""

@@ -65,8 +65,8 @@ class Sighting:
     afloat: bool = False
     """Its size says that it is far nearer than where the ground lies below it: it stands on none,
     or is larger than assumed."""
-    height: float | None = None
-    """Metres from home up to its middle, where it was seen from top to bottom."""
+    top: float | None = None
+    """Metres from home up to its upper edge, where that is in the picture."""
 
     @property
     def offset(self) -> Vector:
@@ -113,9 +113,9 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     reach = _reach(ray(u, bottom), lens)
     lies = reach < _LIES * by_height
     measured = min(measured, reach)
-    height = None
-    if math.isfinite(lens) and not cut_v:
-        height = lens + by_height * _slope(middle)
+    crown = None
+    if math.isfinite(lens) and top >= margin_v:
+        crown = lens + measured * _slope(ray(u, top))
     direction = np.array([math.cos(bearing), math.sin(bearing)])
     # From the lens to the body's centre.
     place = measured * direction + mount[:2]
@@ -125,7 +125,7 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
         bound=lies or (cut_v and cut_u),
         width=None if cut_u or cut_v else by_height * breadth,
         afloat=_is_afloat(ray(u, bottom), by_height, lens),
-        height=height,
+        top=crown,
     )
 
 

@@ -15,7 +15,7 @@ from aerodaas.clock import seconds
 from aerodaas.data import Odometry
 from aerodaas.navigation.sighting import Sighting
 
-__all__ = ["TargetMotion", "seen_from"]
+__all__ = ["TargetMotion", "place_of", "seen_from"]
 
 _RANGE_NOISE, _SIDE_NOISE = 0.06, 0.02
 """Standard deviations along and across the line of sight, in parts of the distance."""
@@ -32,6 +32,13 @@ def seen_from(odometry: Odometry, place: tuple[float, float]) -> Sighting:
     way = np.array(place) - odometry.position[:2]
     bearing = math.remainder(math.atan2(way[1], way[0]) - odometry.yaw, math.tau)
     return Sighting(bearing, float(np.hypot(*way)))
+
+
+def place_of(sighting: Sighting, odometry: Odometry) -> NDArray[np.float64]:
+    """East and north of home in metres, shape (2,), of what a drone at `odometry` sees so."""
+    heading = odometry.yaw + sighting.bearing
+    towards = np.array([math.cos(heading), math.sin(heading)])
+    return np.asarray(odometry.position[:2] + sighting.distance * towards)
 
 
 class TargetMotion:
@@ -66,7 +73,7 @@ class TargetMotion:
         heading = odometry.yaw + sighting.bearing
         along = np.array([math.cos(heading), math.sin(heading)])
         across = np.array([-along[1], along[0]])
-        place = odometry.position[:2] + sighting.distance * along
+        place = place_of(sighting, odometry)
         range_sigma = max(_LEAST_NOISE, _RANGE_NOISE * sighting.distance)
         side_sigma = max(_LEAST_NOISE, _SIDE_NOISE * sighting.distance)
         noise = range_sigma**2 * np.outer(along, along) + side_sigma**2 * np.outer(across, across)

@@ -23,6 +23,7 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.data import Alert, Detection, Detections, Frame, Header, Odometry
 from aerodaas.errors import ConfigError, GraphError
 from aerodaas.graph import AeroStreamData, Graph, Node
+from aerodaas.navigation.follow_controller import FollowPhase
 from aerodaas.navigation.sighting import sight
 from aerodaas.waypoints import AeroNavigation
 
@@ -456,14 +457,36 @@ class Falling(World):
             self.target, self.target_base, self.target_height = feet, base, height
 
 
+def falling_world(speed: float, rate: float) -> Falling:
+    """A person who falls after six seconds of walking at `speed`."""
+    upright = vest_world(lambda time: (4 + speed * min(max(time - 6, 0), 6), 0.0), rate)
+    return Falling(**{one.name: getattr(upright, one.name) for one in fields(upright)})
+
+
+@pytest.mark.parametrize("speed", [0.4, 0.7, 0.9])
 @pytest.mark.parametrize("rate", [5.0, 10.0])
-def test_a_fall_is_not_taken_for_walking(rate: float) -> None:
-    """The drone does not fly after the chest, over the feet."""
-    upright = vest_world(lambda time: (4 + 0.7 * min(max(time - 6, 0), 6), 0.0), rate)
-    world = Falling(**{one.name: getattr(upright, one.name) for one in fields(upright)})
-    distances = world.run(VipFollowAnalytics(), 22)
-    assert min(distances) > 1.1
-    assert distances[-1] < 2.4
+@pytest.mark.parametrize("unseen", [0.0, 0.4])
+def test_a_fall_is_not_taken_for_walking(speed: float, rate: float, unseen: float) -> None:
+    """The drone does not fly after the chest, over the feet, and knows them lying for the same."""
+    world = falling_world(speed, rate)
+    world.hidden = lambda time: 0 < time - world.falls - 0.3 <= unseen
+    follow = VipFollowAnalytics()
+    distances = world.run(follow, 22)
+    assert min(distances) > 1.0
+    assert distances[-1] < 2.5
+    assert follow.controller.phase is FollowPhase.FOLLOWING
+    assert world.alerts == []
+
+
+def test_who_has_fallen_is_watched_even_when_out_of_sight() -> None:
+    """They get up where they fell; a drone that turns round in search finds somebody else."""
+    world = falling_world(0.7, 5.0)
+    world.hidden = lambda time: 14 < time < 24
+    world.run(VipFollowAnalytics(), 28)
+    hidden = [command for command in world.commands[round(17.5 * 5) : 24 * 5] if command]
+    assert len(hidden) > 20
+    assert max(abs(command.yaw_rate) for command in hidden) < 0.05
+    assert [alert.kind for alert in world.alerts] == ["target_lost"]
 
 
 def test_somebody_who_cannot_be_told_from_the_target_is_not_flown_into() -> None:

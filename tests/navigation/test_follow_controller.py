@@ -162,7 +162,7 @@ def test_whatever_it_sees_the_commands_stay_finite_and_within_limits(
         assert np.hypot(command.forward, command.left) <= LIMITS.forward + 1e-9
         assert abs(command.up) <= LIMITS.climb + 1e-9
         assert abs(command.yaw_rate) <= LIMITS.yaw_rate + 1e-9
-        assert np.linalg.norm(command.velocity - last) <= LIMITS.braking * 0.5 + 1e-9 or (
+        assert np.linalg.norm(command.velocity - last) <= LIMITS.stopping * 0.5 + 1e-9 or (
             not command.velocity.any()
         )
         last = command.velocity
