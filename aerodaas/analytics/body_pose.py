@@ -14,6 +14,7 @@ from typing_extensions import Self
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.debounce import Debounce
+from aerodaas.analytics.downfall import Downfall
 from aerodaas.analytics.gestures import GESTURE_MODEL, POINTS, GestureClassifier
 from aerodaas.analytics.lying import lies
 from aerodaas.analytics.tracking import Tracker
@@ -113,6 +114,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         """Track of the person who counts."""
         self.unusable = 0
         """Bodies so far whose keypoints could not be used."""
+        self._downfall = Downfall(min_confidence)
         self._events = {name: Debounce(needed, of, hold) for name in _TEXTS}
         self._vests: Detections | None = None
         self._streams = 0
@@ -181,12 +183,16 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         people = self._people(found)
         chosen = self._choose(people)
         gesture = self._gesture(chosen, found)
+        upright = gesture is not None and gesture[0] == "upright"
+        down = self._downfall.shows(chosen, people, upright=upright)
+        if down:
+            gesture = "fallen", self.min_probability
         for name, event in self._events.items():
             event.update(stamp, gesture is not None and gesture[0] == name)
             if event.began:
                 context.alert(Alert(found.header, name, _TEXTS[name]))
         if chosen is None:
-            return people
+            return self._with_missing(people) if down else people
         label, score = gesture or ("person", chosen.score)
         active = [name for name, event in self._events.items() if event.active]
         if active and label not in active:
@@ -195,6 +201,13 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
             label = "person"
         mine = replace(chosen, label=label, score=score)
         return replace(people, items=tuple(mine if one is chosen else one for one in people))
+
+    def _with_missing(self, people: Detections) -> Detections:
+        """Add one who fell out of the picture, where last seen, once that is confirmed."""
+        last = self._downfall.last
+        if last is None or not self._events["fallen"].active:
+            return people
+        return replace(people, items=(*people.items, replace(last, label="fallen")))
 
     def _people(self, found: Detections) -> Detections:
         """Return those whose body can be looked at, with their tracks."""
