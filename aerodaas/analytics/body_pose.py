@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import Self
 
+from aerodaas.analytics.arms import raised_arm
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.debounce import Debounce
 from aerodaas.analytics.downfall import Downfall
@@ -35,8 +35,6 @@ _VEST_AGE = 1.0
 """Seconds for which the boxes of vests tell who wears one."""
 _SAME_BODY = 0.6
 """Two boxes of which the smaller lies in the other by more than this share are of one body."""
-_SHOULDERS, _ARMS = slice(5, 7), slice(7, 11)
-"""Rows of COCO's keypoints; the arms are elbows and wrists."""
 _MOST_PEOPLE = 100
 """A pose model's own limit is far above what can be told apart in a picture."""
 
@@ -248,7 +246,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
             return "fallen", max(self.min_probability, told[1] if told is not None else 0.0)
         if told is None or told[1] < self.min_probability:
             return None
-        if told[0] == "hand_raised" and not _arm_is_up(chosen.keypoints, least):
+        if told[0] == "hand_raised" and not raised_arm(chosen.keypoints, least):
             return None
         return told
 
@@ -303,13 +301,6 @@ def _shared(one: Detection, other: Detection) -> float:
     width = min(one.box[2], other.box[2]) - max(one.box[0], other.box[0])
     height = min(one.box[3], other.box[3]) - max(one.box[1], other.box[1])
     return max(0.0, width) * max(0.0, height) / max(min(one.area, other.area), 1e-9)
-
-
-def _arm_is_up(points: NDArray[np.float32], least: float) -> bool:
-    """Whether an elbow or wrist is seen above a shoulder: those that are not seen show nothing."""
-    seen = points[:, 2] >= least
-    shoulders, arms = points[_SHOULDERS][seen[_SHOULDERS]], points[_ARMS][seen[_ARMS]]
-    return bool(len(shoulders) and len(arms) and arms[:, 1].min() < shoulders[:, 1].max())
 
 
 def _off_centre(one: Detection, middle: float) -> float:

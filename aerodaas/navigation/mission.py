@@ -52,7 +52,7 @@ __all__ = ["Mission"]
 _ON_GROUND = frozenset({MissionState.IDLE, MissionState.PREFLIGHT})
 _LEAVING = frozenset({MissionState.RETURNING, MissionState.LANDING})
 _DRIFT = 0.5
-"""m/s along the ground, up to which the drone may begin to land: beyond, it flies past its place."""
+"""m/s along the ground, up to which the drone may begin to land; beyond, it flies past home."""
 _SETTLED = frozenset({VehicleMode.HOLDING, VehicleMode.GUIDED})
 
 
