@@ -298,7 +298,7 @@ class DispatcherActor(StreamActor):
         if answer.figures is not None:
             self._figures[task.id] = answer.figures
         if answer.lost:
-            self._lose(task, "its executor in the cloud is gone", now)
+            self._lose(task, answer.error, now)
         elif answer.timed_out:
             self._why[task.id] = "the cloud did not answer"
             self._guarded("finished", task, now, Outcome.TIMEOUT)
