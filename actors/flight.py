@@ -96,7 +96,8 @@ class Flight:
         are shown there to browsers.
         """
         self.plan = plan
-        self.recording = recording if plan.recorded else None
+        # The recorder on a cluster's node does not share our working directory.
+        self.recording = recording.absolute() if recording and plan.recorded else None
         self._drones: dict[str, str] = {}
         self._members: dict[str, _Member] = {}
         self._helpers: list[Any] = []
