@@ -41,7 +41,7 @@ def _ray_processes() -> dict[int, psutil.Process]:
 
 def _title(process: psutil.Process) -> str:
     with contextlib.suppress(psutil.Error, IndexError):
-        return process.cmdline()[0]
+        return str(process.cmdline()[0])
     return ""
 
 

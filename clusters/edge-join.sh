@@ -11,6 +11,7 @@
 #   AERODAAS_VENV        Python environment with aerodaas   (default: ~/aerodaas)
 #   AERODAAS_RESOURCES   what this node offers              (default: {"edge":1})
 #   RAY_AUTH_TOKEN_PATH  the cluster's token                (default: ~/.ray/auth_token)
+#   RAY_USE_TLS and the paths of certificates (docs/cluster.md), if the cluster speaks TLS
 set -eu
 
 fail() {

@@ -46,8 +46,9 @@ def encoded(item: object = FRAME) -> bytes:
 
 def result(executed: Executed) -> float:
     """What the analysis said."""
-    shade: float = decode_message(memoryview(executed.message)).item
-    return shade
+    message: Message[float] = decode_message(memoryview(executed.message))
+    assert message.item is not None
+    return message.item
 
 
 @pytest.fixture
