@@ -114,6 +114,7 @@ class StreamActor:
         self._reads = reads
         self._phase: Phase = "new"
         self._error: AeroDaaSError | None = None
+        self._started = threading.Event()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
@@ -152,6 +153,15 @@ class StreamActor:
         self._phase = "running"
         self._thread = threading.Thread(target=self._guard, name=self.name, daemon=True)
         self._thread.start()
+        self._started.set()
+
+    def await_start(self) -> None:
+        """Return once the actor runs; for a lifeline."""
+        self._started.wait()
+
+    def await_stop(self) -> None:
+        """Return when the actor is stopped; for a lifeline."""
+        self._stopping.wait()
 
     def deliver(self, stream: str, data: bytes) -> None:
         """Take a message from another node."""

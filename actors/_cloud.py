@@ -18,7 +18,7 @@ from ray.exceptions import RayError, RayTaskError
 
 from aerodaas.actors._costs import Executions
 from aerodaas.actors._parcels import Parcel, Parcels
-from aerodaas.actors.executor import Executed, UnpreparedError
+from aerodaas.actors.executor import FRAMES_KEPT, Executed, MissingFrameError, UnpreparedError
 from aerodaas.actors.streams import decode_message
 from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import Task
@@ -54,7 +54,7 @@ class CloudAnswer:
     """The result."""
     timed_out: bool = False
     lost: bool = False
-    """Its executor is gone."""
+    """Its executor is gone, or lacks the frame; `error` tells."""
     error: str = ""
     """What the analysis raised."""
     way: str = ""
@@ -70,6 +70,8 @@ class _Sent:
     """Mission time."""
     future: Future[Executed] | None = None
     parcel: Parcel | None = None
+    carries: bool = True
+    """The frame travels in this call; else it is named."""
     began: float = 0.0
     ended: float = 0.0
     problem: str = ""
@@ -98,6 +100,8 @@ class Cloud:
         """When the newest execution that was answered had been sent."""
         self._probe: Future[bool] | None = None
         self._preparing: Future[None] | None = None
+        self._carried: deque[tuple[str, int]] = deque(maxlen=FRAMES_KEPT)
+        """Frames that the executor knows."""
         self._probed = 0
 
     @property
@@ -134,6 +138,7 @@ class Cloud:
             probe, self._probe = self._probe, None
             if probe.exception() is None and probe.result():
                 self.gone = False
+                self._carried.clear()
                 self._answered_since = now
             elif probe.exception() is None:
                 self._prepare()
@@ -158,12 +163,20 @@ class Cloud:
             self._preparing = self.executor.handle.prepare.remote(works).future()
 
     def _carry(self, sent: _Sent, message: Message[Any], until: float) -> None:
-        """In the packing thread: code the frame, and start the execution."""
+        """In the packing thread: code the frame, and start the execution.
+
+        Calls arrive in the order in which they are made, so that a frame may be named at once.
+        """
         try:
-            sent.parcel = self.parcels.pack(message)
+            parcel = sent.parcel = self.parcels.pack(message)
+            sent.carries = parcel.name not in self._carried
+            if sent.carries:
+                self._carried.append(parcel.name)
+                self.parcels.bytes += len(parcel.data)
             sent.began = time.perf_counter()
             execute, left = self.executor.handle.execute, until - time.monotonic()
-            reference = execute.remote(sent.task.profile.model, sent.parcel.content, left)
+            data = parcel.data if sent.carries else b""
+            reference = execute.remote(sent.task.profile.model, parcel.name, data, left)
             sent.future = reference.future()
             sent.future.add_done_callback(lambda _: self._came_back(sent))
         except Exception as error:  # noqa: BLE001 - whatever it is, it must not be silence
@@ -181,15 +194,16 @@ class Cloud:
         try:
             executed = sent.future.result()
         except RayTaskError as error:
-            if isinstance(error.cause, UnpreparedError):
-                self.gone = True
-                return CloudAnswer(sent.task, lost=True)
+            if isinstance(error.cause, (UnpreparedError, MissingFrameError)):
+                self.gone |= isinstance(error.cause, UnpreparedError)
+                self._carried.clear()
+                return CloudAnswer(sent.task, lost=True, error=str(error.cause))
             self._answered_since = max(self._answered_since, sent.at)
             text = f"{type(error.cause).__name__}: {error.cause}"
             return CloudAnswer(sent.task, error=text, way=self.executor.site)
         except RayError:
             self.gone = True
-            return CloudAnswer(sent.task, lost=True)
+            return CloudAnswer(sent.task, lost=True, error="its executor in the cloud is gone")
         self._answered_since = max(self._answered_since, sent.at)
         return self._learned(sent, executed)
 
@@ -200,14 +214,14 @@ class Cloud:
         assert parcel is not None  # noqa: S101 - it was sent
         there = (hop.published - hop.received) / NANOSECONDS
         link = max(0.0, sent.ended - sent.began - there)
-        first = parcel.fresh
-        self.parcels.arrived(parcel, link, executed.decoding)
+        if sent.carries:
+            self.parcels.arrived(parcel, link, executed.decoding)
         self.executions.observe(sent.task.profile.model, there - executed.decoding)
         figures = {
             "link_ms": link * 1e3,
             "work_ms": (there - executed.decoding) * 1e3,
             "decode_ms": executed.decoding * 1e3,
-            "sent_kb": parcel.size / 1e3 if first else 0.0,
+            "sent_kb": len(parcel.data) / 1e3 if sent.carries else 0.0,
             "frame_kb": parcel.original / 1e3,
             "expected_way_ms": parcel.expected * 1e3,
         }

@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import os
-import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
-
-import ray
 
 from aerodaas.actors._coding import CODINGS, Coder, Coding, fastest
 from aerodaas.actors._costs import Link
@@ -35,38 +32,32 @@ _PATIENCE = 60.0
 class Parcel:
     """A frame on its way to a node."""
 
-    content: Any
-    """The encoded message or, so that it goes once to all who want it there, Ray's reference."""
+    name: tuple[str, int]
+    """Stream and number of the message."""
+    data: bytes
+    """The encoded message."""
     frame: Frame | None
     coding: Coding
-    size: int
     original: int
     """Bytes of the message before coding."""
     expected: float
     """Seconds of coding and way that were expected."""
-    fresh: bool = True
-    """True until an execution has told how long it travelled."""
 
 
 class Parcels:
     """Everything about the way to one node. `later` runs things in the thread that packs."""
 
-    def __init__(self, compression: str, *, shared: bool) -> None:
-        """`compression` is that of `ComputeConfig`; `shared` if several there may want a frame.
-
-        A frame that is not shared travels in the call, which saves round trips.
-        """
-        self._shared = shared
+    def __init__(self, compression: str) -> None:
+        """`compression` is that of `ComputeConfig`."""
         self.link = Link()
         self.chosen: dict[str, int] = {}
-        """Frames sent, by coding."""
+        """Frames coded, by coding."""
         self.bytes = 0
         """Sent in frames."""
         self._allowed = CODINGS[compression]
         self._coder = Coder()
         self._parcels: OrderedDict[tuple[str, int], Parcel] = OrderedDict()
         self._packer = ThreadPoolExecutor(1, "packer")
-        self._lock = threading.Lock()
         self._expected = 0.0
         self._pinged = self._transferred = float("-inf")
         self._pinging: Future[Any] | None = None
@@ -86,13 +77,9 @@ class Parcels:
         return parcel
 
     def arrived(self, parcel: Parcel, seconds: float, decoding: float) -> None:
-        """Learn from the first execution on a frame: `seconds` of way, and of decompressing."""
-        with self._lock:
-            if not parcel.fresh:
-                return
-            parcel.fresh = False
+        """Learn from the call that carried a frame: `seconds` of way, and of decompressing."""
         self._transferred = time.monotonic()
-        self.link.observe(parcel.size, seconds)
+        self.link.observe(len(parcel.data), seconds)
         if parcel.frame is not None and decoding > 0:
             self._coder.took_to_decode(parcel.frame, parcel.coding, decoding)
         parcel.frame = None
@@ -120,7 +107,7 @@ class Parcels:
 
     def _ping(self, executor: Any, size: int) -> None:  # noqa: ANN401
         # Random, so that no link compresses it.
-        data = self._content(os.urandom(size)) if size else b""
+        data = os.urandom(size)
         began = time.perf_counter()
         self._pinging = executor.ping.remote(data).future()
 
@@ -142,12 +129,8 @@ class Parcels:
                 message = _with_item(message, self._coder.encode(frame, coding))
         data = encode_message(message)
         self.chosen[coding] = self.chosen.get(coding, 0) + 1
-        self.bytes += len(data)
-        content = self._content(data)
-        return Parcel(content, frame, coding, len(data), original or len(data), self._expected)
-
-    def _content(self, data: bytes) -> Any:  # noqa: ANN401 - bytes, or a reference to them
-        return ray.put(data) if self._shared else data
+        name = (message.stream, message.seq)
+        return Parcel(name, data, frame, coding, original or len(data), self._expected)
 
 
 def _with_item(message: Message[Any], item: Any) -> Message[Any]:  # noqa: ANN401

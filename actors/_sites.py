@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict, deque
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -24,14 +24,8 @@ class Sites:
         self, executors: Sequence[Executor], timeout_ns: int, wake: Callable[[], None]
     ) -> None:
         """Use `executors`; `timeout_ns` and `wake` as of `Cloud`."""
-        # Processes of one node share its link, and frames cross it once for all of them.
-        models: defaultdict[str, set[str]] = defaultdict(set)
-        for one in executors:
-            models[one.site] |= one.models
-        parcels = {
-            one.site: Parcels(one.compression, shared=len(models[one.site]) > 1)
-            for one in executors
-        }
+        # Processes of one node share its link, and frames are coded once for all of them.
+        parcels = {one.site: Parcels(one.compression) for one in executors}
         self._clouds = [Cloud(one, parcels[one.site], timeout_ns, wake) for one in executors]
         self._parcels = parcels
         self._slots = {one.site: one.slots for one in executors}

@@ -84,26 +84,12 @@ class AnalyticsActor(StreamActor):
         """Belong to `session` as `name`."""
         super().__init__(session, name, {})
         self._workers: list[_Worker] = []
-        self._started = threading.Event()
 
     def prepare(self, *nodes: NodeSpec) -> ActorInfo:
         """Open the analyses `nodes`; raises what their `open` raises."""
         # Not in the constructor: Ray would keep the models in its object store for restarts.
         self._workers = [_Worker(self, node) for node in nodes]
         return super().prepare()
-
-    def start(self, origin_ns: int) -> None:
-        """Run in threads; mission time is zero at host time `origin_ns`."""
-        super().start(origin_ns)
-        self._started.set()
-
-    def await_start(self) -> None:
-        """Return once the analyses run; for a lifeline."""
-        self._started.wait()
-
-    def await_stop(self) -> None:
-        """Return when the actor is stopped; for a lifeline."""
-        self._stopping.wait()
 
     def _open(self) -> None:
         for worker in self._workers:

@@ -100,6 +100,8 @@ def _settings() -> dict[str, Any]:
     os.environ.setdefault("RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL", "minor")
     # A frame goes in the call that it is for: a reference costs round trips.
     os.environ.setdefault("RAY_max_direct_call_object_size", str(4 * 2**20))
+    # That an actor died is told at once; why it did, for which Ray would wait a second, may follow.
+    os.environ.setdefault("RAY_timeout_ms_task_wait_for_death_info", "100")
     return {"logging_level": logging.ERROR, "log_to_driver": False, "namespace": _NAMESPACE}
 
 

@@ -131,6 +131,8 @@ class DispatcherActor(StreamActor):
         self._counts = Counts()
         self._cloud: Sites | None = None
         self._lifelines: Lifelines | None = None
+        self._lives: deque[tuple[str, Life]] = deque()
+        """News of executors on the edge, from other threads."""
 
     def prepare(
         self,
@@ -146,7 +148,12 @@ class DispatcherActor(StreamActor):
         timeout = self._resources.cloud_timeout
         wake = self.inbox.wake
         self._cloud = Sites(cloud, timeout, wake) if cloud else None
-        self._lifelines = Lifelines(edge or {}, wake)
+
+        def tell(model: str, life: Life) -> None:
+            self._lives.append((model, life))
+            wake()
+
+        self._lifelines = Lifelines(edge or {}, tell)
         return info
 
     def _open(self) -> None:
@@ -162,14 +169,13 @@ class DispatcherActor(StreamActor):
 
     def _run(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first
-        assert self._lifelines is not None  # noqa: S101 - as above
         self._guarded("start", self._time())
         while not self.stopping:
             for message in self.inbox.receive(self._patience()):
                 self._wake_scheduler()
                 self._take(message)
-            for model, life in self._lifelines.news():
-                self._executor_is(model, life, self._time())
+            while self._lives:
+                self._executor_is(*self._lives.popleft(), self._time())
             if self.session.lockstep:
                 self._settle()
             else:
@@ -292,7 +298,7 @@ class DispatcherActor(StreamActor):
         if answer.figures is not None:
             self._figures[task.id] = answer.figures
         if answer.lost:
-            self._lose(task, "its executor in the cloud is gone", now)
+            self._lose(task, answer.error, now)
         elif answer.timed_out:
             self._why[task.id] = "the cloud did not answer"
             self._guarded("finished", task, now, Outcome.TIMEOUT)

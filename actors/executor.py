@@ -1,10 +1,14 @@
-"""The cloud's executor: runs analyses on frames that come as references, several at once."""
+"""The cloud's executor: runs analyses on frames, several at once.
+
+A frame travels in the first call that is about it; the calls that follow name it.
+"""
 
 from __future__ import annotations
 
 import threading
 import time
 from collections import OrderedDict
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from aerodaas.actors._coding import CodedFrame, decoded
@@ -16,13 +20,20 @@ from aerodaas.errors import AeroDaaSError
 from aerodaas.status import Hop, Message
 from aerodaas.vehicle import VehicleState
 
-__all__ = ["CloudExecutor", "Executed", "UnpreparedError"]
+__all__ = ["FRAMES_KEPT", "CloudExecutor", "Executed", "MissingFrameError", "UnpreparedError"]
 
-_FRAMES_KEPT = 4
+FRAMES_KEPT = 8
+"""Frames that can be named; the oldest gives way to the next."""
+_UNPACKING = 2.0
+"""Seconds that the thread with the call that carries a frame may take to unpack it."""
 
 
 class UnpreparedError(AeroDaaSError):
     """An executor that Ray has restarted holds no analyses yet."""
+
+
+class MissingFrameError(AeroDaaSError):
+    """An executor does not know the frame that a call names."""
 
 
 class Executed(NamedTuple):
@@ -31,7 +42,7 @@ class Executed(NamedTuple):
     message: bytes
     """The message, encoded, with the result in it; its last hop tells how long it was here."""
     decoding: float
-    """Seconds of it that went into decompressing the frame; 0 where another analysis had."""
+    """Seconds of it that went into decompressing the frame; 0 where the frame was named."""
 
 
 class CloudExecutor:
@@ -41,8 +52,8 @@ class CloudExecutor:
         """Hold nothing yet: the analyses would be kept for restarts."""
         self._analyses: dict[str, Analytics[Any]] = {}
         self._turns: dict[str, threading.Lock] = {}
-        self._frames: OrderedDict[tuple[str, int], Any] = OrderedDict()
-        self._decoding = threading.Lock()
+        self._frames: OrderedDict[tuple[str, int], Message[Any]] = OrderedDict()
+        self._unpacked = threading.Condition()
 
     def prepare(self, analyses: dict[str, Analytics[Any]]) -> None:
         """Open the analyses, by stream."""
@@ -59,37 +70,48 @@ class CloudExecutor:
         """Answer at once, to measure the way here; returns the number of bytes."""
         return len(data)
 
-    def execute(self, stream: str, data: bytes, budget: float | None = None) -> Executed:
-        """Analyse the item of an encoded message within `budget` seconds, if it can hurry."""
+    def execute(
+        self, analysis: str, frame: tuple[str, int], data: bytes, budget: float | None = None
+    ) -> Executed:
+        """Analyse a frame within `budget` seconds, if the analysis can hurry.
+
+        `frame` is the stream and number of its message; `data` the encoded message, or nothing
+        where an earlier call carried it. Raises MissingFrameError if none did.
+        """
         if not self._analyses:
             raise UnpreparedError("the executor in the cloud was restarted")
         received = host_time_ns()
-        message = decode_message(memoryview(data))
-        item, decoding = self._decoded(message)
+        message, decoding = self._unpack(frame, data) if data else (self._named(frame), 0.0)
         context = _Context(message.header.stamp, budget)
-        work, turn = self._analyses[stream], self._turns.get(stream)
+        work, turn = self._analyses[analysis], self._turns.get(analysis)
         if turn is None:
-            result = work.process(item, context)
+            result = work.process(message.item, context)
         else:
             with turn:
-                result = work.process(item, context)
-        fields = (message.stream, message.seq, message.stamp, message.header, message.captured)
-        hops = (*message.hops, Hop(stream, received, host_time_ns()))
-        return Executed(encode_message(Message(*fields, hops, result)), decoding)
+                result = work.process(message.item, context)
+        hops = (*message.hops, Hop(analysis, received, host_time_ns()))
+        return Executed(encode_message(replace(message, hops=hops, item=result)), decoding)
 
-    def _decoded(self, message: Message[Any]) -> tuple[Any, float]:
-        """The item, decompressed once for all analyses here, and the seconds that it took."""
-        if not isinstance(message.item, CodedFrame):
-            return message.item, 0.0
-        key = (message.stream, message.seq)
-        with self._decoding:
-            if key in self._frames:
-                return self._frames[key], 0.0
+    def _unpack(self, frame: tuple[str, int], data: bytes) -> tuple[Message[Any], float]:
+        """The message with its picture decompressed, and the seconds that this took."""
+        message, decoding = decode_message(memoryview(data)), 0.0
+        if isinstance(message.item, CodedFrame):
             began = time.perf_counter()
-            self._frames[key] = decoded(message.item)
-            while len(self._frames) > _FRAMES_KEPT:
+            message = replace(message, item=decoded(message.item))
+            decoding = time.perf_counter() - began
+        with self._unpacked:
+            self._frames[frame] = message
+            while len(self._frames) > FRAMES_KEPT:
                 self._frames.popitem(last=False)
-            return self._frames[key], time.perf_counter() - began
+            self._unpacked.notify_all()
+        return message, decoding
+
+    def _named(self, frame: tuple[str, int]) -> Message[Any]:
+        # The call that carries it came first, but another thread may still be at it.
+        with self._unpacked:
+            if not self._unpacked.wait_for(lambda: frame in self._frames, _UNPACKING):
+                raise MissingFrameError("the executor in the cloud lacks the frame")
+            return self._frames[frame]
 
 
 class _Context:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
+import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import ray
-from ray.exceptions import RayActorError, RayTaskError
+from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
 from typing_extensions import Self
 
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors._cloud import Executor
 from aerodaas.actors._ending import end_actors
-from aerodaas.actors._lifeline import LIFE
+from aerodaas.actors._lifeline import ASKED_AGAIN, LIFE, LIFELINES, Life, Lifelines
 from aerodaas.actors._offload import CloudProcess
 from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.caretaker import Caretaker
@@ -70,11 +70,11 @@ class _Member:
     handle: Any
     setup: tuple[Any, ...]
     """What `prepare` is given."""
+    restarts: int
+    """How often Ray restarts it."""
     info: ActorInfo | None = None
     report: ActorReport = field(default_factory=lambda: ActorReport("new"))
     pending: ray.ObjectRef[ActorReport] | None = None
-    reviving: ray.ObjectRef[ActorInfo] | None = None
-    """Under way after a restart."""
     lost_at: float | None = None
     """Host's monotonic seconds at which it was found dead; None while it lives."""
 
@@ -96,7 +96,8 @@ class Flight:
         are shown there to browsers.
         """
         self.plan = plan
-        self.recording = recording if plan.recorded else None
+        # The recorder on a cluster's node does not share our working directory.
+        self.recording = recording.absolute() if recording and plan.recorded else None
         self._drones: dict[str, str] = {}
         self._members: dict[str, _Member] = {}
         self._helpers: list[Any] = []
@@ -105,6 +106,7 @@ class Flight:
         self._job = ray.get_runtime_context().get_job_id()
         self._caretaker: Any = None
         self._opening: list[Any] = []
+        self._lifelines: Lifelines | None = None
         session, edge = plan.session, Place()
         environments = _environments(plan)
         for specs, place in zip(plan.drones, plan.edges, strict=True):
@@ -164,6 +166,8 @@ class Flight:
         for member in reversed(self._members.values()):
             member.handle.start.remote(self._origin)
             member.report = ActorReport("running")
+        mortal = {name: m.handle for name, m in self._members.items() if m.restarts}
+        self._lifelines = Lifelines(mortal, self._life_of)
 
     def poll(self, newest: int = 200) -> FlightState:
         """Ask how everyone fares, with the `newest` latencies of each robot.
@@ -211,6 +215,8 @@ class Flight:
         if self._stopped:
             return self.reports()
         self._stopped = True
+        if self._lifelines is not None:
+            self._lifelines.end()
         last = end_actors(self._in_ending_order(), self._helpers)
         for member in self._members.values():
             member.report = last.get(member.handle, member.report)
@@ -246,12 +252,12 @@ class Flight:
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         remote: Any = ray.remote
-        if kind is AnalyticsActor:
+        if restarts:
             # Calls that wait for its life to end must not keep others waiting.
-            remote = remote(concurrency_groups={LIFE: 1})
+            remote = remote(concurrency_groups={LIFE: LIFELINES})
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}
         made = remote(kind).options(**placed)
-        self._members[name] = _Member(name, made.remote(*args, **kwargs), setup)
+        self._members[name] = _Member(name, made.remote(*args, **kwargs), setup, restarts)
 
     def _options(self, name: str, place: Place, *, restarts: int) -> dict[str, Any]:
         """Ray's options; in a cluster that outlives us, actors do too, and have a name."""
@@ -304,33 +310,27 @@ class Flight:
             _require_clock(member.name, info, began)
             member.info = info
             progress(member.name)
-        self._connect(members)
-
-    def _connect(self, members: list[_Member]) -> None:
-        """Tell publishers of their readers on other nodes, or without shared memory."""
-        known = [member for member in self._members.values() if member.info is not None]
-        references = []
-        for member in members:
-            assert member.info is not None  # noqa: S101 - just prepared
-            here = member.info
-            routes = {
-                stream: [
-                    reader.handle
-                    for reader in known
-                    if reader.info is not None
-                    and stream in reader.info.reads
-                    and not _share_memory(here, reader.info)
-                ]
-                for stream in here.publishes
-            }
-            routes = {stream: readers for stream, readers in routes.items() if readers}
-            references.append(member.handle.connect.remote(routes))
-        for reference in references:
+        for reference in [self._connect(member) for member in members]:
             self._ask(reference)
+
+    def _connect(self, member: _Member) -> Any:  # noqa: ANN401 - Ray's reference
+        """Tell a publisher of its readers on other nodes, or without shared memory."""
+        here = member.info
+        assert here is not None  # noqa: S101 - just prepared
+        known = [(one.handle, one.info) for one in self._members.values() if one.info is not None]
+        routes = {
+            stream: [
+                handle
+                for handle, reader in known
+                if stream in reader.reads and not _share_memory(here, reader)
+            ]
+            for stream in here.publishes
+        }
+        routes = {stream: readers for stream, readers in routes.items() if readers}
+        return member.handle.connect.remote(routes)
 
     def _gather_reports(self) -> None:
         for member in self._members.values():
-            self._revive(member)
             if member.pending is None:
                 member.pending = member.handle.report.remote()
             ready, _ = ray.wait([member.pending], timeout=0.05)
@@ -340,7 +340,11 @@ class Flight:
             try:
                 member.report = ray.get(reference)
             except RayActorError:
-                self._lost(member)
+                if member.name in self._ids():
+                    raise MissionError(f"the actor {member.name} died") from None
+                # Of those with a lifeline, that tells, and sooner.
+                if not member.restarts:
+                    self._lost(member)
             except RayTaskError as error:
                 # An actor that can't say how it fares is no reason to leave the drones alone.
                 reason = MissionError(f"no report from {member.name}: {error.cause}")
@@ -359,36 +363,50 @@ class Flight:
             }
         )
 
+    def _life_of(self, name: str, life: Life) -> None:
+        """Take note, in any thread, that an actor died, serves, or will not come back."""
+        member = self._members[name]
+        if life == "serving":
+            self._back(member)
+        elif member.lost_at is None:
+            self._lost(member)
+            threading.Thread(target=self._revive, args=(member,), daemon=True).start()
+
     def _lost(self, member: _Member) -> None:
-        """A dead actor is reported; Ray restarts analytics, the next report finds it new."""
         error = MissionError(f"the actor {member.name} died")
-        if member.name in self._ids():
-            raise error
         if member.lost_at is None:
             member.lost_at = time.monotonic()
             self._note("actor_lost", str(error))
         member.report = ActorReport("failed", error)
+
+    def _back(self, member: _Member) -> None:
+        if member.lost_at is not None:
+            absence = time.monotonic() - member.lost_at
+            member.lost_at = None
+            member.report = ActorReport("running")
+            self._note("actor_back", f"{member.name} is back after {absence:.1f} s")
 
     def _note(self, kind: str, text: str) -> None:
         for name in self._ids():
             self._members[name].handle.note.remote(kind, text)
 
     def _revive(self, member: _Member) -> None:
-        """Set an actor up that Ray has restarted, without waiting: the drones need our word."""
-        if member.reviving is None:
-            if member.report.phase == "new" and member.info is not None:
-                member.reviving = member.handle.prepare.remote(*member.setup)
-        elif ray.wait([member.reviving], timeout=0)[0]:
-            reference, member.reviving = member.reviving, None
-            with contextlib.suppress(AeroDaaSError):  # it died again, or its next report says why
-                member.info = self._ask(reference)
-                self._connect([member])
-                member.handle.start.remote(self._origin)
-                member.report = ActorReport("running")
-                if member.lost_at is not None:
-                    absence = time.monotonic() - member.lost_at
-                    member.lost_at = None
-                    self._note("actor_back", f"{member.name} is back after {absence:.1f} s")
+        """Set an actor up anew, in a thread, as soon as Ray has restarted it."""
+        actor, lost_at = member.handle, member.lost_at
+        while member.lost_at == lost_at and not self._stopped:
+            try:
+                if ray.get(actor.report.remote()).phase == "new":
+                    member.info = ray.get(actor.prepare.remote(*member.setup))
+                    self._connect(member)
+                    ray.get(actor.start.remote(self._origin))
+            except ActorUnavailableError:
+                pass  # it is not there yet, or no longer
+            except RayTaskError as error:
+                self._note("actor_failed", f"{member.name} cannot start again: {error.cause}")
+                return
+            except RayActorError:
+                return
+            time.sleep(ASKED_AGAIN)
 
     @staticmethod
     def _ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN401 - as it says

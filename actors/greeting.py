@@ -19,6 +19,7 @@ import ray
 from ray._raylet import GcsClient  # type: ignore[attr-defined]  # compiled
 from ray.exceptions import RayError, RpcError
 
+from aerodaas.actors._encryption import require_same_encryption
 from aerodaas.errors import AeroDaaSError
 
 __all__ = ["greet", "listener_of"]
@@ -32,6 +33,8 @@ _TOKEN_ADVICE = (
 
 def greet(address: str) -> None:
     """Make sure that a cluster listens at `address`, takes our token and runs our versions.
+
+    And that either both ends speak TLS, and trust each other, or neither does.
 
     Raises AeroDaaSError that says what to mend.
     """
@@ -47,6 +50,7 @@ def greet(address: str) -> None:
         ) from None
     if address.startswith("ray://"):
         return
+    require_same_encryption(address, listener)
     _take_up_token()
     _compare(address, _metadata(address))
 

@@ -11,6 +11,7 @@
 #   AERODAAS_VENV        Python environment with aerodaas   (default: ~/aerodaas)
 #   AERODAAS_RESOURCES   what this node offers              (default: {"edge":1})
 #   RAY_AUTH_TOKEN_PATH  the cluster's token                (default: ~/.ray/auth_token)
+#   RAY_USE_TLS and the paths of certificates (docs/cluster.md), if the cluster speaks TLS
 set -eu
 
 fail() {
@@ -38,6 +39,8 @@ export RAY_gcs_rpc_server_reconnect_timeout_s="${RAY_gcs_rpc_server_reconnect_ti
 export RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL=minor
 # A frame goes to the cloud in the call that it is for, instead of by a reference.
 export RAY_max_direct_call_object_size=4194304
+# The death of an actor is told a second earlier than Ray would.
+export RAY_timeout_ms_task_wait_for_death_info=100
 export RAY_AUTH_MODE="${RAY_AUTH_MODE:-token}"
 export RAY_USAGE_STATS_ENABLED=0
 

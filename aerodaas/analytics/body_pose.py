@@ -9,11 +9,12 @@ from pathlib import Path
 from typing import Any, ClassVar, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from typing_extensions import Self
 
+from aerodaas.analytics.arms import raised_arm
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.debounce import Debounce
+from aerodaas.analytics.downfall import Downfall
 from aerodaas.analytics.gestures import GESTURE_MODEL, POINTS, GestureClassifier
 from aerodaas.analytics.lying import lies
 from aerodaas.analytics.tracking import Tracker
@@ -34,8 +35,6 @@ _VEST_AGE = 1.0
 """Seconds for which the boxes of vests tell who wears one."""
 _SAME_BODY = 0.6
 """Two boxes of which the smaller lies in the other by more than this share are of one body."""
-_SHOULDERS, _ARMS = slice(5, 7), slice(7, 11)
-"""Rows of COCO's keypoints; the arms are elbows and wrists."""
 _MOST_PEOPLE = 100
 """A pose model's own limit is far above what can be told apart in a picture."""
 
@@ -113,6 +112,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         """Track of the person who counts."""
         self.unusable = 0
         """Bodies so far whose keypoints could not be used."""
+        self._downfall = Downfall(min_confidence)
         self._events = {name: Debounce(needed, of, hold) for name in _TEXTS}
         self._vests: Detections | None = None
         self._streams = 0
@@ -181,12 +181,16 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         people = self._people(found)
         chosen = self._choose(people)
         gesture = self._gesture(chosen, found)
+        upright = gesture is not None and gesture[0] == "upright"
+        down = self._downfall.shows(chosen, people, upright=upright)
+        if down:
+            gesture = "fallen", self.min_probability
         for name, event in self._events.items():
             event.update(stamp, gesture is not None and gesture[0] == name)
             if event.began:
                 context.alert(Alert(found.header, name, _TEXTS[name]))
         if chosen is None:
-            return people
+            return self._with_missing(people) if down else people
         label, score = gesture or ("person", chosen.score)
         active = [name for name, event in self._events.items() if event.active]
         if active and label not in active:
@@ -195,6 +199,13 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
             label = "person"
         mine = replace(chosen, label=label, score=score)
         return replace(people, items=tuple(mine if one is chosen else one for one in people))
+
+    def _with_missing(self, people: Detections) -> Detections:
+        """Add one who fell out of the picture, where last seen, once that is confirmed."""
+        last = self._downfall.last
+        if last is None or not self._events["fallen"].active:
+            return people
+        return replace(people, items=(*people.items, replace(last, label="fallen")))
 
     def _people(self, found: Detections) -> Detections:
         """Return those whose body can be looked at, with their tracks."""
@@ -235,7 +246,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
             return "fallen", max(self.min_probability, told[1] if told is not None else 0.0)
         if told is None or told[1] < self.min_probability:
             return None
-        if told[0] == "hand_raised" and not _arm_is_up(chosen.keypoints, least):
+        if told[0] == "hand_raised" and not raised_arm(chosen.keypoints, least):
             return None
         return told
 
@@ -290,13 +301,6 @@ def _shared(one: Detection, other: Detection) -> float:
     width = min(one.box[2], other.box[2]) - max(one.box[0], other.box[0])
     height = min(one.box[3], other.box[3]) - max(one.box[1], other.box[1])
     return max(0.0, width) * max(0.0, height) / max(min(one.area, other.area), 1e-9)
-
-
-def _arm_is_up(points: NDArray[np.float32], least: float) -> bool:
-    """Whether an elbow or wrist is seen above a shoulder: those that are not seen show nothing."""
-    seen = points[:, 2] >= least
-    shoulders, arms = points[_SHOULDERS][seen[_SHOULDERS]], points[_ARMS][seen[_ARMS]]
-    return bool(len(shoulders) and len(arms) and arms[:, 1].min() < shoulders[:, 1].max())
 
 
 def _off_centre(one: Detection, middle: float) -> float:

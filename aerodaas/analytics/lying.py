@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aerodaas.data import Detections
 from aerodaas.navigation.ground import GroundView
 
-__all__ = ["lies"]
+__all__ = ["feet_below", "lies"]
 
 _UPPER, _HIPS = slice(0, 7), slice(11, 13)
 """Head and shoulders; hips."""
@@ -31,6 +31,12 @@ _HIPS_LOW = (0.7, 0.51)
 
 _PAIR = 2
 
+_LEGS = ((_ANKLES, 0.08), (_KNEES, 0.5), (_HIPS, 0.93))
+"""Joints, and their height in metres while an adult stands (Drillis and Contini, 1966)."""
+
+_ABOVE = 0.3
+"""Metres from joints up to a camera that tells by them where somebody stands."""
+
 _NEAREST = 0.3
 """Metres from below the camera, nearer than which angles tell nothing."""
 
@@ -46,7 +52,7 @@ def lies(keypoints: NDArray[np.floating], seen: Detections, min_confidence: floa
         view = GroundView(seen)
     except ValueError:
         return None
-    known = np.isfinite(keypoints).all(axis=1) & (keypoints[:, 2] >= min_confidence)
+    known = _known(keypoints, min_confidence)
     upper = next((part for part in (_UPPER, _HIPS) if known[part].sum() >= _PAIR), None)
     lower = next((part for part in (_ANKLES, _KNEES) if known[part].sum() >= _PAIR), None)
     if upper is None or lower is None:
@@ -62,3 +68,24 @@ def lies(keypoints: NDArray[np.floating], seen: Detections, min_confidence: floa
     near = max(_NEAREST, float(np.hypot(*foot)))
     lift = view.height * (1.0 - near / max(near, float(np.hypot(*top))))
     return lift < (_LOW if upper is _UPPER else _HIPS_LOW[lower is _KNEES])
+
+
+def feet_below(
+    keypoints: NDArray[np.floating], view: GroundView, min_confidence: float
+) -> NDArray[np.float64] | None:
+    """Where one stands who does, metres forward and left, by the lowest pair of joints seen.
+
+    None if that is too high for this camera to tell, or there is none.
+    """
+    known = _known(keypoints, min_confidence)
+    for part, up in _LEGS:
+        if known[part].sum() == _PAIR:
+            if view.height - up < _ABOVE:
+                return None
+            place = view.points(keypoints[part, :2].astype(np.float64), up).mean(axis=0)
+            return place if np.isfinite(place).all() else None
+    return None
+
+
+def _known(keypoints: NDArray[np.floating], least: float) -> NDArray[np.bool_]:
+    return np.asarray(np.isfinite(keypoints).all(axis=1) & (keypoints[:, 2] >= least))

@@ -29,6 +29,8 @@ _SLIM = {
     "RAY_prestart_worker_first_driver": "0",
     # A frame goes in the call that it is for: a reference costs round trips.
     "RAY_max_direct_call_object_size": "4194304",
+    # That an actor died is told at once; why it did, for which Ray would wait a second, may follow.
+    "RAY_timeout_ms_task_wait_for_death_info": "100",
 }
 
 

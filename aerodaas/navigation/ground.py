@@ -14,6 +14,7 @@ __all__ = ["GroundView"]
 
 Array = NDArray[np.float64]
 _CORNERS = 64
+_STEEPEST = 1e-6
 _LOWEST = 0.05
 """Metres; a camera that lies on the ground sees none of it."""
 
@@ -49,13 +50,31 @@ class GroundView:
             dtype=np.float64,
         )
 
-    def points(self, pixels: Array) -> Array:
-        """Ground points (N, 2) of the pixels (N, 2); NaN at and above the horizon."""
+    def points(self, pixels: Array, up: float = 0.0) -> Array:
+        """Ground points (N, 2) below what is `up` metres high at the pixels (N, 2).
+
+        NaN at and above the horizon; `up` must be less than the camera's height.
+        """
         rays = self._rays(pixels)
         down = -rays[:, 2]
         with np.errstate(divide="ignore", invalid="ignore"):
-            reach = np.where(down > 0, self.height / down, np.nan)
+            reach = np.where(down > 0, (self.height - up) / down, np.nan)
         return np.asarray(self._eye[:2] + reach[:, None] * rays[:, :2])
+
+    def height_above(self, point: Array, pixel: Array) -> float:
+        """Metres above the ground of what is seen at `pixel` (2,), if it is above `point` (2,)."""
+        (ray,) = self._rays(pixel[None])
+        away = float(np.hypot(*(point - self._eye[:2])))
+        return self.height + away * float(ray[2] / max(np.hypot(*ray[:2]), _STEEPEST))
+
+    def sees(self, point: Array) -> bool:
+        """Whether `point` (3,), forward, left and up from the ground below, is in the picture."""
+        eye = np.array([*self._eye[:2], self.height])
+        across, down, depth = self._rotation.T @ (point - eye)
+        if depth <= 0:
+            return False
+        pixel = (self._focal * (across, down) / depth + self._centre) / self._scale
+        return bool(((pixel >= 0) & (pixel <= self._corners[2])).all())
 
     def area(self, farthest: float) -> float:
         """Square metres of ground in the picture within `farthest` metres of the camera's foot."""

@@ -51,6 +51,8 @@ __all__ = ["Mission"]
 
 _ON_GROUND = frozenset({MissionState.IDLE, MissionState.PREFLIGHT})
 _LEAVING = frozenset({MissionState.RETURNING, MissionState.LANDING})
+_DRIFT = 0.5
+"""m/s along the ground, up to which the drone may begin to land; beyond, it flies past home."""
 _SETTLED = frozenset({VehicleMode.HOLDING, VehicleMode.GUIDED})
 
 
@@ -413,7 +415,9 @@ class Mission:
         above = np.array([self.home[0], self.home[1], self._return_height])
         way = above - position
         late = seconds(self._now - self._machine.since) > self.limits.return_timeout
-        if late or math.hypot(way[0], way[1]) <= self.limits.arrival_radius:
+        drift = math.hypot(*state.odometry.velocity[:2])
+        arrived = math.hypot(way[0], way[1]) <= self.limits.arrival_radius
+        if late or (arrived and drift <= _DRIFT):
             reason = self._machine.reason
             self._to(
                 MissionState.LANDING, f"the return took too long; {reason}" if late else reason

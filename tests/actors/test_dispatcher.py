@@ -15,7 +15,7 @@ import pytest
 import schedulers_at_fault
 from flying import Flyer, hop, robot
 
-from aerodaas import Environment
+from aerodaas import AeroStreamData, Environment
 from aerodaas.actors.dispatcher import DispatcherActor
 from aerodaas.actors.session import Session
 from aerodaas.analytics import SyntheticAnalytics
@@ -164,6 +164,47 @@ def test_a_task_whose_deadline_is_too_near_is_not_tried_again(flyer: Flyer) -> N
         "edge: its executor on the edge died",
         "its executor on the edge is down",
     }
+
+
+@pytest.mark.slow
+def test_a_dispatcher_that_dies_comes_back_without_being_asked(
+    flyer: Flyer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Though the application never asks how it fares; no task ends twice, one stretch is lost."""
+    monkeypatch.setattr("aerodaas.run._BEAT_SECONDS", 3600.0)
+    results: list[AeroStreamData[Any]] = []
+
+    def build(env: Environment) -> None:
+        env.set_analytics_scheduler("edf")
+        drone = env.get_robot_by_id("drone")
+        model = SyntheticAnalytics("model", 20.0, 0.0)
+        model.deploy(env.get_compute_resource_by_id("edge"))
+        results.append(model.analyse(drone.get_sensor_by_id("camera").get_data_stream()))
+        drone.navigate(hop((1, 0), hover=600))
+
+    with flyer.flying(build, _environment(5.0, edge_time=50, deadline=1000), speed=1.0) as env:
+        env.launch()
+        _hear(results[0], 5)
+        killed = _pid(env, "dispatcher")
+        os.kill(killed, signal.SIGKILL)
+        while _pid(env, "dispatcher") == killed:
+            time.sleep(0.05)
+        _hear(results[0], 5)
+        env.get_robot_by_id("drone").end_mission()
+    run = env.launch()
+    alerts = _alerts(run)
+    assert alerts["actor_lost"] == ["the actor dispatcher died"]
+    assert len(alerts["actor_back"]) == 1
+    ends = [one["task"] for one in _decisions(run) if one["action"] not in {"edge", "cloud"}]
+    assert max(Counter(ends).values()) == 1
+    numbers = {int(task.rpartition("#")[2]) for task in ends}
+    lost = set(range(min(numbers), max(numbers))) - numbers
+    assert lost == set(range(min(lost), max(lost) + 1))
+
+
+def _hear(stream: AeroStreamData[Any], count: int) -> None:
+    for _ in range(count):
+        stream.get_data(60.0)
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 import uuid
@@ -11,12 +12,12 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 import ray
+from ray.exceptions import ActorUnavailableError
 
 from aerodaas import Analytics, Frame
 from aerodaas.actors._cloud import CloudAnswer, Executor
-from aerodaas.actors._parcels import Parcels
 from aerodaas.actors._sites import Sites
-from aerodaas.actors.executor import CloudExecutor
+from aerodaas.actors.executor import FRAMES_KEPT, CloudExecutor
 from aerodaas.analytics.base import Context, TimedContext
 from aerodaas.clock import NANOSECONDS, host_time_ns
 from aerodaas.data import Header
@@ -210,12 +211,52 @@ def test_of_two_the_quicker_is_used_and_the_other_when_it_is_gone(
     desk.sites.finish(1.0)
 
 
-def test_a_frame_for_one_analysis_travels_in_its_call(runtime: None) -> None:  # noqa: ARG001
-    """A reference would cost round trips; it is for frames that several may want."""
-    image = np.arange(48, dtype=np.uint8).reshape(4, 4, 3)
-    frame = Frame(Header(1, 2, "camera"), image)
-    message: Message[Any] = Message("camera", 1, 2, frame.header, 3, (), frame)
-    alone = Parcels("none", shared=False).pack(message)
-    shared = Parcels("none", shared=True).pack(message)
-    assert isinstance(alone.content, bytes)
-    assert ray.get(shared.content) == alone.content
+def test_a_frame_that_an_executor_lacks_is_told_and_carried_again(
+    started: Callable[..., Executor],
+) -> None:
+    """It was restarted and nobody saw: the execution is lost with the reason, the next one done."""
+    executor = started(one=Mean(), two=Mean())
+    desk = Desk(executor)
+    frame = desk.frame()
+    desk.send("one", frame)
+    desk.answers(1)
+    ray.kill(executor.handle, no_restart=False)
+    _until_prepared(executor)
+    desk.send("two", frame)
+    (answer,) = desk.answers(1)
+    assert answer.lost
+    assert answer.error == "the executor in the cloud lacks the frame"
+    assert desk.sites.slots == 4, "the executor itself is there"
+    desk.send("two", frame)
+    (answer,) = desk.answers(1)
+    assert answer.message is not None
+    assert answer.figures is not None
+    assert answer.figures["sent_kb"] > 0
+    desk.sites.finish(1.0)
+
+
+def test_frames_that_an_executor_no_longer_keeps_are_carried_again(
+    started: Callable[..., Executor],
+) -> None:
+    """Both ends forget the same frames, so that no call is in vain."""
+    desk = Desk(started(one=Mean(), two=Mean()))
+    frames = [desk.frame() for _ in range(FRAMES_KEPT + 1)]
+    for frame in frames:
+        desk.send("one", frame)
+        desk.answers(1)
+    for frame, carried in ((frames[0], True), (frames[-1], False)):
+        desk.send("two", frame)
+        (answer,) = desk.answers(1)
+        assert answer.message is not None
+        assert answer.figures is not None
+        assert (answer.figures["sent_kb"] > 0) == carried
+    desk.sites.finish(1.0)
+
+
+def _until_prepared(executor: Executor) -> None:
+    end = time.monotonic() + 120
+    while time.monotonic() < end:
+        with contextlib.suppress(ActorUnavailableError):
+            ray.get(executor.handle.prepare.remote(executor.works[0]))
+            return
+        time.sleep(0.1)

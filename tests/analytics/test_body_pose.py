@@ -99,6 +99,18 @@ def test_a_fall_alerts_once(turn: float) -> None:
     assert not fallen(watch.see(22, body(Posture(), ahead=5.0, turn=turn)))
 
 
+def test_who_falls_out_of_the_picture_is_told_and_shown_where_last_seen() -> None:
+    """So that a trigger by `fallen` fires, too; a person who is merely gone is not."""
+    for shares, told in (((0.1, 0.3, 0.42), ["fallen"]), ((), [])):
+        watch = Watch()
+        watch.see(10, body(Posture(), ahead=2.0, turn=0.0))
+        for share in shares:
+            watch.see(1, body(Posture(fallen=share), ahead=2.0, turn=0.0))
+        result = watch.see(7)
+        assert [alert.kind for alert in watch.alerts] == told
+        assert fallen(result) is bool(told)
+
+
 def test_a_moment_is_no_gesture() -> None:
     """Three frames in a row, less than the four that it takes, tell nothing."""
     watch = Watch()

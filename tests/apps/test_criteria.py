@@ -119,6 +119,16 @@ def test_an_order_of_states_is_exact() -> None:
     assert not GOOD["states"](replace(evidence, robot=extra)).holds
 
 
+def test_a_moments_wait_for_a_plan_is_no_state() -> None:
+    """As long as it is one: a drone that hangs about is seen."""
+    evidence = flight()
+    for wait, holds in ((0.1, True), (2.0, False)):
+        planning = Band("holding", 8.0 - wait, 8.0, "waiting for a plan")
+        bands = [*evidence.robot.bands[:3], planning, *evidence.robot.bands[3:]]
+        robot = replace(evidence.robot, bands=bands)
+        assert GOOD["states"](replace(evidence, robot=robot)).holds is holds
+
+
 def test_a_resumed_plan_is_seen() -> None:
     """A waypoint that was to be dropped and was visited."""
     evidence = flight()

@@ -7,6 +7,7 @@ from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -186,7 +187,17 @@ class Told:
         ]
         return min(times) - after if times else float("inf")
 
+    def longest_gap(self, after: float) -> float:
+        """Longest stretch of seconds from `after` on without a result in time."""
+        done = sorted(t for ends in self.ends.values() for t, end, _ in ends if end == "done")
+        times = [after, *(t for t in done if t > after)]
+        return max((late - early for early, late in pairwise(times)), default=float("inf"))
+
     def summary(self) -> str:
-        """What became of all tasks."""
-        counts = Counter(end for ends in self.ends.values() for _, end, _ in ends)
+        """What became of all tasks, and why some failed."""
+        counts = Counter(
+            f"failed ({why})" if end == "failed" else end
+            for ends in self.ends.values()
+            for _, end, why in ends
+        )
         return ", ".join(f"{count} {end}" for end, count in sorted(counts.items()))

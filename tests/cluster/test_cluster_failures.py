@@ -57,7 +57,11 @@ def watched(edge_cloud: EdgeCloud, tmp_path: Path) -> Watched:
 def report(what: str, told: Told, watched: Watched, where: str = "") -> None:
     """State what a failure cost; shown with `pytest -rP`."""
     seconds = told.recovery(watched.broken_at, where)
-    print(f"{what}: next result in time after {seconds:.2f} s; tasks: {told.summary()}")  # noqa: T201
+    gap = told.longest_gap(watched.broken_at)
+    print(  # noqa: T201
+        f"{what}: next result in time after {seconds:.2f} s, longest without any {gap:.2f} s; "
+        f"tasks: {told.summary()}"
+    )
 
 
 def on_clouds(nodes: EdgeCloud, act: Callable[[str], None]) -> None:

@@ -61,6 +61,17 @@ def test_low_battery_returns_and_critical_lands() -> None:
     assert critical.states[-2] is S.LANDING
 
 
+def test_a_drone_that_flies_past_home_does_not_land_there() -> None:
+    """It comes back and stands still above its place first, however wide the arrival."""
+    limits = LimitsConfig(arrival_radius=2.0, cruise_speed=4.0, max_speed=5.0)
+    fast = flight(add(Waypoint("far", 20, 0, 1.5)), limits=limits)
+    fast.run_to(S.LANDING)
+    assert math.hypot(*fast.vehicle.velocity[:2]) <= 0.5
+    fast.run()
+    fast.expect(S.LANDED)
+    assert math.hypot(*fast.vehicle.position[:2]) < 1.0
+
+
 def test_return_is_earlier_where_home_is_far() -> None:
     """The charge at which the drone turns back grows with the way home."""
     limits = LimitsConfig(endurance=100.0, battery_return=0.2, battery_land=0.1)

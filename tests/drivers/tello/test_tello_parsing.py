@@ -9,7 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.drivers.tello.battery import BatteryGauge
-from aerodaas.drivers.tello.commands import ENTER, TAKE_OFF, VERSION, Command, ports
+from aerodaas.drivers.tello.commands import (
+    ENTER,
+    LAND,
+    STREAM_ON,
+    TAKE_OFF,
+    VERSION,
+    Command,
+    ports,
+)
 from aerodaas.drivers.tello.state import parse_state
 from aerodaas.testing.tello.flight import TelloFlight
 from aerodaas.testing.tello.options import TelloOptions
@@ -106,6 +114,19 @@ def test_a_reply_to_another_kind_of_command_is_not_taken(
 ) -> None:
     """Replies carry no id, but numbers answer questions only."""
     assert command.accepts(reply) is taken
+
+
+@given(
+    st.binary(max_size=40) | st.sampled_from([b"ok", b"OK", b"30", b"error", b"unknown command: x"])
+)
+def test_noise_is_never_a_commands_success(noise: bytes) -> None:
+    """Whatever comes: a request is done by `ok` alone, a question by a number alone."""
+    reply = noise.decode("ascii", "replace").strip()
+    for command in (ENTER, TAKE_OFF, LAND, STREAM_ON, ports(8891, 11112)):
+        if command.accepts(reply) and command.succeeded(reply):
+            assert reply.lower() == "ok"
+    if VERSION.accepts(reply) and VERSION.succeeded(reply):
+        assert int(reply) >= 0
 
 
 def test_only_ok_and_figures_count_as_done() -> None:

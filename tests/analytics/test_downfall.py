@@ -1,0 +1,189 @@
+"""Who falls out of a narrow picture is missed; who leaves it in any other way is not."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from aerodaas.analytics.downfall import Downfall
+from aerodaas.clock import NANOSECONDS
+from aerodaas.data import Detection, Detections, Header, Odometry
+from aerodaas.geometry import CameraModel, enu_to_body, rotation_from_rpy
+from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
+
+TELLO = CameraModel.from_fov(640, 480, math.radians(55.2), pitch=math.radians(12))
+WIDE = CameraModel.from_fov(640, 360, math.radians(82.6), pitch=math.radians(12))
+LENSES = pytest.mark.parametrize("camera", [TELLO, WIDE], ids=["tello", "wide"])
+FALL, TURN_OFF = 0.7, 2.0
+"""Seconds that a fall takes; and of the scene after which something happens."""
+
+
+class Scene:
+    """A person and a drone, each as a function of the time in seconds, seen at ten a second."""
+
+    def __init__(self, camera: CameraModel, rate: float = 10.0) -> None:
+        self.camera, self.rate = camera, rate
+        self.posture: Callable[[float], Posture] = lambda _: Posture()
+        self.place: Callable[[float], tuple[float, float]] = lambda _: (2.0, 0.0)
+        self.sink: Callable[[float], float] = lambda _: 0.0
+        """Metres by which the whole body is lower."""
+        self.drone: Callable[[float], Odometry] = lambda _: hovering()
+        self.turn = 0.0
+        self.hidden: Callable[[float], bool] = lambda _: False
+
+    def seen(self, time: float) -> Detections:
+        """What an exact pose model finds; keypoints beside the picture are not."""
+        pose = self.drone(time)
+        body = joints(1.75, self.posture(time))
+        turned = np.array([enu_to_body(point, -self.turn) for point in body])
+        placed = turned + np.array([*self.place(time), -self.sink(time)]) - pose.position
+        tilt = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
+        pixels = np.array([self.camera.project(point) for point in placed @ tilt])
+        width, height = self.camera.width, self.camera.height
+        inside = (pixels[:, 2] > 0) & (np.abs(pixels[:, 0] - width / 2) < width / 2)
+        inside &= np.abs(pixels[:, 1] - height / 2) < height / 2
+        items = []
+        if inside.sum() >= 4 and not self.hidden(time):
+            flat = pixels[pixels[:, 2] > 0, :2]
+            low, high = flat.min(axis=0).tolist(), flat.max(axis=0).tolist()
+            box = (
+                max(0.0, low[0]),
+                max(0.0, low[1]),
+                min(float(width), high[0]),
+                min(float(height), high[1]),
+            )
+            points = np.column_stack([pixels[:, :2], 0.9 * inside])[list(KEYPOINTS)]
+            items.append(Detection(box, "person", 0.9, keypoints=points.astype(np.float32)))
+        header = Header(0, round(time * NANOSECONDS), "drone/cam")
+        return Detections(header, tuple(items), width, height, self.camera, pose)
+
+    def play(self, until: float = 5.0) -> list[float]:
+        """Times at which the person is told to be down."""
+        downfall = Downfall(0.35)
+        told = []
+        for step in range(round(until * self.rate)):
+            time = step / self.rate
+            seen = self.seen(time)
+            body = seen.items[0] if seen.items else None
+            upright = self.posture(time).fallen < 0.1
+            if downfall.shows(body, seen, upright=upright and self.sink(time) == 0.0):
+                told.append(time)
+        return told
+
+
+def hovering(
+    height: float = 1.5, *, east: float = 0.0, yaw: float = 0.0, pitch: float = 0.0
+) -> Odometry:
+    """A drone that looks east."""
+    return Odometry(np.array([east, 0.0, height]), np.zeros(3), yaw, pitch=pitch)
+
+
+def falling(time: float, *, forward: bool) -> Posture:
+    """Over within 0.7 s, as people are."""
+    share = min(max((time - TURN_OFF) / FALL, 0.0), 1.0)
+    return Posture(fallen=share * share * (3 - 2 * share), forward=forward)
+
+
+@LENSES
+@given(turn=st.floats(-math.pi, math.pi), away=st.floats(1.6, 2.2), forward=st.booleans())
+@settings(max_examples=40, deadline=None)
+def test_a_fall_is_told_wherever_it_goes(
+    camera: CameraModel, turn: float, away: float, *, forward: bool
+) -> None:
+    """Away from the drone, across or towards it, unless the whole of it stays in the picture."""
+    scene = Scene(camera)
+    scene.turn, scene.place = turn, lambda _: (away, 0.0)
+    scene.posture = lambda time: falling(time, forward=forward)
+    lying = scene.seen(TURN_OFF + FALL)
+    if lying.items and lying.items[0].box[3] < 0.97 * camera.height:
+        return
+    told = scene.play()
+    assert len(told) >= 8, told
+    assert TURN_OFF < told[0] <= TURN_OFF + FALL + 0.2
+
+
+def test_who_gets_up_is_down_no_more() -> None:
+    """And may fall again."""
+    scene = Scene(TELLO)
+
+    def twice(time: float) -> Posture:
+        return falling(time if time < 5.0 else time - 6.0, forward=True)
+
+    scene.posture = twice
+    told = scene.play(12.0)
+    assert [time for time in told if 2.7 < time < 4.9] != []
+    assert [time for time in told if 5.0 <= time <= 8.0] == []
+    assert [time for time in told if time > 8.7] != []
+
+
+@LENSES
+@pytest.mark.parametrize("seconds", [0.9, 1.5, 3.0])
+def test_bending_and_crouching_is_no_fall(camera: CameraModel, seconds: float) -> None:
+    """The top of the body sinks by 0.8 m, and stays there."""
+    scene = Scene(camera)
+    scene.sink = lambda time: 0.8 * min(max((time - TURN_OFF) / seconds, 0.0), 1.0)
+    assert scene.play() == []
+
+
+@LENSES
+@given(
+    swing=st.floats(0.0, 0.3),
+    climb=st.floats(-0.4, 0.6),
+    turning=st.floats(-1.2, 1.2),
+    speed=st.floats(-1.0, 1.0),
+)
+@settings(max_examples=30, deadline=None)
+def test_a_drone_that_moves_makes_nobody_fall(
+    camera: CameraModel, swing: float, climb: float, turning: float, speed: float
+) -> None:
+    """It pitches by 17 degrees, climbs, turns until nobody is in the picture, comes and goes."""
+    scene = Scene(camera)
+
+    def moving(time: float) -> Odometry:
+        since = max(0.0, time - TURN_OFF)
+        height = 1.5 + climb * math.sin(min(since, 1.6))
+        pitch = swing * math.sin(4.0 * since)
+        return hovering(height, east=speed * min(since, 0.8), yaw=turning * since, pitch=pitch)
+
+    scene.drone = moving
+    assert scene.play() == []
+
+
+@LENSES
+@given(course=st.floats(-math.pi, math.pi), speed=st.floats(0.3, 2.5), height=st.floats(0.8, 3.0))
+@settings(max_examples=40, deadline=None)
+def test_walking_out_of_the_picture_is_no_fall(
+    camera: CameraModel, course: float, speed: float, height: float
+) -> None:
+    """Sideways, and below the drone."""
+    scene = Scene(camera)
+    scene.turn = course
+    scene.drone = lambda _: hovering(height)
+
+    def walking(time: float) -> tuple[float, float]:
+        way = speed * max(0.0, time - TURN_OFF)
+        return 2.0 + way * math.cos(course), way * math.sin(course)
+
+    scene.place = walking
+    scene.posture = lambda time: Posture(travelled=speed * time, stepping=0.8)
+    assert scene.play() == []
+
+
+@LENSES
+def test_who_is_not_found_for_a_while_has_not_fallen(camera: CameraModel) -> None:
+    """A detector that misses, a person who steps behind a wall."""
+    scene = Scene(camera)
+    scene.hidden = lambda time: TURN_OFF < time < TURN_OFF + 2.0
+    assert scene.play() == []
+
+
+def test_a_camera_that_knows_neither_height_nor_lens_tells_nothing() -> None:
+    """And does not stumble over it."""
+    seen = Scene(TELLO).seen(0.0)
+    blind = Detections(seen.header, seen.items, seen.width, seen.height)
+    assert not Downfall(0.35).shows(seen.items[0], blind, upright=True)

@@ -1,0 +1,33 @@
+"""The benchmark of falls: who falls away from a Tello's lens is told, who walks is not."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.mark.slow
+def test_falls_are_told_and_walks_are_not(tmp_path: Path) -> None:
+    """On renders, by the shipped models."""
+    path = tmp_path / "falls.json"
+    words = ["--falls", "2", "--walks", "1", "--duration", "20", "--json", str(path)]
+    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "160"}
+    done = subprocess.run(
+        [sys.executable, "benchmarks/falls.py", *words],
+        cwd=ROOT,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    rows = {row["case"]: row for row in json.loads(path.read_text())["rows"]}
+    assert rows["away"]["told"] == 100
+    assert rows["away"]["after"] < 3.0
+    assert [row["false"] for row in rows.values()] == [0, 0, 0, 0]
