@@ -152,13 +152,13 @@ def _toned(image: Picture, rng: np.random.Generator) -> Picture:
         hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)
         steps = np.arange(256)
         hue = ((np.arange(256) + rng.uniform(-7, 7)) % 180).astype(np.uint8)
-        saturation = np.clip(steps * rng.uniform(0.35, 1.5), 0, 255).astype(np.uint8)
+        saturation = np.clip(steps * rng.uniform(0.25, 1.5), 0, 255).astype(np.uint8)
         table = np.stack([hue, saturation, steps.astype(np.uint8)], axis=-1)[None]
         result = np.asarray(cv2.cvtColor(cv2.LUT(hsv, table), cv2.COLOR_HSV2BGR), np.uint8)
     tones = np.linspace(0, 1, 256)[:, None]
     gamma = np.exp(rng.normal(0.0, 0.22))
-    cast = np.exp(rng.normal(0.0, 0.09, 3))
-    gain, haze = np.exp(rng.normal(0.03, 0.18)), max(0.0, rng.normal(-0.03, 0.07))
+    cast = np.exp(rng.normal(0.0, 0.14, 3))
+    gain, haze = np.exp(rng.normal(0.05, 0.25)), max(0.0, rng.normal(-0.03, 0.07))
     curve = haze + (1 - haze) * gain * cast * tones**gamma
     if rng.random() < 0.3:  # noqa: PLR2004 - highlights and shadows rolled off
         curve = curve + rng.uniform(0, 0.12) * np.sin(2 * np.pi * (curve - 0.5))

@@ -35,8 +35,8 @@ _CABINS = (
 )
 """Saloon, estate, hatchback, van, pick-up."""
 
-_GARISH = 0.12
-"""Share of people without a vest whose shirt has a vest's colour."""
+_GARISH, _BRIGHT = 0.25, 0.25
+"""Shares of people without a vest whose shirt has a vest's colour, or another strong one."""
 
 
 def hi_vis(rng: np.random.Generator) -> Colour:
@@ -93,7 +93,7 @@ class VariousLooks(Looks):
             raise TypeError(f"{thing.id} is no person")
         rng = rng_of(thing)
         skin = np.array(_SKINS[rng.integers(len(_SKINS))]) * rng.uniform(0.85, 1.05)
-        shirt = hi_vis(rng) if rng.random() < _GARISH else any_colour(rng)
+        shirt = _shirt(rng)
         blue = colorsys.hsv_to_rgb(rng.uniform(0.55, 0.65), rng.uniform(0.1, 0.7), rng.uniform())
         trousers = blue if rng.random() < 0.4 else any_colour(rng)  # noqa: PLR2004 - jeans
         return Outfit(
@@ -129,6 +129,15 @@ class VariousLooks(Looks):
             section=rng.uniform(1.6, 3.6),
             stout=rng.uniform(0.8, 1.8),
         )
+
+
+def _shirt(rng: np.random.Generator) -> Colour:
+    kind = rng.random()
+    if kind < _GARISH:
+        return hi_vis(rng)
+    if kind < _GARISH + _BRIGHT:
+        return colorsys.hsv_to_rgb(rng.uniform(), rng.uniform(0.6, 1.0), rng.uniform(0.25, 1.0))
+    return any_colour(rng)
 
 
 def _cut(rng: np.random.Generator) -> VestCut:

@@ -15,7 +15,7 @@ from aerodaas.simulation.world import State, Thing
 
 __all__ = ["ParkedCar", "Passer"]
 
-_RAISED, _WAVING, _FALLEN, _BENT = 0.2, 0.4, 0.12, 0.15
+_RAISED, _WAVING, _FALLEN, _BENT = 0.25, 0.4, 0.2, 0.15
 """Shares of the postures: a hand raised, arms anywhere, lying, legs bent."""
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from aerodaas.simulation.scene.scene import Looks
 from aerodaas.training.backdrops import compose
 from aerodaas.training.clutter import add_clutter
 from aerodaas.training.dataset import Sample, save_shard
@@ -25,12 +26,17 @@ HELD_OUT = 1_000_000
 
 _WORLDS_PER_SHARD = 10
 
+_AS_FLOWN = 3
+"""One world in so many is left as the simulator shows it in flight."""
 
-def render_world(seed: int, views: int = VIEWS, *, plain: bool = False) -> Iterator[Sample]:
+
+def render_world(
+    seed: int, views: int = VIEWS, *, plain: bool = False, looks: Looks | None = None
+) -> Iterator[Sample]:
     """Pictures of the world of this seed, 320 pixels wide; `plain` leaves them as rendered."""
     rng = np.random.default_rng([seed, 1])
     world, camera = draw_world(seed), draw_camera(rng)
-    renderer = LabellingRenderer(world, camera, VariousLooks())
+    renderer = LabellingRenderer(world, camera, looks or VariousLooks())
     for _ in range(rng.integers(0, 16)):
         x, y = rng.uniform(-14, 14, 2).tolist()
         add_clutter(renderer.scene, renderer.palette, (x, y), rng)
@@ -46,6 +52,12 @@ def render_world(seed: int, views: int = VIEWS, *, plain: bool = False) -> Itera
     renderer.close()
 
 
+def _world(seed: int) -> Iterator[Sample]:
+    if seed % _AS_FLOWN:
+        return render_world(seed)
+    return render_world(seed, plain=True, looks=Looks())
+
+
 def render_shards(folder: Path, first: int, worlds: int) -> Iterator[int]:
     """Render `worlds` worlds from seed `first` on into `folder`; yields the worlds done so far.
 
@@ -56,7 +68,7 @@ def render_shards(folder: Path, first: int, worlds: int) -> Iterator[int]:
         seeds = range(start, min(start + _WORLDS_PER_SHARD, first + worlds))
         path = folder / f"{start:08d}.npz"
         if not path.exists():
-            samples = [sample for seed in seeds for sample in render_world(seed)]
+            samples = [sample for seed in seeds for sample in _world(seed)]
             partial = path.with_suffix(".partial.npz")
             save_shard(partial, samples)
             partial.rename(path)

@@ -21,6 +21,10 @@ _WIDTH = 640
 _SHAPES = ((360, 0.55), (480, 0.35), (640, 0.1))
 """Heights of pictures and their shares: 16:9, 4:3, square."""
 
+_WANTED = ("vest", "person", "car", "tower", "tree", "building")
+_SHARES = (0.40, 0.20, 0.21, 0.10, 0.02, 0.07)
+"""What pictures are taken of; walls and windows, close up, have been taken for vests and cars."""
+
 _EDGE = 45.0
 """Metres from the middle to the edge of what stands around."""
 
@@ -63,7 +67,7 @@ def draw_world(seed: int) -> World:
     for k in range(rng.integers(0, 4)):
         size = (rng.uniform(3, 20), rng.uniform(3, 14), rng.uniform(2.4, 10))
         roof = ("gable", "flat")[rng.integers(2)]
-        house = {"kind": "building", "id": f"house{k}", "at": place(18), "size": size}
+        house = {"kind": "building", "id": f"house{k}", "at": place(9), "size": size}
         entities.append({**house, "roof": roof})
     for k in range(rng.integers(0, 3)):
         way = [place(5), place(0, 10), place(5)]
@@ -103,7 +107,7 @@ def _restless(thing: Thing, rng: np.random.Generator) -> Thing:
 
 def draw_view(world: World, camera: CameraModel, time: float, rng: np.random.Generator) -> View:
     """Choose a thing to look at, and a place to see it from at `time`."""
-    wanted = rng.choice(["vest", "person", "car", "tower", "tree"], p=[0.48, 0.2, 0.15, 0.13, 0.04])
+    wanted = rng.choice(_WANTED, p=_SHARES)
     boxes = [box for box in world.boxes(time) if box.label == wanted] or world.boxes(time)
     target = boxes[rng.integers(len(boxes))]
     size = max(target.size)
@@ -113,6 +117,9 @@ def draw_view(world: World, camera: CameraModel, time: float, rng: np.random.Gen
     distance = min(distance, 90.0)
     steep = rng.uniform(-0.08, 0.22) if rng.random() < 0.62 else rng.uniform(0.0, 1.25)  # noqa: PLR2004
     bearing = rng.uniform(-math.pi, math.pi)
+    if wanted == "car" and rng.integers(2):
+        # As whoever drives behind or ahead of it sees it.
+        bearing = target.yaw + rng.normal(0.0, 0.25) + math.pi * rng.integers(2)
     x = target.centre[0] - distance * math.cos(steep) * math.cos(bearing)
     y = target.centre[1] - distance * math.cos(steep) * math.sin(bearing)
     z = min(max(target.centre[2] + distance * math.sin(steep), 0.5), 40.0)
