@@ -12,6 +12,7 @@ import ray
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from aerodaas.actors.greeting import greet
+from aerodaas.actors.ray_variables import VARIABLES
 from aerodaas.config import ComputeConfig
 from aerodaas.errors import AeroDaaSError, ConfigError
 
@@ -93,15 +94,10 @@ def join(address: str) -> None:
 
 def _settings() -> dict[str, Any]:
     """How quiet Ray is to be."""
-    os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")
+    for name, value in VARIABLES.items():
+        os.environ.setdefault(name, value)
     # The first error is told; Ray would print the tracebacks of those that followed.
     os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
-    # Ray would refuse a node whose Python differs in its patch level; a Jetson's always does.
-    os.environ.setdefault("RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL", "minor")
-    # A frame goes in the call that it is for: a reference costs round trips.
-    os.environ.setdefault("RAY_max_direct_call_object_size", str(4 * 2**20))
-    # That an actor died is told at once; why it did, for which Ray would wait a second, may follow.
-    os.environ.setdefault("RAY_timeout_ms_task_wait_for_death_info", "100")
     return {"logging_level": logging.ERROR, "log_to_driver": False, "namespace": _NAMESPACE}
 
 

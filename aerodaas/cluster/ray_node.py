@@ -11,6 +11,7 @@ from pathlib import Path
 import psutil
 
 import aerodaas
+from aerodaas.actors.ray_variables import VARIABLES
 from aerodaas.cluster.machine import Machine
 from aerodaas.errors import AeroDaaSError
 
@@ -22,15 +23,10 @@ _TOO_SLOW = "timed out during startup"
 STORE_BYTES = 128 * 2**20
 _TOKEN = Path.home() / ".ray" / "auth_token"
 _SLIM = {
-    "RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL": "minor",
-    "RAY_USAGE_STATS_ENABLED": "0",
+    **VARIABLES,
     # Workers started before anybody asks for them take 80 MB each.
     "RAY_enable_worker_prestart": "0",
     "RAY_prestart_worker_first_driver": "0",
-    # A frame goes in the call that it is for: a reference costs round trips.
-    "RAY_max_direct_call_object_size": "4194304",
-    # That an actor died is told at once; why it did, for which Ray would wait a second, may follow.
-    "RAY_timeout_ms_task_wait_for_death_info": "100",
 }
 
 

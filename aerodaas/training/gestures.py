@@ -99,7 +99,8 @@ def train(seed: int, count: int, worlds: int) -> tuple[bytes, dict[str, Any]]:
     from sklearn.svm import SVC  # noqa: PLC0415 - only for training
 
     drawn, found = draw(seed, count), find(seed, worlds)
-    features, classes = (np.concatenate(parts) for parts in zip(drawn, found, strict=True))
+    features = np.concatenate([drawn[0], found[0]])
+    classes = np.concatenate([drawn[1], found[1]])
     machine = SVC(C=10.0, gamma=0.08, probability=True, random_state=seed, cache_size=500)
     machine.fit(features, classes)
     content = _as_onnx(machine)
