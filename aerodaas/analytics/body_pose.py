@@ -31,6 +31,9 @@ _TEXTS = {
     "fallen": "The person has fallen.",
     "hand_raised": "The person raises a hand.",
 }
+_SURER = 2
+"""More frames, in twice the time, that a raised hand takes: a missed fall is worse than a false
+alert, but a landing nobody asked for is worse than one that comes half a second later."""
 _VEST_AGE = 1.0
 """Seconds for which the boxes of vests tell who wears one."""
 _SAME_BODY = 0.6
@@ -91,8 +94,9 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         gestures: str | Path = GESTURE_MODEL,
         detector: Detector | None = None,
     ) -> None:
-        """Confirm a gesture that `needed` of the last `of` frames show for `hold` seconds.
+        """Confirm a fall that `needed` of the last `of` frames show for `hold` seconds.
 
+        A raised hand takes two frames more, for twice as long: it lands the drone.
         `lands=False` leaves the drone in the air. A gesture of less than `min_probability` is
         none; keypoints of less than `min_confidence` count as missing (both 0 to 1). `gestures`
         is a classifier of your own, `detector` a pose model for camera streams. The paper's
@@ -113,7 +117,10 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self.unusable = 0
         """Bodies so far whose keypoints could not be used."""
         self._downfall = Downfall(min_confidence)
-        self._events = {name: Debounce(needed, of, hold) for name in _TEXTS}
+        self._events = {
+            "fallen": Debounce(needed, of, hold),
+            "hand_raised": Debounce(needed + _SURER, of + _SURER, 2 * hold),
+        }
         self._vests: Detections | None = None
         self._streams = 0
         self._poses: str | None = None

@@ -151,6 +151,9 @@ class FollowController:
             self._last = replace(sighting, bound=True)
         elif not sighting.bound:
             self._stood = None
+            falls = sighting.top is not None
+            if falls and self.motion.leaps(sighting, seen.at_capture, seen.stamp):
+                return
             self.motion.observe(sighting, seen.at_capture, seen.stamp)
             self._remember_place(seen.stamp)
 

@@ -42,7 +42,7 @@ class FollowLimits:
     stopping: float = 4.0
     """m/s^2 of the commanded velocity where the drone would else come too near: the airframe does
     what it can."""
-    reaction_time: float = 0.5
+    reaction_time: float = 0.6
     """Seconds from a target's stop until the drone brakes: a frame at 5 a second, a detector's work
     and the tilting of the airframe."""
     yaw_acceleration: float = 4.0

@@ -22,6 +22,8 @@ _RANGE_NOISE, _SIDE_NOISE = 0.06, 0.02
 _LEAST_NOISE = 0.03
 _ACCELERATION = 0.7
 """Standard deviation of a walking person's acceleration, m/s^2."""
+_LEAP, _PATIENCE = 2.5, 0.5
+"""Standard deviations of range beyond which a sighting leaps, and seconds of disbelief."""
 _NEAREST = 0.1
 _FIRST_SPEED = 0.7
 """Standard deviation of a velocity not yet observed, m/s."""
@@ -67,6 +69,16 @@ class TargetMotion:
     def reset(self) -> None:
         """Forget the target."""
         self._state = None
+
+    def leaps(self, sighting: Sighting, odometry: Odometry, stamp: int) -> bool:
+        """Tell whether a sighting is farther off than a target that was there can have got to.
+
+        Such a box shows a part of it, or one who tilts before a fall. It is believed if it lasts.
+        """
+        predicted = self.relative_to(odometry, stamp)
+        if predicted is None or seconds(stamp - self._stamp) > _PATIENCE:
+            return False
+        return sighting.distance - predicted[0].distance > _LEAP * _RANGE_NOISE * sighting.distance
 
     def observe(self, sighting: Sighting, odometry: Odometry, stamp: int) -> None:
         """Take in a sighting made at `stamp` from a drone at `odometry`."""

@@ -82,7 +82,7 @@ def test_a_raised_hand_is_confirmed_from_all_sides(turn: float, ahead: float) ->
         result = watch.see(1, walking)
         assert not hand_raised(result)
         assert not fallen(result)
-    result = watch.see(8, body(Posture(raised=1.0), ahead=ahead, turn=turn))
+    result = watch.see(13, body(Posture(raised=1.0), ahead=ahead, turn=turn))
     assert hand_raised(result)
     assert not fallen(result)
     assert [alert.kind for alert in watch.alerts] == ["hand_raised"]
@@ -112,11 +112,11 @@ def test_who_falls_out_of_the_picture_is_told_and_shown_where_last_seen() -> Non
 
 
 def test_a_moment_is_no_gesture() -> None:
-    """Three frames in a row, less than the four that it takes, tell nothing."""
+    """Five frames in a row, less than the six that it takes, tell nothing."""
     watch = Watch()
     for _ in range(5):
         watch.see(6, body(Posture()))
-        assert not hand_raised(watch.see(3, body(Posture(raised=1.0))))
+        assert not hand_raised(watch.see(5, body(Posture(raised=1.0))))
     assert watch.alerts == []
 
 
@@ -185,7 +185,7 @@ def test_a_body_that_is_boxed_in_parts_is_one_body() -> None:
     points = whole.keypoints.copy()
     points[11:, 2] = 0.1
     upper = replace(whole, box=(left, top, right, (top + bottom) / 2), keypoints=points)
-    watch.see(1, whole)
+    watch.see(6, whole)
     watch.see(2, upper)
     watch.see(2, whole, upper)
     result = watch.see(3, upper)

@@ -424,7 +424,7 @@ def test_who_stops_short_is_not_come_near(
 ) -> None:
     """Within a step, from a brisk walk: the drone, 2 m behind, stops before 1.1 m."""
     world = vest_world(lambda time: (4 + speed * min(max(time - 6, 0), walk), 0.0), rate)
-    distances = world.run(VipFollowAnalytics(), 6 + walk + 8, seed)
+    distances = world.run(VipFollowAnalytics(), 6 + walk + 10, seed)
     assert min(distances) > 1.1
     assert np.abs(np.array(distances[-round(2 * rate) :]) - 2.0).max() < 0.3
 

@@ -37,3 +37,16 @@ def test_a_place_is_seen_as_it_lies() -> None:
     found = seen_from(drone, (-2.0, 0.0))
     assert found.bearing == pytest.approx(np.pi / 2)
     assert found.distance == pytest.approx(3.0)
+
+
+def test_a_leap_away_is_not_believed_at_once() -> None:
+    """Nor for ever: what still seems farther half a second later is farther."""
+    motion = TargetMotion()
+    drone = Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), 0.0)
+    far = Sighting(0.0, 3.0)
+    assert not motion.leaps(far, drone, 0)
+    motion.observe(Sighting(0.0, 2.0), drone, 0)
+    assert motion.leaps(far, drone, NANOSECONDS // 5)
+    assert not motion.leaps(Sighting(0.0, 2.2), drone, NANOSECONDS // 5)
+    assert not motion.leaps(Sighting(0.0, 1.0), drone, NANOSECONDS // 5)
+    assert not motion.leaps(far, drone, NANOSECONDS)
