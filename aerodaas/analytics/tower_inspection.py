@@ -126,7 +126,7 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
             return None
         before = self.controller.phase
         found = boxes.labelled(*self.labels)
-        sighting = self._sight(max(found, key=lambda item: item.area), boxes) if found else None
+        sighting = self._sight(max(found, key=lambda item: item.score), boxes) if found else None
         command = self.controller.step(observation(boxes, sighting, context))
         self._tell_changes(before, boxes, context)
         if self.controller.picture_due is not None:
