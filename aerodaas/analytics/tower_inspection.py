@@ -62,6 +62,7 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         patience: float = 20.0,
         longest: float = 600.0,
         width: float = 3.0,
+        sure: float = 0.5,
         labels: Sequence[str] = ("tower",),
         lands: bool = True,
         pictures: str | Path | None = None,
@@ -72,6 +73,7 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
 
         A picture is taken each `interval` metres; with a folder `pictures`, on the machine where
         the analysis runs, they are written there as JPEG. `width` is the tower's at its foot.
+        An inspection begins with boxes of a score of `sure` (0 to 1) and more.
         `patience` and `longest`, in seconds, bound the time without a sight of the tower and the
         time in all. With `lands=False` the drone is left to other navigation at the end. The
         paper's listings pass the environment; the analysed stream knows its own. Raises
@@ -87,6 +89,7 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         self.controller = InspectionController(plan, priority)
         self.lands = lands
         self.width = width
+        self.sure = sure
         self.folder = None if pictures is None else Path(pictures)
         self.taken: list[float] = []
         """Heights in metres of the pictures taken so far."""
@@ -125,7 +128,8 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         if self.controller.phase is InspectionPhase.DONE and self._told:
             return None
         before = self.controller.phase
-        found = boxes.labelled(*self.labels)
+        least = self.sure if self.controller.phase is InspectionPhase.WAITING else 0.0
+        found = [box for box in boxes.labelled(*self.labels) if box.score >= least]
         sighting = self._sight(max(found, key=lambda item: item.score), boxes) if found else None
         command = self.controller.step(observation(boxes, sighting, context))
         self._tell_changes(before, boxes, context)

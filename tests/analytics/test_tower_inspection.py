@@ -36,6 +36,7 @@ class Site:
     rate: float = 5.0
     noise: float = 0.0
     hidden: Callable[[float], bool] = lambda _: False
+    score: float = 0.9
     loose: float | None = None
     """Score of a second box in the first seconds, twice as wide, as around a tower and a hut."""
     time: float = 0.0
@@ -67,7 +68,7 @@ class Site:
             box = np.clip(box + random.normal(0, spread, 4), 0, [1280, 720, 1280, 720])
             left, top, right, bottom = box.tolist()
             if right - left > 4 and bottom - top > 8:
-                items.append(Detection((left, top, right, bottom), "tower", 0.9))
+                items.append(Detection((left, top, right, bottom), "tower", self.score))
                 if self.loose is not None and self.time < 4.0:
                     wide = max(0.0, left - (right - left))
                     items.append(Detection((wide, top, right, bottom), "tower", self.loose))
@@ -153,6 +154,15 @@ def test_a_larger_box_that_is_less_sure_changes_nothing() -> None:
     assert inspect.taken
     assert max(site.heights) > 5.5
     assert "cut_short" not in " ".join(alert.kind for alert in site.alerts)
+
+
+def test_an_unsure_tower_is_not_inspected() -> None:
+    """The trunk of a tree may look a little like one."""
+    site = Site((30.0, 0.0), np.array([0.0, 0.0, 3.0]), score=0.4)
+    inspect = TowerInspectionAnalytics()
+    site.run(inspect, 20)
+    assert inspect.controller.phase is InspectionPhase.WAITING
+    assert not site.alerts
 
 
 def test_a_tower_that_disappears_ends_the_inspection() -> None:
