@@ -31,6 +31,8 @@ _REACH, _REACH_SHARE = 0.3, 0.2
 """Metres, and parts of the distance, from where the target should stand to where it is seen."""
 _FALLEN = 1.3
 """Metres from the feet to the chest of one who lies there; in any direction."""
+_SURER = 0.2
+"""By how much the score of another must be better than that of a doubtful target."""
 _WIDTH_MEMORY = 0.1
 """Weight of the newest look in the mean of the target's width: arms swing."""
 
@@ -137,22 +139,39 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         mine = next((item for item in trusted if item.track_id == self.target), None)
         if mine is None:
             mine = self._found_where_expected(found, tracked)
-        if mine is not None or not self._may_choose():
-            return mine
-        least = self.choice.score
-        trusted = [
+        least = self._score_to_be_chosen(mine)
+        chosen = [
             item
             for item in trusted
-            if item.score >= least
+            if self._score(item) >= least
             and self._is_inside(item, tracked)
-            and self._is_new(item, tracked)
+            and (self._is_lost(mine) or self._shows_enough(item, tracked))
         ]
-        if not trusted:
-            return None
-        chosen = max(trusted, key=lambda item: item.area * item.score)
-        self.target = chosen.track_id
+        if not chosen:
+            return mine
+        best = max(chosen, key=lambda item: item.area * item.score)
+        if mine is not None:
+            self.controller.change_target()
+        self.target = best.track_id
         self._width = self.size.width
-        return chosen
+        return best
+
+    def _score_to_be_chosen(self, mine: Detection | None) -> float:
+        """Least score of a new target; infinite while the present one, seen as `mine`, is kept.
+
+        One that has come to look doubtful, such as a passer in a bright shirt, gives way to a much
+        surer one.
+        """
+        if self.target is None or self._is_lost(mine):
+            return self.choice.score
+        held = self.tracker.find(self.target)
+        if mine is None or held is None or held.score >= self.choice.score:
+            return math.inf
+        return max(self.choice.score, held.score + _SURER)
+
+    def _score(self, item: Detection) -> float:
+        track = self.tracker.find(item.track_id)
+        return 0.0 if track is None else track.score
 
     def _has_left(self) -> bool:
         place = self.controller.motion.place
@@ -164,9 +183,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         text = f"The {' or '.join(self.labels)} has left the area; following ends."
         context.alert(Alert(item.header, "target_left_area", text))
 
-    def _is_new(self, detection: Detection, item: Detections) -> bool:
-        """Tell whether it shows enough to be a first target; a lost one is taken as it is."""
-        if not self.choice.whole or self.target is not None:
+    def _shows_enough(self, detection: Detection, item: Detections) -> bool:
+        """Tell whether its size can be told, if that is asked of a first look."""
+        if not self.choice.whole:
             return True
         sighting = sight(detection, item, self.size)
         return sighting is not None and sighting.width is not None
@@ -207,10 +226,10 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             self.target = best.track_id
         return best
 
-    def _may_choose(self) -> bool:
-        """Another target is taken only when the present one has been gone for a while."""
+    def _is_lost(self, mine: Detection | None) -> bool:
+        """Whether the target has been gone for a while; another one is then taken as it is."""
         free = (FollowPhase.WAITING, FollowPhase.SEARCHING)
-        return self.target is None or self.controller.phase in free
+        return self.target is not None and mine is None and self.controller.phase in free
 
     def _sight(self, detection: Detection, item: Detections) -> Sighting | None:
         sighting = sight(detection, item, self.size.with_width(self._width))

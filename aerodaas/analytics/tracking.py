@@ -21,6 +21,8 @@ from aerodaas.data import Detection, Detections
 
 __all__ = ["Track", "Tracker", "TrackingAnalytics"]
 
+_NEWEST = 0.2
+"""Weight of the newest look in the score of a track: it stands for about five looks."""
 _GATE = 25.0
 """Squared Mahalanobis distance, of four degrees of freedom, that one true box in 20,000 exceeds."""
 
@@ -33,6 +35,8 @@ class Track:
     detection: Detection
     """As last seen."""
     filter: BoxFilter
+    score: float
+    """Mean confidence of its looks, the newest weighing most."""
     hits: int = 1
     """How often it was seen."""
     age: float = 0.0
@@ -105,11 +109,14 @@ class Tracker:
             if track is None and item.score < self.sure:
                 continue
             if track is None:
-                track = owners[column] = Track(self._next_id, item, BoxFilter(item.box), hits=0)
+                track = owners[column] = Track(
+                    self._next_id, item, BoxFilter(item.box), item.score, hits=0
+                )
                 self._next_id += 1
                 self.tracks.append(track)
             else:
                 track.filter.update(item.box)
+                track.score += _NEWEST * (item.score - track.score)
             track.detection = replace(item, track_id=track.id)
             track.hits += 1
             track.age = 0.0

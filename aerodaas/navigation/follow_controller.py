@@ -131,6 +131,13 @@ class FollowController:
         self.phase = FollowPhase.WAITING
         self._forget()
 
+    def change_target(self) -> None:
+        """Forget the target but not the drone's motion: another one is followed from now on."""
+        self._seen = self._last = self._stood = None
+        self._places.clear()
+        self._upright.reset()
+        self._reset()
+
     def expected(self, odometry: Odometry, stamp: int) -> Sighting | None:
         """Where the target should be in a picture taken at `odometry`; None if that is unknown."""
         predicted = self.motion.relative_to(odometry, stamp)
@@ -178,12 +185,9 @@ class FollowController:
         return next((phase for until, phase in phases if unseen <= until), FollowPhase.WAITING)
 
     def _forget(self) -> None:
-        self._seen = self._last = self._stood = None
-        self._places.clear()
+        self.change_target()
         self._shaper.reset()
         self._approach.reset()
-        self._upright.reset()
-        self._reset()
 
     def _reset(self) -> None:
         self.motion.reset()

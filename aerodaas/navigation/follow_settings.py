@@ -73,7 +73,8 @@ class TargetChoice:
     """What it takes to be chosen as a target; one that is held is held on less."""
 
     score: float = 0.0
-    """Least confidence of the box that is chosen; the detector's own threshold holds as well."""
+    """Least mean confidence of the track that is chosen, and below which it gives way to a much
+    surer one; the detector's own threshold holds as well."""
     sure: float = 0.0
     """Confidence from which a box begins a track; below, it only continues one."""
     looks: int = 2

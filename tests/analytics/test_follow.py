@@ -514,6 +514,22 @@ def test_a_wall_that_looks_like_a_vest_for_a_moment_is_not_followed() -> None:
             assert follow.process(item, Snapshot(item.header.stamp, None, [])) is None
 
 
+@pytest.mark.parametrize(("passer_score", "followed"), [(0.45, "vest"), (0.7, "passer")])
+def test_a_doubtful_target_gives_way_to_a_surer_one(passer_score: float, followed: str) -> None:
+    """Only one that looks doubtful itself does, and only to one that is not just as doubtful."""
+    follow = VipFollowAnalytics()
+    passer, vest = (180.0, 200.0, 220.0, 270.0), (560.0, 200.0, 720.0, 430.0)
+    for step in range(60):
+        boxes = [Detection(passer, "vest", 0.6 if step < 10 else passer_score)]
+        if step > 20:
+            boxes.append(Detection(vest, "vest", 0.8))
+        item = frame(step, *boxes)
+        command = follow.process(item, Snapshot(item.header.stamp, None, []))
+    assert command is not None
+    left = command.commands[0].yaw_rate
+    assert abs(left) < 0.05 if followed == "vest" else left > 0.2
+
+
 def test_a_car_whose_box_flickers_does_not_fall() -> None:
     """A box that is sometimes too tall moves the middle of a car, which stays on its wheels."""
     world = car_world(lambda time: (9 + 0.5 * time, 0.0))
