@@ -10,11 +10,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["raised_arm"]
+from aerodaas.analytics.joints import ARMS, FACE, HIPS, SHOULDERS, visible
 
-_FACE, _SHOULDERS, _HIPS = slice(0, 5), slice(5, 7), slice(11, 13)
-_ARMS = ((5, 7, 9), (6, 8, 10))
-"""Rows of COCO's keypoints: shoulder, elbow, wrist."""
+__all__ = ["raised_arm"]
 
 _LONGEST = 0.85
 """Of the trunk, shoulders to hips: an upper arm measures 0.6 of it and a forearm 0.55 (Winter,
@@ -33,16 +31,16 @@ def raised_arm(keypoints: NDArray[np.floating], min_confidence: float) -> bool:
     and show nothing. Without hips, a wrist above the face is taken at its word.
     """
     points = keypoints[:, :2].astype(np.float64)
-    seen = np.isfinite(keypoints).all(axis=1) & (keypoints[:, 2] >= min_confidence)
-    if not seen[_SHOULDERS].any():
+    seen = visible(keypoints, min_confidence)
+    if not seen[SHOULDERS].any():
         return False
-    shoulders = points[_SHOULDERS][seen[_SHOULDERS]].mean(axis=0)
+    shoulders = points[SHOULDERS][seen[SHOULDERS]].mean(axis=0)
     trunk = math.inf
-    if seen[_HIPS].any():
-        trunk = float(np.hypot(*(points[_HIPS][seen[_HIPS]].mean(axis=0) - shoulders)))
-    face = points[_FACE][seen[_FACE], 1]
+    if seen[HIPS].any():
+        trunk = float(np.hypot(*(points[HIPS][seen[HIPS]].mean(axis=0) - shoulders)))
+    face = points[FACE][seen[FACE], 1]
     top = float(face.mean()) if len(face) else shoulders[1] - _FACE_UP * trunk
-    return any(_is_up(points[list(arm)], seen[list(arm)], trunk, top) for arm in _ARMS)
+    return any(_is_up(points[list(arm)], seen[list(arm)], trunk, top) for arm in ARMS)
 
 
 def _is_up(arm: Array, seen: NDArray[np.bool_], trunk: float, top: float) -> bool:

@@ -15,7 +15,8 @@ from aerodaas.analytics.arms import raised_arm
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.debounce import Debounce
 from aerodaas.analytics.downfall import Downfall
-from aerodaas.analytics.gestures import GESTURE_MODEL, POINTS, GestureClassifier
+from aerodaas.analytics.gestures import GESTURE_MODEL, GestureClassifier
+from aerodaas.analytics.joints import POINTS
 from aerodaas.analytics.lying import lies
 from aerodaas.analytics.tracking import Tracker
 from aerodaas.clock import seconds

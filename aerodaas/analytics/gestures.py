@@ -13,9 +13,10 @@ import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
 
+from aerodaas.analytics.joints import HIPS, POINTS, SHOULDERS, visible
 from aerodaas.errors import ModelError
 
-__all__ = ["GESTURES", "GESTURE_MODEL", "POINTS", "GestureClassifier", "normalised"]
+__all__ = ["GESTURES", "GESTURE_MODEL", "GestureClassifier", "normalised"]
 
 GESTURES = ("fallen", "hand_raised", "other", "upright")
 """Classes of the model; `upright` is standing or walking, `other` sitting, bending and the like."""
@@ -23,10 +24,6 @@ GESTURES = ("fallen", "hand_raised", "other", "upright")
 GESTURE_MODEL = Path(__file__).parent / "models" / "gestures.onnx"
 """The model that ships; `gestures.md` beside it tells how it was made, and how good it is."""
 
-POINTS = 17
-"""Keypoints of a body, in COCO's order."""
-
-_SHOULDERS, _HIPS = slice(5, 7), slice(11, 13)
 _LEAST = 5
 """Keypoints without which nothing is told."""
 _FARTHEST = 4.0
@@ -43,10 +40,10 @@ def normalised(keypoints: Array, min_confidence: float) -> tuple[Array, NDArray[
     one of the trunk among them.
     """
     points = np.asarray(keypoints[..., :2], np.float64)
-    seen = np.isfinite(keypoints).all(axis=2) & (keypoints[..., 2] >= min_confidence)
+    seen = visible(keypoints, min_confidence)
     points = np.where(seen[..., None], np.nan_to_num(points), 0.0)
-    trunk = seen.copy()
-    trunk[:, [index for index in range(POINTS) if index not in (5, 6, 11, 12)]] = False
+    trunk = np.zeros_like(seen)
+    trunk[:, SHOULDERS], trunk[:, HIPS] = seen[:, SHOULDERS], seen[:, HIPS]
     useful = (seen.sum(axis=1) >= _LEAST) & trunk.any(axis=1)
     middle = _mean(points, trunk)
     offsets = np.where(seen[..., None], points - middle[:, None], 0.0)
@@ -60,12 +57,12 @@ def normalised(keypoints: Array, min_confidence: float) -> tuple[Array, NDArray[
 def _mean(points: NDArray[np.float64], seen: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Mean of the points seen, shoulders and hips weighing the same."""
     groups = []
-    for part in (_SHOULDERS, _HIPS):
+    for part in (SHOULDERS, HIPS):
         count = seen[:, part].sum(axis=1)
         groups.append(
             (points[:, part] * seen[:, part, None]).sum(axis=1) / np.maximum(count, 1)[:, None]
         )
-    there = np.stack([seen[:, part].any(axis=1) for part in (_SHOULDERS, _HIPS)])
+    there = np.stack([seen[:, part].any(axis=1) for part in (SHOULDERS, HIPS)])
     total = there[0][:, None] * groups[0] + there[1][:, None] * groups[1]
     return np.asarray(total / np.maximum(there.sum(axis=0), 1)[:, None])
 

@@ -10,15 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.analytics.joints import ANKLES, HIPS, KNEES, UPPER, visible
 from aerodaas.data import Detections
 from aerodaas.navigation.ground import GroundView
 
 __all__ = ["feet_below", "lies"]
-
-_UPPER, _HIPS = slice(0, 7), slice(11, 13)
-"""Head and shoulders; hips."""
-
-_KNEES, _ANKLES = slice(13, 15), slice(15, 17)
 
 _LONGEST = 2.2
 """Metres of ground that a lying body covers, at most, its joints a little above it."""
@@ -31,7 +27,7 @@ _HIPS_LOW = (0.7, 0.51)
 
 _PAIR = 2
 
-_LEGS = ((_ANKLES, 0.08), (_KNEES, 0.5), (_HIPS, 0.93))
+_LEGS = ((ANKLES, 0.08), (KNEES, 0.5), (HIPS, 0.93))
 """Joints, and their height in metres while an adult stands (Drillis and Contini, 1966)."""
 
 _ABOVE = 0.3
@@ -52,9 +48,9 @@ def lies(keypoints: NDArray[np.floating], seen: Detections, min_confidence: floa
         view = GroundView(seen)
     except ValueError:
         return None
-    known = _known(keypoints, min_confidence)
-    upper = next((part for part in (_UPPER, _HIPS) if known[part].sum() >= _PAIR), None)
-    lower = next((part for part in (_ANKLES, _KNEES) if known[part].sum() >= _PAIR), None)
+    known = visible(keypoints, min_confidence)
+    upper = next((part for part in (UPPER, HIPS) if known[part].sum() >= _PAIR), None)
+    lower = next((part for part in (ANKLES, KNEES) if known[part].sum() >= _PAIR), None)
     if upper is None or lower is None:
         return None
     ground = view.points(keypoints[:, :2].astype(np.float64))
@@ -67,7 +63,7 @@ def lies(keypoints: NDArray[np.floating], seen: Detections, min_confidence: floa
         return False
     near = max(_NEAREST, float(np.hypot(*foot)))
     lift = view.height * (1.0 - near / max(near, float(np.hypot(*top))))
-    return lift < (_LOW if upper is _UPPER else _HIPS_LOW[lower is _KNEES])
+    return lift < (_LOW if upper is UPPER else _HIPS_LOW[lower is KNEES])
 
 
 def feet_below(
@@ -77,7 +73,7 @@ def feet_below(
 
     None if that is too high for this camera to tell, or there is none.
     """
-    known = _known(keypoints, min_confidence)
+    known = visible(keypoints, min_confidence)
     for part, up in _LEGS:
         if known[part].sum() == _PAIR:
             if view.height - up < _ABOVE:
@@ -85,7 +81,3 @@ def feet_below(
             place = view.points(keypoints[part, :2].astype(np.float64), up).mean(axis=0)
             return place if np.isfinite(place).all() else None
     return None
-
-
-def _known(keypoints: NDArray[np.floating], least: float) -> NDArray[np.bool_]:
-    return np.asarray(np.isfinite(keypoints).all(axis=1) & (keypoints[:, 2] >= least))

@@ -18,7 +18,8 @@ import onnxruntime as ort
 import typer
 from numpy.typing import NDArray
 
-from aerodaas.analytics.gestures import GESTURE_MODEL, GESTURES, POINTS, normalised
+from aerodaas.analytics.gestures import GESTURE_MODEL, GESTURES, normalised
+from aerodaas.analytics.joints import POINTS
 from aerodaas.geometry import CameraModel, enu_to_body
 from aerodaas.training.bodies import keypoints_of, sample_body
 

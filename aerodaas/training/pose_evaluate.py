@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.analytics import joints
 from aerodaas.analytics.onnx.keypoints import KeypointModel
 from aerodaas.training.metrics import similarity
 from aerodaas.training.pose_cuts import People
@@ -17,15 +18,14 @@ from aerodaas.training.pose_cuts import People
 __all__ = ["PARTS", "Placing", "milliseconds_per_person", "placing"]
 
 PARTS = {
-    "nose, eyes, ears": slice(0, 5),
-    "shoulders": slice(5, 7),
-    "elbows": slice(7, 9),
-    "wrists": slice(9, 11),
-    "hips": slice(11, 13),
-    "knees": slice(13, 15),
-    "ankles": slice(15, 17),
+    "nose, eyes, ears": joints.FACE,
+    "shoulders": joints.SHOULDERS,
+    "elbows": joints.ELBOWS,
+    "wrists": joints.WRISTS,
+    "hips": joints.HIPS,
+    "knees": joints.KNEES,
+    "ankles": joints.ANKLES,
 }
-"""Rows of COCO's keypoints."""
 
 _TRUSTED = 0.35
 """Confidence from which on the gestures' analysis counts a joint as seen."""
