@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parents[2]
+from bench_runs import run_benchmark
 
 
 @pytest.mark.slow
@@ -17,15 +14,7 @@ def test_falls_are_told_and_walks_are_not(tmp_path: Path) -> None:
     """On renders, by the shipped models."""
     path = tmp_path / "falls.json"
     words = ["--falls", "2", "--walks", "1", "--duration", "20", "--json", str(path)]
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "160"}
-    done = subprocess.run(
-        [sys.executable, "benchmarks/falls.py", *words],
-        cwd=ROOT,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_benchmark("falls", *words)
     assert done.returncode == 0, done.stderr
     rows = {row["case"]: row for row in json.loads(path.read_text())["rows"]}
     assert rows["away"]["told"] == 100

@@ -3,26 +3,16 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
-ROOT = Path(__file__).parents[2]
+from bench_runs import run_benchmark
 
 
 def test_a_short_walk_is_measured(tmp_path: Path) -> None:
     """By true boxes: the person is in view, the height held, and the figures say so."""
     path = tmp_path / "following.json"
     words = ["--speeds", "0.5", "--seeds", "1", "--duration", "22", "--json", str(path)]
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "160"}
-    done = subprocess.run(
-        [sys.executable, "benchmarks/following.py", *words],
-        cwd=ROOT,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = run_benchmark("following", *words)
     assert done.returncode == 0, done.stderr
     (row,) = json.loads(path.read_text())["rows"]
     assert row["case"] == "0.5 m/s"

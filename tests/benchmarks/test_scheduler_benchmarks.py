@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).parents[2]
+from bench_runs import run_benchmark
 
 
 @pytest.mark.parametrize(
@@ -25,11 +22,7 @@ def test_it_prints_a_table_and_writes_the_same_figures(
 ) -> None:
     """With units, machine, versions and revision."""
     out = tmp_path / "out.json"
-    command = [sys.executable, f"benchmarks/{name}.py", *arguments.split(), "--json", str(out)]
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "160"}
-    done = subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
-    )
+    done = run_benchmark(name, *arguments.split(), "--json", str(out))
     assert done.returncode == 0, done.stderr
     found = json.loads(out.read_text())
     assert len(found["rows"]) == cases

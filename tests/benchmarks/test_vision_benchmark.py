@@ -3,23 +3,11 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
+from bench_runs import run_benchmark
 from onnx import TensorProto, helper, numpy_helper, save
-
-ROOT = Path(__file__).parents[2]
-
-
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    """Run the benchmark as a user does."""
-    command = [sys.executable, "benchmarks/vision.py", *arguments]
-    environment = {"PYTHONPATH": str(ROOT), "PATH": "/usr/bin:/bin", "COLUMNS": "160"}
-    return subprocess.run(
-        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
-    )
 
 
 def test_it_prints_a_table_and_writes_the_same_figures(tmp_path: Path) -> None:
@@ -36,7 +24,7 @@ def test_it_prints_a_table_and_writes_the_same_figures(tmp_path: Path) -> None:
     opset = [helper.make_opsetid("", 13)]
     save(helper.make_model(graph, opset_imports=opset, ir_version=8), str(model))
     path = tmp_path / "figures" / "vision.json"
-    done = run(str(model), "--rounds", "3", "--json", str(path))
+    done = run_benchmark("vision", str(model), "--rounds", "3", "--json", str(path))
     assert done.returncode == 0, done.stderr
     assert "tiny.onnx" in done.stdout
     figures = json.loads(path.read_text())
@@ -47,7 +35,7 @@ def test_it_prints_a_table_and_writes_the_same_figures(tmp_path: Path) -> None:
 
 def test_a_model_that_does_not_load_is_told_in_one_line(tmp_path: Path) -> None:
     """Exit code 2: the user's input is wrong."""
-    done = run(str(tmp_path / "gone.onnx"))
+    done = run_benchmark("vision", str(tmp_path / "gone.onnx"))
     assert done.returncode == 2
     assert "gone.onnx cannot be read" in done.stderr
     assert "Traceback" not in done.stderr
