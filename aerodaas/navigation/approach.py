@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 
+import numpy as np
+
 from aerodaas.data import Odometry
 from aerodaas.geometry import Vector
 from aerodaas.navigation.control import braking_speed
@@ -64,11 +66,14 @@ class ApproachLimit:
     def speed(self, towards: Sighting, away: float, now: Odometry | None) -> float:
         """Fastest speed in m/s towards `towards`, which moves away at `away` m/s.
 
-        Negative where the drone must back off from the target. Only its coming nearer counts as
-        motion. Others in the way stop the drone, but do not drive it back.
+        Negative where the drone must back off from the target. Its walking away allows no more
+        speed than its standing still, but a drone that gains on it has less room than it seems: the
+        airframe goes on gaining until it has answered. Others in the way stop the drone, but do not
+        drive it back.
         """
         seen = list(self._distances(towards.bearing, now))
         target = min([towards.distance, *(far for far, is_target in seen if is_target)])
+        target -= self.limits.response * max(0.0, _speed(now, towards.bearing) - max(away, 0.0))
         others = [self._closing(far) for far, is_target in seen if not is_target]
         speed = self._closing(target) + min(away, 0.0)
         return min(speed, max(0.0, min(others))) if others else speed
@@ -86,3 +91,11 @@ class ApproachLimit:
             off = abs(math.remainder(one.bearing - bearing, math.tau))
             if off <= _AHEAD:
                 yield one.distance, self._target and number == 0
+
+
+def _speed(now: Odometry | None, bearing: float) -> float:
+    """How fast the drone flies towards `bearing`, in m/s; zero if that is not known."""
+    if now is None or not np.isfinite(now.velocity).all():
+        return 0.0
+    heading = now.yaw + bearing
+    return float(now.velocity[:2] @ (math.cos(heading), math.sin(heading)))

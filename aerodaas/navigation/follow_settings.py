@@ -45,6 +45,8 @@ class FollowLimits:
     reaction_time: float = 0.6
     """Seconds from a target's stop until the drone brakes: a frame at 5 a second, a detector's work
     and the tilting of the airframe."""
+    response: float = 0.4
+    """Seconds by which the airframe's velocity lags behind the commanded one."""
     yaw_acceleration: float = 4.0
     """rad/s^2 of the commanded yaw rate."""
     nearest: float = 0.6

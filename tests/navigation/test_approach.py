@@ -87,3 +87,15 @@ def test_others_stop_the_drone_but_do_not_drive_it_back() -> None:
     assert approach.speed(Sighting(0.0, 4.0), 0.0, AT_ORIGIN) == 0.0
     approach.see(Sighting(0.0, 0.5), [], AT_ORIGIN)
     assert approach.speed(Sighting(0.0, 0.5), 0.0, AT_ORIGIN) < -1.0
+
+
+@given(speed=st.floats(0.0, 1.5), away=st.floats(0.0, 1.5), distance=st.floats(1.5, 6.0))
+def test_a_drone_that_gains_on_its_target_must_slow_down_sooner(
+    speed: float, away: float, distance: float
+) -> None:
+    """By what it gains until the airframe answers; one that does not gain loses nothing."""
+    target = Sighting(0.0, distance)
+    flying = Odometry(np.array([0.0, 0.0, 1.5]), np.array([speed, 0.0, 0.0]), 0.0)
+    gained = LIMITS.response * max(0.0, speed - away)
+    found = limit().speed(target, away, flying)
+    assert found == pytest.approx(limit().speed(Sighting(0.0, distance - gained), 0.0, AT_ORIGIN))
