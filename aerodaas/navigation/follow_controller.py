@@ -25,7 +25,7 @@ from aerodaas.navigation.approach import ApproachLimit
 from aerodaas.navigation.command_shaper import CommandShaper
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
 from aerodaas.navigation.sighting import Sighting
-from aerodaas.navigation.target_motion import TargetMotion, seen_from
+from aerodaas.navigation.target_motion import TargetMotion, place_of, seen_from
 from aerodaas.navigation.upright import Upright
 from aerodaas.waypoints import DEFAULT_PRIORITY, VelocityCommand
 
@@ -162,13 +162,11 @@ class FollowController:
             if falls and self.motion.leaps(sighting, seen.at_capture, seen.stamp):
                 return
             self.motion.observe(sighting, seen.at_capture, seen.stamp)
-            self._remember_place(seen.stamp)
+            self._remember_place(place_of(sighting, seen.at_capture), seen.stamp)
 
-    def _remember_place(self, stamp: int) -> None:
+    def _remember_place(self, place: NDArray[np.float64], stamp: int) -> None:
         """Keep where the target was of late: the first picture of a fall looks like a long step."""
-        place = self.motion.place
-        if place is not None:
-            self._places.append((stamp, place))
+        self._places.append((stamp, (float(place[0]), float(place[1]))))
         while seconds(stamp - self._places[0][0]) > _TOPPLING:
             self._places.popleft()
 
@@ -221,7 +219,8 @@ class FollowController:
         self._distance_pid.Ki = self.gains.distance[1] if abs(error) < _INTEGRAL_REACH else 0.0
         speed = float(self._distance_pid(-error, dt=dt) or 0.0) + away
         safe = self._approach.speed(target, away, seen.now or seen.at_capture)
-        if target.bound:
+        if target.bound and self._stood is None:
+            # Nobody knows how near it is. Of one who fell it is known where the feet are.
             safe = min(safe, 0.0)
         self._braking = self._shaper.towards(target.bearing) > safe
         if speed > safe and safe <= 0.0:

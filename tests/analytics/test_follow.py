@@ -478,6 +478,17 @@ def test_a_fall_is_not_taken_for_walking(speed: float, rate: float, unseen: floa
     assert world.alerts == []
 
 
+def test_who_falls_while_the_drone_lags_behind_is_come_up_to() -> None:
+    """To the wanted distance from the feet, though the chest lies farther away."""
+    world = falling_world(1.0, 5.0)
+    world.falls = 7.0
+    world.target = lambda time: (4 + 1.4 * min(max(time - 6, 0), 1.0), 0.0)
+    distances = world.run(VipFollowAnalytics(), 25)
+    assert max(distances[35:45]) > 2.7
+    assert min(distances) > 1.2
+    assert distances[-1] == pytest.approx(2.0, abs=0.35)
+
+
 def test_who_has_fallen_is_watched_even_when_out_of_sight() -> None:
     """They get up where they fell; a drone that turns round in search finds somebody else."""
     world = falling_world(0.7, 5.0)
