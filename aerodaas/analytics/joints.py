@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 __all__ = [
     "ANKLES",
     "ARMS",
+    "BONES",
     "ELBOWS",
     "FACE",
     "HIPS",
     "KNEES",
+    "MIRRORED",
     "POINTS",
     "SHOULDERS",
     "UPPER",
@@ -29,6 +31,15 @@ UPPER = slice(0, 7)
 
 ARMS = ((5, 7, 9), (6, 8, 10))
 """Left and right: shoulder, elbow, wrist."""
+
+BONES = (
+    *((5, 7), (7, 9), (6, 8), (8, 10), (11, 13), (13, 15), (12, 14), (14, 16)),
+    *((5, 6), (11, 12), (5, 11), (6, 12), (0, 5), (0, 6)),
+)
+"""Limbs, then trunk and neck: pairs of joints with body between them."""
+
+MIRRORED = (0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15)
+"""Which joint each one is in a mirrored picture."""
 
 
 def visible(keypoints: NDArray[np.floating[Any]], min_confidence: float) -> NDArray[np.bool_]:

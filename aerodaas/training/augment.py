@@ -12,14 +12,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.analytics.joints import MIRRORED
 from aerodaas.training.dataset import Sample
 
-__all__ = ["FLIPPED", "augmented", "placed", "spoiled"]
+__all__ = ["augmented", "placed", "spoiled"]
 
 Picture = NDArray[np.uint8]
-
-FLIPPED = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15])
-"""Which keypoint of a mirrored person is which."""
 
 _GREY = 114
 _LEAST_SIDE, _LEAST_SHARE = 3.0, 0.3
@@ -74,7 +72,7 @@ def placed(
     inside = ((points[..., :2] >= 0) & (points[..., :2] < (width, height))).all(axis=-1)
     points[~inside] = 0.0
     if mirror:
-        points = points[:, FLIPPED]
+        points = points[:, list(MIRRORED)]
     return Sample(
         np.asarray(image, np.uint8),
         sample.kinds[kept],

@@ -10,6 +10,7 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 
 from aerodaas.analytics.body_cut import cut_out, square_around
+from aerodaas.analytics.joints import MIRRORED, POINTS
 from aerodaas.analytics.models import POSE
 from aerodaas.analytics.onnx.model_file import read_model
 from aerodaas.analytics.onnx.providers import open_session
@@ -24,12 +25,18 @@ _TASK = "keypoints"
 _NUMBERS = 3
 """For each joint: u, v, confidence."""
 
+_ASTRAY = 0.1
+"""Sides of the cut by which the places of a joint differ where one of them is doubtful."""
+
 
 class KeypointModel:
     """A network on square cuts around people, as `aerodaas.training pose` exports it.
 
-    Cuts (n, 3, s, s), RGB from 0 to 1, to keypoints (n, k, 3): u and v in pixels of the cut, and
+    Cuts (n, 3, s, s), RGB from 0 to 1, to keypoints (n, 17, 3): u and v in pixels of the cut, and
     the confidence, 0 to 1, that the joint is seen and its place is right.
+
+    Each cut is looked at twice, the second time mirrored. An arm that is there is found in both;
+    one that the network makes up, of a window behind a shoulder, seldom is.
     """
 
     def __init__(
@@ -42,7 +49,7 @@ class KeypointModel:
         """Read the file, which travels to the actor by value; raises ModelError."""
         model = read_model(path)
         shape = model.output_shape
-        if model.metadata.get("task") != _TASK or len(shape) < _NUMBERS or shape[-1] != _NUMBERS:
+        if model.metadata.get("task") != _TASK or tuple(shape[1:]) != (POINTS, _NUMBERS):
             raise model.refusal(
                 "finds no keypoints in cuts around people",
                 "train one with `python -m aerodaas.training pose`; a YOLO pose model is for "
@@ -65,17 +72,32 @@ class KeypointModel:
         self._session = None
 
     def find(self, image: NDArray[np.uint8], boxes: Sequence[Box]) -> NDArray[np.float32]:
-        """Keypoints (n, k, 3) in pixels of `image` (BGR) of the person in each of `boxes`.
+        """Keypoints (n, 17, 3) in pixels of `image` (BGR) of the person in each of `boxes`.
 
         All in one run of the network; raises ModelError before `open`.
         """
         squares = [square_around(box) for box in boxes]
         cuts = np.stack([cut_out(image, square, self.size) for square in squares])
-        pixels = cuts[..., ::-1].transpose(0, 3, 1, 2).astype(self._dtype) / 255
-        found = self._run(np.ascontiguousarray(pixels, self._dtype))
+        both = np.concatenate([cuts, cuts[:, :, ::-1]])
+        pixels = both[..., ::-1].transpose(0, 3, 1, 2).astype(self._dtype) / 255
+        straight, mirrored = np.split(self._run(np.ascontiguousarray(pixels, self._dtype)), 2)
+        found = self._agreed(straight, mirrored)
         for points, (left, top, side) in zip(found, squares, strict=True):
             points[:, :2] = points[:, :2] * (side / self.size) + (left, top)
         return found
+
+    def _agreed(
+        self, straight: NDArray[np.float32], mirrored: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """Where the joints are by both looks; the less these agree, the less it is believed."""
+        other = mirrored[:, list(MIRRORED)]
+        other[..., 0] = self.size - other[..., 0]
+        apart = np.linalg.norm(straight[..., :2] - other[..., :2], axis=-1) / self.size
+        agreed = (straight + other) / 2
+        surer = np.where(straight[..., 2:] >= other[..., 2:], straight, other)
+        places = np.where((apart < _ASTRAY)[..., None], agreed, surer)
+        places[..., 2] = agreed[..., 2] * np.exp(-0.5 * np.square(apart / _ASTRAY))
+        return np.asarray(places, np.float32)
 
     def _run(self, pixels: NDArray[np.floating]) -> NDArray[np.float32]:
         if self._session is None:
