@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.body_cut import CUT, GREY, MARGIN
-from aerodaas.training.augment import FLIPPED, spoiled
+from aerodaas.analytics.joints import MIRRORED
+from aerodaas.training.augment import spoiled
 from aerodaas.training.dataset import Pictures
+from aerodaas.training.surroundings import surrounded
 
 __all__ = ["Cut", "People"]
 
@@ -22,6 +24,9 @@ _MOST = 6
 
 _TURNED = 0.15
 """Share of the cuts turned by any angle: those who lie are rare, and lie any way."""
+
+_SURROUNDED = 0.5
+"""Share of the cuts with pieces of other pictures beside the person."""
 
 _COVERED = 0.35
 """Share of the cuts in which something hides a part."""
@@ -91,13 +96,17 @@ class People:
         found[((found[:, :2] < 0) | (found[:, :2] >= CUT)).any(axis=1)] = 0.0
         found[points[:, 2] == 0] = 0.0
         if mirror:
-            found = found[FLIPPED]
+            found = found[list(MIRRORED)]
+        longest = float((self[index][1][2:] - self[index][1][:2]).max())
+        size = longest * CUT / side
         if rng is not None:
+            if rng.random() < _SURROUNDED:
+                other = self._images[int(rng.integers(len(self._images)))]
+                image = surrounded(image, found, size, other, rng)
             if rng.random() < _COVERED:
                 image, found = _covered(image, found, rng)
             image = spoiled(image, rng)
-        longest = float((self[index][1][2:] - self[index][1][:2]).max())
-        return Cut(image, found.astype(np.float32), longest * CUT / side)
+        return Cut(image, found.astype(np.float32), size)
 
 
 def _without_arms(box: NDArray[np.float32], points: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import cv2
 import numpy as np
+import onnxruntime
 import pytest
 import torch
 from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.analytics.body_cut import CUT, MARGIN
+from aerodaas.analytics.joints import BONES
 from aerodaas.analytics.onnx.keypoints import KeypointModel
 from aerodaas.training.dataset import Pictures, Sample, save_shard
 from aerodaas.training.pose_cuts import People
@@ -18,7 +21,13 @@ from aerodaas.training.pose_evaluate import PARTS, placing
 from aerodaas.training.pose_export import export_pose
 from aerodaas.training.pose_network import STRIDE, Joints, places
 from aerodaas.training.pose_train import PoseRecipe, train_pose
+from aerodaas.training.surroundings import surrounded
 
+_UPRIGHT = [
+    *((54, 45, 2), (74, 45, 2), (52, 60, 2), (76, 60, 2), (52, 74, 2), (76, 74, 2)),
+    *((57, 72, 2), (71, 72, 2), (57, 90, 2), (71, 90, 2), (57, 106, 2), (71, 106, 2)),
+]
+"""Joints from the shoulders down, in a cut."""
 BOX = np.array([[100, 60, 150, 180]], np.float32)
 
 
@@ -47,6 +56,34 @@ def test_a_plain_cut_holds_the_person_and_its_joints(people: People) -> None:
     for u, v, seen in cut.keypoints:
         assert seen == 2
         assert cut.image[int(v), int(u)].mean() > 100
+
+
+@given(st.integers(0, 10_000))
+def test_other_surroundings_leave_the_person_alone(seed: int) -> None:
+    """Not a pixel near a joint or a bone changes; beside them, most often some do."""
+    rng = np.random.default_rng(seed)
+    points = np.zeros((17, 3), np.float32)
+    points[:] = [(64, 30, 2), *[(64, 30, 2)] * 4, *_UPRIGHT]
+    image, other = np.zeros((CUT, CUT, 3), np.uint8), np.full((200, 300, 3), 255, np.uint8)
+    changed = surrounded(image, points, 85.0, other, rng)[..., 0] > 0
+    body = np.zeros((CUT, CUT), np.uint8)
+    for one, end in BONES:
+        cv2.line(
+            body, points[one, :2].astype(int).tolist(), points[end, :2].astype(int).tolist(), 1
+        )
+    assert not (changed & (body > 0)).any()
+    assert not changed[24:37, 58:71].any()
+
+
+def test_other_surroundings_come_near() -> None:
+    """To where arms would be."""
+    points = np.array([(64, 30, 2)] * 5 + _UPRIGHT, np.float32)
+    image, other = np.zeros((CUT, CUT, 3), np.uint8), np.full((200, 300, 3), 255, np.uint8)
+    laid = [
+        surrounded(image, points, 85.0, other, np.random.default_rng(seed))[20:40, 78:96].any()
+        for seed in range(50)
+    ]
+    assert np.mean(laid) > 0.3
 
 
 @given(st.integers(0, 10_000))
@@ -92,14 +129,10 @@ def test_the_exported_network_is_the_trained_one(tmp_path: Path) -> None:
     network = Joints().eval()
     torch.save(network.state_dict(), tmp_path / "weights.pt")
     export_pose(tmp_path / "weights.pt", tmp_path / "pose.onnx")
-    model = KeypointModel(tmp_path / "pose.onnx", threads=1)
-    model.open()
-    image = np.random.default_rng(0).integers(0, 255, (CUT, CUT, 3), dtype=np.uint8)
-    side = CUT / MARGIN
-    edge = (CUT - side) / 2
-    (found,) = model.find(image, [(edge, edge, edge + side, edge + side)])
-    pixels = torch.from_numpy(image[..., ::-1].copy()).permute(2, 0, 1)[None].float() / 255
+    session = onnxruntime.InferenceSession(tmp_path / "pose.onnx")
+    pixels = torch.rand(2, 3, CUT, CUT, generator=torch.Generator().manual_seed(0))
+    (found,) = session.run(None, {session.get_inputs()[0].name: pixels.numpy()})
     with torch.no_grad():
         maps, seen = network(pixels)
-    assert found[:, 2] == pytest.approx(seen.sigmoid()[0].numpy(), abs=1e-3)
-    assert np.median(np.abs(found[:, :2] - places(maps)[0].numpy())) < 0.5
+    assert found[..., 2] == pytest.approx(seen.sigmoid().numpy(), abs=1e-3)
+    assert np.median(np.abs(found[..., :2] - places(maps).numpy())) < 0.5
