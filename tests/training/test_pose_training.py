@@ -131,7 +131,7 @@ def test_the_exported_network_is_the_trained_one(tmp_path: Path) -> None:
     export_pose(tmp_path / "weights.pt", tmp_path / "pose.onnx")
     session = onnxruntime.InferenceSession(tmp_path / "pose.onnx")
     pixels = torch.rand(2, 3, CUT, CUT, generator=torch.Generator().manual_seed(0))
-    (found,) = session.run(None, {session.get_inputs()[0].name: pixels.numpy()})
+    found = np.asarray(session.run(None, {session.get_inputs()[0].name: pixels.numpy()})[0])
     with torch.no_grad():
         maps, seen = network(pixels)
     assert found[..., 2] == pytest.approx(seen.sigmoid().numpy(), abs=1e-3)
