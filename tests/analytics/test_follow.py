@@ -530,6 +530,7 @@ def test_a_doubtful_target_gives_way_to_a_surer_one(passer_score: float, followe
     """Only one that looks doubtful itself does, and only to one that is not just as doubtful."""
     follow = VipFollowAnalytics()
     passer, vest = (180.0, 200.0, 220.0, 270.0), (560.0, 200.0, 720.0, 430.0)
+    command = None
     for step in range(60):
         boxes = [Detection(passer, "vest", 0.6 if step < 10 else passer_score)]
         if step > 20:
