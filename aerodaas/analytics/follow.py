@@ -18,7 +18,7 @@ from aerodaas.analytics.overlap import one_for_each
 from aerodaas.analytics.tracking import Tracker
 from aerodaas.data import Alert, Detection, Detections
 from aerodaas.errors import ConfigError
-from aerodaas.navigation.follow_controller import FollowController, FollowPhase
+from aerodaas.navigation.follow_controller import LYING, FollowController, FollowPhase
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
 from aerodaas.navigation.sighting import Sighting, TargetSize, sight
 from aerodaas.navigation.target_motion import TargetMotion, place_of
@@ -29,8 +29,6 @@ __all__ = ["FollowAnalytics"]
 _log = logging.getLogger(__name__)
 _REACH, _REACH_SHARE = 0.3, 0.2
 """Metres, and parts of the distance, from where the target should stand to where it is seen."""
-_FALLEN = 1.3
-"""Metres from the feet to the chest of one who lies there; in any direction."""
 _SURER = 0.2
 """By how much the score of another must be better than that of a doubtful target."""
 _WIDTH_MEMORY = 0.1
@@ -219,7 +217,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
                 continue
             off = float(np.linalg.norm(sighting.offset - expected.offset))
             if sighting.bound:
-                off = max(0.0, off - _FALLEN)
+                off = max(0.0, off - LYING)
             if off <= reach:
                 best, reach = detection, off
         if best is not None and best.track_id is not None:

@@ -29,7 +29,7 @@ from aerodaas.navigation.target_motion import TargetMotion, place_of, seen_from
 from aerodaas.navigation.upright import Upright
 from aerodaas.waypoints import DEFAULT_PRIORITY, VelocityCommand
 
-__all__ = ["FollowController", "FollowPhase", "Observation"]
+__all__ = ["LYING", "FollowController", "FollowPhase", "Observation"]
 
 _LONGEST_STEP = 0.5
 """Seconds; after a longer silence the integrals would grow by what nobody saw."""
@@ -37,6 +37,8 @@ _FIRST_STEP = 0.1
 _FARTHEST = 1000.0
 """Metres; no camera tells a person from farther away."""
 _FARTHEST_FROM_HOME = 1e5
+LYING = 1.3
+"""Metres from the feet to the chest of one who lies there, at most; in any direction."""
 _TOPPLING = 0.4
 """Seconds from a fall's begin until it is known for one."""
 _INTEGRAL_REACH = 1.2
@@ -241,7 +243,8 @@ class FollowController:
             feet = seen_from(now, self._stood)
             if self._seen != seen.stamp:
                 last = replace(feet, bound=True)
-            last = replace(last, distance=min(last.distance, feet.distance))
+            nearest = max(feet.distance, last.distance - LYING)
+            last = replace(last, distance=min(last.distance, nearest))
         return predicted or (last, 0.0, 0.0)
 
     def _command(
