@@ -16,7 +16,7 @@ from aerodaas.navigation.ground import GroundView
 
 __all__ = ["feet_below", "lies"]
 
-_LONGEST = 2.2
+_LONGEST = 2.3
 """Metres of ground that a lying body covers, at most, its joints a little above it."""
 
 _LOW = 0.75

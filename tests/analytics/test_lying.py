@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from aerodaas.analytics.lying import lies
@@ -33,6 +33,7 @@ def keypoints(posture: Posture, ahead: float, turn: float, up: float) -> np.ndar
     return np.column_stack([pixels[:, :2], 0.9 * (inside & (pixels[:, 2] > 0))])
 
 
+@example(turn=3.0, ahead=8.0, up=1.3125, forward=False)
 @given(
     turn=st.floats(-math.pi, math.pi),
     ahead=st.floats(5.0, 8.0),
