@@ -38,7 +38,7 @@ BONES = (
 )
 """Limbs, then trunk and neck: pairs of joints with body between them."""
 
-MIRRORED = (0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15)
+MIRRORED = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15])
 """Which joint each one is in a mirrored picture."""
 
 

@@ -72,7 +72,7 @@ def placed(
     inside = ((points[..., :2] >= 0) & (points[..., :2] < (width, height))).all(axis=-1)
     points[~inside] = 0.0
     if mirror:
-        points = points[:, list(MIRRORED)]
+        points = points[:, MIRRORED]
     return Sample(
         np.asarray(image, np.uint8),
         sample.kinds[kept],

@@ -9,7 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.training.labelling import KEYPOINTS, Label
+from aerodaas.analytics.joints import POINTS
+from aerodaas.training.labelling import Label
 
 __all__ = ["Pictures", "Sample", "save_shard"]
 
@@ -34,7 +35,7 @@ class Sample:
         """Gather labels, their pixels multiplied by `scale`."""
         kinds = np.array([label.kind for label in labels], np.int64)
         boxes = np.array([label.box for label in labels], np.float32).reshape(-1, 4) * scale
-        keypoints = np.zeros((len(labels), KEYPOINTS, 3), np.float32)
+        keypoints = np.zeros((len(labels), POINTS, 3), np.float32)
         for row, label in zip(keypoints, labels, strict=True):
             if label.keypoints is not None:
                 row[:] = label.keypoints * (scale, scale, 1.0)

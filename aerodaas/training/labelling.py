@@ -27,9 +27,8 @@ from aerodaas.simulation.scene.scene import Looks
 from aerodaas.simulation.scene.textures import Palette
 from aerodaas.simulation.world import World
 
-__all__ = ["KEYPOINTS", "Label", "LabellingRenderer", "box_of", "mask_of", "project", "visibility"]
+__all__ = ["Label", "LabellingRenderer", "box_of", "mask_of", "project", "visibility"]
 
-KEYPOINTS = 17
 _STEP = 8
 """Between the codes of two things, in grey levels: rounding confuses no two."""
 

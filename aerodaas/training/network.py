@@ -12,8 +12,8 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
+from aerodaas.analytics.joints import POINTS
 from aerodaas.analytics.models import DETECTOR_CLASSES
-from aerodaas.training.labelling import KEYPOINTS
 
 __all__ = ["STRIDES", "Eyes", "anchors_of"]
 
@@ -108,7 +108,7 @@ class Eyes(nn.Module):
         self.down_coarse = _Stage(w4 + w5, w5, add=False)
         self.boxes = nn.ModuleList(_branch(w, 48, 4) for w in (w3, w4, w5))
         self.kinds = nn.ModuleList(_branch(w, 48, self.classes) for w in (w3, w4, w5))
-        self.points = nn.ModuleList(_branch(w, 64, 3 * KEYPOINTS) for w in (w3, w4, w5))
+        self.points = nn.ModuleList(_branch(w, 64, 3 * POINTS) for w in (w3, w4, w5))
         for box, kind in zip(self.boxes, self.kinds, strict=True):
             nn.init.constant_(box[-1].bias, 0.7)
             nn.init.constant_(kind[-1].bias, math.log(_PRIOR / (1 - _PRIOR)))
@@ -156,6 +156,6 @@ def decode_boxes(raw: Tensor, centres: Tensor, strides: Tensor) -> Tensor:
 
 def decode_points(raw: Tensor, centres: Tensor, strides: Tensor) -> Tensor:
     """Keypoints (b, 17, 3, n): u, v in pixels, and the logit of being seen."""
-    points = raw.unflatten(1, (KEYPOINTS, 3))
+    points = raw.unflatten(1, (POINTS, 3))
     places = points[:, :, :2] * 2.0 * strides + centres
     return torch.cat([places, points[:, :, 2:]], 2)

@@ -96,7 +96,7 @@ class People:
         found[((found[:, :2] < 0) | (found[:, :2] >= CUT)).any(axis=1)] = 0.0
         found[points[:, 2] == 0] = 0.0
         if mirror:
-            found = found[list(MIRRORED)]
+            found = found[MIRRORED]
         longest = float((self[index][1][2:] - self[index][1][:2]).max())
         size = longest * CUT / side
         if rng is not None:

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from aerodaas.training.labelling import KEYPOINTS
+from aerodaas.analytics.joints import POINTS
 
 __all__ = ["STRIDE", "Joints", "places"]
 
@@ -57,8 +57,8 @@ class Joints(nn.Module):
         self.up_8 = nn.Sequential(_conv(w4, w3, 1), _Residual(w3))
         self.up_4 = nn.Sequential(_Residual(w3), _conv(w3, 48, 1))
         self.beside_4 = _conv(w2, 48, 1)
-        self.maps = nn.Sequential(_conv(48, 48), nn.Conv2d(48, KEYPOINTS, 1))
-        self.found = nn.Linear(w5, KEYPOINTS)
+        self.maps = nn.Sequential(_conv(48, 48), nn.Conv2d(48, POINTS, 1))
+        self.found = nn.Linear(w5, POINTS)
 
     def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
         """Logits over the cells (b, 17, s/4, s/4), and of each joint's being found (b, 17)."""

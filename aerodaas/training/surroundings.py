@@ -65,10 +65,8 @@ def surrounded(
 def _outline(points: Points, size: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Places along the bones (n, 2), and how far the body reaches from each (n, 1), in pixels."""
     seen = points[:, 2] > 0
-    bones = [(one, other) for one, other in BONES if seen[one] and seen[other]]
-    lines = [
-        points[one, :2] + _STEPS * (points[other, :2] - points[one, :2]) for one, other in bones
-    ]
+    bones = [points[list(bone), :2] for bone in BONES if seen[list(bone)].all()]
+    lines = [begin + _STEPS * (end - begin) for begin, end in bones]
     places = np.concatenate([points[seen, :2], *lines])
     room = np.full((len(places), 1), _FLESH * size)
     room[: seen[:_FACE].sum()] = _SKULL * size

@@ -10,9 +10,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from aerodaas.analytics.joints import POINTS
 from aerodaas.training.augment import augmented
 from aerodaas.training.dataset import Pictures, Sample
-from aerodaas.training.labelling import KEYPOINTS
 from aerodaas.training.loop import Course, Progress, learn
 from aerodaas.training.loss import Targets, losses
 from aerodaas.training.network import Eyes
@@ -67,7 +67,7 @@ def _batch_of(samples: list[Sample], device: torch.device) -> tuple[Tensor, Targ
     most = max(1, *(len(sample.kinds) for sample in samples))
     kinds = np.zeros((len(samples), most), np.int64)
     boxes = np.zeros((len(samples), most, 4), np.float32)
-    keypoints = np.zeros((len(samples), most, KEYPOINTS, 3), np.float32)
+    keypoints = np.zeros((len(samples), most, POINTS, 3), np.float32)
     valid = np.zeros((len(samples), most), dtype=bool)
     for row, sample in enumerate(samples):
         count = len(sample.kinds)

@@ -90,7 +90,7 @@ class KeypointModel:
         self, straight: NDArray[np.float32], mirrored: NDArray[np.float32]
     ) -> NDArray[np.float32]:
         """Where the joints are by both looks; the less these agree, the less it is believed."""
-        other = mirrored[:, list(MIRRORED)]
+        other = mirrored[:, MIRRORED]
         other[..., 0] = self.size - other[..., 0]
         apart = np.linalg.norm(straight[..., :2] - other[..., :2], axis=-1) / self.size
         agreed = (straight + other) / 2
