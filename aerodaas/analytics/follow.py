@@ -137,13 +137,14 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         mine = next((item for item in trusted if item.track_id == self.target), None)
         if mine is None:
             mine = self._found_where_expected(found, tracked)
-        least = self._score_to_be_chosen(mine)
+        lost = mine is None and self._is_lost()
+        least = self.choice.score if lost or self.target is None else self._score_to_displace(mine)
         chosen = [
             item
             for item in trusted
             if self._score(item) >= least
             and self._is_inside(item, tracked)
-            and (self._is_lost(mine) or self._shows_enough(item, tracked))
+            and (lost or self._shows_enough(item, tracked))
         ]
         if not chosen:
             return mine
@@ -154,14 +155,12 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self._width = self.size.width
         return best
 
-    def _score_to_be_chosen(self, mine: Detection | None) -> float:
-        """Least score of a new target; infinite while the present one, seen as `mine`, is kept.
+    def _score_to_displace(self, mine: Detection | None) -> float:
+        """Least score of what takes the place of the target, seen as `mine`; infinite for nothing.
 
         One that has come to look doubtful, such as a passer in a bright shirt, gives way to a much
         surer one.
         """
-        if self.target is None or self._is_lost(mine):
-            return self.choice.score
         held = self.tracker.find(self.target)
         if mine is None or held is None or held.score >= self.choice.score:
             return math.inf
@@ -224,10 +223,10 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             self.target = best.track_id
         return best
 
-    def _is_lost(self, mine: Detection | None) -> bool:
+    def _is_lost(self) -> bool:
         """Whether the target has been gone for a while; another one is then taken as it is."""
         free = (FollowPhase.WAITING, FollowPhase.SEARCHING)
-        return self.target is not None and mine is None and self.controller.phase in free
+        return self.target is not None and self.controller.phase in free
 
     def _sight(self, detection: Detection, item: Detections) -> Sighting | None:
         sighting = sight(detection, item, self.size.with_width(self._width))
