@@ -23,11 +23,12 @@ from aerodaas.training.pose_network import STRIDE, Joints, places
 from aerodaas.training.pose_train import PoseRecipe, train_pose
 from aerodaas.training.surroundings import surrounded
 
-_UPRIGHT = [
+UPRIGHT = [
+    *[(64, 30, 2)] * 5,
     *((54, 45, 2), (74, 45, 2), (52, 60, 2), (76, 60, 2), (52, 74, 2), (76, 74, 2)),
     *((57, 72, 2), (71, 72, 2), (57, 90, 2), (71, 90, 2), (57, 106, 2), (71, 106, 2)),
 ]
-"""Joints from the shoulders down, in a cut."""
+"""Joints of one who stands in the middle of a cut."""
 BOX = np.array([[100, 60, 150, 180]], np.float32)
 
 
@@ -62,22 +63,20 @@ def test_a_plain_cut_holds_the_person_and_its_joints(people: People) -> None:
 def test_other_surroundings_leave_the_person_alone(seed: int) -> None:
     """Not a pixel near a joint or a bone changes; beside them, most often some do."""
     rng = np.random.default_rng(seed)
-    points = np.zeros((17, 3), np.float32)
-    points[:] = [(64, 30, 2), *[(64, 30, 2)] * 4, *_UPRIGHT]
+    points = np.array(UPRIGHT, np.float32)
     image, other = np.zeros((CUT, CUT, 3), np.uint8), np.full((200, 300, 3), 255, np.uint8)
     changed = surrounded(image, points, 85.0, other, rng)[..., 0] > 0
     body = np.zeros((CUT, CUT), np.uint8)
-    for one, end in BONES:
-        cv2.line(
-            body, points[one, :2].astype(int).tolist(), points[end, :2].astype(int).tolist(), 1
-        )
+    for bone in BONES:
+        begin, end = points[list(bone), :2].astype(int).tolist()
+        cv2.line(body, begin, end, 1)
     assert not (changed & (body > 0)).any()
     assert not changed[24:37, 58:71].any()
 
 
 def test_other_surroundings_come_near() -> None:
     """To where arms would be."""
-    points = np.array([(64, 30, 2)] * 5 + _UPRIGHT, np.float32)
+    points = np.array(UPRIGHT, np.float32)
     image, other = np.zeros((CUT, CUT, 3), np.uint8), np.full((200, 300, 3), 255, np.uint8)
     laid = [
         surrounded(image, points, 85.0, other, np.random.default_rng(seed))[20:40, 78:96].any()
