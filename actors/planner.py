@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import threading
 from collections.abc import Callable
-from concurrent.futures import Executor, Future
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from typing import Any, TypeVar
 
 import ray
-from ray.exceptions import RayActorError
+from ray.exceptions import GetTimeoutError, RayActorError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 __all__ = ["PlannerExecutor"]
@@ -17,19 +16,19 @@ __all__ = ["PlannerExecutor"]
 T = TypeVar("T")
 
 
-def _load(*_: object) -> None:
-    """Arrive with one's arguments."""
-
-
 class _PlannerActor:
     """Calls what it is given; holds no state, so that a restart loses nothing."""
 
-    def call(self, function: Callable[..., T], *args: Any) -> T:  # noqa: ANN401
-        return function(*args)
+    @ray.method(max_task_retries=-1)
+    def load(self, *_: object) -> None:
+        """Arrive with one's arguments, however often the process dies on the way."""
+
+    def call(self, function: Callable[..., T], *args: Any, **kwargs: Any) -> T:  # noqa: ANN401
+        return function(*args, **kwargs)
 
 
 class PlannerExecutor(Executor):
-    """Runs calls in an actor on this node, which is killed and started anew where it hangs."""
+    """Runs one call after another in an actor on this node, started anew where one hangs."""
 
     def __init__(self, patience: float, *used: object) -> None:
         """Give each call `patience` wall seconds; returns when the actor is there.
@@ -44,40 +43,30 @@ class PlannerExecutor(Executor):
             scheduling_strategy=NodeAffinitySchedulingStrategy(here, soft=False),
         ).remote()
         self._patience = patience
-        ray.get(self._actor.call.remote(_load, *used))
+        self._caller = ThreadPoolExecutor(1, "planner")
+        ray.get(self._actor.load.remote(*used))
 
     def submit(self, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:  # noqa: ANN401
-        """Call `function` in the actor; the future raises RuntimeError if the actor dies."""
-        del kwargs
-        result: Future[T] = Future()
-        watchdog = threading.Timer(self._patience, self._kill)
-        watchdog.daemon = True
-
-        def finish(done: Future[T]) -> None:
-            watchdog.cancel()
-            error = done.exception()
-            if isinstance(error, RayActorError):
-                text = (
-                    f"the scheduler's actor died, or took longer than {self._patience:.0f} s and "
-                    "was stopped; it starts anew"
-                )
-                result.set_exception(RuntimeError(text))
-            elif error is not None:
-                result.set_exception(error)
-            else:
-                result.set_result(done.result())
-
-        # An actor that is starting anew is waited for; its patience counts from when it is there.
-        self._actor.call.remote(bool).future().add_done_callback(lambda _: watchdog.start())
-        self._actor.call.remote(function, *args).future().add_done_callback(finish)
-        return result
+        """Call `function` in the actor; the future raises RuntimeError if that hangs or dies."""
+        return self._caller.submit(self._call, function, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - the base's
-        """End the actor."""
+        """End the actor, and the calls that wait for it."""
         del wait, cancel_futures
         with contextlib.suppress(Exception):
             ray.kill(self._actor)
+        self._caller.shutdown(wait=False, cancel_futures=True)
 
-    def _kill(self) -> None:
-        with contextlib.suppress(Exception):
+    def _call(self, function: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
+        try:
+            # An actor that is starting anew is waited for: patience counts from when it is there.
+            ray.get(self._actor.load.remote())
+            done = self._actor.call.remote(function, *args, **kwargs)
+            result: T = ray.get(done, timeout=self._patience)
+        except GetTimeoutError:
             ray.kill(self._actor, no_restart=False)
+            text = f"the scheduler took longer than {self._patience:.0f} s; its actor starts anew"
+            raise RuntimeError(text) from None
+        except RayActorError:
+            raise RuntimeError("the scheduler's actor died; it starts anew") from None
+        return result
