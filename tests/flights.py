@@ -142,6 +142,7 @@ class KinematicVehicle:
             self.mode = VehicleMode.HOLDING
         if self.position[2] <= self._ground:
             self.position[2] = self._ground
+            self.velocity[2] = max(0.0, self.velocity[2])
             if self.mode is VehicleMode.LANDING:
                 self.mode = VehicleMode.GROUNDED
 
