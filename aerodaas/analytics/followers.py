@@ -123,7 +123,9 @@ _CAR_CHOICE = TargetChoice(score=0.5, sure=0.3, looks=5, grounded=True, shared=0
 """Windows look like cars, but hang on walls, and are seldom taken for one as surely; half a car
 looks like one, too."""
 _CAR_GAINS = FollowGains(distance=(0.5, 0.05, 0.0))
-_CAR_LIMITS = FollowLimits(backward=0.6, acceleration=0.8, braking=1.5, stopping=2.0)
+_CAR_LIMITS = FollowLimits(
+    backward=0.6, acceleration=0.8, braking=1.5, stopping=2.0, reaction_time=0.5
+)
 """Gentle: a drone that pitches hard tilts a near car out of the picture."""
 _CAR_ACCELERATION = 0.3
 """Standard deviation of a car's acceleration among people, m/s^2."""

@@ -46,6 +46,9 @@ class ApproachLimit:
         self._sightings: list[Sighting] = []
         self._target = False
         """Whether the first of them is the target."""
+        self.blind = 0.0
+        """Seconds in which a picture and what follows from it are no news: added to the reaction
+        time, so that a drone whose frames come seldom or late keeps farther away."""
 
     def reset(self) -> None:
         """Forget them all."""
@@ -79,8 +82,8 @@ class ApproachLimit:
         return min(speed, max(0.0, min(others))) if others else speed
 
     def _closing(self, distance: float) -> float:
-        limits = self.limits
-        return closing_speed(distance - self.nearest, limits.braking, limits.reaction_time)
+        reaction_time = self.limits.reaction_time + self.blind
+        return closing_speed(distance - self.nearest, self.limits.braking, reaction_time)
 
     def _distances(self, bearing: float, now: Odometry | None) -> Iterator[tuple[float, bool]]:
         """How far each stands that is in the way, and whether it is the target."""

@@ -34,6 +34,8 @@ __all__ = ["LYING", "FollowController", "FollowPhase", "Observation"]
 _LONGEST_STEP = 0.5
 """Seconds; after a longer silence the integrals would grow by what nobody saw."""
 _FIRST_STEP = 0.1
+_LONGEST_BLIND = 1.0
+"""Seconds from one frame's command to the next; who is not seen for longer is lost."""
 _FARTHEST = 1000.0
 """Metres; no camera tells a person from farther away."""
 _FARTHEST_FROM_HOME = 1e5
@@ -119,6 +121,7 @@ class FollowController:
         self._stamp = seen.stamp
         seen = _without_nonsense(seen)
         self._approach.see(seen.sighting, seen.others, seen.at_capture)
+        self._approach.blind = min(dt + _age(seen), _LONGEST_BLIND)
         if seen.sighting is not None:
             self._take_in(seen.sighting, seen)
         self.phase = self._next_phase(seen.stamp)
@@ -142,10 +145,10 @@ class FollowController:
 
     def expected(self, odometry: Odometry, stamp: int) -> Sighting | None:
         """Where the target should be in a picture taken at `odometry`; None if that is unknown."""
+        if self._stood is not None:
+            return seen_from(odometry, self._stood)
         predicted = self.motion.relative_to(odometry, stamp)
-        if predicted is not None:
-            return predicted[0]
-        return None if self._stood is None else seen_from(odometry, self._stood)
+        return None if predicted is None or self.phase is FollowPhase.HOLDING else predicted[0]
 
     def _take_in(self, sighting: Sighting, seen: Observation) -> None:
         self._seen, self._last = seen.stamp, sighting
@@ -197,20 +200,20 @@ class FollowController:
     def _wanted(self, seen: Observation, dt: float) -> tuple[NDArray[np.float64], float]:
         """Velocity (forward, left) in m/s and yaw rate in rad/s that the phase asks for."""
         self._braking = False
-        if self.phase is FollowPhase.FOLLOWING:
-            return self._follow(seen, dt)
-        if self.phase is FollowPhase.SLOWING:
-            unseen = seconds(seen.stamp - (self._seen or 0))
-            left = (self.lost.slow - unseen) / (self.lost.slow - self.lost.coast)
-            velocity, yaw_rate = self._follow(seen, dt)
-            return velocity * left, yaw_rate * left
-        if self._stood is not None:
-            # Whoever fell there gets up there: watch over them instead of turning away.
+        # Whoever fell gets up where they fell: they are watched over, not turned away from.
+        if self.phase is not FollowPhase.SEARCHING or self._stood is not None:
             return self._follow(seen, dt)
         self._reset()
-        if self.phase is FollowPhase.SEARCHING and self._last is not None:
+        if self._last is not None:
             return np.zeros(2), math.copysign(self.lost.search_rate, self._last.bearing)
         return np.zeros(2), 0.0
+
+    def _share(self, stamp: int) -> float:
+        """Part of what following asks for that is done, by how long nobody was seen."""
+        if self.phase is FollowPhase.SLOWING:
+            unseen = seconds(stamp - (self._seen or 0))
+            return (self.lost.slow - unseen) / (self.lost.slow - self.lost.coast)
+        return 0.0 if self.phase is FollowPhase.HOLDING and self._stood is None else 1.0
 
     def _follow(self, seen: Observation, dt: float) -> tuple[NDArray[np.float64], float]:
         target, away, left = self._target(seen)
@@ -220,24 +223,33 @@ class FollowController:
         # Far away the integral would only wind up and carry the drone past its place.
         self._distance_pid.Ki = self.gains.distance[1] if abs(error) < _INTEGRAL_REACH else 0.0
         speed = float(self._distance_pid(-error, dt=dt) or 0.0) + away
-        safe = self._approach.speed(target, away, seen.now or seen.at_capture)
+        now = seen.now or seen.at_capture
+        safe = self._approach.speed(target, away, now)
         if target.bound and self._stood is None:
             # Nobody knows how near it is. Of one who fell it is known where the feet are.
             safe = min(safe, 0.0)
         self._braking = self._shaper.towards(target.bearing) > safe
-        if speed > safe and safe <= 0.0:
+        share = self._share(seen.stamp)
+        if share == 0.0 or (speed > safe and safe <= 0.0):
             self._distance_pid.reset()
-        speed = min(speed, safe)
-        return speed * np.array([math.cos(target.bearing), math.sin(target.bearing)]), yaw_rate
+        # Whoever comes may be out of the picture for being near: backing off goes on.
+        speed = share * min(speed, safe) if now is None else min(share * speed, safe)
+        direction = np.array([math.cos(target.bearing), math.sin(target.bearing)])
+        return speed * direction, share * yaw_rate
 
     def _target(self, seen: Observation) -> tuple[Sighting, float, float]:
         """The target as it should be now, and how fast it moves away and to the left."""
         last = self._last or Sighting(0.0, self.distance)
         now = seen.now or seen.at_capture
         stamp = max(seen.stamp, seen.now_stamp or 0) if seen.now else seen.stamp
-        predicted = None
-        if now is not None and not last.bound:
-            predicted = self.motion.relative_to(now, stamp)
+        predicted = None if now is None else self.motion.relative_to(now, stamp)
+        if last.bound and predicted is not None:
+            # Whoever came nearer until the picture cut them is taken to come on.
+            found, away, _ = predicted
+            if away >= 0.0:
+                return last, 0.0, 0.0
+            nearest = last.distance if self._seen == seen.stamp else math.inf
+            return replace(last, distance=min(nearest, found.distance)), away, 0.0
         if now is not None and last.bound and self._stood is not None:
             # Whoever lies there has their feet about where they stood, and may get up on them.
             feet = seen_from(now, self._stood)
@@ -273,6 +285,11 @@ def _without_nonsense(seen: Observation) -> Observation:
     at_capture = seen.at_capture if _is_sane(seen.at_capture) else None
     now = seen.now if _is_sane(seen.now) else None
     return replace(seen, sighting=sighting, at_capture=at_capture, now=now, others=others)
+
+
+def _age(seen: Observation) -> float:
+    """Seconds from the frame to the command that is made of it, as far as is known."""
+    return 0.0 if seen.now_stamp is None else max(0.0, seconds(seen.now_stamp - seen.stamp))
 
 
 def _can_be(sighting: Sighting | None) -> bool:

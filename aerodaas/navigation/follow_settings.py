@@ -29,8 +29,9 @@ class FollowLimits:
 
     forward: float = 1.5
     """m/s towards the target."""
-    backward: float = 1.0
-    """m/s away from it: nothing looks where the drone goes then."""
+    backward: float = 2.0
+    """m/s away from it. Nothing looks where the drone goes then, but whoever walks up to it, at the
+    1.4 m/s that people walk, must not reach it."""
     climb: float = 0.5
     """m/s up or down."""
     yaw_rate: float = 1.2
@@ -42,9 +43,9 @@ class FollowLimits:
     stopping: float = 4.0
     """m/s^2 of the commanded velocity where the drone would else come too near: the airframe does
     what it can."""
-    reaction_time: float = 0.6
-    """Seconds from a target's stop until the drone brakes: a frame at 5 a second, a detector's work
-    and the tilting of the airframe."""
+    reaction_time: float = 0.3
+    """Seconds, beyond those between two frames and from a frame to its command, which are measured,
+    from a target's stop until the drone brakes: the tilting of the airframe."""
     response: float = 0.4
     """Seconds by which the airframe's velocity lags behind the commanded one."""
     yaw_acceleration: float = 4.0

@@ -57,6 +57,16 @@ def test_a_target_that_comes_nearer_is_given_way() -> None:
     assert limit().speed(target, -0.6, AT_ORIGIN) == pytest.approx(-0.6)
 
 
+@given(distance=st.floats(0.0, 20.0), blind=st.floats(0.01, 1.0))
+def test_who_sees_seldom_or_late_comes_near_slower(distance: float, blind: float) -> None:
+    """And backs off as soon as others do."""
+    approach, late = limit(), limit()
+    late.blind = blind
+    one, other = (a.speed(Sighting(0.0, distance), 0.0, AT_ORIGIN) for a in (approach, late))
+    assert abs(other) < abs(one) or one == other == 0.0
+    assert one * other >= 0.0
+
+
 @pytest.mark.parametrize("odometry", [AT_ORIGIN, None])
 @pytest.mark.parametrize(("bearing", "limits"), [(0.3, True), (-0.3, True), (1.4, False)])
 def test_somebody_else_in_the_way_counts(

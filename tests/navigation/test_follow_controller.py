@@ -159,7 +159,8 @@ def test_whatever_it_sees_the_commands_stay_finite_and_within_limits(
         if command is None:
             continue
         assert np.isfinite(command.velocity).all()
-        assert np.hypot(command.forward, command.left) <= LIMITS.forward + 1e-9
+        fastest = LIMITS.forward if command.forward >= 0 else LIMITS.backward
+        assert np.hypot(command.forward, command.left) <= fastest + 1e-9
         assert abs(command.up) <= LIMITS.climb + 1e-9
         assert abs(command.yaw_rate) <= LIMITS.yaw_rate + 1e-9
         assert np.linalg.norm(command.velocity - last) <= LIMITS.stopping * 0.5 + 1e-9 or (

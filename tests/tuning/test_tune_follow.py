@@ -12,6 +12,8 @@ from aerodaas.analytics.followers import VipFollowAnalytics
 from aerodaas.cli import app
 from aerodaas.errors import ConfigError
 from aerodaas.navigation.follow_settings import FollowGains
+from aerodaas.simulation.scenario import Scenario
+from aerodaas.simulation.world import World
 from aerodaas.tuning.chase import TELLO, Chase, ChaseResult
 from aerodaas.tuning.eyes import TruthEyes
 from aerodaas.tuning.search import FollowTask, tune_follow
@@ -31,6 +33,25 @@ def test_a_walk_is_followed_within_the_aims() -> None:
     assert flown.within(2.0, 0.3) >= 0.95
     assert flown.at_height(1.5, 0.1) == 1.0
     assert flown.in_view.mean() >= 0.99
+
+
+@pytest.mark.parametrize("seed", [0, 3, 4])
+@pytest.mark.parametrize(
+    ("rate", "latency", "nearest"), [(10.0, 0.15, 0.5), (5.0, 0.25, 0.3)], ids=["10 Hz", "5 Hz"]
+)
+def test_nobody_who_walks_up_to_the_drone_reaches_it(
+    rate: float, latency: float, nearest: float, seed: int
+) -> None:
+    """It backs off as fast as people walk, and goes on where they are too near to be seen."""
+    way = {"points": [(3.0, 0.0), (-12.0, 0.0)], "speed": 1.3, "start": 8.0, "end": "stop"}
+    walker = {"kind": "person", "id": PERSON, "vest": "any", "at": (3.0, 0.0), "motion": way}
+    world = World(Scenario.model_validate({"name": "meeting", "entities": [walker]}), seed)
+    person = world.thing(PERSON)
+    eyes = TruthEyes(person, "vest", TELLO, seed=seed)
+    chase = Chase(person, rate=rate, latency=latency, seed=seed)
+    flown = chase.fly(VipFollowAnalytics(), eyes, 22.0)
+    assert flown.person[-1, 0] < -10.0
+    assert flown.distance.min() > nearest
 
 
 def test_the_same_seed_flies_the_same() -> None:
