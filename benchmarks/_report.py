@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
+import math
 import os
 import platform
 import subprocess
@@ -43,7 +44,7 @@ class Report:
         self.notes: list[str] = []
 
     def row(self, case: str, figures: Mapping[str, float]) -> None:
-        """Add the figures of one case; raises KeyError for one that has no unit."""
+        """Add the figures of one case, NaN for none; raises KeyError for one without a unit."""
         self.rows.append((case, {figure: figures[figure] for figure in self.units}))
 
     def note(self, text: str) -> None:
@@ -64,7 +65,7 @@ class Report:
         for figure, unit in self.units.items():
             table.add_column(f"{figure}\n{unit}", justify="right", no_wrap=True)
         for case, figures in self.rows:
-            table.add_row(case, *(f"{value:.3g}" for value in figures.values()))
+            table.add_row(case, *map(_shown, figures.values()))
         console = Console()
         # A figure cut short is worth nothing: a narrow terminal wraps instead.
         wide = Console(width=_WIDEST)
@@ -90,9 +91,21 @@ class Report:
             | {"python": platform.python_version()},
             "command": sys.argv,
             "units": self.units,
-            "rows": [{"case": case, **figures} for case, figures in self.rows],
+            "rows": [
+                {"case": case} | {name: _plain(value) for name, value in figures.items()}
+                for case, figures in self.rows
+            ],
             "notes": self.notes,
         }
+
+
+def _shown(value: float) -> str:
+    return "-" if math.isnan(value) else f"{value:.3g}"
+
+
+def _plain(value: float) -> float | None:
+    """JSON has no word for NaN."""
+    return None if math.isnan(value) else value
 
 
 def _machine() -> dict[str, Any]:

@@ -162,7 +162,8 @@ def main(
         for seed in range(walks)
     ]
     wrong = sum(map(len, flown))
-    report.row("walks", {"scenes": walks, "told": 0.0, "after": math.nan, "false": wrong})
+    none = math.nan
+    report.row("walks", {"scenes": walks, "told": none, "after": none, "false": wrong})
     report.note(
         f"{lens.value} lens, {rate:g} frames a second; walks of {duration:g} s. The shipped models "
         "look at renders; the follower is given true boxes with noise."

@@ -20,3 +20,14 @@ def test_falls_are_told_and_walks_are_not(tmp_path: Path) -> None:
     assert rows["away"]["told"] == 100
     assert rows["away"]["after"] < 3.0
     assert [row["false"] for row in rows.values()] == [0, 0, 0, 0]
+
+
+def test_what_was_not_measured_is_shown_as_such(tmp_path: Path) -> None:
+    """Walks have no falls to be told: a dash in the table, null in the file."""
+    path = tmp_path / "falls.json"
+    words = ["--falls", "0", "--walks", "0", "--json", str(path)]
+    done = run_benchmark("falls", *words)
+    assert done.returncode == 0, done.stderr
+    assert "nan" not in done.stdout
+    rows = json.loads(path.read_text(), parse_constant=pytest.fail)["rows"]
+    assert {row["told"] for row in rows} == {None}
