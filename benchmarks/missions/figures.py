@@ -59,7 +59,6 @@ def _latency(evidence: Evidence) -> tuple[float, float]:
 def lines_of_code(path: Path) -> int:
     """Lines that hold code: no blank ones, no comments, no docstrings."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
-    used: set[int] = set()
     texts = {
         line
         for node in ast.walk(tree)
