@@ -20,7 +20,7 @@ from rich.console import Console
 from rich.measure import Measurement
 from rich.table import Table
 
-__all__ = ["Report", "machine_line"]
+__all__ = ["Report", "machine_line", "plain"]
 
 _WIDEST = 400
 _ROOT = Path(__file__).resolve().parent.parent
@@ -92,7 +92,7 @@ class Report:
             "command": sys.argv,
             "units": self.units,
             "rows": [
-                {"case": case} | {name: _plain(value) for name, value in figures.items()}
+                {"case": case} | {name: plain(value) for name, value in figures.items()}
                 for case, figures in self.rows
             ],
             "notes": self.notes,
@@ -103,8 +103,8 @@ def _shown(value: float) -> str:
     return "-" if math.isnan(value) else f"{value:.3g}"
 
 
-def _plain(value: float) -> float | None:
-    """JSON has no word for NaN."""
+def plain(value: float) -> float | None:
+    """The same for a JSON file, which has no word for NaN."""
     return None if math.isnan(value) else value
 
 

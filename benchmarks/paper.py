@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from _report import machine_line
+from _report import machine_line, plain
 from missions.catalogue import MISSIONS, Mission
 from missions.criteria import Check
 from missions.figures import Figures, lines_of_code
@@ -203,15 +203,21 @@ def _content(results: list[Result], saved: float, speed: str) -> dict[str, objec
             "checks": {check.what: [check.holds, check.found] for check in one.checks},
             "memory": one.flown.memory,
             "rate": _rate(one),
-            **(
-                {name: getattr(one.figures, name) for name in Figures.__slots__}
-                if one.figures
-                else {}
-            ),
+            **_measured(one.figures),
         }
         for one in results
     ]
-    return {"machine": machine_line(), "speed": speed, "saved": saved, "flights": rows}
+    return {"machine": machine_line(), "speed": speed, "saved": plain(saved), "flights": rows}
+
+
+def _measured(figures: Figures | None) -> dict[str, object]:
+    """The figures by name; a height is a range."""
+    if figures is None:
+        return {}
+    values = {name: getattr(figures, name) for name in Figures.__slots__ if name != "height"}
+    return {"height": [plain(end) for end in figures.height]} | {
+        name: plain(value) for name, value in values.items()
+    }
 
 
 if __name__ == "__main__":
