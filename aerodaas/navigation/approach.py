@@ -47,8 +47,9 @@ class ApproachLimit:
         self._target = False
         """Whether the first of them is the target."""
         self.blind = 0.0
-        """Seconds in which a picture and what follows from it are no news: added to the reaction
-        time, so that a drone whose frames come seldom or late keeps farther away."""
+        """Seconds from one picture to the next: added to the reaction time, so that a drone whose
+        pictures come seldom keeps farther away. That they come late needs no more, as whoever is
+        seen is taken to have stopped when the picture was taken."""
 
     def reset(self) -> None:
         """Forget them all."""

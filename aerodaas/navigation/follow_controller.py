@@ -35,7 +35,7 @@ _LONGEST_STEP = 0.5
 """Seconds; after a longer silence the integrals would grow by what nobody saw."""
 _FIRST_STEP = 0.1
 _LONGEST_BLIND = 1.0
-"""Seconds from one frame's command to the next; who is not seen for longer is lost."""
+"""Seconds between two frames that count; who is not seen for longer is lost."""
 _FARTHEST = 1000.0
 """Metres; no camera tells a person from farther away."""
 _FARTHEST_FROM_HOME = 1e5
@@ -121,7 +121,7 @@ class FollowController:
         self._stamp = seen.stamp
         seen = _without_nonsense(seen)
         self._approach.see(seen.sighting, seen.others, seen.at_capture)
-        self._approach.blind = min(dt + _age(seen), _LONGEST_BLIND)
+        self._approach.blind = min(dt, _LONGEST_BLIND)
         if seen.sighting is not None:
             self._take_in(seen.sighting, seen)
         self.phase = self._next_phase(seen.stamp)
@@ -285,11 +285,6 @@ def _without_nonsense(seen: Observation) -> Observation:
     at_capture = seen.at_capture if _is_sane(seen.at_capture) else None
     now = seen.now if _is_sane(seen.now) else None
     return replace(seen, sighting=sighting, at_capture=at_capture, now=now, others=others)
-
-
-def _age(seen: Observation) -> float:
-    """Seconds from the frame to the command that is made of it, as far as is known."""
-    return 0.0 if seen.now_stamp is None else max(0.0, seconds(seen.now_stamp - seen.stamp))
 
 
 def _can_be(sighting: Sighting | None) -> bool:

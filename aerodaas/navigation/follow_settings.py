@@ -43,9 +43,9 @@ class FollowLimits:
     stopping: float = 4.0
     """m/s^2 of the commanded velocity where the drone would else come too near: the airframe does
     what it can."""
-    reaction_time: float = 0.3
-    """Seconds, beyond those between two frames and from a frame to its command, which are measured,
-    from a target's stop until the drone brakes: the tilting of the airframe."""
+    reaction_time: float = 0.4
+    """Seconds from the command to brake until the drone does: the tilting of the airframe. The time
+    between two frames, in which no such command can come, is measured and added."""
     response: float = 0.4
     """Seconds by which the airframe's velocity lags behind the commanded one."""
     yaw_acceleration: float = 4.0

@@ -58,7 +58,7 @@ def test_a_target_that_comes_nearer_is_given_way() -> None:
 
 
 @given(distance=st.floats(0.0, 20.0), blind=st.floats(0.01, 1.0))
-def test_who_sees_seldom_or_late_comes_near_slower(distance: float, blind: float) -> None:
+def test_who_sees_seldom_comes_near_slower(distance: float, blind: float) -> None:
     """And backs off as soon as others do."""
     approach, late = limit(), limit()
     late.blind = blind
