@@ -215,7 +215,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             if sighting is None:
                 continue
             off = float(np.linalg.norm(sighting.offset - expected.offset))
-            if sighting.bound:
+            if sighting.bound or expected.bound:
                 off = max(0.0, off - LYING)
             if off <= reach:
                 best, reach = detection, off

@@ -144,9 +144,12 @@ class FollowController:
         self._reset()
 
     def expected(self, odometry: Odometry, stamp: int) -> Sighting | None:
-        """Where the target should be in a picture taken at `odometry`; None if that is unknown."""
+        """Where the target should be in a picture taken at `odometry`; None if that is unknown.
+
+        A bound is where the feet of one who fell are: they lie, or get up, within `LYING` of it.
+        """
         if self._stood is not None:
-            return seen_from(odometry, self._stood)
+            return replace(seen_from(odometry, self._stood), bound=True)
         predicted = self.motion.relative_to(odometry, stamp)
         return None if predicted is None or self.phase is FollowPhase.HOLDING else predicted[0]
 

@@ -442,10 +442,12 @@ class Falling(World):
     """Falls forward, away from the drone, at a time: the vest goes down and a metre ahead."""
 
     falls: float = 12.0
+    rises: float = math.inf
 
     def box(self) -> tuple[float, float, float, float] | None:
         """The vest as it is at the time; its feet stay where the target is."""
         share = min(max((self.time - self.falls) / 0.6, 0.0), 1.0)
+        share -= min(max((self.time - self.rises) / 0.6, 0.0), 1.0)
         feet, base, height = self.target, self.target_base, self.target_height
         east, north = feet(self.time)
         self.target = lambda _: (east + 1.1 * share, north)
@@ -498,6 +500,19 @@ def test_who_has_fallen_is_watched_even_when_out_of_sight() -> None:
     assert len(hidden) > 20
     assert max(abs(command.yaw_rate) for command in hidden) < 0.05
     assert [alert.kind for alert in world.alerts] == ["target_lost"]
+
+
+def test_who_gets_up_a_step_away_and_walks_on_is_followed_at_once() -> None:
+    """Near where they fell, whatever has become of their track."""
+    world = falling_world(0.7, 5.0)
+    world.rises = 20.0
+    fell = world.target
+    world.target = lambda time: (fell(time)[0] + (time > world.rises) * max(0.8, time - 20), 0.0)
+    world.hidden = lambda time: 20.0 < time < 20.7
+    distances = world.run(VipFollowAnalytics(), 30)
+    assert max(distances[20 * 5 :]) < 4.0
+    assert distances[-1] == pytest.approx(2.0, abs=0.4)
+    assert world.alerts == []
 
 
 def test_somebody_who_cannot_be_told_from_the_target_is_not_flown_into() -> None:
