@@ -214,10 +214,10 @@ def _measured(figures: Figures | None) -> dict[str, object]:
     """The figures by name; a height is a range."""
     if figures is None:
         return {}
-    values = {name: getattr(figures, name) for name in Figures.__slots__ if name != "height"}
-    return {"height": [plain(end) for end in figures.height]} | {
-        name: plain(value) for name, value in values.items()
-    }
+    numbers = [name for name in Figures.__slots__ if name != "height"]
+    measured: dict[str, object] = {name: plain(getattr(figures, name)) for name in numbers}
+    measured["height"] = [plain(end) for end in figures.height]
+    return measured
 
 
 if __name__ == "__main__":
