@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import threading
 import time
 import uuid
@@ -12,7 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 import pytest
 import ray
-from ray.exceptions import ActorUnavailableError
+from ray.exceptions import RayActorError
 
 from aerodaas import Analytics, Frame
 from aerodaas.actors._cloud import CloudAnswer, Executor
@@ -220,8 +221,7 @@ def test_a_frame_that_an_executor_lacks_is_told_and_carried_again(
     frame = desk.frame()
     desk.send("one", frame)
     desk.answers(1)
-    ray.kill(executor.handle, no_restart=False)
-    _until_prepared(executor)
+    _restart(executor)
     desk.send("two", frame)
     (answer,) = desk.answers(1)
     assert answer.lost
@@ -253,10 +253,22 @@ def test_frames_that_an_executor_no_longer_keeps_are_carried_again(
     desk.sites.finish(1.0)
 
 
-def _until_prepared(executor: Executor) -> None:
+def _restart(executor: Executor) -> None:
+    """Kill its process, and prepare the one that takes its place.
+
+    A call that reaches the old one on its last breath says nothing, or that it has died.
+    """
+    old = _process_of(executor)
+    ray.kill(executor.handle, no_restart=False)
     end = time.monotonic() + 120
     while time.monotonic() < end:
-        with contextlib.suppress(ActorUnavailableError):
-            ray.get(executor.handle.prepare.remote(executor.works[0]))
-            return
+        with contextlib.suppress(RayActorError):
+            if _process_of(executor) != old:
+                ray.get(executor.handle.prepare.remote(executor.works[0]))
+                return
         time.sleep(0.1)
+
+
+def _process_of(executor: Executor) -> int:
+    number: int = ray.get(executor.handle.__ray_call__.remote(lambda _: os.getpid()))
+    return number
