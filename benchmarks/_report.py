@@ -104,7 +104,7 @@ def _shown(value: float) -> str:
 
 
 def plain(value: float) -> float | None:
-    """The same for a JSON file, which has no word for NaN."""
+    """The value, or None for NaN, for which JSON has no word."""
     return None if math.isnan(value) else value
 
 
