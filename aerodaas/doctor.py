@@ -33,6 +33,10 @@ _PACKAGES = {
     "mcap": "mcap",
     "pyvrp": "pyvrp",
 }
+_REMEDIES = {
+    "iceoryx2": "pip install 'iceoryx2==0.10.*', which builds it with Rust where it has no wheel",
+    "pyvrp": "for the optimal scheduler and fleets, use Python 3.11 or newer",
+}
 _MEMORY_NEEDED = 1.0
 _SHARED_MEMORY_NEEDED = 256
 _PORTS = {
@@ -124,7 +128,8 @@ def _package(package: str, module: str) -> Finding:
         importlib.import_module(module)
         return Finding(package, version(package))
     except (ImportError, PackageNotFoundError) as error:
-        return Finding(package, str(error), ok=False, remedy=f"pip install {package}")
+        remedy = _REMEDIES.get(package, f"pip install {package}")
+        return Finding(package, str(error), ok=False, remedy=remedy)
 
 
 def _providers() -> Iterator[Finding]:
@@ -143,7 +148,7 @@ def _streams() -> Iterator[Finding]:
         yield Finding("streams", "zero-copy in shared memory between actors of this host")
     else:
         text = "shared memory not available; frames go through Ray's object store"
-        yield Finding("streams", text, ok=False, remedy="pip install 'iceoryx2==0.10.*'")
+        yield Finding("streams", text, ok=False, remedy=_REMEDIES["iceoryx2"])
 
 
 def _renderer() -> Iterator[Finding]:

@@ -11,7 +11,12 @@ import numpy as np
 from aerodaas.errors import SchedulerError
 from aerodaas.navigation.energy import EnergyModel
 from aerodaas.schedulers.waypoint.base import Situation
-from aerodaas.schedulers.waypoint.routing import RoutingProblem, Tour, solve_routes
+from aerodaas.schedulers.waypoint.routing import (
+    RoutingProblem,
+    Tour,
+    require_solver,
+    solve_routes,
+)
 from aerodaas.schedulers.waypoint.travel import Matrix, Travel
 from aerodaas.waypoints import Waypoint
 
@@ -34,8 +39,9 @@ def share_out(
     `objective` is the least energy of all drones together, or the earliest time at which the last
     one is home. Each drone's charge less its reserve bounds its own tour; waypoints that no drone
     can serve, or not by their deadline, are left out. Takes about `budget` seconds. Raises
-    SchedulerError for a fleet without drones.
+    SchedulerError for a fleet without drones, and without PyVRP (on Python 3.10).
     """
+    require_solver("sharing waypoints out")
     if not fleet:
         raise SchedulerError("a fleet needs at least one drone")
     if not waypoints:

@@ -13,7 +13,12 @@ from aerodaas.interfaces import IEnvironment
 from aerodaas.navigation.energy import EnergyModel
 from aerodaas.schedulers.waypoint.base import Situation, TrajectoryScheduler
 from aerodaas.schedulers.waypoint.exact import shortest_order
-from aerodaas.schedulers.waypoint.routing import RoutingProblem, Tour, solve_routes
+from aerodaas.schedulers.waypoint.routing import (
+    RoutingProblem,
+    Tour,
+    require_solver,
+    solve_routes,
+)
 from aerodaas.schedulers.waypoint.travel import Matrix, Travel
 from aerodaas.waypoints import Waypoint
 
@@ -44,9 +49,10 @@ class OptimalScheduler(TrajectoryScheduler):
         """Minimise `objective`, in `budget` seconds (None: 9.5 ms a waypoint, up to 1.9 s).
 
         `prizes` weighs waypoints by id where not all can be visited; 1 where not named. Raises
-        SchedulerError for settings that make no sense.
+        SchedulerError for settings that make no sense, and without PyVRP (on Python 3.10).
         """
         super().__init__(environment)
+        require_solver("the optimal scheduler")
         if objective not in {"distance", "energy"}:
             raise SchedulerError(f"the objective is distance or energy, not {objective!r}")
         if budget is not None and not 0.0 < budget < np.inf:

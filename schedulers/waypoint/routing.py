@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import importlib.util
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import pyvrp
 from numpy.typing import NDArray
-from pyvrp.stop import MaxRuntime
 
+from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.waypoint.travel import Matrix
 
-__all__ = ["RoutingProblem", "Tour", "solve_routes"]
+__all__ = ["RoutingProblem", "Tour", "require_solver", "solve_routes"]
 
 _RESOLUTION = 1e6
 """Whole units that the largest leg is divided into: PyVRP counts in integers."""
@@ -50,12 +50,24 @@ class RoutingProblem:
     """Seconds from now by which every drone must be home."""
 
 
+def require_solver(purpose: str) -> None:
+    """Raise SchedulerError, which names `purpose`, where PyVRP is not installed."""
+    if importlib.util.find_spec("pyvrp") is None:
+        raise SchedulerError(
+            f"{purpose} needs PyVRP, which exists for Python 3.11 and newer: "
+            "pip install 'pyvrp>=0.13' there, or take another scheduler"
+        )
+
+
 def solve_routes(problem: RoutingProblem, budget: float, seed: int = 0) -> list[list[int]] | None:
     """Waypoints of each tour in order, found in about `budget` seconds; None if none is feasible.
 
     Iterated local search by PyVRP (Wouda, Lan and Kool, INFORMS J. Computing 36(4), 2024). With
     prizes, what is worth most is visited, and the cost decides between equals.
     """
+    import pyvrp  # noqa: PLC0415 - not there on Python 3.10
+    from pyvrp.stop import MaxRuntime  # noqa: PLC0415
+
     count = len(problem.hover)
     tours = problem.tours
     unit = _RESOLUTION / (max(float(tour.costs.max()) for tour in tours) or 1.0)
