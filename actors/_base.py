@@ -168,6 +168,13 @@ class StreamActor:
         if self.inbox is not None:
             self.inbox.deliver(stream, data)
 
+    def hand_out(self, stream: str, seq: int) -> list[bytes]:
+        """Messages of a published `stream` from number `seq` on, of the newest few, encoded.
+
+        For an application on another node, or without shared memory.
+        """
+        return self.outlets[stream].since(seq) if stream in self.outlets else []
+
     def report(self) -> ActorReport:
         """How the actor fares."""
         return ActorReport(

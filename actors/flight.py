@@ -205,10 +205,12 @@ class Flight:
         """Where each actor lives, once launched."""
         return {m.name: m.info for m in self._members.values() if m.info is not None}
 
-    @property
-    def streams(self) -> set[str]:
-        """Streams that the flight's actors publish, once launched."""
-        return {stream for info in self.infos().values() for stream in info.publishes}
+    def publisher(self, stream: str) -> tuple[Any, str] | None:
+        """Who publishes `stream`, an actor's handle, and its node; None if nobody does."""
+        for name, info in self.infos().items():
+            if stream in info.publishes:
+                return self._members[name].handle, info.node_id
+        return None
 
     def stop(self) -> dict[str, ActorReport]:
         """Stop all actors, the recorder last, and return their last reports."""

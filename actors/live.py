@@ -6,25 +6,88 @@ import time
 import uuid
 from collections import deque
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 import ray
+from ray.exceptions import RayError
 
 from aerodaas.actors.session import Session
-from aerodaas.actors.streams import Inbox
+from aerodaas.actors.streams import Inbox, decode_message, shared_memory_available
+from aerodaas.status import Message
 
 __all__ = ["LiveReader"]
 
 _DEPTH = 4
+_PAUSE = 0.02
+"""Seconds between two questions to a publisher."""
+_ANSWER = 0.2
+"""Seconds that a question may take, however little time there is."""
+
+
+class _Source(Protocol):
+    def receive(self, timeout: float) -> list[Message[Any]]:
+        """Return what has arrived; wait up to `timeout` seconds for it."""
+        ...
+
+
+class _Asking:
+    """Asks the publisher for its newest messages: nobody can call an application."""
+
+    def __init__(self, publisher: Any, stream: str) -> None:  # noqa: ANN401 - Ray's handle
+        self._publisher = publisher
+        self._stream = stream
+        self._next = 0
+        self._question: Any = None
+
+    def receive(self, timeout: float) -> list[Message[Any]]:
+        """Return what has arrived; wait up to `timeout` seconds for it."""
+        until = time.monotonic() + timeout
+        while True:
+            messages = self._ask(max(_ANSWER, until - time.monotonic()))
+            left = until - time.monotonic()
+            if messages or left <= 0.0:
+                return messages
+            time.sleep(min(_PAUSE, left))
+
+    def _ask(self, timeout: float) -> list[Message[Any]]:
+        if self._question is None:
+            self._question = self._publisher.hand_out.remote(self._stream, self._next)
+        answered, _ = ray.wait([self._question], timeout=timeout)
+        if not answered:
+            return []
+        self._question = None
+        try:
+            messages = [decode_message(memoryview(data)) for data in ray.get(answered[0])]
+        except RayError:
+            return []  # It has died: either it is restarted, or the flight is over.
+        if messages:
+            self._next = messages[-1].seq + 1
+        return messages
 
 
 class LiveReader:
     """Reads the items of one stream until the flight is over; keeps the newest few."""
 
-    def __init__(self, session: Session, stream: str, over: Callable[[], bool]) -> None:
-        """Read `stream` of the run `session`; `over` tells when to stop waiting."""
-        scope = session.scope(ray.get_runtime_context().get_node_id())
-        self._inbox = Inbox(scope, f"application/{uuid.uuid4().hex[:8]}", {stream: _DEPTH})
+    def __init__(
+        self,
+        session: Session,
+        stream: str,
+        publisher: Any,  # noqa: ANN401 - Ray's handle
+        node: str,
+        over: Callable[[], bool],
+    ) -> None:
+        """Read `stream` of the run `session` from its `publisher`, an actor on the node `node`.
+
+        `over` tells when to stop waiting.
+        """
+        here = ray.get_runtime_context().get_node_id()
+        self._source: _Source
+        if here == node and shared_memory_available():
+            name = f"application/{uuid.uuid4().hex[:8]}"
+            self._source = Inbox(session.scope(here), name, {stream: _DEPTH})
+        else:
+            self._source = _Asking(publisher, stream)
+            self._source.receive(0.0)
         self._waiting: deque[Any] = deque()
         self._newest: Any = None
         self._over = over
@@ -53,7 +116,7 @@ class LiveReader:
         return self._newest
 
     def _take(self, timeout: float) -> None:
-        items = [message.item for message in self._inbox.receive(timeout)]
+        items = [message.item for message in self._source.receive(timeout)]
         for item in items:
             if item is not None:
                 self._waiting.append(item)

@@ -102,11 +102,12 @@ class Run:
         session = plan.session
 
         def read(stream: str) -> LiveReader:
-            if stream not in flight.streams:
+            publisher = flight.publisher(stream)
+            if publisher is None:
                 raise GraphError(
                     f"{stream} does not run: call get_data_stream() before start_mission()"
                 )
-            return LiveReader(session, stream, lambda: self._over)
+            return LiveReader(session, stream, *publisher, lambda: self._over)
 
         self.graph.reader = read
         for callback in self.graph.on_launch:

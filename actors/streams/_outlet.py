@@ -15,6 +15,7 @@ from aerodaas.status import Hop, Message
 __all__ = ["Outlet", "RemoteReader"]
 
 _LATENCIES_KEPT = 256
+_MESSAGES_KEPT = 4
 
 
 class Outlet:
@@ -29,6 +30,7 @@ class Outlet:
         """Milliseconds from capture to publishing, newest last."""
         self.remote: list[RemoteReader] = []
         self._shared = SharedPublisher(f"{scope}/{stream}") if shared_memory_available() else None
+        self._kept: deque[tuple[int, bytes]] | None = None
 
     def measure(self, item: Any, header: Header, captured: int) -> Message[Any]:  # noqa: ANN401
         """Publish a measurement: the first message of its way. `captured` is host time in ns."""
@@ -66,7 +68,20 @@ class Outlet:
             self._shared.send(encoded)
         if self.remote:
             send_to(self.remote, self.stream, encoded)
+        if self._kept is not None:
+            self._kept.append((message.seq, encoded.to_bytes()))
         return message
+
+    def since(self, seq: int) -> list[bytes]:
+        """Encoded messages from number `seq` on, of the newest few; any thread may ask.
+
+        They are kept from the first question on. Whoever is ahead of this outlet has known one
+        before it, and is given all.
+        """
+        if self._kept is None:
+            self._kept = deque(maxlen=_MESSAGES_KEPT)
+        first = seq if seq <= self.sent else 0
+        return [data for number, data in list(self._kept) if number >= first]
 
     def close(self) -> None:
         """Leave the stream."""

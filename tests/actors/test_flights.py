@@ -82,6 +82,14 @@ def test_a_slow_start_is_not_taken_for_a_dead_application(
     assert flight.alerts == []
 
 
+@pytest.fixture(params=["in shared memory", "by asking"])
+def reads(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """How the application reads: as beside the drone, or as from another node."""
+    if request.param == "by asking":
+        monkeypatch.setattr("aerodaas.actors.live.shared_memory_available", lambda: False)
+
+
+@pytest.mark.usefixtures("reads")
 def test_the_application_reads_streams_in_flight(flyer: Flyer) -> None:
     """Push, pull and iteration give what is measured; all end with the mission."""
     pushed: list[Odometry] = []
@@ -115,6 +123,7 @@ def test_the_application_reads_streams_in_flight(flyer: Flyer) -> None:
         drone_of(env).end_mission()
 
 
+@pytest.mark.usefixtures("reads")
 def test_poll_gives_the_newest(flyer: Flyer) -> None:
     """However long nobody asked, the item is a fresh one; asked twice, there is still one."""
     with flyer.flying(long, speed=SPEED) as env:

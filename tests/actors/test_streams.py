@@ -23,6 +23,7 @@ from aerodaas.actors.streams import (
     Inbox,
     Outlet,
     RemoteReader,
+    decode_message,
     shared_memory_available,
 )
 from aerodaas.data import Frame, Header
@@ -327,3 +328,21 @@ def test_a_dead_reader_on_another_node_does_not_stop_the_publisher(runtime: None
         link.publish(stamp, stamp)
         assert [one.seq for one in link.take()] == [stamp]
     ray.kill(alive)
+
+
+def test_who_asks_is_given_the_newest_once() -> None:
+    """From the first question on; whoever knew an outlet that has died is given all again."""
+    outlet = Outlet(f"test/{uuid.uuid4().hex[:8]}", "s")
+
+    def numbers(first: int) -> list[int]:
+        return [decode_message(memoryview(data)).seq for data in outlet.since(first)]
+
+    outlet.measure(0, Header(0, 0, "camera"), 0)
+    assert numbers(0) == []
+    for stamp in range(1, 8):
+        outlet.measure(stamp, Header(stamp, stamp, "camera"), stamp)
+    assert numbers(0) == [4, 5, 6, 7]
+    assert numbers(7) == [7]
+    assert numbers(8) == []
+    assert numbers(99) == [4, 5, 6, 7]
+    outlet.close()
