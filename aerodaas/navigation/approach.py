@@ -18,6 +18,8 @@ __all__ = ["ApproachLimit", "closing_speed"]
 
 _AHEAD = 0.7
 """Radians off the drone's way within which somebody stands in it."""
+_LONGEST_BLIND = 1.0
+"""Seconds between two pictures that count; who is not seen for longer is lost."""
 
 
 def closing_speed(gap: float, deceleration: float, reaction_time: float) -> float:
@@ -46,7 +48,7 @@ class ApproachLimit:
         self._sightings: list[Sighting] = []
         self._target = False
         """Whether the first of them is the target."""
-        self.blind = 0.0
+        self._blind = 0.0
         """Seconds from one picture to the next: added to the reaction time, so that a drone whose
         pictures come seldom keeps farther away. That they come late needs no more, as whoever is
         seen is taken to have stopped when the picture was taken."""
@@ -56,9 +58,17 @@ class ApproachLimit:
         self._places, self._sightings = [], []
 
     def see(
-        self, target: Sighting | None, others: Iterable[Sighting], at_capture: Odometry | None
+        self,
+        target: Sighting | None,
+        others: Iterable[Sighting],
+        at_capture: Odometry | None,
+        interval: float,
     ) -> None:
-        """Take in everybody whom one picture shows; one that shows nobody changes nothing."""
+        """Take in everybody whom a picture shows that was taken `interval` seconds after the last.
+
+        One that shows nobody leaves them where they stood.
+        """
+        self._blind = min(interval, _LONGEST_BLIND)
         seen = [*([] if target is None else [target]), *others]
         if not seen:
             return
@@ -83,7 +93,7 @@ class ApproachLimit:
         return min(speed, max(0.0, min(others))) if others else speed
 
     def _closing(self, distance: float) -> float:
-        reaction_time = self.limits.reaction_time + self.blind
+        reaction_time = self.limits.reaction_time + self._blind
         return closing_speed(distance - self.nearest, self.limits.braking, reaction_time)
 
     def _distances(self, bearing: float, now: Odometry | None) -> Iterator[tuple[float, bool]]:

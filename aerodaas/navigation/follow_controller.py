@@ -34,8 +34,6 @@ __all__ = ["LYING", "FollowController", "FollowPhase", "Observation"]
 _LONGEST_STEP = 0.5
 """Seconds; after a longer silence the integrals would grow by what nobody saw."""
 _FIRST_STEP = 0.1
-_LONGEST_BLIND = 1.0
-"""Seconds between two frames that count; who is not seen for longer is lost."""
 _FARTHEST = 1000.0
 """Metres; no camera tells a person from farther away."""
 _FARTHEST_FROM_HOME = 1e5
@@ -120,8 +118,7 @@ class FollowController:
         dt = _FIRST_STEP if self._stamp is None else seconds(seen.stamp - self._stamp)
         self._stamp = seen.stamp
         seen = _without_nonsense(seen)
-        self._approach.see(seen.sighting, seen.others, seen.at_capture)
-        self._approach.blind = min(dt, _LONGEST_BLIND)
+        self._approach.see(seen.sighting, seen.others, seen.at_capture, dt)
         if seen.sighting is not None:
             self._take_in(seen.sighting, seen)
         self.phase = self._next_phase(seen.stamp)

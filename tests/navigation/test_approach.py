@@ -16,6 +16,8 @@ from aerodaas.navigation.sighting import Sighting
 
 LIMITS = FollowLimits()
 GAPS = st.floats(-3.0, 30.0)
+INTERVAL = 0.2
+"""Seconds between two pictures."""
 AT_ORIGIN = Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), 0.0)
 
 
@@ -61,7 +63,7 @@ def test_a_target_that_comes_nearer_is_given_way() -> None:
 def test_who_sees_seldom_comes_near_slower(distance: float, blind: float) -> None:
     """And backs off as soon as others do."""
     approach, late = limit(), limit()
-    late.blind = blind
+    late.see(None, [], AT_ORIGIN, blind)
     one, other = (a.speed(Sighting(0.0, distance), 0.0, AT_ORIGIN) for a in (approach, late))
     assert abs(other) < abs(one) or one == other == 0.0
     assert one * other >= 0.0
@@ -75,27 +77,28 @@ def test_somebody_else_in_the_way_counts(
     """Who stands aside does not."""
     approach = limit()
     free = approach.speed(Sighting(0.0, 4.0), 0.0, odometry)
-    approach.see(None, [Sighting(bearing, 1.3)], odometry)
+    approach.see(None, [Sighting(bearing, 1.3)], odometry, INTERVAL)
     assert (approach.speed(Sighting(0.0, 4.0), 0.0, odometry) < 0.3 < free) is limits
 
 
 def test_they_stay_where_they_were_while_the_drone_flies_and_sees_nothing() -> None:
     """A drone that has come a metre nearer has a metre less to go."""
     approach = limit()
-    approach.see(Sighting(0.0, 2.4), [], AT_ORIGIN)
-    approach.see(None, [], AT_ORIGIN)
+    approach.see(Sighting(0.0, 2.4), [], AT_ORIGIN, INTERVAL)
+    approach.see(None, [], AT_ORIGIN, INTERVAL)
     moved = Odometry(np.array([1.0, 0.0, 1.5]), np.zeros(3), 0.0)
     found = approach.speed(Sighting(0.0, 5.0), 1.0, moved)
-    assert found == pytest.approx(closing_speed(0.2, LIMITS.braking, LIMITS.reaction_time))
+    reaction_time = LIMITS.reaction_time + INTERVAL
+    assert found == pytest.approx(closing_speed(0.2, LIMITS.braking, reaction_time))
     assert math.isfinite(found)
 
 
 def test_others_stop_the_drone_but_do_not_drive_it_back() -> None:
     """Whoever is taken for a person by mistake must not push it into what it does not see."""
     approach = limit()
-    approach.see(Sighting(0.0, 4.0), [Sighting(0.2, 0.5)], AT_ORIGIN)
+    approach.see(Sighting(0.0, 4.0), [Sighting(0.2, 0.5)], AT_ORIGIN, INTERVAL)
     assert approach.speed(Sighting(0.0, 4.0), 0.0, AT_ORIGIN) == 0.0
-    approach.see(Sighting(0.0, 0.5), [], AT_ORIGIN)
+    approach.see(Sighting(0.0, 0.5), [], AT_ORIGIN, INTERVAL)
     assert approach.speed(Sighting(0.0, 0.5), 0.0, AT_ORIGIN) < -1.0
 
 
