@@ -20,7 +20,7 @@ from aerodaas.data import Alert, Detection, Detections
 from aerodaas.errors import ConfigError
 from aerodaas.navigation.follow_controller import LYING, FollowController, FollowPhase
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
-from aerodaas.navigation.sighting import Sighting, TargetSize, sight
+from aerodaas.navigation.sighting import Sighting, TargetSize, ends_in_picture, sight
 from aerodaas.navigation.target_motion import TargetMotion, place_of
 from aerodaas.waypoints import DEFAULT_PRIORITY, AeroNavigation, NavigationType
 
@@ -124,6 +124,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         """Leave out the boxes of what cannot be the target, so that no track takes them."""
         boxes = [box for box in item if all(map(math.isfinite, box.box))]
         if self.choice.grounded:
+            boxes = [box for box in boxes if ends_in_picture(box, item)]
             seen = [(box, sight(box, item, self.size)) for box in boxes]
             boxes = [box for box, found in seen if found is None or not found.afloat]
         if self.choice.shared < 1.0:

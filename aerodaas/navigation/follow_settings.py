@@ -83,8 +83,9 @@ class TargetChoice:
     looks: int = 2
     """Frames in which it must have been seen."""
     grounded: bool = False
-    """It stands on the ground: a box of its size that hangs in the air is something else. Not for
-    a part of a thing, such as a vest, nor where the ground is far from level."""
+    """It stands on the ground: a box of its size that hangs in the air is something else, and one
+    that fills the picture from side to side down to its lower edge may be the ground itself. Not
+    for a part of a thing, such as a vest, nor where the ground is far from level."""
     whole: bool = False
     """The first look at it shows all of it: of what fills the picture, the size is not known."""
     shared: float = 1.0

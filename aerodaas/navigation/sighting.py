@@ -17,7 +17,7 @@ import numpy as np
 from aerodaas.data import Detection, Detections
 from aerodaas.geometry import Vector, rotation_from_rpy
 
-__all__ = ["Sighting", "TargetSize", "sight"]
+__all__ = ["Sighting", "TargetSize", "ends_in_picture", "sight"]
 
 _MARGIN = 0.03
 """Part of the picture's side within which a box counts as cut: boxes of people whose feet are out
@@ -126,6 +126,21 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
         width=None if cut_u or cut_v else by_height * breadth,
         afloat=_is_afloat(ray(u, bottom), by_height, lens),
         top=crown,
+    )
+
+
+def ends_in_picture(detection: Detection, detections: Detections) -> bool:
+    """Whether a box has a side or its lower edge in the picture.
+
+    What leaves it on the left, on the right and below may be the ground before the camera, of which
+    a detector sees no more than of a thing as near as that.
+    """
+    left, _, right, bottom = detection.box
+    margin_u, margin_v = _MARGIN * detections.width, _MARGIN * detections.height
+    return (
+        left >= margin_u
+        or right <= detections.width - margin_u
+        or bottom <= detections.height - margin_v
     )
 
 

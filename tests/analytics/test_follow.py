@@ -22,6 +22,7 @@ from aerodaas.analytics.followers import (
 from aerodaas.clock import NANOSECONDS
 from aerodaas.data import Alert, Detection, Detections, Frame, Header, Odometry
 from aerodaas.errors import ConfigError, GraphError
+from aerodaas.geometry import CameraModel
 from aerodaas.graph import AeroStreamData, Graph, Node
 from aerodaas.navigation.follow_controller import FollowPhase
 from aerodaas.navigation.sighting import sight
@@ -226,9 +227,11 @@ def test_lengths_that_cannot_be_are_refused(length: float) -> None:
         FollowAnalytics(distance=length)
 
 
-def car_world(target: Path, hidden: Callable[[float], bool] = lambda _: False) -> World:
+def car_world(
+    target: Path, hidden: Callable[[float], bool] = lambda _: False, kind: type[World] = World
+) -> World:
     """A car seen from behind."""
-    return World(
+    return kind(
         target,
         np.array([0.0, 0.0, 2.5]),
         target_height=1.5,
@@ -367,6 +370,27 @@ def test_what_hangs_in_the_air_is_no_car() -> None:
     world.target_base = 0.0
     world.run(CarFollowAnalytics(), 4)
     assert world.commands[-1] is not None
+
+
+class Paved(World):
+    """A detector that takes the ground below the drone for a car, more surely than the car."""
+
+    def look(self, random: np.random.Generator) -> Detections:
+        """See the car and, from 8 s on, a box that ends only at the picture's edges."""
+        seen = super().look(random)
+        width, height = float(seen.width), float(seen.height)
+        ground = Detection((0.01 * width, 0.4 * height, width, height), self.label, 0.95)
+        return seen if self.time < 8 else replace(seen, items=(*seen, ground))
+
+
+def test_the_ground_is_no_car() -> None:
+    """What has neither sides nor a lower edge in the picture neither hides the car nor stops us."""
+    world = car_world(lambda time: (10 + 0.5 * time, 0.0), kind=Paved)
+    world.rate = 10.0
+    world.camera = CameraModel.from_fov(640, 360, math.radians(82.6), pitch=math.radians(14))
+    distances = world.run(CarFollowAnalytics(), 40)
+    assert world.alerts == []
+    assert np.abs(np.array(distances[-150:]) - 6.0).max() < 0.5
 
 
 class Unsure(World):
