@@ -16,7 +16,7 @@ from aerodaas.options import RunOptions, current_options
 _ROOT = Path(__file__).resolve().parents[1]
 
 # The training itself needs PyTorch, which flying does not: without it, its tests do not exist.
-_TRAINING = ["training/test_training_run.py", "training/test_pose_training.py"]
+_TRAINING = [f"training/test_{name}.py" for name in ("company", "training_run", "pose_training")]
 collect_ignore = [] if importlib.util.find_spec("torch") else _TRAINING
 
 

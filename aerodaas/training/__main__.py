@@ -29,6 +29,9 @@ _Seed = Annotated[int, typer.Option(help="Seed of weights and order.")]
 _Start = Annotated[
     Path | None, typer.Option(help="Weights to begin with (weights.pt of an earlier run).")
 ]
+_Processes = Annotated[
+    int, typer.Option(min=1, help="Processes that share each step, one per core at best.")
+]
 _Photographs = Annotated[Path | None, typer.Option(help="Photographs to try the detector on.")]
 _Labels = Annotated[
     Path | None, typer.Option(help="Their vests: JSON, {file: [left, top, right, bottom]}.")
@@ -61,6 +64,7 @@ def detector(
     halved: _Halved = 4400,
     seed: _Seed = 1,
     start: _Start = None,
+    processes: _Processes = 1,
     photographs: _Photographs = None,
     labels: _Labels = None,
 ) -> None:
@@ -70,7 +74,7 @@ def detector(
 
     render(work, worlds)
     places = pipeline.Places(work, out, photographs, labels)
-    recipe = train.Recipe(steps=steps, halved=halved, seed=seed, start=start)
+    recipe = train.Recipe(steps=steps, halved=halved, seed=seed, start=start, processes=processes)
     _watch(pipeline.trained(places, recipe), steps)
     _console.print(pipeline.make_detector(places, recipe).figures)
 
@@ -82,6 +86,7 @@ def pose(
     worlds: _Worlds = 600,
     steps: _Steps = 4000,
     seed: _Seed = 1,
+    processes: _Processes = 1,
 ) -> None:
     """The same for the keypoints of people, which learn from cuts around them."""
     _require_torch()
@@ -89,7 +94,7 @@ def pose(
 
     render(work, worlds)
     places = pipeline.Places(work, out)
-    recipe = pose_train.PoseRecipe(steps=steps, seed=seed)
+    recipe = pose_train.PoseRecipe(steps=steps, seed=seed, processes=processes)
     _watch(pose_pipeline.trained_pose(places, recipe), steps)
     _console.print(pose_pipeline.make_pose(places, recipe).figures)
 

@@ -23,15 +23,16 @@ _GREY = 114
 _LEAST_SIDE, _LEAST_SHARE = 3.0, 0.3
 """A box cut at the picture's edge stays if this many pixels and this share of it remain."""
 
-_MOSAIC = 0.2
-
 
 def augmented(
-    draw: Callable[[], Sample], size: tuple[int, int], rng: np.random.Generator
+    draw: Callable[[], Sample], size: tuple[int, int], rng: np.random.Generator, mosaics: float
 ) -> Sample:
-    """Make one picture of `size` (height, width) from one, or four, of those that `draw` gives."""
+    """Make one picture of `size` (height, width) of those that `draw` gives.
+
+    With a probability of `mosaics` it is patched together of four.
+    """
     height, width = size
-    if rng.random() < _MOSAIC:
+    if rng.random() < mosaics:
         middle = rng.uniform((0.3, 0.3), (0.7, 0.7)) * (width, height)
         canvas = np.full((height, width, 3), _GREY, np.uint8)
         u, v = (int(part) for part in middle)

@@ -19,13 +19,16 @@ from aerodaas.data import Detections, Frame, Header
 from aerodaas.training.dataset import Sample
 from aerodaas.training.metrics import Floats, Ranking, overlap, strays
 
-__all__ = ["Sightings", "milliseconds", "rankings", "sightings", "thresholds"]
+__all__ = ["SMALLEST", "Sightings", "milliseconds", "rankings", "sightings", "thresholds"]
 
 _LEAST = 0.01
 """Score of the weakest detection that counts for average precision."""
 
-_SMALL = 8.0
+SMALLEST = 8.0
 """Pixels: what is narrower or lower in the network's input need not be found."""
+
+_ENOUGH = 0.5
+"""IoU of a box with what it has found."""
 
 _TIMED_RUNS = 200
 
@@ -46,20 +49,30 @@ def _boxes(found: Detections, label: str) -> tuple[list[float], Floats]:
     return [item.score for item in kept], boxes
 
 
-def _large(boxes: Floats, least: float = _SMALL) -> NDArray[np.bool_]:
-    return np.asarray((boxes[:, 2:] - boxes[:, :2]).min(axis=1, initial=np.inf) >= least)
+def _sized(boxes: Floats, least: float, below: float) -> NDArray[np.bool_]:
+    sides = (boxes[:, 2:] - boxes[:, :2]).min(axis=1, initial=np.inf)
+    return np.asarray((sides >= least) & (sides < below))
 
 
-def rankings(model: Path, samples: Iterable[Sample]) -> dict[str, Ranking]:
-    """Rank the detections of each class of a detector over labelled pictures."""
+def rankings(
+    model: Path, samples: Iterable[Sample], least: float = SMALLEST, below: float = np.inf
+) -> dict[str, Ranking]:
+    """Rank the detections of each class of a detector over labelled pictures.
+
+    What is narrower or lower than `least` pixels, or neither than `below`, need not be found. Where
+    nothing is, a box counts unless another range has it (as COCO measures by size).
+    """
     detector = _opened(model, _LEAST)
+    lowest = 0.0 if least == SMALLEST else least
     result = {label: Ranking([], []) for label in detector.names}
     for sample in samples:
         found = _find(detector, sample)
         for label, ranking in result.items():
             truth = sample.boxes[sample.kinds == DETECTOR_CLASSES.index(label)].astype(float)
             scores, boxes = _boxes(found, label)
-            ranking.add(np.array(scores), overlap(boxes, truth), _large(truth))
+            counts, table = _sized(truth, least, below), overlap(boxes, truth)
+            heard = _sized(boxes, lowest, below) | (table >= _ENOUGH).any(axis=1)
+            ranking.add(np.array(scores)[heard], table[heard], counts, _ENOUGH)
     return result
 
 

@@ -23,8 +23,18 @@ Colour = tuple[float, float, float]
 
 _SKINS = ((0.97, 0.82, 0.72), (0.82, 0.62, 0.46), (0.58, 0.40, 0.28), (0.33, 0.23, 0.17))
 
-_HUES = ((55.0, 112.0, 0.68), (14.0, 32.0, 0.2), (-8.0, 6.0, 0.07), (325.0, 345.0, 0.05))
-"""Hues of hazard vests in degrees (lime to yellow, orange, red, pink) and their shares."""
+_HUES = (
+    (55.0, 112.0, 0.48),
+    (112.0, 150.0, 0.2),
+    (14.0, 32.0, 0.2),
+    (-8.0, 6.0, 0.07),
+    (325.0, 345.0, 0.05),
+)
+"""Hues of hazard vests in degrees and their shares: lime to yellow, lime as a camera gives it
+whose white balance is off, orange, red, pink."""
+
+_PALEST = 0.22
+"""Saturation of a vest that the sun blows out."""
 
 _CABINS = (
     ((-1.75, 0.90), (-1.30, 1.40), (0.05, 1.43), (0.95, 0.90)),
@@ -43,7 +53,7 @@ def hi_vis(rng: np.random.Generator) -> Colour:
     """Colour of a hazard vest."""
     low, high, _ = _HUES[rng.choice(len(_HUES), p=[share for *_, share in _HUES])]
     hue = rng.uniform(low, high) % 360.0 / 360.0
-    return colorsys.hsv_to_rgb(hue, rng.uniform(0.5, 1.0), rng.uniform(0.72, 1.0))
+    return colorsys.hsv_to_rgb(hue, rng.uniform(_PALEST, 1.0), rng.uniform(0.72, 1.0))
 
 
 def any_colour(rng: np.random.Generator) -> Colour:

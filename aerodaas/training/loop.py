@@ -14,6 +14,8 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
+from aerodaas.training.company import average, rank
+
 __all__ = ["Course", "Loss", "Progress", "learn"]
 
 _WARM_UP = 150
@@ -28,6 +30,7 @@ class Course:
 
     steps: int
     batch: int = 32
+    """Pictures of a step, of all processes together."""
     rate: float = 2e-3
     decay: float = 0.03
     memory: float = 0.9985
@@ -37,6 +40,7 @@ class Course:
     seed: int = 1
     start: Path | None = None
     """Weights to begin with, instead of random ones."""
+    processes: int = 1
 
 
 @dataclass(frozen=True)
@@ -57,7 +61,8 @@ def learn(network: nn.Module, loss: Loss, course: Course, folder: Path) -> Itera
     """Train from where `folder` has a checkpoint, or from the start; yields as it goes.
 
     The mean of the weights is kept in `folder/weights.pt`, everything else beside it, so that a
-    training that was stopped goes on. Runs on a GPU if there is one.
+    training that was stopped goes on. Runs on a GPU if there is one. In a company of processes,
+    each calls this with the same arguments, and the first one keeps the checkpoint.
     """
     cv2.setNumThreads(0)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
@@ -68,7 +73,7 @@ def learn(network: nn.Module, loss: Loss, course: Course, folder: Path) -> Itera
     optimiser = _optimiser_of(network, course.rate, course.decay)
     step, before = _resume(folder, network, mean, optimiser)
     begun = time.monotonic()
-    rng = np.random.default_rng([course.seed, step])
+    rng = np.random.default_rng([course.seed, step, rank()])
     sums: list[tuple[float, ...]] = []
     while step < course.steps:
         network.train()
@@ -77,6 +82,7 @@ def learn(network: nn.Module, loss: Loss, course: Course, folder: Path) -> Itera
         total, parts = loss(step, rng, device)
         optimiser.zero_grad(set_to_none=True)
         total.backward()
+        average(network)
         torch.nn.utils.clip_grad_norm_(network.parameters(), course.clip)
         optimiser.step()
         step += 1
@@ -84,7 +90,8 @@ def learn(network: nn.Module, loss: Loss, course: Course, folder: Path) -> Itera
         sums.append(parts)
         if step % _KEEP_EVERY == 0 or step == course.steps:
             seconds = before + time.monotonic() - begun
-            _keep(folder, (step, seconds), network, mean, optimiser)
+            if rank() == 0:
+                _keep(folder, (step, seconds), network, mean, optimiser)
             yield Progress(step, tuple(np.mean(sums, axis=0).tolist()), seconds)
             sums.clear()
 
@@ -97,7 +104,7 @@ def _optimiser_of(network: nn.Module, rate: float, decay: float) -> torch.optim.
         {"params": matrices, "weight_decay": decay},
         {"params": others, "weight_decay": 0.0},
     ]
-    return torch.optim.AdamW(groups, lr=rate, betas=(0.9, 0.99))
+    return torch.optim.AdamW(groups, lr=rate, betas=(0.9, 0.99), fused=True)
 
 
 def _schedule(step: int, steps: int) -> float:

@@ -1,8 +1,7 @@
 """What the network is asked to get right.
 
 Cells are assigned to things by how well they do already (TOOD: Feng et al., 2021, as in YOLOv8):
-boxes by complete IoU (Zheng et al., 2020), classes by cross entropy with the IoU as their target,
-keypoints by their similarity relative to the person's size, as COCO measures it.
+boxes by complete IoU (Zheng et al., 2020), classes by cross entropy with the IoU as their target.
 """
 
 from __future__ import annotations
@@ -14,15 +13,14 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from aerodaas.training.metrics import SIGMAS
-from aerodaas.training.network import anchors_of, decode_boxes, decode_points
+from aerodaas.training.network import anchors_of, decode_boxes
 
 __all__ = ["Losses", "Targets", "losses", "overlaps"]
 
 _CANDIDATES = 10
 _SCORE_POWER, _OVERLAP_POWER = 0.5, 6.0
-_PERSON = 1
-_SIGMAS = 2 * torch.from_numpy(SIGMAS).float()
+_WORTH = (1.5, 0.5, 1.0, 1.0)
+"""Of a vest, a person, a car and a tower: drones are led by vests, and people are the most."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +31,6 @@ class Targets:
     """(b, m) class numbers."""
     boxes: Tensor
     """(b, m, 4) left, top, right, bottom in pixels."""
-    keypoints: Tensor
-    """(b, m, 17, 3)."""
     valid: Tensor
     """(b, m) true where there is a label."""
 
@@ -45,18 +41,16 @@ class Losses:
 
     box: Tensor
     kind: Tensor
-    place: Tensor
-    seen: Tensor
 
     @property
     def total(self) -> Tensor:
         """Weighted sum."""
-        return 7.5 * self.box + 1.0 * self.kind + 3.0 * self.place + 0.6 * self.seen
+        return 7.5 * self.box + self.kind
 
     @property
-    def figures(self) -> tuple[float, ...]:
-        """The four parts as numbers."""
-        return tuple(part.item() for part in (self.box, self.kind, self.place, self.seen))
+    def figures(self) -> tuple[float, float]:
+        """Both parts as numbers."""
+        return self.box.item(), self.kind.item()
 
 
 def overlaps(one: Tensor, other: Tensor, *, complete: bool = False) -> Tensor:
@@ -80,11 +74,9 @@ def overlaps(one: Tensor, other: Tensor, *, complete: bool = False) -> Tensor:
     return iou - apart / diagonal - weight * shape
 
 
-def losses(
-    outputs: tuple[Tensor, Tensor, Tensor], targets: Targets, size: tuple[int, int]
-) -> Losses:
+def losses(outputs: tuple[Tensor, Tensor], targets: Targets, size: tuple[int, int]) -> Losses:
     """Compare raw outputs for inputs of `size` (height, width) with the labels."""
-    raw_boxes, logits, raw_points = (output.float() for output in outputs)
+    raw_boxes, logits = (output.float() for output in outputs)
     centres, strides = (part.to(raw_boxes.device) for part in anchors_of(size))
     boxes = decode_boxes(raw_boxes, centres, strides).transpose(1, 2)
     with torch.no_grad():
@@ -97,12 +89,12 @@ def losses(
     weight = quality[batch, cell]
     wanted[batch, cell, kinds] = weight
     normal = weight.sum().clamp(min=1.0)
-    kind = functional.binary_cross_entropy_with_logits(
-        logits.transpose(1, 2), wanted, reduction="sum"
+    worth = torch.tensor(_WORTH, device=logits.device)
+    entropy = functional.binary_cross_entropy_with_logits(
+        logits.transpose(1, 2), wanted, worth, reduction="sum"
     )
     fit = overlaps(boxes[batch, cell], targets.boxes[batch, thing], complete=True)
-    place, seen = _keypoint_losses(raw_points, targets, (batch, cell, thing), (centres, strides))
-    return Losses(((1 - fit) * weight).sum() / normal, kind / normal, place, seen)
+    return Losses(((1 - fit) * weight * worth[kinds]).sum() / normal, entropy / normal)
 
 
 def _assign(
@@ -137,31 +129,3 @@ def _assign(
     top_fit = (fit * positive).amax(-1, keepdim=True)
     quality = (metric / (top_metric + 1e-12) * top_fit).amax(1)
     return torch.where(most > 0, owner, -1), quality
-
-
-def _keypoint_losses(
-    raw: Tensor,
-    targets: Targets,
-    chosen: tuple[Tensor, Tensor, Tensor],
-    grid: tuple[Tensor, Tensor],
-) -> tuple[Tensor, Tensor]:
-    batch, cell, thing = chosen
-    people = targets.kinds[batch, thing] == _PERSON
-    if not bool(people.any()):
-        return raw.sum() * 0.0, raw.sum() * 0.0
-    batch, cell, thing = batch[people], cell[people], thing[people]
-    points = decode_points(raw, *grid)[batch, :, :, cell]
-    labels = targets.keypoints[batch, thing]
-    box = targets.boxes[batch, thing]
-    area = (box[:, 2:] - box[:, :2]).prod(-1)[:, None]
-    inside = (labels[..., 2] > 0).float()
-    away = (points[..., :2] - labels[..., :2]).square().sum(-1)
-    exponent = away / (2 * _SIGMAS.to(raw.device).square() * (0.53 * area + 1e-6))
-    # Similarity alone says nothing about points far away.
-    far = (away + 1e-6).sqrt() / (area + 1e-6).sqrt()
-    place = (1 - torch.exp(-exponent) + far) * inside
-    each = inside.sum(1).clamp(min=1.0)
-    seen = functional.binary_cross_entropy_with_logits(
-        points[..., 2], (labels[..., 2] > 1).float(), reduction="mean"
-    )
-    return (place.sum(1) / each).mean(), seen

@@ -1,4 +1,4 @@
-"""The network: one body, and heads for boxes, classes and keypoints at strides 8, 16 and 32.
+"""The network: one body, and heads for boxes and classes at strides 8, 16 and 32.
 
 In kind it is YOLOv8 (anchor-free, decoupled heads, feature pyramid up and down), smaller: ReLU
 and plain distances instead of SiLU and their distributions, since both run faster on a CPU.
@@ -12,7 +12,6 @@ import torch
 from torch import Tensor, nn
 from torch.nn import functional
 
-from aerodaas.analytics.joints import POINTS
 from aerodaas.analytics.models import DETECTOR_CLASSES
 
 __all__ = ["STRIDES", "Eyes", "anchors_of"]
@@ -84,7 +83,7 @@ def _branch(width: int, hidden: int, outputs: int) -> nn.Sequential:
 
 
 class Eyes(nn.Module):
-    """Body and heads; the forward pass gives raw maps, `decode` boxes, scores and keypoints."""
+    """Body and heads; `decode_boxes` and a sigmoid make boxes and scores of what they give."""
 
     def __init__(self) -> None:
         """Start from random weights."""
@@ -108,7 +107,6 @@ class Eyes(nn.Module):
         self.down_coarse = _Stage(w4 + w5, w5, add=False)
         self.boxes = nn.ModuleList(_branch(w, 48, 4) for w in (w3, w4, w5))
         self.kinds = nn.ModuleList(_branch(w, 48, self.classes) for w in (w3, w4, w5))
-        self.points = nn.ModuleList(_branch(w, 64, 3 * POINTS) for w in (w3, w4, w5))
         for box, kind in zip(self.boxes, self.kinds, strict=True):
             nn.init.constant_(box[-1].bias, 0.7)
             nn.init.constant_(kind[-1].bias, math.log(_PRIOR / (1 - _PRIOR)))
@@ -126,13 +124,12 @@ class Eyes(nn.Module):
         entered = self.down_coarse_enter(out_middle)
         return [out_fine, out_middle, self.down_coarse(torch.cat([entered, coarse], 1))]
 
-    def forward(self, x: Tensor) -> tuple[Tensor, Tensor, Tensor]:
-        """Raw distances (b, 4, n), class logits (b, c, n) and keypoints (b, 51, n)."""
+    def forward(self, x: Tensor) -> tuple[Tensor, Tensor]:
+        """Raw distances (b, 4, n) and class logits (b, c, n)."""
         maps = self.maps(x)
         return (
             torch.cat([head(m).flatten(2) for head, m in zip(self.boxes, maps, strict=True)], 2),
             torch.cat([head(m).flatten(2) for head, m in zip(self.kinds, maps, strict=True)], 2),
-            torch.cat([head(m).flatten(2) for head, m in zip(self.points, maps, strict=True)], 2),
         )
 
 
@@ -152,10 +149,3 @@ def decode_boxes(raw: Tensor, centres: Tensor, strides: Tensor) -> Tensor:
     """Boxes (b, 4, n), left, top, right, bottom in pixels, of raw distances."""
     distances = raw.clamp(-6.0, 6.0).exp() * strides
     return torch.cat([centres - distances[:, :2], centres + distances[:, 2:]], 1)
-
-
-def decode_points(raw: Tensor, centres: Tensor, strides: Tensor) -> Tensor:
-    """Keypoints (b, 17, 3, n): u, v in pixels, and the logit of being seen."""
-    points = raw.unflatten(1, (POINTS, 3))
-    places = points[:, :, :2] * 2.0 * strides + centres
-    return torch.cat([places, points[:, :, 2:]], 2)

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
 import torch
 
 from aerodaas.training.card import Card, write_card
+from aerodaas.training.company import together
 from aerodaas.training.dataset import Pictures, Sample
 from aerodaas.training.evaluate import (
+    SMALLEST,
     milliseconds,
     rankings,
     sightings,
@@ -28,6 +33,9 @@ _FALSE_PER_PICTURE = 0.1
 """Boxes of each class beside everything, in rendered pictures, that the threshold allows."""
 
 _HIGHEST = 0.95
+
+_SIZES = (16.0, 32.0)
+"""Pixels between small, medium and large vests: COCO's limits, of pictures twice as wide."""
 
 _PLAIN_WORLDS = 12
 _UNCALIBRATED = [NOMINAL_SCORE] * 4
@@ -52,7 +60,11 @@ class Places:
 
 def trained(places: Places, recipe: Recipe) -> Iterator[Progress]:
     """Train the detector, unless it has been for that many steps already."""
-    yield from train(Pictures(places.work / "train"), recipe, places.run("detector"))
+    yield from together(recipe.processes, partial(_course, places, recipe))
+
+
+def _course(places: Places, recipe: Recipe) -> Iterator[Progress]:
+    return train(Pictures(places.work / "train"), recipe, places.run("detector"))
 
 
 def make_detector(places: Places, recipe: Recipe) -> Card:
@@ -75,6 +87,10 @@ def make_detector(places: Places, recipe: Recipe) -> Card:
     for label, ranking in rankings(path, test).items():
         card.figures[f"mAP50, {label}"] = _precision(ranking)
         card.figures[f"mAP50, {label}, as the simulator shows it"] = _precision(plain[label])
+    for least, below in pairwise((SMALLEST, *_SIZES, np.inf)):
+        vests = rankings(path, test, least, below)["vest"]
+        sizes = f"{least:.0f} pixels and more" if below == np.inf else f"{least:.0f} to {below:.0f}"
+        card.figures[f"mAP50, vest, {sizes}"] = _precision(vests)
     if places.photographs is not None and places.labels is not None:
         seen = sightings(path, places.photographs, places.labels, NOMINAL_SCORE)
         card.figures["Photographs with the vest found"] = f"{seen.found} of {seen.pictures}"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import torch
 
 from aerodaas.analytics.body_cut import CUT
 from aerodaas.training.card import Card, write_card
+from aerodaas.training.company import together
 from aerodaas.training.dataset import Pictures
 from aerodaas.training.loop import Progress
 from aerodaas.training.pipeline import Places, spent
@@ -21,7 +23,11 @@ __all__ = ["make_pose", "trained_pose"]
 
 def trained_pose(places: Places, recipe: PoseRecipe) -> Iterator[Progress]:
     """Train the network, unless it has been for that many steps already."""
-    yield from train_pose(People(Pictures(places.work / "train")), recipe, places.run("pose"))
+    yield from together(recipe.processes, partial(_course, places, recipe))
+
+
+def _course(places: Places, recipe: PoseRecipe) -> Iterator[Progress]:
+    return train_pose(People(Pictures(places.work / "train")), recipe, places.run("pose"))
 
 
 def make_pose(places: Places, recipe: PoseRecipe) -> Card:

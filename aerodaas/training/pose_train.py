@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
+from aerodaas.training.company import share
 from aerodaas.training.loop import Course, Progress, learn
 from aerodaas.training.pose_cuts import Cut, People
 from aerodaas.training.pose_network import STRIDE, Joints, places
@@ -44,7 +45,7 @@ def train_pose(people: People, recipe: PoseRecipe, folder: Path) -> Iterator[Pro
     def loss(
         _: int, rng: np.random.Generator, device: torch.device
     ) -> tuple[Tensor, tuple[float, ...]]:
-        cuts = [people.cut(int(rng.integers(len(people))), rng) for _ in range(recipe.batch)]
+        cuts = [people.cut(int(rng.integers(len(people))), rng) for _ in range(share(recipe.batch))]
         pixels, points, sizes = (part.to(device) for part in _batch(cuts))
         with torch.autocast(device.type, torch.bfloat16):
             maps, found = network(pixels.contiguous(memory_format=torch.channels_last))

@@ -25,6 +25,10 @@ _WANTED = ("vest", "person", "car", "tower", "tree", "building")
 _SHARES = (0.40, 0.20, 0.21, 0.10, 0.02, 0.07)
 """What pictures are taken of; walls and windows, close up, have been taken for vests and cars."""
 
+_AIMLESS = 0.08
+"""Share of pictures that a drone takes on its way, of nothing in particular: roads, shadows and
+walls close by have been taken for cars."""
+
 _EDGE = 45.0
 """Metres from the middle to the edge of what stands around."""
 
@@ -106,7 +110,9 @@ def _restless(thing: Thing, rng: np.random.Generator) -> Thing:
 
 
 def draw_view(world: World, camera: CameraModel, time: float, rng: np.random.Generator) -> View:
-    """Choose a thing to look at, and a place to see it from at `time`."""
+    """Choose a thing to look at, and a place to see it from at `time`; or look about on the way."""
+    if rng.random() < _AIMLESS:
+        return _on_the_way(time, rng)
     wanted = rng.choice(_WANTED, p=_SHARES)
     boxes = [box for box in world.boxes(time) if box.label == wanted] or world.boxes(time)
     target = boxes[rng.integers(len(boxes))]
@@ -131,3 +137,9 @@ def draw_view(world: World, camera: CameraModel, time: float, rng: np.random.Gen
     pitch = math.atan2(-dz, math.hypot(dx, dy)) + math.atan(above)
     roll = rng.normal(0.0, 0.07)
     return View(time, Odometry(np.array([x, y, z]), np.zeros(3), yaw, roll, pitch))
+
+
+def _on_the_way(time: float, rng: np.random.Generator) -> View:
+    place = np.array([*rng.uniform(-25.0, 25.0, 2), rng.uniform(1.2, 6.0)])
+    yaw, roll = rng.uniform(-math.pi, math.pi), rng.normal(0.0, 0.05)
+    return View(time, Odometry(place, np.zeros(3), yaw, roll, rng.uniform(-0.05, 0.45)))

@@ -10,14 +10,18 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from aerodaas.analytics.joints import POINTS
 from aerodaas.training.augment import augmented
+from aerodaas.training.company import share
 from aerodaas.training.dataset import Pictures, Sample
 from aerodaas.training.loop import Course, Progress, learn
 from aerodaas.training.loss import Targets, losses
 from aerodaas.training.network import Eyes
 
 __all__ = ["Recipe", "train"]
+
+_MOSAICS, _WHOLE = 0.2, 0.2
+"""Share of pictures that are patched together of four, and of the steps, the last ones, that get
+none (as YOLOX: Ge et al., 2021)."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,8 @@ def train(pictures: Pictures, recipe: Recipe, folder: Path) -> Iterator[Progress
         step: int, rng: np.random.Generator, device: torch.device
     ) -> tuple[Tensor, tuple[float, ...]]:
         size, draw = _source(pictures, recipe, step, rng)
-        samples = [augmented(draw, size, rng) for _ in range(recipe.batch)]
+        mosaics = _MOSAICS if step < (1 - _WHOLE) * recipe.steps else 0.0
+        samples = [augmented(draw, size, rng, mosaics) for _ in range(share(recipe.batch))]
         inputs, targets = _batch_of(samples, device)
         with torch.autocast(device.type, torch.bfloat16):
             outputs = network(inputs)
@@ -67,12 +72,11 @@ def _batch_of(samples: list[Sample], device: torch.device) -> tuple[Tensor, Targ
     most = max(1, *(len(sample.kinds) for sample in samples))
     kinds = np.zeros((len(samples), most), np.int64)
     boxes = np.zeros((len(samples), most, 4), np.float32)
-    keypoints = np.zeros((len(samples), most, POINTS, 3), np.float32)
     valid = np.zeros((len(samples), most), dtype=bool)
     for row, sample in enumerate(samples):
         count = len(sample.kinds)
         kinds[row, :count], boxes[row, :count] = sample.kinds, sample.boxes
-        keypoints[row, :count], valid[row, :count] = sample.keypoints, True
-    arrays = (torch.from_numpy(array).to(device) for array in (kinds, boxes, keypoints, valid))
+        valid[row, :count] = True
+    arrays = (torch.from_numpy(array).to(device) for array in (kinds, boxes, valid))
     inputs = pixels.contiguous(memory_format=torch.channels_last).float() / 255
     return inputs, Targets(*arrays)

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import cv2
-import numpy as np
 import onnxruntime as ort
 import pytest
-from numpy.typing import NDArray
 
 from aerodaas.analytics.models import DETECTOR, DETECTOR_CLASSES, POSE
 from aerodaas.analytics.onnx.detector import OnnxDetector
 from aerodaas.analytics.vip_detection import VipDetectionAnalytics
-from aerodaas.data import Frame, Header
-from aerodaas.training.evaluate import rankings
+from aerodaas.training.evaluate import rankings, sightings
 from aerodaas.training.rendering import HELD_OUT, render_world
 
-PHOTOGRAPHS = sorted((Path(__file__).parents[3] / "shared" / "data" / "frames").glob("*.jpg"))
+PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "frames"
+VESTS = Path(__file__).parent / "vests.json"
+"""Where the vest is in each photograph, marked by hand: left, top, right, bottom in pixels."""
 FRESH = HELD_OUT + 500
 """Seeds from here on were neither trained on nor measured with."""
 
@@ -65,31 +63,13 @@ def test_things_are_found_in_fresh_worlds() -> None:
     precision = {
         label: ranking.average_precision for label, ranking in rankings(DETECTOR, samples).items()
     }
-    assert precision["vest"] > 0.5
-    assert min(precision.values()) > 0.15
+    assert precision["vest"] > 0.65
+    assert min(precision.values()) > 0.4
 
 
-@pytest.mark.skipif(not PHOTOGRAPHS, reason="the photographs are not beside this checkout")
+@pytest.mark.skipif(not PHOTOGRAPHS.is_dir(), reason="the photographs are not beside this checkout")
 def test_the_vest_is_found_in_photographs() -> None:
-    """No photograph was trained on. A box counts if its middle is as lime as the vest."""
-    detector = VipDetectionAnalytics()
-    detector.open()
-    found = stray = 0
-    for path in PHOTOGRAPHS:
-        image = np.asarray(cv2.imread(str(path)), np.uint8)
-        seen = list(detector.detect([Frame(Header(0, 0, path.name), image)])[0])
-        hits = [is_lime(image, item.box) for item in seen]
-        found += any(hits)
-        stray += len(hits) - sum(hits)
-    assert found >= 30
-    assert stray <= 6
-
-
-def is_lime(image: NDArray[np.uint8], box: tuple[float, float, float, float]) -> bool:
-    """Whether half of the box's inner part is yellow-green, or washed out by the sun."""
-    left, top, right, bottom = box
-    wide, tall = (right - left) / 4, (bottom - top) / 4
-    inner = image[int(top + tall) : int(bottom - tall), int(left + wide) : int(right - wide)]
-    hue, saturation, value = cv2.cvtColor(inner, cv2.COLOR_BGR2HSV).transpose(2, 0, 1)
-    lime = (hue > 28) & (hue < 78) & (saturation > 35) & (value > 90)
-    return bool(lime.mean() > 0.5)
+    """In nine of ten, with five boxes elsewhere at most; no photograph was trained on."""
+    seen = sightings(DETECTOR, PHOTOGRAPHS, VESTS, 0.3)
+    assert seen.found >= 0.9 * seen.pictures
+    assert seen.false <= 5

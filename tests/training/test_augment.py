@@ -70,7 +70,7 @@ def test_what_is_cut_away_has_no_label() -> None:
 def test_whatever_is_drawn_the_labels_lie_in_the_picture(seed: int) -> None:
     """Mosaics as well as single pictures."""
     rng = np.random.default_rng(seed)
-    sample = augmented(lambda: marked(30, 30, 70, 60), (96, 160), rng)
+    sample = augmented(lambda: marked(30, 30, 70, 60), (96, 160), rng, 0.5)
     assert sample.image.shape == (96, 160, 3)
     assert sample.image.dtype == np.uint8
     assert (sample.boxes >= 0).all()

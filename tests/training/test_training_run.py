@@ -49,10 +49,10 @@ def test_what_is_exported_is_what_the_detector_reads(work: Path, tmp_path: Path)
 
 
 def test_the_network_has_one_cell_per_anchor() -> None:
-    """At each stride, for boxes, classes and keypoints alike."""
+    """At each stride, for boxes and classes alike."""
     centres, strides = anchors_of((64, 96))
     outputs = Eyes().eval()(torch.zeros(2, 3, 64, 96))
-    assert [tuple(output.shape[:2]) for output in outputs] == [(2, 4), (2, 4), (2, 51)]
+    assert [tuple(output.shape[:2]) for output in outputs] == [(2, 4), (2, 4)]
     assert {output.shape[2] for output in outputs} == {centres.shape[1], strides.shape[1]}
 
 
