@@ -57,6 +57,8 @@ class CodedFrame:
     coding: Coding
     camera: CameraModel | None
     odometry: Odometry | None
+    depth: NDArray[np.uint8] | None = None
+    """The bytes of a PNG file, where the camera measured depth."""
 
 
 @dataclass(frozen=True)
@@ -93,9 +95,11 @@ def decoded(item: Frame | CodedFrame) -> Frame:
     if isinstance(item, Frame):
         return item
     image = cv2.imdecode(item.data, cv2.IMREAD_COLOR)
-    if image is None:
+    depth = None if item.depth is None else cv2.imdecode(item.depth, cv2.IMREAD_UNCHANGED)
+    if image is None or (item.depth is not None and depth is None):
         raise SourceError(f"frame {item.header.id} of {item.header.source} arrived damaged")
-    return Frame(item.header, np.asarray(image, np.uint8), item.camera, item.odometry)
+    measured = None if depth is None else np.asarray(depth, np.uint16)
+    return Frame(item.header, np.asarray(image, np.uint8), item.camera, item.odometry, measured)
 
 
 class Coder:
@@ -119,16 +123,16 @@ class Coder:
     def encode(self, frame: Frame, coding: Coding) -> Frame | CodedFrame:
         """Code a frame, and learn from it."""
         if coding == "raw":
-            self._learn(frame, coding, CodingCost(frame.image.nbytes, 0.0, 0.0))
+            self._learn(frame, coding, CodingCost(frame.nbytes, 0.0, 0.0))
             return frame
         began = time.perf_counter()
-        suffix, settings = _WRITING[coding]
-        _, data = cv2.imencode(suffix, frame.image, settings)
+        data = _written(frame.image, coding)
+        depth = None if frame.depth is None else _written(frame.depth, "png")
         took = time.perf_counter() - began
         # Until the other end has told, decoding is taken to last as long as encoding.
-        self._learn(frame, coding, CodingCost(data.nbytes, took, took))
-        array = np.asarray(data, np.uint8).ravel()
-        return CodedFrame(frame.header, array, coding, frame.camera, frame.odometry)
+        size = data.nbytes + (0 if depth is None else depth.nbytes)
+        self._learn(frame, coding, CodingCost(size, took, took))
+        return CodedFrame(frame.header, data, coding, frame.camera, frame.odometry, depth)
 
     def took_to_decode(self, frame: Frame, coding: Coding, seconds: float) -> None:
         """Learn what decoding took at the other end."""
@@ -145,6 +149,12 @@ class Coder:
             if old is None
             else CodingCost(_mixed(old.size, new.size), _mixed(old.encode, new.encode), old.decode)
         )
+
+
+def _written(pixels: NDArray[np.uint8] | NDArray[np.uint16], coding: Coding) -> NDArray[np.uint8]:
+    suffix, settings = _WRITING[coding]
+    _, data = cv2.imencode(suffix, pixels, settings)
+    return np.asarray(data, np.uint8).ravel()
 
 
 def _mixed(old: float, new: float) -> float:

@@ -122,7 +122,7 @@ class Parcels:
         coding: Coding = "raw"
         original = 0
         if frame is not None:
-            original = frame.image.nbytes
+            original = frame.nbytes
             costs = self._coder.costs(frame, self._allowed)
             coding, self._expected = fastest(costs, self.link.seconds)
             if coding != "raw":

@@ -94,7 +94,7 @@ class SensorActor(StreamActor):
         odometry = picture.odometry
         if odometry is None and self._vehicle is not None:
             odometry = self._vehicle.odometry
-        return Frame(header, picture.image, self._camera.model, odometry)
+        return Frame(header, picture.image, self._camera.model, odometry, picture.depth)
 
     def _close(self) -> None:
         self._camera.close()

@@ -160,6 +160,8 @@ class CameraConfig(_Strict):
     """Degrees downwards."""
     yaw: Annotated[float, Field(ge=-180, le=180)] = 0.0
     """Degrees to the left."""
+    depth_range: Annotated[float, Field(ge=3, le=60)] | None = None
+    """Metres up to which a simulated camera measures depth as well; None: it measures none."""
     path: str | None = None
     """Folder of pictures, video file or URL, for the drivers that read one."""
     topic: str | None = None

@@ -7,12 +7,13 @@ angles are radians (see `aerodaas.geometry`).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple, TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.depth import depth_in_box
 from aerodaas.errors import SourceError
 from aerodaas.geometry import CameraModel, Vector
 from aerodaas.interfaces import IAeroData
@@ -165,15 +166,25 @@ class Frame:
     """Calibration and mount, where known."""
     odometry: Odometry | None = None
     """The vehicle's odometry at capture, where known."""
+    depth: NDArray[np.uint16] | None = None
+    """Height x width, pixel by pixel: millimetres along the optical axis, 0 where not measured.
+    None from cameras that measure none."""
 
     def __post_init__(self) -> None:
-        """Refuse anything but 8-bit BGR."""
+        """Refuse anything but 8-bit BGR, and depth that is not the picture's."""
         bgr_axes, bgr_channels = 3, 3
         image = self.image
         if image.dtype != np.uint8 or image.ndim != bgr_axes or image.shape[2] != bgr_channels:
             message = (
                 f"{self.header.source}: a frame must be height x width x 3 of uint8 (BGR), "
                 f"not {image.shape} of {image.dtype}"
+            )
+            raise SourceError(message)
+        depth = self.depth
+        if depth is not None and (depth.dtype != np.uint16 or depth.shape != image.shape[:2]):
+            message = (
+                f"{self.header.source}: depth must be height x width of uint16 (millimetres), as "
+                f"the picture's {image.shape[:2]}, not {depth.shape} of {depth.dtype}"
             )
             raise SourceError(message)
 
@@ -186,6 +197,11 @@ class Frame:
     def height(self) -> int:
         """Pixels down."""
         return int(self.image.shape[0])
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of the picture and its depth, as they are."""
+        return self.image.nbytes + (0 if self.depth is None else self.depth.nbytes)
 
 
 @travels
@@ -202,6 +218,8 @@ class Detection:
     """Identity kept by a tracker."""
     keypoints: NDArray[np.float32] | None = None
     """K x 3: pixel u, pixel v, confidence; None where the model gives none."""
+    depth: float | None = None
+    """Metres along the optical axis to its surface, where the camera measured that."""
 
     @property
     def centre(self) -> tuple[float, float]:
@@ -232,8 +250,10 @@ class Detections(Sequence[Detection]):
 
     @classmethod
     def of(cls, frame: Frame, items: Iterable[Detection]) -> Detections:
-        """Gather `items` found in `frame`, ordered by score."""
+        """Gather `items` found in `frame`, ordered by score, each with its depth if measured."""
         ordered = tuple(sorted(items, key=lambda item: -item.score))
+        if (depth := frame.depth) is not None:
+            ordered = tuple(replace(one, depth=depth_in_box(depth, one.box)) for one in ordered)
         return cls(frame.header, ordered, frame.width, frame.height, frame.camera, frame.odometry)
 
     def labelled(self, *labels: str) -> tuple[Detection, ...]:

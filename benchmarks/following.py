@@ -22,6 +22,8 @@ from aerodaas.tuning.walk import PERSON, walk
 
 SETTLED = 12.0
 """Seconds from the start: take-off, and the person's first steps."""
+DEPTH_RANGE = 10.0
+"""Metres, as of stereo cameras made for drones."""
 UNITS = {
     "distance": "% within 2.0±0.3 m",
     "nearest": "m",
@@ -38,12 +40,16 @@ class Sight(str, enum.Enum):
 
     TRUTH = "truth"
     MODEL = "model"
+    DEPTH = "depth"
 
 
 def main(
     eyes: Annotated[
         Sight,
-        typer.Option(help="True boxes with 2 % noise and 3 % misses, or the detector on renders."),
+        typer.Option(
+            help="True boxes with 2 % noise and 3 % misses, the detector on renders, "
+            "or the detector beside measured depth."
+        ),
     ] = Sight.TRUTH,
     speeds: Annotated[str, typer.Option(help="Of the person, m/s.")] = "0.1,0.3,0.5,0.7,1.0",
     seeds: Annotated[int, typer.Option(help="Walks for each speed.", min=1)] = 2,
@@ -73,7 +79,8 @@ def main(
                     sight = TruthEyes(person, "vest", TELLO, seed=seed)
                     flown.append(chase.fly(follow, sight, duration).after(SETTLED))
                     continue
-                detector = DetectorEyes(world, TELLO, VipDetectionAnalytics())
+                measured = DEPTH_RANGE if eyes is Sight.DEPTH else None
+                detector = DetectorEyes(world, TELLO, VipDetectionAnalytics(), depth_range=measured)
                 flown.append(chase.fly(follow, detector, duration).after(SETTLED))
                 detector.close()
             report.row(f"{text} m/s", _figures(flown))

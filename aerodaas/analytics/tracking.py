@@ -42,11 +42,6 @@ class Track:
     age: float = 0.0
     """Seconds since it was last seen."""
 
-    @property
-    def predicted(self) -> Detection:
-        """Where it should be now, whether seen or not."""
-        return replace(self.detection, box=self.filter.box, track_id=self.id)
-
 
 class Tracker:
     """Keeps the identity of every target."""

@@ -26,6 +26,8 @@ class Picture:
     """Where it came from, such as a file's name."""
     odometry: Odometry | None = None
     """The vehicle's at capture where the source knows it; None: the vehicle's newest is it."""
+    depth: NDArray[np.uint16] | None = None
+    """Of each pixel, as in a `Frame`; None from cameras that measure none."""
 
 
 @runtime_checkable

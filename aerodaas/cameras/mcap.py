@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from dataclasses import replace
 
 from aerodaas.cameras.base import Picture
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
@@ -11,7 +12,7 @@ from aerodaas.config import EnvironmentConfig, SensorConfig
 from aerodaas.data import Odometry
 from aerodaas.errors import RecordingError, SourceError
 from aerodaas.geometry import CameraModel
-from aerodaas.recording.pictures import PICTURE_SCHEMAS, Shot, decoded_ahead, shots
+from aerodaas.recording.pictures import Shot, decoded_ahead, picture_topics, shots
 from aerodaas.recording.reader import Recording
 
 __all__ = ["McapCamera", "ReplayedCamera"]
@@ -85,7 +86,8 @@ class McapCamera:
             _log.warning("%s: skipped a broken picture on %s", self._path, self._topic)
             return None
         self._model = camera_model(self._settings, image.shape[1], image.shape[0])
-        return self._picture(Picture(image, stamp, self._topic, due.odometry), due)
+        picture = Picture(image, stamp, self._topic, due.odometry, due.depth())
+        return self._picture(picture, due)
 
     def close(self) -> None:
         """Close the recording."""
@@ -129,12 +131,10 @@ class McapCamera:
         return found
 
     def _choose(self, recording: Recording) -> str:
-        topics = [
-            topic.name for topic in recording.topics.values() if topic.schema in PICTURE_SCHEMAS
-        ]
+        topics = picture_topics(recording)
         if self._settings.topic in topics:
             return str(self._settings.topic)
-        known = ", ".join(sorted(topics)) or "none"
+        known = ", ".join(topics) or "none"
         if self._settings.topic is not None:
             raise SourceError(
                 f"{self._path} has no pictures on {self._settings.topic}; it has: {known}"
@@ -167,4 +167,4 @@ class ReplayedCamera(McapCamera):
         """Mission time does not begin again."""
 
     def _picture(self, picture: Picture, shot: Shot) -> Picture:
-        return Picture(picture.image, shot.header.stamp, picture.label, shot.odometry)
+        return replace(picture, stamp=shot.header.stamp)

@@ -44,6 +44,7 @@ class SimulatedCamera:
             pitch=math.radians(config.pitch),
             yaw=math.radians(config.yaw),
         )
+        self._depth_range = config.depth_range
         self._renderer: Renderer | None = None
 
     @property
@@ -65,9 +66,9 @@ class SimulatedCamera:
         """Start the renderer; raise SourceError if it cannot be had."""
         if self._renderer is None:
             # panda3d takes 0.2 s to import, which only a camera that is used should pay.
-            from aerodaas.simulation.renderer import Renderer  # noqa: PLC0415
+            from aerodaas.simulation.depth import renderer_for  # noqa: PLC0415
 
-            self._renderer = Renderer(self._world, self._model)
+            self._renderer = renderer_for(self._world, self._model, self._depth_range)
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
         """Picture at mission time `stamp` (ns) from the true `pose`; None while that is unknown.
@@ -78,7 +79,8 @@ class SimulatedCamera:
             raise SourceError(f"{self._name} is not open; call open first")
         if pose is None:
             return None
-        return Picture(self._renderer.render(seconds(stamp), pose), stamp)
+        image = self._renderer.render(seconds(stamp), pose)
+        return Picture(image, stamp, depth=self._renderer.depth())
 
     def close(self) -> None:
         """Free the renderer."""

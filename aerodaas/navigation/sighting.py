@@ -30,6 +30,8 @@ whoever gets up again may do so nearer than what is seen of them, as feet stand 
 _AFLOAT, _TILTED = 1.5, 0.05
 """What is afloat meets the ground so many times farther than its size says, and by more than an
 attitude that is 3 degrees wrong would make it."""
+_LARGER = 2.0
+"""What is so many times farther than its size says is no large target, but what lies behind it."""
 _SMALLEST_SLOPE = 1e-3
 _NARROWEST, _WIDEST = 0.6, 1.6
 
@@ -77,9 +79,10 @@ class Sighting:
 def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sighting | None:
     """Locate `detection`, one of `detections`, an upright object of `size`.
 
-    The height counts where all of it is in the picture; where its top or bottom is cut off or
-    hidden, by a wall or a car, the width stands in, for such a box is too short and the object
-    nearer than it seems. None if the camera is not calibrated or the box says nothing.
+    Where its depth was measured, that is the distance to it. Else the height counts where all of
+    it is in the picture; where its top or bottom is cut off or hidden, by a wall or a car, the
+    width stands in, for such a box is too short and the object nearer than it seems. None if the
+    camera is not calibrated or the box says nothing.
     """
     camera, odometry = detections.camera, detections.odometry
     left, top, right, bottom = detection.box
@@ -109,10 +112,13 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     margin_u, margin_v = _MARGIN * detections.width, _MARGIN * detections.height
     cut_v = top < margin_v or bottom > detections.height - margin_v or by_height > _HIDDEN * at_most
     cut_u = left < margin_u or right > detections.width - margin_u
-    measured = by_height if not cut_v else min(by_height, by_width)
+    by_size = by_height if not cut_v else min(by_height, by_width)
     reach = _reach(ray(u, bottom), lens)
     lies = reach < _LIES * by_height
-    measured = min(measured, reach)
+    depth = _along_ground(detection.depth, middle, level @ camera.body_from_optical[:, 2])
+    if depth is not None and depth > _LARGER * by_size:
+        depth = None
+    measured = min(by_size, reach) if depth is None else depth
     crown = None
     if math.isfinite(lens) and top >= margin_v:
         crown = lens + measured * _slope(ray(u, top))
@@ -122,9 +128,9 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     return Sighting(
         bearing=math.atan2(place[1], place[0]),
         distance=float(np.hypot(*place)),
-        bound=lies or (cut_v and cut_u),
+        bound=lies or (cut_v and cut_u and depth is None),
         width=None if cut_u or cut_v else by_height * breadth,
-        afloat=_is_afloat(ray(u, bottom), by_height, lens),
+        afloat=_is_afloat(ray(u, bottom), depth or by_height, lens),
         top=crown,
     )
 
@@ -142,6 +148,17 @@ def ends_in_picture(detection: Detection, detections: Detections) -> bool:
         or right <= detections.width - margin_u
         or bottom <= detections.height - margin_v
     )
+
+
+def _along_ground(depth: float | None, ray: Vector, axis: Vector) -> float | None:
+    """Metres along the ground, from the lens, to where `ray` is `depth` metres along `axis`.
+
+    None where nothing was measured. Ray and axis are unit vectors of the level frame.
+    """
+    towards = float(ray @ axis)
+    if depth is None or not (math.isfinite(depth) and depth > 0.0 and towards > 0.0):
+        return None
+    return depth / towards * math.hypot(ray[0], ray[1])
 
 
 def _reach(lowest: Vector, lens: float) -> float:

@@ -1,4 +1,7 @@
-"""Pictures as others record them, too: Foxglove's and ROS 2's, compressed or raw, to BGR."""
+"""Pictures as others record them, too: Foxglove's and ROS 2's, compressed or raw, to BGR.
+
+And the depth pictures that this project records: raw, 16UC1.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,14 @@ from numpy.typing import NDArray
 
 from aerodaas.errors import SourceError
 
-__all__ = ["IMAGE_SCHEMAS", "VIDEO_SCHEMAS", "decode_image", "picture_bytes", "picture_field"]
+__all__ = [
+    "IMAGE_SCHEMAS",
+    "VIDEO_SCHEMAS",
+    "decode_depth",
+    "decode_image",
+    "picture_bytes",
+    "picture_field",
+]
 
 _COMPRESSED = frozenset({"foxglove.CompressedImage", "sensor_msgs/msg/CompressedImage"})
 _RAW = frozenset({"foxglove.RawImage", "sensor_msgs/msg/Image"})
@@ -65,6 +75,14 @@ def decode_image(schema: str, value: Any) -> NDArray[np.uint8] | None:  # noqa: 
     return _decode_raw(value, data)
 
 
+def decode_depth(value: Any) -> NDArray[np.uint16] | None:  # noqa: ANN401 - by schema
+    """Decode a raw message in 16UC1 to height x width of millimetres; None for a broken one."""
+    if picture_field(value, "encoding") != "16UC1":
+        return None
+    pixels = _pixels(value, np.frombuffer(picture_bytes(value), np.uint8), _LAYOUTS["16UC1"])
+    return None if pixels is None else pixels[..., 0].astype(np.uint16)
+
+
 def _decode_raw(value: Any, data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:  # noqa: ANN401
     encoding = str(picture_field(value, "encoding"))
     layout = _LAYOUTS.get(encoding)
@@ -73,6 +91,22 @@ def _decode_raw(value: Any, data: NDArray[np.uint8]) -> NDArray[np.uint8] | None
         raise SourceError(
             f"pictures in {encoding!r} cannot be decoded; record them in one of: {known}"
         )
+    pixels = _pixels(value, data, layout)
+    if pixels is None:
+        return None
+    if layout.kind == "u2":
+        pixels = (pixels >> 8).astype(np.uint8)
+    if layout.conversion is None:
+        return np.asarray(pixels, np.uint8)
+    return np.asarray(cv2.cvtColor(pixels, layout.conversion), np.uint8)
+
+
+def _pixels(
+    value: Any,  # noqa: ANN401 - by schema
+    data: NDArray[np.uint8],
+    layout: _Layout,
+) -> NDArray[Any] | None:
+    """Height x width x channels, as they were written; None if bytes are missing."""
     width, height = int(picture_field(value, "width")), int(picture_field(value, "height"))
     pixel = layout.channels * np.dtype(layout.kind).itemsize
     step = int(picture_field(value, "step")) or width * pixel
@@ -81,12 +115,7 @@ def _decode_raw(value: Any, data: NDArray[np.uint8]) -> NDArray[np.uint8] | None
     rows = data[: step * height].reshape(height, step)[:, : width * pixel]
     order = ">" if picture_field(value, "is_bigendian", default=0) else "<"
     pixels = np.ascontiguousarray(rows).view(f"{order}{layout.kind}")
-    pixels = pixels.reshape(height, width, layout.channels)
-    if layout.kind == "u2":
-        pixels = (pixels >> 8).astype(np.uint8)
-    if layout.conversion is None:
-        return np.asarray(pixels, np.uint8)
-    return np.asarray(cv2.cvtColor(pixels, layout.conversion), np.uint8)
+    return pixels.reshape(height, width, layout.channels)
 
 
 def picture_bytes(value: Any) -> bytes:  # noqa: ANN401

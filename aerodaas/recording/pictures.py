@@ -18,6 +18,7 @@ from aerodaas.recording.h264 import H264Decoder, is_key_frame
 from aerodaas.recording.images import (
     IMAGE_SCHEMAS,
     VIDEO_SCHEMAS,
+    decode_depth,
     decode_image,
     picture_bytes,
     picture_field,
@@ -26,17 +27,18 @@ from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.states import odometry_of
 
 __all__ = [
-    "PICTURE_SCHEMAS",
     "Shot",
     "decoded_ahead",
     "detections",
     "detections_by_frame",
     "frames",
+    "picture_topics",
     "shots",
 ]
 
-PICTURE_SCHEMAS = IMAGE_SCHEMAS | VIDEO_SCHEMAS
-"""Schemas whose messages are pictures."""
+_PICTURE_SCHEMAS = IMAGE_SCHEMAS | VIDEO_SCHEMAS
+_DEPTH = "/aligned_depth"
+"""End of the topic of our frames' depth, whose frames are described beside it."""
 _AHEAD = 4
 """Pictures decoded before they are asked for."""
 
@@ -81,6 +83,8 @@ class Shot:
     """Width and height in pixels, where they were recorded."""
     decoded: Callable[[], NDArray[np.uint8] | None] | None = None
     """Gives the picture where it is being decoded already."""
+    measured: Record | None = None
+    """Its depth, where the camera measured it."""
 
     @property
     def format(self) -> str:
@@ -103,6 +107,23 @@ class Shot:
         width, height = self.size
         return image[:height, :width]
 
+    def depth(self) -> NDArray[np.uint16] | None:
+        """Decode the depth: height x width of millimetres, as in a `Frame`; None if there is none.
+
+        A depth that is broken, or not of the picture's size, counts as none.
+        """
+        found = None if self.measured is None else decode_depth(self.measured.value)
+        if found is None or self.size is None or found.shape != self.size[::-1]:
+            return None
+        return found
+
+
+def picture_topics(recording: Recording) -> list[str]:
+    """Topics that hold pictures, in order; the depth of our frames is none by itself."""
+    known = recording.topics
+    found = (name for name, one in known.items() if one.schema in _PICTURE_SCHEMAS)
+    return sorted(name for name in found if not _is_depth(name, known))
+
 
 def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterator[Shot]:
     """Every picture in the order of recording; nothing is decoded.
@@ -111,11 +132,17 @@ def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterat
     """
     heads: dict[str, Record] = {}
     videos: dict[str, _Video] = defaultdict(_Video)
-    schemas = ("aerodaas.Frame", *PICTURE_SCHEMAS)
-    wanted = None if topics is None else {name for one in topics for name in (one, *_heads(one))}
+    depths: dict[str, Record] = {}
+    schemas = ("aerodaas.Frame", *_PICTURE_SCHEMAS)
+    wanted = None
+    if topics is not None:
+        wanted = {name for one in topics for name in (one, *_heads(one), _depth_of(one))}
     for record in recording.records(schemas=schemas, topics=wanted):
         if record.schema == "aerodaas.Frame":
             heads[record.topic] = record
+            continue
+        if _is_depth(record.topic, recording.topics):
+            depths[record.topic] = record
             continue
         is_video = record.schema in VIDEO_SCHEMAS
         video = videos[record.topic].add(record.value) if is_video else None
@@ -127,7 +154,11 @@ def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterat
             value = head.value
             header = Header(value["id"], value["stamp"], value["source"])
             size = value["width"], value["height"]
-            yield Shot(header, odometry_of(value.get("odometry")), record, video, size)
+            odometry = odometry_of(value.get("odometry"))
+            depth = depths.get(_depth_of(record.topic))
+            if depth is not None and depth.captured != record.captured:
+                depth = None
+            yield Shot(header, odometry, record, video, size, measured=depth)
 
 
 def decoded_ahead(found: Iterator[Shot]) -> Iterator[Shot]:
@@ -159,7 +190,7 @@ def frames(
         if stamps is None or shot.record.captured in stamps:
             image = shot.image()
             if image is not None:
-                yield Frame(shot.header, image, odometry=shot.odometry)
+                yield Frame(shot.header, image, odometry=shot.odometry, depth=shot.depth())
 
 
 def detections(recording: Recording) -> Iterator[tuple[str, Detections]]:
@@ -189,6 +220,15 @@ def _heads(topic: str) -> tuple[str, str]:
     return stream, f"{stream}/frame"
 
 
+def _depth_of(topic: str) -> str:
+    """Topic of the depth that belongs to the pictures on `topic`."""
+    return topic.removesuffix("/image") + _DEPTH
+
+
+def _is_depth(topic: str, known: Collection[str]) -> bool:
+    return topic.endswith(_DEPTH) and any(name in known for name in _heads(topic[: -len(_DEPTH)]))
+
+
 def _frame_id(value: Any) -> str:  # noqa: ANN401 - by the schema
     head = getattr(value, "header", value)
     found = value.get("frame_id", "") if isinstance(value, dict) else getattr(head, "frame_id", "")
@@ -204,4 +244,5 @@ def _detection(value: dict[str, Any]) -> Detection:
         value["score"],
         value.get("track_id"),
         None if points is None else np.array(points, dtype=np.float32),
+        value.get("depth"),
     )

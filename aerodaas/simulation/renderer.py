@@ -113,6 +113,10 @@ class Renderer:
         picture = cv2.flip(cv2.cvtColor(upside_down, cv2.COLOR_BGRA2BGR), 0)
         return picture.astype(np.uint8, copy=False)
 
+    def depth(self) -> NDArray[np.uint16] | None:
+        """Of the last picture; None, for this camera measures none."""
+        return None
+
     def close(self) -> None:
         """Free the buffer and the scene."""
         self._engine.remove_all_windows()

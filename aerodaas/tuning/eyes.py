@@ -92,12 +92,19 @@ class TruthEyes:
 class DetectorEyes:
     """A detector that looks at rendered pictures."""
 
-    def __init__(self, world: World, camera: CameraModel, detector: Analytics[Detections]) -> None:
-        """Open the renderer and the detector."""
+    def __init__(
+        self,
+        world: World,
+        camera: CameraModel,
+        detector: Analytics[Detections],
+        *,
+        depth_range: float | None = None,
+    ) -> None:
+        """Open the renderer and the detector; the camera measures depth up to `depth_range` m."""
         # panda3d takes its time to load.
-        from aerodaas.simulation.renderer import Renderer  # noqa: PLC0415
+        from aerodaas.simulation.depth import renderer_for  # noqa: PLC0415
 
-        self._renderer = Renderer(world, camera)
+        self._renderer = renderer_for(world, camera, depth_range)
         self._camera = camera
         self._detector = detector
         self.frame: Frame | None = None
@@ -109,7 +116,7 @@ class DetectorEyes:
     ) -> Detections:
         """Render and detect."""
         image = self._renderer.render(seconds(header.stamp), pose)
-        self.frame = Frame(header, image, self._camera, believed)
+        self.frame = Frame(header, image, self._camera, believed, self._renderer.depth())
         found = self._detector.process(self.frame, context)
         return found if found is not None else Detections.of(self.frame, ())
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aerodaas.actors._coding import CODINGS, CodedFrame, Coder, CodingCost, decoded, fastest
+from aerodaas.actors._coding import CODINGS, CodedFrame, Coder, Coding, CodingCost, decoded, fastest
 from aerodaas.data import Frame, Header
 from aerodaas.errors import SourceError
 
@@ -119,3 +120,22 @@ def test_what_arrives_damaged_is_told() -> None:
     damaged = CodedFrame(Header(1, 2, "cam"), np.zeros(9, np.uint8), "png", None, None)
     with pytest.raises(SourceError, match="frame 1 of cam arrived damaged"):
         decoded(damaged)
+
+
+@pytest.mark.parametrize("coding", ["raw", "jpeg", "png"])
+def test_depth_arrives_exactly_whatever_becomes_of_the_picture(coding: Coding) -> None:
+    """It is counted in what travels, and damage to it is told."""
+    plain = scene()
+    depth = np.random.default_rng(2).integers(0, 2**16, plain.image.shape[:2]).astype(np.uint16)
+    sent = Frame(plain.header, plain.image, depth=depth)
+    coder = Coder()
+    coded = coder.encode(sent, coding)
+    arrived = decoded(coded)
+    assert arrived.depth is not None
+    np.testing.assert_array_equal(arrived.depth, depth)
+    without = Coder().costs(plain, (coding,))[coding]
+    assert coder.costs(sent, (coding,))[coding].size > without.size + depth.nbytes / 2
+    if isinstance(coded, CodedFrame):
+        assert coded.depth is not None
+        with pytest.raises(SourceError, match="arrived damaged"):
+            decoded(dataclasses.replace(coded, depth=coded.depth[:40]))

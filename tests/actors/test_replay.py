@@ -35,6 +35,7 @@ from aerodaas.data import Detection
 from aerodaas.errors import RecordingError
 from aerodaas.recording.difference import difference
 from aerodaas.recording.pace_reader import read_pace
+from aerodaas.recording.pictures import detections, frames, picture_topics
 from aerodaas.recording.reader import Recording
 from aerodaas.run import Run
 
@@ -237,3 +238,45 @@ def test_a_recording_of_others_cannot_be_replayed(tmp_path: Path, flyer: Flyer) 
         writer.finish()
     with flyer.options(replay=path), pytest.raises(RecordingError, match='driver "mcap"'):
         Environment("environment.json")
+
+
+class Ranging(Analytics[Detections]):
+    """Steers by depth alone: any loss of it shows."""
+
+    accepts: ClassVar[tuple[type, ...]] = (Frame,)
+    produces: ClassVar[type] = Detections
+
+    def process(self, item: Frame, context: Context) -> Detections:  # noqa: ARG002
+        """One box around all, its score made of all that was measured."""
+        assert item.depth is not None
+        box = (0.0, 0.0, float(item.width), float(item.height))
+        return Detections.of(item, [Detection(box, "all", float(item.depth.mean()) / 2**16)])
+
+
+def by_depth(env: Environment) -> None:
+    """Camera to depth to flight, for five seconds."""
+    drone = env.get_robot_by_id("drone")
+    found = Ranging().analyse(drone.get_sensor_by_id("cam").get_data_stream())
+    drone.navigate(Chase().analyse(found))
+    end_after(env, 20)
+
+
+def test_depth_is_recorded_and_replayed_to_the_millimetre(flyer: Flyer) -> None:
+    """As the picture's companion, not as another camera; boxes keep what was measured in them."""
+    content = with_camera("jpeg")
+    settings = {"width": 64, "height": 36, "depth_range": 20, "pitch": 30}
+    content["robots"][0]["sensors"] = [{**CAMERA, "settings": settings}]
+    first = flyer.fly(by_depth, content, record=flyer.folder / "first")
+    second = again(flyer, first, by_depth)
+    assert first.recording is not None
+    found = difference(first.recording, second)
+    assert found.agrees, str(found)
+    counted = {stream.what: stream.same for stream in found.streams}
+    assert counted["drone/ranging detections"] > 20
+    with Recording.open(first.recording) as recording:
+        assert picture_topics(recording) == ["/drone/cam/image"]
+        depths = [frame.depth for frame in frames(recording)]
+        boxes = [result[0].depth for _, result in detections(recording)]
+    assert all(depth is not None and depth.shape == (36, 64) for depth in depths)
+    assert 0.2 < min(filter(None, boxes)) < 1.0, "on the ground"
+    assert 1.0 < max(filter(None, boxes)) < 20.0, "above it"

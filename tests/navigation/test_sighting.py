@@ -240,3 +240,48 @@ def test_the_length_of_a_car_may_be_its_width() -> None:
     assert CAR.with_width(4.1).width == pytest.approx(4.1)
     assert CAR.with_width(9.0).width == pytest.approx(4.2)
     assert PERSON.with_width(9.0).width == pytest.approx(0.8)
+
+
+@given(
+    distance=st.floats(0.8, 12),
+    bearing=st.floats(-0.6, 0.6),
+    pitch=st.floats(-0.1, 0.3),
+    tilt=st.floats(-0.1, 0.1),
+    tall=st.floats(0.8, 1.4),
+)
+@settings(max_examples=200, deadline=None)
+def test_measured_depth_tells_the_distance_of_anybody(
+    distance: float, bearing: float, pitch: float, tilt: float, tall: float
+) -> None:
+    """Also of who is taller or smaller than assumed, or cut by the picture; then it is no bound."""
+    model = camera(pitch)
+    whole = project(model, distance, bearing, tilt=tilt)
+    assume(whole is not None)
+    assert whole is not None
+    box = (max(0, whole[0]), max(0, whole[1]), min(WIDE, whole[2]), min(TALL, whole[3]))
+    assume(box[2] - box[0] > 5 and box[3] - box[1] > 5)
+    detections = found(box, model, tilt)
+    middle = model.ray(*detections[0].centre)
+    level = rotation_from_rpy(0.0, tilt, 0.0) @ middle
+    away = distance / (math.hypot(level[0], level[1]) * math.cos(_off(level, bearing)))
+    depth = away * float(middle @ model.body_from_optical[:, 2])
+    measured = replace(detections, items=(replace(detections[0], depth=depth),))
+    seen = sight(measured[0], measured, TargetSize(1.7 * tall, 0.5 * tall))
+    assert seen is not None
+    assert seen.distance == pytest.approx(distance, rel=0.03)
+    assert not seen.bound
+
+
+def _off(ray: np.ndarray, bearing: float) -> float:
+    return math.atan2(ray[1], ray[0]) - bearing
+
+
+@pytest.mark.parametrize("depth", [math.nan, math.inf, 0.0, -1.0, 9.0])
+def test_a_depth_that_cannot_be_is_not_believed(depth: float) -> None:
+    """Nor that of a wall behind a person whose size says 4 m: that would draw the drone in."""
+    model = camera()
+    box = project(model, 4.0, 0.0)
+    assert box is not None
+    plain = found(box, model)
+    measured = replace(plain, items=(replace(plain[0], depth=depth),))
+    assert sight(measured[0], measured, PERSON) == sight(plain[0], plain, PERSON)

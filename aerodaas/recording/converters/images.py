@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import cv2
+import numpy as np
 from foxglove.messages import (
     CameraCalibration,
     Color,
@@ -16,11 +17,13 @@ from foxglove.messages import (
     Point2,
     PointsAnnotation,
     PointsAnnotationType,
+    RawImage,
     TextAnnotation,
 )
+from numpy.typing import NDArray
 
 from aerodaas.config import RecordingConfig
-from aerodaas.data import Detection, Detections, Frame
+from aerodaas.data import Detection, Detections, Frame, Header
 from aerodaas.geometry import CameraModel
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector
 from aerodaas.recording.converters.vehicle import body_frame, odometry_json
@@ -34,6 +37,7 @@ __all__: list[str] = []
 
 IMAGE = CompressedImage.get_schema()
 VIDEO = CompressedVideo.get_schema()
+DEPTH = RawImage.get_schema()
 CALIBRATION = CameraCalibration.get_schema()
 TRANSFORM = FrameTransform.get_schema()
 ANNOTATIONS = ImageAnnotations.get_schema()
@@ -71,6 +75,9 @@ def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entr
     if item.odometry is not None:
         value["odometry"] = odometry_json(item.odometry)
     yield Entry(topic(stream, "frame"), FRAME, json_bytes(value), header.stamp)
+    if item.depth is not None and session.config.images != "none":
+        # Before the picture, so that a reader has all of a frame once it has the picture.
+        yield _depth(item.depth, header, stream, session)
     if session.config.images == "h264":
         yield _video(item, stream, session)
     elif session.config.images != "none":
@@ -110,6 +117,20 @@ def _image(item: Frame, stream: str, session: Session) -> Entry:
         format=kind,
     )
     return Entry(topic(stream, "image"), IMAGE, image.encode(), stamp)
+
+
+def _depth(depth: NDArray[np.uint16], header: Header, stream: str, session: Session) -> Entry:
+    height, width = depth.shape
+    image = RawImage(
+        timestamp=session.time(header.stamp),
+        frame_id=header.source,
+        width=width,
+        height=height,
+        encoding="16UC1",
+        step=2 * width,
+        data=depth.astype("<u2", copy=False).tobytes(),
+    )
+    return Entry(topic(stream, "aligned_depth"), DEPTH, image.encode(), header.stamp)
 
 
 def _video(item: Frame, stream: str, session: Session) -> Entry:
@@ -206,4 +227,6 @@ def _detection_json(found: Detection) -> dict[str, Any]:
         value["track_id"] = found.track_id
     if found.keypoints is not None:
         value["keypoints"] = found.keypoints.tolist()
+    if found.depth is not None:
+        value["depth"] = found.depth
     return value

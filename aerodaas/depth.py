@@ -1,0 +1,38 @@
+"""What a depth picture, aligned with the camera's, tells of a box in it.
+
+Depth pictures are height x width of uint16: millimetres along the optical axis, 0 where nothing
+was measured, as REP 118 of ROS has them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["METRE", "depth_in_box"]
+
+METRE = 1000.0
+"""Units of a depth picture in one metre."""
+_INNER = 0.25
+"""Part of a box's sides left out at each edge: what is behind shows beside a body."""
+_LEAST = 0.3
+"""Part of the pixels in the inner box that must have been measured."""
+
+
+def depth_in_box(depth: NDArray[np.uint16], box: tuple[float, float, float, float]) -> float | None:
+    """Metres along the optical axis to the surface in the middle of `box` (pixels), the median.
+
+    None where too little of it was measured, or the box is none.
+    """
+    if not np.isfinite(box).all():
+        return None
+    height, width = depth.shape
+    left, top, right, bottom = box
+    margin_u, margin_v = _INNER * (right - left), _INNER * (bottom - top)
+    columns = np.clip([left + margin_u, right - margin_u], 0, width).round().astype(int)
+    rows = np.clip([top + margin_v, bottom - margin_v], 0, height).round().astype(int)
+    inner = depth[rows[0] : rows[1], columns[0] : columns[1]]
+    measured = inner[inner > 0]
+    if not inner.size or measured.size < _LEAST * inner.size:
+        return None
+    return float(np.median(measured)) / METRE
