@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeVar, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.depth import depth_in_box
+from aerodaas.depth import depth_in_box, nearest_in_cells
 from aerodaas.errors import SourceError
 from aerodaas.geometry import CameraModel, Vector
 from aerodaas.interfaces import IAeroData
@@ -247,14 +247,20 @@ class Detections(Sequence[Detection]):
     """Pixels down of the frame."""
     camera: CameraModel | None = None
     odometry: Odometry | None = None
+    nearest: NDArray[np.uint16] | None = None
+    """Rows x columns of cells that cover the frame: millimetres along the optical axis to the
+    nearest in each, 0 where nothing was measured. None where the camera measures no depth."""
 
     @classmethod
     def of(cls, frame: Frame, items: Iterable[Detection]) -> Detections:
         """Gather `items` found in `frame`, ordered by score, each with its depth if measured."""
         ordered = tuple(sorted(items, key=lambda item: -item.score))
+        nearest = None
         if (depth := frame.depth) is not None:
             ordered = tuple(replace(one, depth=depth_in_box(depth, one.box)) for one in ordered)
-        return cls(frame.header, ordered, frame.width, frame.height, frame.camera, frame.odometry)
+            nearest = nearest_in_cells(depth)
+        camera, odometry = frame.camera, frame.odometry
+        return cls(frame.header, ordered, frame.width, frame.height, camera, odometry, nearest)
 
     def labelled(self, *labels: str) -> tuple[Detection, ...]:
         """Keep the detections with one of `labels`, best first."""

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.data import Detection, Detections, Frame, Header
-from aerodaas.depth import depth_in_box
+from aerodaas.depth import depth_in_box, nearest_in_cells
 from aerodaas.errors import SourceError
 
 EDGES = st.floats(-2000, 2000, allow_nan=False) | st.sampled_from([math.nan, math.inf, -math.inf])
@@ -69,3 +69,28 @@ def test_a_depth_that_is_not_the_pictures_is_refused(depth: np.ndarray) -> None:
     """By size and by type, saying what is wanted."""
     with pytest.raises(SourceError, match="cam: depth must be height x width of uint16"):
         Frame(Header(0, 0, "cam"), np.zeros((60, 80, 3), np.uint8), depth=depth)
+
+
+@given(
+    rows=st.integers(1, 100),
+    columns=st.integers(1, 100),
+    background=st.integers(0, 2**16 - 1),
+)
+def test_coarse_depth_of_an_even_picture_is_the_same(
+    rows: int, columns: int, background: int
+) -> None:
+    """Of any size, with no more cells than pixels."""
+    coarse = nearest_in_cells(np.full((rows, columns), background, np.uint16))
+    assert coarse.shape == (min(18, rows), min(32, columns))
+    assert (coarse == background).all()
+
+
+def test_the_nearest_in_a_cell_counts_unless_it_is_speckle() -> None:
+    """A post of a fifth of the cell, before a background or before nothing."""
+    for background in (0, 9000):
+        depth = np.full((360, 640), background, np.uint16)
+        depth[40:60, 80:84] = 1500
+        depth[0, 0] = 200
+        coarse = nearest_in_cells(depth)
+        assert coarse[2, 4] == 1500
+        assert (np.delete(coarse.ravel(), 2 * 32 + 4) == background).all()

@@ -13,6 +13,7 @@ from shapely import Point, Polygon
 
 from aerodaas.analytics.base import Context, NavigableAnalytics
 from aerodaas.analytics.boxes import BoxAnalytics
+from aerodaas.analytics.debounce import Debounce
 from aerodaas.analytics.observing import observation
 from aerodaas.analytics.overlap import one_for_each
 from aerodaas.analytics.tracking import Tracker
@@ -31,6 +32,8 @@ _REACH, _REACH_SHARE = 0.3, 0.2
 """Metres, and parts of the distance, from where the target should stand to where it is seen."""
 _SURER = 0.2
 """By how much the score of another must be better than that of a doubtful target."""
+_BLOCKED = (3, 10)
+"""Of the last 10 frames so many in which something stands in the way are told."""
 _WIDTH_MEMORY = 0.1
 """Weight of the newest look in the mean of the target's width: arms swing."""
 
@@ -99,6 +102,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         )
         self.target: int | None = None
         """Track that is followed."""
+        self._blocked = Debounce(*_BLOCKED)
         self._width = target_width
 
     def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
@@ -116,6 +120,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         others = self._others(tracked, detection)
         command = self.controller.step(observation(item, sighting, context, others))
         self._tell_changes(phase, item, context)
+        self._tell_what_blocks(item, context)
         if command is None:
             return None
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
@@ -243,6 +248,13 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         boxes = (box for box in found if box.score >= least)
         seen = (sight(box, tracked, self.size) for box in boxes)
         return tuple(sighting for sighting in seen if sighting is not None)
+
+    def _tell_what_blocks(self, item: Detections, context: Context) -> None:
+        self._blocked.update(item.header.stamp, self.controller.blocked)
+        if self._blocked.began:
+            what = " or ".join(self.labels)
+            text = f"Something stands in the way to the {what}; the drone waits."
+            context.alert(Alert(item.header, "way_blocked", text))
 
     def _tell_changes(self, before: FollowPhase, item: Detections, context: Context) -> None:
         phase = self.controller.phase

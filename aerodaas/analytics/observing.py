@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from aerodaas.analytics.base import Context
 from aerodaas.data import Detections
+from aerodaas.navigation.clearance import surfaces
 from aerodaas.navigation.follow_controller import Observation
 from aerodaas.navigation.sighting import Sighting
 
@@ -25,4 +26,5 @@ def observation(
         now=None if state is None else state.odometry,
         now_stamp=None if state is None else state.stamp,
         others=others,
+        surfaces=surfaces(boxes),
     )

@@ -22,6 +22,7 @@ from simple_pid import PID
 from aerodaas.clock import seconds
 from aerodaas.data import Odometry
 from aerodaas.navigation.approach import ApproachLimit
+from aerodaas.navigation.clearance import Clearance
 from aerodaas.navigation.command_shaper import CommandShaper
 from aerodaas.navigation.follow_settings import FollowGains, FollowLimits, LostPolicy
 from aerodaas.navigation.sighting import Sighting
@@ -41,6 +42,8 @@ LYING = 1.3
 """Metres from the feet to the chest of one who lies there, at most; in any direction."""
 _TOPPLING = 0.4
 """Seconds from a fall's begin until it is known for one."""
+_CRAWL = 0.1
+"""m/s; what may go on no faster stands."""
 _INTEGRAL_REACH = 1.2
 """Metres; a person who walks at 1 m/s is followed so far behind by the proportional part alone."""
 
@@ -68,6 +71,8 @@ class Observation:
     now_stamp: int | None = None
     others: tuple[Sighting, ...] = ()
     """What else the frame shows that may be the target, or somebody like it."""
+    surfaces: NDArray[np.float64] | None = None
+    """What the frame's depth shows at the drone's own height, as `clearance.surfaces` gives it."""
 
 
 class FollowController:
@@ -101,6 +106,9 @@ class FollowController:
         self._yaw_pid = _pid(self.gains.yaw, -limits.yaw_rate, limits.yaw_rate)
         self._shaper = CommandShaper(limits)
         self._approach = ApproachLimit(limits.nearest * distance, limits)
+        self._clearance = Clearance(limits, limits.nearest * distance)
+        self.blocked = False
+        """Whether something stands in the way to the target, so that the drone does not move."""
         self._upright = Upright()
         self._stamp: int | None = None
         self._seen: int | None = None
@@ -119,6 +127,7 @@ class FollowController:
         self._stamp = seen.stamp
         seen = _without_nonsense(seen)
         self._approach.see(seen.sighting, seen.others, seen.at_capture, dt)
+        self._clearance.see(seen.surfaces, seen.at_capture, dt)
         if seen.sighting is not None:
             self._take_in(seen.sighting, seen)
         self.phase = self._next_phase(seen.stamp)
@@ -199,7 +208,7 @@ class FollowController:
 
     def _wanted(self, seen: Observation, dt: float) -> tuple[NDArray[np.float64], float]:
         """Velocity (forward, left) in m/s and yaw rate in rad/s that the phase asks for."""
-        self._braking = False
+        self._braking = self.blocked = False
         # Whoever fell gets up where they fell: they are watched over, not turned away from.
         if self.phase is not FollowPhase.SEARCHING or self._stood is not None:
             return self._follow(seen, dt)
@@ -228,6 +237,9 @@ class FollowController:
         if target.bound and self._stood is None:
             # Nobody knows how near it is. Of one who fell it is known where the feet are.
             safe = min(safe, 0.0)
+        free = self._clearance.speed(target, now)
+        self.blocked = free < min(speed, _CRAWL)
+        safe = min(safe, free)
         self._braking = self._shaper.towards(target.bearing) > safe
         share = self._share(seen.stamp)
         if share == 0.0 or (speed > safe and safe <= 0.0):

@@ -30,8 +30,9 @@ whoever gets up again may do so nearer than what is seen of them, as feet stand 
 _AFLOAT, _TILTED = 1.5, 0.05
 """What is afloat meets the ground so many times farther than its size says, and by more than an
 attitude that is 3 degrees wrong would make it."""
-_LARGER = 2.0
-"""What is so many times farther than its size says is no large target, but what lies behind it."""
+_TWICE = 2.0
+"""What is so many times farther than its size says is no large target, but what lies behind it,
+and what is so many times nearer, all of it in the picture, something that passes in between."""
 _SMALLEST_SLOPE = 1e-3
 _NARROWEST, _WIDEST = 0.6, 1.6
 
@@ -116,7 +117,9 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Sig
     reach = _reach(ray(u, bottom), lens)
     lies = reach < _LIES * by_height
     depth = _along_ground(detection.depth, middle, level @ camera.body_from_optical[:, 2])
-    if depth is not None and depth > _LARGER * by_size:
+    if depth is not None and not (
+        (0.0 if cut_u or cut_v else by_size / _TWICE) <= depth <= by_size * _TWICE
+    ):
         depth = None
     measured = min(by_size, reach) if depth is None else depth
     crown = None

@@ -276,9 +276,12 @@ def _off(ray: np.ndarray, bearing: float) -> float:
     return math.atan2(ray[1], ray[0]) - bearing
 
 
-@pytest.mark.parametrize("depth", [math.nan, math.inf, 0.0, -1.0, 9.0])
+@pytest.mark.parametrize("depth", [math.nan, math.inf, 0.0, -1.0, 9.0, 1.5])
 def test_a_depth_that_cannot_be_is_not_believed(depth: float) -> None:
-    """Nor that of a wall behind a person whose size says 4 m: that would draw the drone in."""
+    """Nor that of a wall behind a person whose size says 4 m, which would draw the drone in.
+
+    Nor of what passes in between, which would drive it back.
+    """
     model = camera()
     box = project(model, 4.0, 0.0)
     assert box is not None
