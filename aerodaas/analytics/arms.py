@@ -18,7 +18,10 @@ _LONGEST = 0.85
 """Of the trunk, shoulders to hips: an upper arm measures 0.6 of it and a forearm 0.55 (Winter,
 Biomechanics and Motor Control of Human Movement, 2009, by body height)."""
 
-_FACE_UP, _ELBOW_UP = 0.4, 0.3
+_SHORTEST = 0.5
+"""Of the trunk, both parts of an arm together: one that seems shorter points at the lens, or is
+none, such as a tree's crown beside the head."""
+_FACE_UP, _ELBOW_UP = 0.4, 0.4
 """Of the trunk above the shoulders: the face, and the elbow of an arm whose wrist is not seen."""
 
 Array = NDArray[np.float64]
@@ -49,4 +52,6 @@ def _is_up(arm: Array, seen: NDArray[np.bool_], trunk: float, top: float) -> boo
         return False
     if not seen[2]:
         return bool(arm[0, 1] - arm[1, 1] >= _ELBOW_UP * trunk)
+    if math.isfinite(trunk) and lengths.sum() < _SHORTEST * trunk:
+        return False
     return bool(lengths[1] <= _LONGEST * trunk and arm[2, 1] < top)

@@ -29,9 +29,13 @@ __all__ = ["FollowAnalytics"]
 
 _log = logging.getLogger(__name__)
 _REACH, _REACH_SHARE = 0.3, 0.2
-"""Metres, and parts of the distance, from where the target should stand to where it is seen."""
+"""Metres, and parts of the distance, from where the target should stand to where it is seen; and
+as far as it may have gone since, while it was not."""
 _SURER = 0.2
 """By how much the score of another must be better than that of a doubtful target."""
+_ALOFT = (1.0, 0.6)
+"""Metres of height, or parts of the height to follow at, from which all who stand near are seen:
+from the ground, the chest of who stands 3 m away is above the picture, and a passer's is not."""
 _BLOCKED = (3, 10)
 """Of the last 10 frames so many in which something stands in the way are told."""
 _WIDTH_MEMORY = 0.1
@@ -103,6 +107,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self.target: int | None = None
         """Track that is followed."""
         self._blocked = Debounce(*_BLOCKED)
+        self._aloft = 0
+        """Frames taken since it was high enough to choose."""
         self._width = target_width
 
     def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
@@ -113,6 +119,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             return None
         if self._has_left():
             self._let_go(item, context)
+        self._aloft = self._aloft + 1 if self._is_aloft(item) else 0
         phase = self.controller.phase
         tracked = self.tracker.update(self._possible(item))
         detection = self._target_in(tracked)
@@ -143,6 +150,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         mine = next((item for item in trusted if item.track_id == self.target), None)
         if mine is None:
             mine = self._found_where_expected(found, tracked)
+        if self.target is None and self._aloft < self.choice.looks:
+            return None
         lost = mine is None and self._is_lost()
         least = self.choice.score if lost or self.target is None else self._score_to_displace(mine)
         chosen = [
@@ -160,6 +169,12 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self.target = best.track_id
         self._width = self.size.width
         return best
+
+    def _is_aloft(self, item: Detections) -> bool:
+        """Whether the drone is so high that a first choice misses nobody."""
+        least, part = _ALOFT
+        height = math.inf if item.odometry is None else item.odometry.height
+        return not height < min(least, part * self.controller.height)
 
     def _score_to_displace(self, mine: Detection | None) -> float:
         """Least score of what takes the place of the target, seen as `mine`; infinite for nothing.
@@ -215,6 +230,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         if self.target is None or expected is None:
             return None
         reach = _REACH + _REACH_SHARE * expected.distance
+        reach += controller.motion.spread(item.header.stamp)
         best = None
         for detection in found:
             sighting = sight(detection, item, self.size.with_width(self._width))

@@ -157,7 +157,7 @@ class FollowController:
         if self._stood is not None:
             return replace(seen_from(odometry, self._stood), bound=True)
         predicted = self.motion.relative_to(odometry, stamp)
-        return None if predicted is None or self.phase is FollowPhase.HOLDING else predicted[0]
+        return None if predicted is None else predicted[0]
 
     def _take_in(self, sighting: Sighting, seen: Observation) -> None:
         self._seen, self._last = seen.stamp, sighting

@@ -81,7 +81,7 @@ class TargetChoice:
     sure: float = 0.0
     """Confidence from which a box begins a track; below, it only continues one."""
     looks: int = 2
-    """Frames in which it must have been seen."""
+    """Frames in which it must have been seen, the first target by a drone that is up."""
     grounded: bool = False
     """It stands on the ground: a box of its size that hangs in the air is something else, and one
     that fills the picture from side to side down to its lower edge may be the ground itself. Not

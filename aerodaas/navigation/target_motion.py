@@ -95,10 +95,10 @@ class TargetMotion:
             self._covariance[:2, :2] = noise
             self._covariance[2:, 2:] = self._speed**2 * np.eye(2)
         else:
-            self._advance(seconds(stamp - self._stamp))
-            gain = self._covariance[:, :2] @ np.linalg.inv(self._covariance[:2, :2] + noise)
-            self._state = self._state + gain @ (place - self._state[:2])
-            self._covariance = self._covariance - gain @ self._covariance[:2]
+            state, covariance = self._predicted(self._state, seconds(stamp - self._stamp))
+            gain = covariance[:, :2] @ np.linalg.inv(covariance[:2, :2] + noise)
+            self._state = state + gain @ (place - state[:2])
+            self._covariance = covariance - gain @ covariance[:2]
         self._stamp = stamp
 
     def relative_to(self, odometry: Odometry, stamp: int) -> tuple[Sighting, float, float] | None:
@@ -117,11 +117,19 @@ class TargetMotion:
         left = float(along[0] * velocity[1] - along[1] * velocity[0])
         return found, away, left
 
-    def _advance(self, dt: float) -> None:
+    def spread(self, stamp: int) -> float:
+        """Standard deviation in metres of where it is predicted to be at `stamp`; 0 if unknown."""
         if self._state is None:
-            return
+            return 0.0
+        _, covariance = self._predicted(self._state, seconds(stamp - self._stamp))
+        return float(np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1]))
+
+    def _predicted(
+        self, state: NDArray[np.float64], dt: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """State and covariance `dt` seconds later."""
         step = np.eye(4)
         step[0, 2] = step[1, 3] = dt
         push = np.vstack([np.eye(2) * dt**2 / 2, np.eye(2) * dt])
-        self._state = step @ self._state
-        self._covariance = step @ self._covariance @ step.T + self._acceleration**2 * push @ push.T
+        covariance = step @ self._covariance @ step.T + self._acceleration**2 * push @ push.T
+        return step @ state, covariance

@@ -581,6 +581,50 @@ def test_a_doubtful_target_gives_way_to_a_surer_one(passer_score: float, followe
     assert abs(left) < 0.05 if followed == "vest" else left > 0.2
 
 
+def test_nobody_is_chosen_before_the_drone_is_up() -> None:
+    """From the ground a passer's shirt is in the picture, and the vest near by is above it."""
+    follow = VipFollowAnalytics()
+    passer, vest = (180.0, 200.0, 220.0, 270.0), (760.0, 200.0, 920.0, 430.0)
+    commands = []
+    for step in range(60):
+        height = min(1.5, max(0.0, 0.05 * (step - 20)))
+        boxes = [Detection(passer, "vest", 0.65)]
+        if height > 0.7:
+            boxes.append(Detection(vest, "vest", 0.9))
+        where = Odometry(np.array([0.0, 0.0, height]), np.zeros(3), 0.0)
+        item = replace(frame(step, *boxes), odometry=where)
+        commands.append(follow.process(item, Snapshot(item.header.stamp, where, [])))
+    turns = [one.commands[0].yaw_rate for one in commands if one is not None]
+    assert commands[:40] == [None] * 40
+    assert len(turns) > 10
+    assert max(turns) < 0.0, "to the right, where the vest is"
+
+
+@pytest.mark.parametrize("unseen", [1.6, 2.6])
+def test_who_comes_back_into_view_is_the_same_and_is_backed_off_from(unseen: float) -> None:
+    """Somebody who walked up was out of the picture for being too near, longer than a track lasts.
+
+    They are about where they may have gone meanwhile, and nobody waits until they are sure.
+    """
+    follow = VipFollowAnalytics()
+    still = Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), 0.0)
+    far, near = (600.0, 330.0, 700.0, 460.0), (480.0, 330.0, 800.0, 720.0)
+    command = None
+    for step in range(40):
+        item = replace(frame(step, Detection(far, "vest", 0.9)), odometry=still)
+        command = follow.process(item, Snapshot(item.header.stamp, still, []))
+    target = follow.target
+    for step in range(40, 40 + round(unseen * 10)):
+        item = replace(frame(step), odometry=still)
+        follow.process(item, Snapshot(item.header.stamp, still, []))
+    for step in range(40 + round(unseen * 10), 44 + round(unseen * 10)):
+        item = replace(frame(step, Detection(near, "vest", 0.9)), odometry=still)
+        command = follow.process(item, Snapshot(item.header.stamp, still, []))
+    assert target is not None
+    assert command is not None
+    assert command.commands[0].forward < -0.3
+
+
 def test_a_car_whose_box_flickers_does_not_fall() -> None:
     """A box that is sometimes too tall moves the middle of a car, which stays on its wheels."""
     world = car_world(lambda time: (9 + 0.5 * time, 0.0))

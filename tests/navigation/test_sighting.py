@@ -243,7 +243,7 @@ def test_the_length_of_a_car_may_be_its_width() -> None:
 
 
 @given(
-    distance=st.floats(0.8, 12),
+    distance=st.floats(1.5, 12),
     bearing=st.floats(-0.6, 0.6),
     pitch=st.floats(-0.1, 0.3),
     tilt=st.floats(-0.1, 0.1),
