@@ -16,6 +16,7 @@ import numpy as np
 from aerodaas.clock import seconds
 from aerodaas.errors import ConfigError
 from aerodaas.geometry import wrap_angle
+from aerodaas.navigation.clearance import Clearance
 from aerodaas.navigation.command_shaper import CommandShaper
 from aerodaas.navigation.control import braking_speed
 from aerodaas.navigation.follow_controller import Observation
@@ -100,6 +101,7 @@ class InspectionController:
         self.motion = TargetMotion(acceleration=0.0, speed=0.0)
         limits = FollowLimits(plan.speed, plan.speed, max(plan.climb, 0.5), 0.8, 1.0, 2.0)
         self._shaper = CommandShaper(limits)
+        self._clearance = Clearance(limits, plan.stand_off)
         self._sightings: list[int] = []
         self._began = self._seen = 0
         self._stamp: int | None = None
@@ -113,6 +115,7 @@ class InspectionController:
         dt = 0.1 if self._stamp is None else seconds(seen.stamp - self._stamp)
         self._stamp = seen.stamp
         self._take_in(seen)
+        self._clearance.see(seen.surfaces, seen.at_capture, dt)
         now = seen.now or seen.at_capture
         if self.phase is InspectionPhase.WAITING or now is None:
             return None
@@ -125,15 +128,17 @@ class InspectionController:
             distance = min(distance, seen.sighting.distance)
         self._advance(distance, now.height, seen.stamp)
         unseen = seconds(seen.stamp - self._seen)
-        along = self._along(distance, unseen)
+        free = self._clearance.speed(relative[0], now)
+        along = min(self._along(distance, unseen), free)
         wanted = [along * math.cos(bearing), along * math.sin(bearing), self._climb(now.height)]
         yaw_rate = 1.5 * wrap_angle(bearing)
         if self.phase is InspectionPhase.APPROACHING and unseen > _MEMORY:
             yaw_rate = math.copysign(_SEARCH_RATE, bearing)
         if self.phase is InspectionPhase.DONE:
             wanted, yaw_rate = [0.0, 0.0, 0.0], 0.0
-        step = min(dt, _LONGEST_STEP)
-        return self._shaper.shape(np.array(wanted), yaw_rate, step, self.priority)
+        step, braking = min(dt, _LONGEST_STEP), self._shaper.towards(bearing) > free
+        velocity = np.array(wanted)
+        return self._shaper.shape(velocity, yaw_rate, step, self.priority, braking=braking)
 
     def _take_in(self, seen: Observation) -> None:
         sighting = seen.sighting
