@@ -18,7 +18,7 @@ _LONGEST = 0.85
 """Of the trunk, shoulders to hips: an upper arm measures 0.6 of it and a forearm 0.55 (Winter,
 Biomechanics and Motor Control of Human Movement, 2009, by body height)."""
 
-_SHORTEST = 0.5
+_SHORTEST = 0.7
 """Of the trunk, both parts of an arm together: one that seems shorter points at the lens, or is
 none, such as a tree's crown beside the head."""
 _FACE_UP, _ELBOW_UP = 0.4, 0.4

@@ -59,13 +59,18 @@ def test_what_is_not_seen_shows_nothing(missing: list[int]) -> None:
     assert not raised_arm(points, 0.35)
 
 
-def test_a_trees_crown_beside_the_head_is_no_hand() -> None:
-    """As a network saw it, of somebody who walked before a tree, six times in eight frames."""
+@pytest.mark.parametrize(
+    ("elbow", "wrist"), [((0.18, -0.34), (0.23, -0.43)), ((0.27, -0.33), (0.33, -0.52))]
+)
+def test_a_trees_crown_beside_the_head_is_no_hand(
+    elbow: tuple[float, float], wrist: tuple[float, float]
+) -> None:
+    """As a network saw it, of two who stood before a tree, in six of eight frames."""
     points = seen_from(Posture())
     trunk = points[11:13, 1].mean() - points[5:7, 1].mean()
     shoulder = points[6, :2].copy()
-    points[8, :2] = shoulder + trunk * np.array([0.18, -0.34])
-    points[10, :2] = shoulder + trunk * np.array([0.23, -0.43])
+    points[8, :2] = shoulder + trunk * np.array(elbow)
+    points[10, :2] = shoulder + trunk * np.array(wrist)
     points[:5, 1] = shoulder[1] - 0.4 * trunk
     assert not raised_arm(points, 0.35)
     points[10, 2] = 0.1
