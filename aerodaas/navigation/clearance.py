@@ -93,5 +93,4 @@ class Clearance:
 
 def _turn(angle: float) -> NDArray[np.float64]:
     """Rotation matrix (2, 2), counter-clockwise."""
-    c, s = math.cos(angle), math.sin(angle)
-    return np.array([[c, -s], [s, c]])
+    return rotation_from_rpy(0.0, 0.0, angle)[:2, :2]
