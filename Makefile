@@ -3,15 +3,16 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: fly test lint clean
+.PHONY: fly test lint training clean
 
 fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
 
-# Slow tests run where CI is set, as continuous integration does; there a test that flies by the
-# wall clock and met a busy machine is run once more, and counted as such.
+# One worker for each of two cores, with a Ray of its own. Slow tests run where CI is set, as
+# continuous integration does; there a test that goes by the wall clock and met a busy machine is
+# run once more, named, and counted as a rerun.
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest $(if $(CI),--reruns 1,-m "not slow")
+	$(BIN)/python -m pytest --numprocesses 2 $(if $(CI),,-m "not slow")
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
@@ -30,6 +31,10 @@ $(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
 $(VENV)/.installed-dev: pyproject.toml $(VENV)/.installed
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
 	@touch $@
+
+# PyTorch's own CPU build where there is one; only the tests of training need it.
+training: $(VENV)/.installed-dev
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'torch==2.13.0' -e '.[dev,training]'
 
 clean:
 	rm -rf $(VENV) runs

@@ -15,9 +15,34 @@ from aerodaas.options import RunOptions, current_options
 
 _ROOT = Path(__file__).resolve().parents[1]
 
-# The training itself needs PyTorch, which flying does not: without it, its tests do not exist.
+_CI = bool(os.environ.get("CI"))
+# The training itself needs PyTorch, which flying does not: without it, its tests do not exist,
+# but in continuous integration, where they must run.
 _TRAINING = [f"training/test_{name}.py" for name in ("company", "training_run", "pose_training")]
-collect_ignore = [] if importlib.util.find_spec("torch") else _TRAINING
+collect_ignore = [] if _CI or importlib.util.find_spec("torch") else _TRAINING
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Order the files for parallel workers; run what met a busy machine once more, in CI only.
+
+    A file is one worker's, so that its fixtures are made once. Those without Ray come first: one
+    mistake in a function is told within seconds. Then come files with slow tests, so that no
+    worker is left with a long one at the end.
+    """
+    files: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        files.setdefault(item.nodeid.partition("::")[0], []).append(item)
+        if item.get_closest_marker("xdist_group") is None:
+            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
+        if _CI and item.get_closest_marker("wall_clock"):
+            item.add_marker(pytest.mark.flaky(reruns=1))
+
+    def rank(name: str) -> tuple[bool, bool]:
+        ray = any("runtime" in getattr(item, "fixturenames", ()) for item in files[name])
+        slow = any(item.get_closest_marker("slow") for item in files[name])
+        return ray or slow, not slow
+
+    items[:] = [item for name in sorted(files, key=rank) for item in files[name]]
 
 
 @pytest.fixture(autouse=True)

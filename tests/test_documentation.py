@@ -20,6 +20,8 @@ from aerodaas.config import EnvironmentConfig
 from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
 
+pytestmark = pytest.mark.wall_clock
+
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 

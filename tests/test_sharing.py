@@ -10,6 +10,8 @@ from flying import FLAT, Flyer, hop, recorded
 from aerodaas import Environment
 from aerodaas.errors import ConfigError, GraphError, UnknownIdError
 
+pytestmark = pytest.mark.wall_clock
+
 GUEST = '''
 from aerodaas import Analytics, Environment, Odometry
 from aerodaas.data import Readings

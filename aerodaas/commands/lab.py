@@ -41,7 +41,6 @@ app = typer.Typer(
     Try `aerodaas lab run`, then add your own class: `--scheduler dems,mine.py:Mine`.
     """,
 )
-_console = Console()
 
 Names = Annotated[
     str,
@@ -150,7 +149,7 @@ def run(
             if as_flown is not None:
                 result.scores["as flown"] = [as_flown] * seeds
             results.append(result)
-            _console.print(result_table(result))
+            Console().print(result_table(result))
             if plots is not None:
                 _plot(result, names, resources, plots)
         if json_path is not None:
@@ -167,7 +166,7 @@ def list_all() -> None:
     for name in scheduler_names():
         text = (type(load_scheduler(name)).__doc__ or "").strip().splitlines()[0]
         table.add_row(name, text)
-    _console.print(table)
+    Console().print(table)
     columns = ("benefit", "deadline ms", "edge ms", "cloud ms", "edge cost", "cloud cost", "QoE")
     models = Table("model", title="Models of the published evaluation")
     for column in columns:
@@ -177,8 +176,8 @@ def list_all() -> None:
         bonus = p.qoe.bonus if p.qoe else 0
         figures = (p.benefit, *clock, p.edge_cost, p.cloud_cost, bonus)
         models.add_row(name, *(f"{figure:g}" for figure in figures))
-    _console.print(models)
-    _console.print(f"Workloads: {', '.join(SIX)}, NNND-A/EDGES, or a JSON file", highlight=False)
+    Console().print(models)
+    Console().print(f"Workloads: {', '.join(SIX)}, NNND-A/EDGES, or a JSON file", highlight=False)
 
 
 def result_table(result: LabResult) -> Table:
@@ -244,7 +243,7 @@ def _loads(
 
 def _progress() -> Progress:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    return Progress(*columns, TimeRemainingColumn(), console=_console, transient=True)
+    return Progress(*columns, TimeRemainingColumn(), console=Console(), transient=True)
 
 
 def _plot(result: LabResult, names: list[str], resources: Resources, folder: Path) -> None:
@@ -271,7 +270,7 @@ def _plot(result: LabResult, names: list[str], resources: Resources, folder: Pat
         file = folder / f"{stem}_timeline_{_file_name(name)}.png"
         plot_timeline(traces[name], file, title, middle, middle + 6)
     plot_observations(traces, path, folder / f"{stem}_over_time.png")
-    _console.print(f"plots in {folder}", highlight=False)
+    Console().print(f"plots in {folder}", highlight=False)
 
 
 def _file_name(text: str) -> str:

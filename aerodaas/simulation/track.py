@@ -112,7 +112,8 @@ class Track:
         index = min(max(index, 0), len(self._points) - 2)
         (x0, y0), (x1, y1) = self._points[index], self._points[index + 1]
         piece = self._lengths[index + 1] - self._lengths[index]
-        share = min(max((travelled - self._lengths[index]) / piece, 0.0), 1.0)
+        # Points may lie so close that their distance is lost in the length of the whole.
+        share = min(max((travelled - self._lengths[index]) / piece, 0.0), 1.0) if piece else 0.0
         return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
 
 

@@ -25,6 +25,8 @@ from aerodaas.run import Run
 from aerodaas.schedulers.analytics.base import Resources
 from aerodaas.schedulers.analytics.dems import Dems
 
+pytestmark = pytest.mark.wall_clock
+
 _CAMERA = {"driver": "simulated", "settings": {"width": 64, "height": 36}}
 
 

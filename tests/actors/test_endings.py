@@ -19,7 +19,7 @@ from flying import FLAT
 from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
 _ROOT = Path(__file__).resolve().parents[2]
 _APP = """

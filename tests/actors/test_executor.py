@@ -23,6 +23,8 @@ from aerodaas.analytics.base import Context
 from aerodaas.data import Header
 from aerodaas.status import Message
 
+pytestmark = pytest.mark.wall_clock
+
 FRAME = Frame(Header(7, 70, "camera"), np.full((8, 8, 3), 200, np.uint8))
 
 

@@ -17,6 +17,8 @@ from aerodaas.errors import GraphError, MissionError
 from aerodaas.graph import AeroStreamData
 from aerodaas.status import MissionState
 
+pytestmark = pytest.mark.wall_clock
+
 SPEED = 5.0
 
 

@@ -23,6 +23,8 @@ from aerodaas.recording.reader import Recording
 from aerodaas.run import Run
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
 
+pytestmark = pytest.mark.wall_clock
+
 CAMERA = {"id": "camera", "rate": 4, "settings": {"width": 320, "height": 180}}
 TOLD = Profile("a", 10.0, 1000 * MILLISECOND, 100 * MILLISECOND, 300 * MILLISECOND, cloud_cost=2.0)
 

@@ -9,6 +9,8 @@ import pytest
 
 from aerodaas.actors.planner import PlannerExecutor
 
+pytestmark = pytest.mark.wall_clock
+
 
 def test_planner_survives_what_it_is_asked(runtime: None) -> None:  # noqa: ARG001 - needs Ray
     """Results and errors come back; after a hang and a death the next call is answered."""

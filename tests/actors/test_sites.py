@@ -25,6 +25,8 @@ from aerodaas.data import Header
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
 from aerodaas.status import Message
 
+pytestmark = pytest.mark.wall_clock
+
 
 class Mean(Analytics[dict[str, Any]]):
     """Says what it saw, and how long it might have taken."""

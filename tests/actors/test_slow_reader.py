@@ -11,9 +11,12 @@ from aerodaas.actors.streams import Inbox, Outlet
 from aerodaas.actors.streams._shared import MAX_DEPTH, shared_memory_available
 from aerodaas.data import Header
 
-pytestmark = pytest.mark.skipif(
-    not shared_memory_available(), reason="this host has no shared memory for iceoryx2"
-)
+pytestmark = [
+    pytest.mark.skipif(
+        not shared_memory_available(), reason="this host has no shared memory for iceoryx2"
+    ),
+    pytest.mark.wall_clock,
+]
 
 
 def test_a_slow_recorder_starves_nobody() -> None:

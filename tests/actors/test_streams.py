@@ -29,9 +29,12 @@ from aerodaas.actors.streams import (
 from aerodaas.data import Frame, Header
 from aerodaas.status import Message
 
-pytestmark = pytest.mark.skipif(
-    not shared_memory_available(), reason="this host has no shared memory for streams"
-)
+pytestmark = [
+    pytest.mark.skipif(
+        not shared_memory_available(), reason="this host has no shared memory for streams"
+    ),
+    pytest.mark.wall_clock,
+]
 
 
 def start_reader() -> Any:  # noqa: ANN401 - a Ray actor handle

@@ -31,6 +31,8 @@ from aerodaas.status import MissionState, MissionStatus
 from aerodaas.vehicle import VehicleState
 from aerodaas.waypoints import AeroNavigation, Waypoint
 
+pytestmark = pytest.mark.wall_clock
+
 TOKEN = "correct-horse-battery"  # noqa: S105 - this test's own
 STREAM = "drone/remote"
 RANGE = LimitsConfig(max_range=200.0)

@@ -20,6 +20,8 @@ from aerodaas.config import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.testing.tello.video import packets
 
+pytestmark = pytest.mark.wall_clock
+
 WIDTH, HEIGHT = 320, 240
 PERIOD = 10
 ADDRESS = "127.0.0.1"

@@ -20,6 +20,8 @@ from aerodaas.clock import NANOSECONDS
 from aerodaas.config import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.errors import ConfigError, SourceError
 
+pytestmark = pytest.mark.wall_clock
+
 ENVIRONMENT = EnvironmentConfig(robots=[RobotConfig(id="drone")])
 STEP = 20
 """Grey levels between the frames of the test video."""

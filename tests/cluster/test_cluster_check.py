@@ -21,6 +21,8 @@ from aerodaas.cluster.trace import TracePlayer
 from aerodaas.errors import ConfigError
 from aerodaas.schedulers.lab.network import Network
 
+pytestmark = [pytest.mark.wall_clock, pytest.mark.xdist_group("namespaces")]
+
 ROOT = Path(__file__).resolve().parents[2]
 needs_root = pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root")
 SLOW = [

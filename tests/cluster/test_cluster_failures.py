@@ -22,6 +22,8 @@ pytestmark = [
     pytest.mark.slow,
     pytest.mark.timeout(240),
     pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
+    pytest.mark.wall_clock,
+    pytest.mark.xdist_group("namespaces"),
 ]
 _HERE = Path(__file__).resolve().parent
 _ROOT = _HERE.parents[1]

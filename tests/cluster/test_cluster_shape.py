@@ -15,6 +15,8 @@ from aerodaas.cluster.relay import Wire
 from aerodaas.cluster.shape import Shape, parse_bandwidth, parse_time
 from aerodaas.errors import ConfigError
 
+pytestmark = [pytest.mark.wall_clock, pytest.mark.xdist_group("namespaces")]
+
 
 @pytest.mark.parametrize(
     ("text", "seconds"), [("40ms", 0.04), ("0.5s", 0.5), (" 200US ", 0.0002), ("0ms", 0.0)]

@@ -29,6 +29,8 @@ pytestmark = [
     pytest.mark.timeout(400),
     pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
     pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl"),
+    pytest.mark.wall_clock,
+    pytest.mark.xdist_group("namespaces"),
 ]
 _ROOT = Path(__file__).resolve().parents[2]
 _CAMERA = {"id": "camera", "type": "camera", "driver": "glances:NoiseCamera", "rate": 5.0}

@@ -25,6 +25,8 @@ pytestmark = [
         not all(map(shutil.which, ("ssh", "ssh-keygen", "rsync", "/usr/sbin/sshd"))),
         reason="needs an SSH client and server, and rsync",
     ),
+    pytest.mark.wall_clock,
+    pytest.mark.xdist_group("namespaces"),
 ]
 ROOT = Path(__file__).resolve().parents[2]
 CLUSTERS = ROOT / "clusters"

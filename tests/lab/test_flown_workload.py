@@ -24,6 +24,8 @@ from aerodaas.schedulers.lab import ExecutionTimes, Network, run_lab
 from aerodaas.schedulers.lab.metrics import score
 from aerodaas.schedulers.lab.sample import SamplePath
 
+pytestmark = pytest.mark.wall_clock
+
 _CAMERA = {"driver": "simulated", "rate": 2, "settings": {"width": 64, "height": 36}}
 _CONTENT = {
     "robots": [robot(sensors=[{"id": f"camera{n}", **_CAMERA} for n in range(2)])],

@@ -29,6 +29,8 @@ from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
 
+pytestmark = pytest.mark.wall_clock
+
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).resolve().parent
 

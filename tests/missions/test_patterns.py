@@ -23,6 +23,8 @@ from aerodaas.analytics import RemoteAnalytics
 from aerodaas.recording.flight import RobotFlight
 from aerodaas.run import Run
 
+pytestmark = pytest.mark.wall_clock
+
 
 def flown(run: Run) -> RobotFlight:
     """The drone's part of the recording."""

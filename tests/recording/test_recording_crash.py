@@ -25,6 +25,8 @@ from aerodaas.recording.flight import Flight
 from aerodaas.recording.pictures import frames
 from aerodaas.recording.reader import Recording
 
+pytestmark = pytest.mark.wall_clock
+
 MAGIC = 8
 """Bytes by which an MCAP file is known."""
 HERE = Path(__file__).parent

@@ -17,6 +17,8 @@ from aerodaas.errors import ConfigError
 from aerodaas.recording.live import LiveServer
 from aerodaas.recording.recorder import FlightRecorder
 
+pytestmark = pytest.mark.wall_clock
+
 
 def watch(port: int, recorder: FlightRecorder, messages: list[Any]) -> dict[str, list[bytes]]:
     """Subscribe to every channel after the first half, and gather what comes by topic."""

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -72,6 +72,7 @@ def test_scattered_trees_keep_clear() -> None:
 
 
 @settings(deadline=None)
+@example([(0.0, 1.0), (0.0, 1e-131), (0.0, 0.0)], 1.0, 0.0, "stop", [0.0, 1.0])
 @given(
     st.lists(place, min_size=2, max_size=6, unique=True),
     st.floats(0.1, 8),

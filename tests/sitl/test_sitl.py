@@ -35,7 +35,7 @@ from aerodaas.waypoints import (
     Waypoint,
 )
 
-pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420)]
+pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock]
 
 VARIABLES = {"px4": "AERODAAS_SITL_PX4", "ardupilot": "AERODAAS_SITL_ARDUPILOT"}
 HERE = Path(__file__).parent

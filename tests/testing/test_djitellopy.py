@@ -24,6 +24,7 @@ PYTHON = os.environ.get("AERODAAS_DJITELLOPY", "")
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not PYTHON, reason="AERODAAS_DJITELLOPY names no Python with djitellopy"),
+    pytest.mark.wall_clock,
 ]
 
 

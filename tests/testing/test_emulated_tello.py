@@ -18,6 +18,8 @@ from aerodaas.testing.tello.flight import TelloFlight
 from aerodaas.testing.tello.sdk import TelloSdk
 from aerodaas.vehicle import VehicleMode
 
+pytestmark = pytest.mark.wall_clock
+
 
 @pytest.fixture
 def sdk() -> TelloSdk:

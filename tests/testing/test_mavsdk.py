@@ -23,6 +23,7 @@ PYTHON = os.environ.get("AERODAAS_MAVSDK", "")
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(not PYTHON, reason="AERODAAS_MAVSDK names no Python with MAVSDK"),
+    pytest.mark.wall_clock,
 ]
 
 

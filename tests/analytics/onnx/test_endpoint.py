@@ -30,6 +30,8 @@ from aerodaas.config import ComputeConfig
 from aerodaas.data import Detections, Frame, Header
 from aerodaas.errors import ConfigError, EndpointError, GraphError, ModelError
 
+pytestmark = pytest.mark.wall_clock
+
 SECRET = "correct-horse-battery"  # noqa: S105 - this test's own
 PICTURE = np.full((360, 640, 3), 250, np.uint8)
 PICTURE[:, 320:] = 10

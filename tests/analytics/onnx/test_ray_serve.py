@@ -19,7 +19,11 @@ from aerodaas.config import ComputeConfig
 from aerodaas.data import Frame, Header
 
 # Ray Serve's own declarations are of an older Pydantic.
-pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("ignore::DeprecationWarning")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.filterwarnings("ignore::DeprecationWarning"),
+    pytest.mark.wall_clock,
+]
 
 PICTURE = np.full((360, 640, 3), 250, np.uint8)
 PICTURE[:, 320:] = 10

@@ -16,7 +16,7 @@ from aerodaas.cli import app
 from aerodaas.status import MissionState
 from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
 APPS = Path(__file__).parents[3] / "apps"
 

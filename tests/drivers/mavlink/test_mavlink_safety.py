@@ -17,7 +17,7 @@ from aerodaas.errors import VehicleError
 from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot
 from aerodaas.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
 FAMILIES = ("px4", "ardupilot")
 AHEAD = VelocitySetpoint(np.array([0.5, 0.0, 0.0]))

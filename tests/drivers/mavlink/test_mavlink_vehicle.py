@@ -23,6 +23,8 @@ from aerodaas.vehicle import (
     VelocitySetpoint,
 )
 
+pytestmark = pytest.mark.wall_clock
+
 FAMILIES = ("px4", "ardupilot")
 BAD_AIR = Impairment(loss=0.3, duplicates=0.1, late=0.05, lateness=0.3, delay=0.01, jitter=0.03)
 

@@ -13,6 +13,8 @@ from aerodaas.drivers.mavlink.forwarding import Forwarder
 from aerodaas.drivers.mavlink.transport import Transport, open_transport
 from aerodaas.errors import ConfigError, VehicleError
 
+pytestmark = pytest.mark.wall_clock
+
 LOOPBACK = "127.0.0.1"
 
 

@@ -15,6 +15,8 @@ from tello_flights import LOOPBACK
 
 from aerodaas.drivers.tello.last_word import LastWord
 
+pytestmark = pytest.mark.wall_clock
+
 _FLYING = """
 import socket, sys, time
 from aerodaas.drivers.tello.last_word import LastWord

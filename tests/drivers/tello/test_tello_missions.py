@@ -22,7 +22,7 @@ from aerodaas.status import MissionState
 from aerodaas.testing.tello import EmulatedTello, TelloOptions, VideoOptions
 from aerodaas.vehicle import VehicleMode
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
 # The actors' processes cannot import from the tests' folders.
 cloudpickle.register_pickle_by_value(tello_apps)

@@ -25,6 +25,8 @@ from aerodaas.vehicle import (
     VelocitySetpoint,
 )
 
+pytestmark = pytest.mark.wall_clock
+
 BAD_AIR = Impairment(loss=0.1, duplicates=0.1, late=0.05, delay=0.01, jitter=0.03, garbled=0.05)
 
 
