@@ -11,10 +11,7 @@ from collections import defaultdict
 
 from aerodaas.graph import Graph
 
-__all__ = ["ACKS", "Barrier", "paths"]
-
-ACKS = "acks"
-"""Prefix of the streams on which readers without readers of their own say that they are done."""
+__all__ = ["Barrier", "paths"]
 
 
 def paths(graph: Graph, stream: str, steering: set[str], *, recorded: bool) -> int:

@@ -18,6 +18,7 @@ from typing import Any, Literal
 
 import ray
 
+from aerodaas.actors._names import alert_stream
 from aerodaas.actors.session import Session
 from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteReader
 from aerodaas.clock import LockstepClock, host_time_ns
@@ -127,7 +128,7 @@ class StreamActor:
         logging.captureWarnings(capture=True)
         logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
         self.inbox = Inbox(self.scope, self.name, self._reads)
-        self.alerts = self.outlet(f"alerts/{self.name}")
+        self.alerts = self.outlet(alert_stream(self.name))
         self._open()
         self._phase = "ready"
         return ActorInfo(

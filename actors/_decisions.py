@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
+from aerodaas.actors._names import DECISIONS
 from aerodaas.actors.streams import Outlet
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Header
@@ -13,10 +14,7 @@ from aerodaas.schedulers.analytics.base import MILLISECOND, Outcome, Result, Tas
 from aerodaas.schedulers.analytics.windows import QoeWindows
 from aerodaas.status import Decision
 
-__all__ = ["DECISIONS", "Counts", "DecisionLog"]
-
-DECISIONS = "decisions"
-"""Stream of the scheduler's decisions and their outcomes."""
+__all__ = ["Counts", "DecisionLog"]
 
 
 class DecisionLog:

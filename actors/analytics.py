@@ -15,9 +15,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
 from aerodaas.actors._link import StreamLink
+from aerodaas.actors._names import ACKS
 from aerodaas.actors.replayed import RecordedWork
 from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
 from aerodaas.actors.streams import Inbox, Outlet

@@ -19,13 +19,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor, failure_line
 from aerodaas.actors._cloud import CloudAnswer, Executor
-from aerodaas.actors._decisions import DECISIONS, Counts, DecisionLog
+from aerodaas.actors._decisions import Counts, DecisionLog
 from aerodaas.actors._estimates import Estimates
 from aerodaas.actors._fence import FencedDispatch
 from aerodaas.actors._lifeline import Life, Lifelines
+from aerodaas.actors._names import ACKS, DECISIONS, done_stream, task_stream
 from aerodaas.actors._sites import Sites
 from aerodaas.actors._way import Way
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
@@ -46,7 +46,7 @@ from aerodaas.schedulers.analytics.base import (
 from aerodaas.schedulers.analytics.edge_cloud import EdgeCloudEdf
 from aerodaas.status import Message
 
-__all__ = ["DispatcherActor", "Managed", "done_stream", "task_stream"]
+__all__ = ["DispatcherActor", "Managed"]
 
 _LAST_ANSWERS = 2.0
 """Seconds given to the cloud at the end of a run."""
@@ -57,16 +57,6 @@ _LEAST_PATIENCE = NANOSECONDS
 """... but not before this: a first inference may take some."""
 _FORGOTTEN = NANOSECONDS
 """A task still undecided so long after its deadline, the edge being idle, has been forgotten."""
-
-
-def task_stream(node: str) -> str:
-    """Stream on which the edge executor of an analysis gets its tasks."""
-    return f"{node}/tasks"
-
-
-def done_stream(node: str) -> str:
-    """Stream on which the edge executor of an analysis answers."""
-    return f"{node}/done"
 
 
 @dataclass(frozen=True)

@@ -12,9 +12,9 @@ import time
 from dataclasses import dataclass, field
 from typing import Any
 
-from aerodaas.actors._barrier import ACKS, Barrier
+from aerodaas.actors._barrier import Barrier
 from aerodaas.actors._base import StreamActor
-from aerodaas.actors._names import reply_stream, request_stream, state_stream
+from aerodaas.actors._names import ACKS, end_stream, reply_stream, request_stream, state_stream
 from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import (
     CONTROL_PERIOD_NS,
@@ -261,7 +261,7 @@ class DroneActor(StreamActor):
 
 def _order(message: Message[Any]) -> tuple[bool, str, int]:
     """What was made of a camera's last picture counts before the word that it was the last."""
-    return message.stream.endswith("/commands"), message.stream, message.seq
+    return message.stream.endswith(end_stream("")), message.stream, message.seq
 
 
 def _neighbour(state: VehicleState) -> Neighbour:

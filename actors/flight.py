@@ -17,11 +17,12 @@ from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors._cloud import Executor
 from aerodaas.actors._ending import end_actors
 from aerodaas.actors._lifeline import ASKED_AGAIN, LIFE, LIFELINES, Life, Lifelines
+from aerodaas.actors._names import done_stream
 from aerodaas.actors._offload import CloudProcess
 from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.caretaker import Caretaker
 from aerodaas.actors.cluster import Place, nodes_at, options_for, outlives_application
-from aerodaas.actors.dispatcher import DispatcherActor, done_stream
+from aerodaas.actors.dispatcher import DispatcherActor
 from aerodaas.actors.drone import DroneActor, RobotReport
 from aerodaas.actors.executor import CloudExecutor
 from aerodaas.actors.isolation import isolation_options

@@ -10,7 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.actors._names import reply_stream, request_stream, state_stream, status_stream
+from aerodaas.actors._names import (
+    reply_stream,
+    request_stream,
+    setpoint_stream,
+    state_stream,
+    status_stream,
+)
 from aerodaas.actors.planner import PlannerExecutor
 from aerodaas.actors.replayed import Arrivals, WatchedPlanner, as_planned
 from aerodaas.actors.session import Session
@@ -139,7 +145,7 @@ class Pilot:
         own = [state_stream(spec.robot.id), status_stream(spec.robot.id)]
         return [
             *own,
-            f"{spec.robot.id}/setpoints",
+            setpoint_stream(spec.robot.id),
             *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
         ]
 
@@ -193,7 +199,7 @@ class Pilot:
         record = replace(record, heard=tuple(self._heard), planned=self._planner.answered)
         self._heard.clear()
         self._turned = now
-        self._publish(f"{self.id}/setpoints", record, now)
+        self._publish(setpoint_stream(self.id), record, now)
         self._publish(status_stream(self.id), self.mission.status, now)
         return record
 

@@ -5,13 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from aerodaas.actors._barrier import ACKS, paths
-from aerodaas.actors._decisions import DECISIONS
-from aerodaas.actors._names import state_stream
+from aerodaas.actors._barrier import paths
+from aerodaas.actors._names import (
+    ACKS,
+    DECISIONS,
+    alert_stream,
+    done_stream,
+    end_stream,
+    state_stream,
+    task_stream,
+    trigger_stream,
+)
 from aerodaas.actors._offload import CloudProcess, allowed, cloud_processes, priced, short_name
 from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
 from aerodaas.actors.cluster import Place
-from aerodaas.actors.dispatcher import Managed, done_stream, task_stream
+from aerodaas.actors.dispatcher import Managed
 from aerodaas.actors.drone import Conduct
 from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
@@ -223,7 +231,7 @@ class _Planner:
     def node_spec(self, node: Node) -> NodeSpec:
         triggers = tuple(
             TriggerSpec(
-                _trigger_stream(trigger.target, node),
+                trigger_stream(trigger.target, node.id),
                 _COMMANDS[trigger.method] if trigger.method else Wake(),
                 trigger.when,
             )
@@ -246,7 +254,7 @@ class _Planner:
             kind=self.place_of(node).kind,
             acknowledges=self.acknowledgements(node.id) == 0 and not managed,
             answers_always=managed,
-            wakes=tuple(_trigger_stream(node.id, waker) for waker in wakers),
+            wakes=tuple(trigger_stream(node.id, waker.id) for waker in wakers),
         )
 
     def depth(self, stream: str) -> int:
@@ -305,9 +313,9 @@ class _Planner:
     def robot_spec(self, robot: RobotConfig) -> RobotSpec:
         edges = [edge for edge in self.graph.navigation if edge.robot == robot.id]
         mine = [node for node in self.sensors() if node.robot == robot.id]
-        commanding = [f"{camera.stream}/commands" for camera in self.cameras() if camera.ends]
+        commanding = [end_stream(camera.stream) for camera in self.cameras() if camera.ends]
         commanding += [
-            _trigger_stream(robot.id, node)
+            trigger_stream(robot.id, node.id)
             for node in self.analyses()
             if any(trigger.target == robot.id for trigger in node.triggers)
         ]
@@ -387,7 +395,7 @@ def make_plan(
     names += [f"sensor/{camera.stream}" for camera in cameras]
     names += [actor.name for actor in analyses]
     names += ["dispatcher"] if dispatch is not None else []
-    streams += [f"alerts/{name}" for name in names]
+    streams += [alert_stream(name) for name in names]
     return FlightPlan(
         session=session,
         drones=drones,
@@ -403,7 +411,3 @@ def make_plan(
 def _streams_of(edge: NavigationEdge) -> list[str]:
     names = [edge.navigation.stream.name] if edge.navigation.stream is not None else []
     return [*names, edge.clear_on] if edge.clear_on else names
-
-
-def _trigger_stream(target: str, source: Node) -> str:
-    return f"{target}/commands/{source.id}"

@@ -8,8 +8,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerodaas.actors._barrier import ACKS
 from aerodaas.actors._base import StreamActor
+from aerodaas.actors._names import ACKS, vitals_stream
 from aerodaas.actors.session import Session
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Header
@@ -80,7 +80,7 @@ class RecorderActor(StreamActor):
         stamp = self.clock.now()
         self._readings += 1
         for source, reading in readings.items():
-            stream = f"vitals/{source.partition('@')[0]}"
+            stream = vitals_stream(source.partition("@")[0])
             header = Header(self._readings, stamp, source)
             message = Message(stream, self._readings, stamp, header, reading.taken, (), reading)
             self._write(message)

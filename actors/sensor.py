@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from aerodaas.actors._base import StreamActor, StreamCount
+from aerodaas.actors._names import end_stream
 from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
 from aerodaas.cameras.base import Camera, Picture
 from aerodaas.clock import host_time_ns
@@ -42,7 +43,7 @@ class SensorActor(StreamActor):
         self._camera: Camera = plugin(self._sensor, environment)
         self._camera.open()
         self._frames = self.outlet(self._stream)
-        self._commands = self.outlet(f"{self._stream}/commands")
+        self._commands = self.outlet(end_stream(self._stream))
 
     def _run(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first

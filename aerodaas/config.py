@@ -16,6 +16,7 @@ from pydantic import BaseModel, ConfigDict, Field, SecretStr, ValidationError, m
 from typing_extensions import Self
 
 from aerodaas.errors import ConfigError
+from aerodaas.identifiers import Identifier
 
 __all__ = [
     "CameraConfig",
@@ -38,7 +39,6 @@ __all__ = [
     "validated",
 ]
 
-Identifier = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", max_length=64)]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]

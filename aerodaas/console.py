@@ -16,6 +16,7 @@ from typing_extensions import Self
 from aerodaas.clock import seconds
 from aerodaas.config import EnvironmentConfig
 from aerodaas.errors import RecordingError
+from aerodaas.identifiers import is_internal
 from aerodaas.options import RunOptions
 from aerodaas.view.live import MissionView
 from aerodaas.view.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
@@ -123,7 +124,7 @@ class Watching:
             for name, report in state.reports.items()
             if name.startswith(("sensor/", "analytics/"))
             for stream, sent in report.sent.items()
-            if not stream.startswith(("alerts/", "acks/")) and "/commands" not in stream
+            if not is_internal(stream)
         ]
 
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING
 from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.errors import ConfigError, GraphError, UnknownIdError
 from aerodaas.graph import Node, Trigger
+from aerodaas.identifiers import safe_name
 from aerodaas.options import current_options
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def welcome(application: Path, host: Environment) -> None:
         raise ConfigError(f"{application.name} never called start_mission(), so it cannot join")
     for guest in offered:
         _refuse_navigation(guest, application.name)
-        _join(guest, host, application.stem)
+        _join(guest, host, safe_name(application.stem))
 
 
 @contextmanager

@@ -102,7 +102,7 @@ def fly(events: int, folder: Path) -> Delays:
 def _collect(env: Environment, events: int) -> Delays:
     """Watch the setpoints; the first one that an event's frame caused is the one."""
     assert env.run is not None  # noqa: S101 - just started
-    reader: LiveReader = env.graph.reader("drone/setpoints")  # type: ignore[misc, assignment]
+    reader: LiveReader = env.graph.reader("drone/@setpoints")  # type: ignore[misc, assignment]
     found: dict[int, float] = {}
     with Progress() as progress:
         task = progress.add_task("flying", total=events)

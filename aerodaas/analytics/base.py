@@ -24,6 +24,7 @@ from aerodaas.config import RuntimeEnvConfig, TaskConfig, as_runtime_env
 from aerodaas.data import Alert
 from aerodaas.errors import GraphError
 from aerodaas.graph import AeroStreamData, Graph, Node, Trigger
+from aerodaas.identifiers import require_name
 from aerodaas.interfaces import IAeroData, IAnalyse, ICompute, INavigableAnalyse
 from aerodaas.names import PaperNames, snake_case
 from aerodaas.vehicle import VehicleState
@@ -191,7 +192,8 @@ class Analytics(PaperNames, IAnalyse[O_co]):
 
     def _node_in(self, graph: Graph, robot: str | None) -> Node:
         if self.node is None:
-            name = self.name or snake_case(type(self).__name__).removesuffix("_analytics")
+            own = snake_case(type(self).__name__).removesuffix("_analytics")
+            name = require_name(self.name or own, type(self).__name__)
             self.node = graph.add(
                 Node(
                     id=f"{robot}/{name}" if robot else name,

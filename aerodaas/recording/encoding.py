@@ -14,10 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from foxglove import Schema
 
-__all__ = ["Entry", "json_bytes", "json_schema", "plain", "topic"]
+from aerodaas.identifiers import INTERNAL, is_internal
+
+__all__ = ["Entry", "json_bytes", "json_schema", "plain", "stream_of", "topic"]
 
 _DEEPEST = 12
 _LONGEST_ARRAY = 4096
+_TAKEN = frozenset({"fence", "setpoints", "state", "status"})
+"""Last parts of the topics of a robot that are the project's own."""
+_OWN = "own."
 _FORBIDDEN = re.compile(r"[^A-Za-z0-9_/\-]+")
 
 
@@ -37,9 +42,21 @@ def topic(stream: str, kind: str) -> str:
     """Topic of one kind of data of a stream: `/robot/camera/image`.
 
     Dots and blanks become `_`; a stream that is already named after the kind does not repeat it.
+    Streams of the project's own go without the sign that tells them apart (`/robot/state`), so a
+    robot's sensor or analysis of such a name is recorded as `/robot/own.state`.
     """
-    name = "/" + _FORBIDDEN.sub("_", stream).strip("/")
+    plain_name = stream.replace(INTERNAL, "") if is_internal(stream) else stream
+    name = "/" + _FORBIDDEN.sub("_", plain_name).strip("/")
+    owner, _, last = name.rpartition("/")
+    if owner and last in _TAKEN and not is_internal(stream):
+        name = f"{owner}/{_OWN}{last}"
     return name if name.rsplit("/", 1)[-1] == kind else f"{name}/{kind}"
+
+
+def stream_of(name: str) -> str:
+    """The stream of a sensor or an analysis whose topic, without the kind, is `name`."""
+    owner, slash, last = name.strip("/").rpartition("/")
+    return f"{owner}{slash}{last.removeprefix(_OWN)}"
 
 
 def json_schema(name: str, **properties: str | dict[str, Any]) -> Schema:

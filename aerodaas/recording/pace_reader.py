@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from aerodaas.recording.encoding import stream_of
 from aerodaas.recording.pace import Pace
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.status import Heard
@@ -34,12 +35,12 @@ class _Reading:
         name = record.topic.strip("/")
         # A stream that is named after the kind of its data does not repeat it.
         for stream in (name, name.rpartition("/")[0]):
-            self.readings[stream].add(record.stamp)
+            self.readings[stream_of(stream)].add(record.stamp)
 
     def result(self, record: Record) -> None:
         """Of an analysis; one without inputs measures something itself."""
         source = record.value["source"]
-        if source == record.topic.strip("/").rpartition("/")[0]:
+        if source == stream_of(record.topic.strip("/").rpartition("/")[0]):
             self.readings[source].add(record.value["stamp"])
 
     def setpoint(self, record: Record) -> None:

@@ -108,7 +108,7 @@ def test_unread_sensors_of_a_flying_robot_run_all_the_same(environment: Environm
     made = plan(environment)
     assert [one.stream for one in made.cameras] == ["drone/cam"]
     assert [sensor.id for sensor in made.drones[0][0].sensors] == ["odom"]
-    assert {"drone/cam", "drone/odom", "drone/state", "drone/status"} <= set(made.recorded)
+    assert {"drone/cam", "drone/odom", "drone/@state", "drone/@status"} <= set(made.recorded)
 
 
 def test_what_steers_is_waited_for(environment: Environment) -> None:
@@ -119,7 +119,7 @@ def test_what_steers_is_waited_for(environment: Environment) -> None:
     windows = plan(env).conduct.windows
     assert windows["drone/odom"] == 0
     assert windows["drone/cam"] > 0
-    assert windows["drone/state"] > 0
+    assert windows["drone/@state"] > 0
 
 
 def test_what_triggers_or_wakes_what_steers_is_waited_for(environment: Environment) -> None:
@@ -162,7 +162,7 @@ def test_every_measurement_is_acknowledged_by_its_readers(tmp_path: Path, record
     counts = plan(env).conduct.acknowledgements
     # The drone for what Weave says, and Jitter itself; or the recorder for each of the streams.
     assert counts["drone/odom"] == (4 if recording else 2)
-    assert counts["drone/state"] == (1 if recording else 0)
+    assert counts["drone/@state"] == (1 if recording else 0)
     (actor,) = plan(env).analyses
     silent = {node.stream: node.acknowledges for node in actor.nodes}
     assert silent == {"drone/weave": False, "drone/jitter": not recording}

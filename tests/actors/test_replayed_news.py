@@ -14,7 +14,7 @@ from aerodaas.recording.pace import NEVER, later
 from aerodaas.schedulers.waypoint.ordered import OrderedScheduler
 from aerodaas.status import Heard, Message
 
-NEWS, ORDERS = "drone/follow", "drone/commands/ticker"
+NEWS, ORDERS = "drone/follow", "drone/@commands/ticker"
 
 
 def message(stream: str, stamp: int) -> Message[Any]:

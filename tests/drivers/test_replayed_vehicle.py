@@ -47,9 +47,9 @@ def recorded(tmp_path: Path) -> Path:
         for number in range(10):
             stamp = number * STEP
             for stream, item in (
-                ("drone/state", state(number)),
+                ("drone/@state", state(number)),
                 (
-                    "drone/status",
+                    "drone/@status",
                     MissionStatus(
                         stamp,
                         MissionState.PREFLIGHT if number < 3 else MissionState.TAKING_OFF,

@@ -120,9 +120,9 @@ class SyntheticFlight:
             odometry = Odometry(step.position + noise, step.velocity, step.yaw, 0.01, 0.02)
             truth = Odometry(step.position, step.velocity, step.yaw)
             charge = 0.97 - 0.004 * step.time
-            yield self.message("state", stamp, self._state(stamp, odometry, truth, charge))
+            yield self.message("@state", stamp, self._state(stamp, odometry, truth, charge))
             yield self.message("mission", stamp, step.status)
-            yield self.message("setpoints", stamp, self._setpoint(stamp, step))
+            yield self.message("@setpoints", stamp, self._setpoint(stamp, step))
             if self.frames and step.time >= next_frame:
                 next_frame += 1 / self.frames
                 yield from self._seen(stamp, odometry, rng)

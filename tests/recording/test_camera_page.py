@@ -81,7 +81,7 @@ def test_the_state_stands_below() -> None:
     with CameraPage("127.0.0.1:0") as page:
         fed(page, frame(1), frame(1, "other/cam"))
         status = MissionStatus(5_000_000_000, MissionState.FOLLOWING, "following commands")
-        page.put(message(status, Header(0, 5, "drone"), "drone/status"))
+        page.put(message(status, Header(0, 5, "drone"), "drone/@status"))
         for source, told in (("drone/cam", True), ("other/cam", False)):
             image = page.picture(source)
             assert image is not None

@@ -74,7 +74,7 @@ def test_graphics_processors_are_recorded(
     with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
         for number in range(2):
             header = Header(number, number * 10**9, "drone/tello@node")
-            message = Message("vitals/a", number, header.stamp, header, 0, (), read_vitals())
+            message = Message("@vitals/a", number, header.stamp, header, 0, (), read_vitals())
             recorder.write(message)
     with Recording.open(path) as recording:
         (load,) = Flight.read(recording).gpus.values()

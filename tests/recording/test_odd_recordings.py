@@ -38,7 +38,9 @@ def written(
 
 def without(*kinds: str) -> Callable[[Messages], Messages]:
     """Leave streams out."""
-    return lambda messages: [m for m in messages if m.stream.partition("/")[2] not in kinds]
+    return lambda messages: [
+        m for m in messages if m.stream.partition("/")[2].lstrip("@") not in kinds
+    ]
 
 
 @pytest.mark.parametrize(

@@ -73,7 +73,7 @@ def test_a_late_client_sees_everything(tmp_path: Path) -> None:
     assert fence["polygon"] == [list(corner) for corner in FENCE.polygon]
     assert b"\xff\xd8\xff" in seen["/tello/camera/image"][-1]
     states = [json.loads(data)["stamp"] for data in seen["/tello/state"]]
-    second_half = [m for m in messages[len(messages) // 2 :] if m.stream == "tello/state"]
+    second_half = [m for m in messages[len(messages) // 2 :] if m.stream == "tello/@state"]
     assert states[-len(second_half) :] == [m.stamp for m in second_half]
     assert len(seen["/tello/camera/calibration"]) >= 1
 

@@ -131,7 +131,7 @@ def test_vitals_become_cores_in_use(tmp_path: Path) -> None:
             header = Header(number, number * 10**9, "drone/tello@node")
             vitals = Vitals(taken, used, 80_000_000, 0.5, 0.25)
             recorder.write(
-                Message("vitals/drone/tello", number, header.stamp, header, taken, (), vitals)
+                Message("@vitals/drone/tello", number, header.stamp, header, taken, (), vitals)
             )
     with Recording.open(path) as recording:
         flight = Flight.read(recording)

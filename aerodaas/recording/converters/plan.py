@@ -24,6 +24,7 @@ from foxglove.messages import (
 
 from aerodaas.config import GeofenceConfig
 from aerodaas.geometry import GeodeticOrigin
+from aerodaas.identifiers import internal
 from aerodaas.recording.converters.base import MAP_FRAME, Session, quaternion, vector
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.palette import OKABE_ITO, rgb
@@ -96,13 +97,14 @@ def plan_entries(
 
 def fence_entries(fence: GeofenceConfig, robot: str, session: Session) -> Iterator[Entry]:
     """Write a robot's geofence as JSON, scene and, with a home, GeoJSON."""
+    fence_stream = internal(robot, "fence")
     value = {
         "robot": robot,
         "polygon": fence.polygon,
         "floor": fence.floor,
         "ceiling": fence.ceiling,
     }
-    yield Entry(topic(robot, "fence"), FENCE, json_bytes(value), 0)
+    yield Entry(topic(fence_stream, "fence"), FENCE, json_bytes(value), 0)
     if not fence.polygon:
         return
     colour = _colour("vermilion")
@@ -122,11 +124,11 @@ def fence_entries(fence: GeofenceConfig, robot: str, session: Session) -> Iterat
         ],
     )
     scene = SceneUpdate(entities=[entity])
-    yield Entry(topic(f"{robot}/fence", "scene"), SCENE, scene.encode(), 0)
+    yield Entry(topic(fence_stream, "scene"), SCENE, scene.encode(), 0)
     if session.home is not None:
         ring = [_place((x, y, 0.0), session.home) for x, y in fence.polygon]
         feature = _feature("Polygon", [[*ring, ring[0]]], f"{robot} geofence")
-        yield Entry(topic(f"{robot}/fence", "map"), MAP, _geojson([feature]), 0)
+        yield Entry(topic(fence_stream, "map"), MAP, _geojson([feature]), 0)
 
 
 def _colour(name: str) -> Color:
