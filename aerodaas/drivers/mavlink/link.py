@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import queue
 import select
 import socket
@@ -13,7 +14,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
-from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.dialect import EventMessage, mavlink
 from aerodaas.drivers.mavlink.forwarding import Forwarder
 from aerodaas.drivers.mavlink.framing import Framer
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
@@ -42,7 +43,9 @@ _WANTED = frozenset(
         *(mavlink.MAVLINK_MSG_ID_MISSION_ACK, mavlink.MAVLINK_MSG_ID_COMMAND_ACK),
         *(mavlink.MAVLINK_MSG_ID_HOME_POSITION, mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE),
         *(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, mavlink.MAVLINK_MSG_ID_STATUSTEXT),
-        410,  # EVENT
+        *(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT),
+        *(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, mavlink.MAVLINK_MSG_ID_VIBRATION),
+        EventMessage.id,
     }
 )
 
@@ -95,6 +98,8 @@ class MavlinkLink:
         self._lock = threading.Lock()
         self._listeners: list[tuple[frozenset[str], queue.SimpleQueue[Message]]] = []
         self._closing = threading.Event()
+        self._turn_due = self._heartbeat_due = -math.inf
+        self._thread: threading.Thread | None = None
         self._forwarder: Forwarder | None = None
 
     def open(self) -> None:
@@ -108,6 +113,9 @@ class MavlinkLink:
                 opened.callback(self._forwarder.close)
             self._bell, self._rope = map(opened.enter_context, socket.socketpair())
             self._resources = opened.pop_all()
+        self._start()
+
+    def _start(self) -> None:
         self._thread = threading.Thread(target=self._run, name=f"{self._name}-link", daemon=True)
         self._thread.start()
 
@@ -141,7 +149,8 @@ class MavlinkLink:
         self._closing.set()
         with contextlib.suppress(OSError):
             self._rope.send(b"!")
-        self._thread.join(timeout=2.0)
+        if self._thread is not None:
+            self._thread.join(timeout=2.0)
         self._resources.close()
 
     def _addressees(self) -> tuple[Peer, ...]:
@@ -151,21 +160,23 @@ class MavlinkLink:
         return tuple(dict.fromkeys(self._peers.values()))
 
     def _run(self) -> None:
-        turn_due = heartbeat_due = time.monotonic()
         while not self._closing.is_set():
-            self._wait(max(0.0, min(_TICK, turn_due - time.monotonic())))
-            now = time.monotonic()
-            self._hear(now)
-            if self._forwarder is not None:
-                for packet in self._forwarder.receive():
-                    with self._lock:
-                        self._wire.send(packet, tuple(dict.fromkeys(self._peers.values())))
-            if now >= turn_due:
-                turn_due = now + _TICK
-                self._on_turn(now)
-            if now >= heartbeat_due and self._healthy(now):
-                heartbeat_due = now + _HEARTBEAT
-                self.send(self._heartbeat())
+            self._wait(max(0.0, min(_TICK, self._turn_due - time.monotonic())))
+            self.turn(time.monotonic())
+
+    def turn(self, now: float) -> None:
+        """Hear what has come, and do what is due at `now`; called by the link's thread."""
+        self._hear(now)
+        if self._forwarder is not None:
+            for packet in self._forwarder.receive():
+                with self._lock:
+                    self._wire.send(packet, tuple(dict.fromkeys(self._peers.values())))
+        if now >= self._turn_due:
+            self._turn_due = now + _TICK
+            self._on_turn(now)
+        if now >= self._heartbeat_due and self._healthy(now):
+            self._heartbeat_due = now + _HEARTBEAT
+            self.send(self._heartbeat())
 
     def _wait(self, duration: float) -> None:
         wires = [self._wire.fileno(), self._bell.fileno()]

@@ -24,6 +24,7 @@ __all__ = ["EmulatedAutopilot"]
 _TURN = 0.01
 _LARGEST = 65535
 _HEARTBEAT = 1.0
+_ROUNDING = 1e-6
 _PLANS = {"MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_COUNT", "MISSION_ITEM_INT"}
 
 
@@ -39,7 +40,7 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         """Open a port of its own."""
         self.options = options or AutopilotOptions()
         self.heard: list[tuple[float, Any]] = []
-        """Every message that arrived whole, with its monotonic second."""
+        """Every message that arrived whole, with the second at which it did."""
         opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         opened.settimeout(0.0)
         opened.bind(("127.0.0.1", 0))
@@ -56,6 +57,9 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         self._down = Channel(self.options.downlink, f"{seed}/down", self._transmit)
         self._due: dict[int, float] = {}
         self._beat_due = 0.0
+        self._now = 0.0
+        """Seconds of the latest turn."""
+        self._flown_to: float | None = None
 
     @property
     def armed(self) -> bool:
@@ -94,20 +98,24 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
                 self._transmit(content, peer)
 
     def _run(self) -> None:
-        last = time.monotonic()
         with selectors.DefaultSelector() as selector:
             selector.register(self._socket, selectors.EVENT_READ)
             while not self._stopping.is_set():
                 selector.select(_TURN)
-                now = time.monotonic()
-                with self._lock:
-                    self._receive(now)
-                    self._up.turn(now)
-                    steps = int((now - last) / STEP)
-                    last += steps * STEP
-                    self.firmware.advance(min(steps * STEP, LONGEST_LEAP))
-                    self._report(now)
-                    self._down.turn(now)
+                self.turn(time.monotonic())
+
+    def turn(self, now: float) -> None:
+        """Hear, fly and talk at `now` seconds of a clock that need not be the wall's."""
+        with self._lock:
+            self._now = now
+            self._flown_to = now if self._flown_to is None else self._flown_to
+            self._receive(now)
+            self._up.turn(now)
+            steps = int((now - self._flown_to) / STEP + _ROUNDING)
+            self._flown_to += steps * STEP
+            self.firmware.advance(min(steps * STEP, LONGEST_LEAP))
+            self._report(now)
+            self._down.turn(now)
 
     def _receive(self, now: float) -> None:
         while True:
@@ -125,7 +133,7 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         messages = self._mav.parse_buffer(content) or []
         for message in messages:
             if message.get_type() != "BAD_DATA":
-                self.heard.append((time.monotonic(), message))
+                self.heard.append((self._now, message))
                 self._obey(message)
 
     def _obey(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
@@ -172,9 +180,8 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
     def _say(self, message: Any) -> None:  # noqa: ANN401
         packet = message.pack(self._mav)
         self._mav.seq = (self._mav.seq + 1) % 256
-        now = time.monotonic()
         for peer in self._peers:
-            self._down.send(packet, peer, now)
+            self._down.send(packet, peer, self._now)
 
     def _transmit(self, content: bytes, peer: tuple[str, int]) -> None:
         with contextlib.suppress(OSError):
