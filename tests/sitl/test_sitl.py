@@ -19,7 +19,6 @@ import pytest
 from sitl_flights import SitlFlight, autopilot, robot_at
 
 from aerodaas.config import EnvironmentConfig, GeofenceConfig
-from aerodaas.drivers.mavlink.connecting import global_origin
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.fence import upload_fence
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
@@ -149,7 +148,7 @@ def test_fence_breach(url: str) -> None:
     try:
         connection = flight.vehicle.connection
         small = GeofenceConfig(polygon=[(-8, -8), (8, -8), (8, 8), (-8, 8)], ceiling=50)
-        origin = global_origin(flight.vehicle.telemetry, connection.frame)
+        origin = connection.alignment.origin
         upload_fence(connection.link, connection.autopilot, small, origin, "return")
         flight.run_to(S.ABORTED)
         assert VehicleMode.FAILSAFE in flight.modes or VehicleMode.MANUAL in flight.modes

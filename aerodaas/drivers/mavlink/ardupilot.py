@@ -64,6 +64,10 @@ class ArduPilot(Autopilot):
         "if this process dies it hovers where it is; with FS_GCS_ENABLE at 1 and "
         '"role": "ground_station" it comes home'
     )
+    rates: ClassVar[dict[int, float]] = {
+        **Autopilot.rates,
+        mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 2.0,
+    }
     failsafes: ClassVar[tuple[Failsafe, ...]] = (
         Failsafe(
             "BATT_FS_LOW_ACT",
@@ -97,7 +101,7 @@ class ArduPilot(Autopilot):
     def ask_mode(self, mode: FlightMode) -> Order:
         """Ask for one of its modes."""
         values = (1.0, float(_ASKED[mode]), 0.0, 0.0, 0.0, 0.0, 0.0)
-        return Order(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}")
+        return Order(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}", mode=mode)
 
     def take_off(self, height: float, telemetry: Telemetry) -> tuple[Order, ...]:
         """Guided first, then arm, then climb: it takes off in guided mode only."""
@@ -110,9 +114,16 @@ class ArduPilot(Autopilot):
         )
         return self.ask_mode(FlightMode.GUIDED), self.arm(), climb
 
+    def ready(self, telemetry: Telemetry) -> bool | None:
+        """It says that it has the check, and whether it passes."""
+        sensors, check = telemetry.sensors, mavlink.MAV_SYS_STATUS_PREARM_CHECK
+        if sensors is None or not sensors.present & check:
+            return None
+        return bool(sensors.health & check)
+
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
         """Its PreArm texts."""
-        if telemetry.ready is not False:
+        if self.ready(telemetry) is not False:
             return []
         said = [
             text

@@ -55,6 +55,8 @@ class Autopilot(ABC):
         mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 4.0,
         mavlink.MAVLINK_MSG_ID_HOME_POSITION: 1.0,
         mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+        mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
+        mavlink.MAVLINK_MSG_ID_VIBRATION: 1.0,
     }
     """Messages that we live by, and how often a second we ask for them."""
 
@@ -73,6 +75,10 @@ class Autopilot(ABC):
     @abstractmethod
     def take_off(self, height: float, telemetry: Telemetry) -> tuple[Order, ...]:
         """Orders for one armed climb to `height` metres above here, each after the other's end."""
+
+    @abstractmethod
+    def ready(self, telemetry: Telemetry) -> bool | None:
+        """Whether its own checks would let it arm; None where it does not say."""
 
     @abstractmethod
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
@@ -95,6 +101,12 @@ class Autopilot(ABC):
         """Start the motors; the autopilot's checks apply."""
         values = (1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return Order(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, values, "arm")
+
+    @staticmethod
+    def disarm() -> Order:
+        """Stop the motors, which it refuses in the air."""
+        values = (0.0,) * 7
+        return Order(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, values, "disarm", insists=False)
 
     @staticmethod
     def check() -> Order:

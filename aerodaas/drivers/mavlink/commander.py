@@ -2,23 +2,24 @@
 
 from __future__ import annotations
 
-import logging
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.phase import FlightMode
 
 __all__ = ["Commander", "Order", "Outcome", "always"]
-
-_log = logging.getLogger(__name__)
 
 _TIMEOUT = 1.0
 """Seconds to wait for an acknowledgement."""
 _PROGRESS = 5.0
 """The same after the word that it is being worked on."""
-_TRIES = 4
+_TRIES = 6
+_LATER = 1.0
+"""Seconds after which an order is tried again that was rejected for now, such as one to arm while
+the estimator still settles."""
 _RESULTS = {
     mavlink.MAV_RESULT_TEMPORARILY_REJECTED: "rejected for now",
     mavlink.MAV_RESULT_DENIED: "denied",
@@ -40,6 +41,10 @@ class Order:
     what: str
     """For people: what it does."""
     frame: int | None = None
+    mode: FlightMode | None = None
+    """The mode that it asks for, if it asks for one."""
+    insists: bool = True
+    """Whether it is tried again when it is rejected for now."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,10 @@ class Outcome:
     accepted: bool
     text: str = ""
     """Why not, in a few words."""
+    replaced: bool = False
+    """A newer order of the same number has taken its place: neither done nor refused."""
+    tries: int = 1
+    """How often it was sent."""
 
 
 def always() -> bool:
@@ -63,6 +72,8 @@ class _Pending:
     still: Callable[[], bool]
     tries: int = 0
     deadline: float = 0.0
+    answer: str = "no answer"
+    """What to say if it is given up."""
 
 
 class Commander:
@@ -88,15 +99,26 @@ class Commander:
     ) -> None:
         """Give an order; `done` is told its outcome, in the link's thread.
 
-        It is repeated only while `still` says that it needs doing. A newer order of the same
-        number takes the place of an older one, whose `done` is told so.
+        It is repeated while it is not answered or rejected for now, and only while `still` says
+        that it needs doing: what the vehicle shows to be done is done, acknowledged or not. A
+        newer order of the same number takes the place of an older one, whose `done` is told so.
         """
         with self._lock:
             before = self._pending.get(order.number)
             self._pending[order.number] = pending = _Pending(order, done, still)
             self._transmit(pending, now)
         if before is not None:
-            before.done(Outcome(accepted=False, text="replaced by a newer order"))
+            before.done(Outcome(accepted=False, text="replaced by a newer order", replaced=True))
+
+    def withdraw(self, number: int) -> None:
+        """Repeat the order of this `number` no more; its `done` is told nothing."""
+        with self._lock:
+            self._pending.pop(number, None)
+
+    def waits_for(self, number: int) -> bool:
+        """Whether an order of this `number` is still to be answered."""
+        with self._lock:
+            return number in self._pending
 
     def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Take a COMMAND_ACK."""
@@ -110,37 +132,36 @@ class Commander:
             if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
                 pending.deadline = now + _PROGRESS
                 return
+            later = message.result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+            if later and pending.order.insists:
+                pending.answer = _RESULTS[message.result]
+                pending.deadline = now + _LATER
+                return
             del self._pending[message.command]
         if message.result == mavlink.MAV_RESULT_ACCEPTED:
-            pending.done(Outcome(accepted=True))
+            pending.done(Outcome(accepted=True, tries=pending.tries))
         else:
             word = _RESULTS.get(message.result, f"result {message.result}")
-            pending.done(Outcome(accepted=False, text=word))
+            pending.done(Outcome(accepted=False, text=word, tries=pending.tries))
 
     def turn(self, now: float) -> None:
-        """Repeat what has not been acknowledged, or give it up."""
+        """Repeat what has not been acknowledged, or give it up; end what shows to be done."""
         ended: list[tuple[_Pending, Outcome]] = []
         with self._lock:
             for number, pending in list(self._pending.items()):
-                if now < pending.deadline:
-                    continue
                 if not pending.still():
                     del self._pending[number]
-                    ended.append((pending, Outcome(accepted=True)))
+                    ended.append((pending, Outcome(accepted=True, tries=pending.tries)))
+                elif now < pending.deadline:
+                    continue
                 elif pending.tries >= _TRIES:
                     del self._pending[number]
-                    ended.append((pending, Outcome(accepted=False, text="no answer")))
+                    outcome = Outcome(accepted=False, text=pending.answer, tries=pending.tries)
+                    ended.append((pending, outcome))
                 else:
                     self._transmit(pending, now)
         for pending, outcome in ended:
-            if not outcome.accepted:
-                _log.warning("no answer to: %s", pending.order.what)
             pending.done(outcome)
-
-    def forget(self) -> None:
-        """Repeat nothing any more."""
-        with self._lock:
-            self._pending.clear()
 
     def _transmit(self, pending: _Pending, now: float) -> None:
         order = pending.order
@@ -154,5 +175,6 @@ class Commander:
                 *self._target, order.frame, order.number, 0, 0, p1, p2, p3, p4, int(p5), int(p6), p7
             )
         pending.tries += 1
+        pending.answer = "no answer"
         pending.deadline = now + _TIMEOUT
         self._send(message)

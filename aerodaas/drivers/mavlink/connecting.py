@@ -11,8 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerodaas.config import RobotConfig
+from aerodaas.drivers.mavlink.alignment import Alignment, global_origin
 from aerodaas.drivers.mavlink.autopilot import Autopilot
 from aerodaas.drivers.mavlink.commander import Commander
+from aerodaas.drivers.mavlink.departure import Departure
 from aerodaas.drivers.mavlink.fence import upload_fence
 from aerodaas.drivers.mavlink.frames import LocalFrame
 from aerodaas.drivers.mavlink.link import MavlinkLink
@@ -22,7 +24,7 @@ from aerodaas.drivers.mavlink.telemetry import Telemetry
 from aerodaas.errors import VehicleError
 from aerodaas.geometry import GeodeticOrigin, Vector, ned_to_enu
 
-__all__ = ["Connection", "establish", "global_origin"]
+__all__ = ["Connection", "establish"]
 
 _log = logging.getLogger(__name__)
 
@@ -41,7 +43,8 @@ class Connection:
     link: MavlinkLink
     autopilot: Autopilot
     commander: Commander
-    frame: LocalFrame
+    departure: Departure
+    alignment: Alignment
     target: tuple[int, int]
     """System and component."""
 
@@ -50,6 +53,7 @@ def establish(
     link: MavlinkLink,
     autopilot: Autopilot,
     commander: Commander,
+    departure: Departure,
     telemetry: Telemetry,
     *,
     robot: RobotConfig,
@@ -68,7 +72,8 @@ def establish(
             origin = global_origin(telemetry, frame)
             upload_fence(link, autopilot, robot.limits.geofence, origin, settings.fence)
     _log.info("%s: %s %s, system %d", robot.id, autopilot.name, telemetry.software, link.target[0])
-    return Connection(link, autopilot, commander, frame, link.target)
+    alignment = Alignment(frame, telemetry)
+    return Connection(link, autopilot, commander, departure, alignment, link.target)
 
 
 def _await_ready(
@@ -144,15 +149,6 @@ def _armed_at(telemetry: Telemetry, pause: Callable[[], None]) -> Vector:
     if telemetry.home is None:
         raise VehicleError("it is flying already, and does not say where it took off; land it")
     return telemetry.home
-
-
-def global_origin(telemetry: Telemetry, frame: LocalFrame) -> GeodeticOrigin:
-    """Where zero of our local frame lies on the earth, by the autopilot's own estimate."""
-    assert telemetry.place is not None  # noqa: S101 - it is ready
-    assert telemetry.position is not None  # noqa: S101 - the same
-    here = GeodeticOrigin(*telemetry.place)
-    latitude, longitude, _ = here.to_geodetic(-frame.position(telemetry.position))
-    return GeodeticOrigin(latitude, longitude)
 
 
 def _see_to_failsafes(

@@ -79,6 +79,10 @@ class FlightPhase:
             self._before, self.seen = follows | {self.shown}, False
         self.wish, self._asked_at = wish, now
 
+    def rest(self) -> None:
+        """Nothing is asked of it any more: it stands."""
+        self.wish, self.seen = None, False
+
     def observe(self, shown: FlightMode, now: float, *, armed: bool, critical: bool) -> None:
         """Take note of a HEARTBEAT."""
         if not armed:

@@ -63,6 +63,10 @@ class PX4(Autopilot):
     family: ClassVar[int] = mavlink.MAV_AUTOPILOT_PX4
     stream_before: ClassVar[float] = 1.2
     stops_short: ClassVar[bool] = True
+    rates: ClassVar[dict[int, float]] = {
+        **Autopilot.rates,
+        mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,
+    }
     failsafes: ClassVar[tuple[Failsafe, ...]] = (
         Failsafe(
             "COM_LOW_BAT_ACT",
@@ -100,7 +104,7 @@ class PX4(Autopilot):
         """Ask for one of its modes."""
         main, sub = _MODES[mode]
         values = (1.0, float(main), float(sub), 0.0, 0.0, 0.0, 0.0)
-        return Order(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}")
+        return Order(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}", mode=mode)
 
     def take_off(self, height: float, telemetry: Telemetry) -> tuple[Order, ...]:
         """From hold, where no sticks are needed: arm, then climb to an altitude above the sea."""
@@ -113,14 +117,26 @@ class PX4(Autopilot):
         )
         return self.ask_mode(FlightMode.HOLD), self.arm(), climb
 
+    def ready(self, telemetry: Telemetry) -> bool | None:
+        """It has the bit in `health` only; before it has looked, nothing is present."""
+        if telemetry.sensors is None or not telemetry.sensors.present:
+            return None
+        return bool(telemetry.sensors.health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
+
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
         """What its latest report of the arming checks complained about."""
         del now
         if telemetry.altitude is None:
             return ["PX4 does not know its altitude above the sea yet"]
-        if telemetry.ready is not False:
+        ready, events = self.ready(telemetry), telemetry.events
+        if ready is None:
+            return ["PX4 has not told yet whether its arming checks pass"]
+        if ready:
             return []
-        return list(telemetry.events.objections) or ["PX4's arming checks fail"]
+        if self.mode(telemetry.custom_mode) is not FlightMode.HOLD and events.objections:
+            # A take-off begins with hold, so that what only its present mode lacks does not matter.
+            return list(events.objections_to_hold)
+        return list(events.objections) or ["PX4's arming checks fail"]
 
     def encode(self, value: float, kind: int) -> float:
         """Integers travel as the float of the same bytes."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -12,17 +12,28 @@ from aerodaas.data import Battery, GpsFix
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.events import EventReader
 from aerodaas.drivers.mavlink.frames import Attitude, attitude_from_frd
+from aerodaas.drivers.mavlink.health import Health
 from aerodaas.drivers.mavlink.texts import Texts
 from aerodaas.geometry import Vector
 
-__all__ = ["Telemetry"]
+__all__ = ["Sensors", "Telemetry"]
 
 _FRESH = 1.0
 """Seconds after which a position or an attitude is none any more."""
 _FIX = 2
 """GPS fix types from this one on are positions."""
+_FAR = 5.0
+"""Seconds: packets may overtake each other by less, and only a restart goes back by more."""
 _UNKNOWN_SATELLITES = 255
 _UNKNOWN_VOLTAGE = 65535
+
+
+class Sensors(NamedTuple):
+    """Bits of MAV_SYS_STATUS_SENSOR."""
+
+    present: int
+    enabled: int
+    health: int
 
 
 class Telemetry:
@@ -31,6 +42,8 @@ class Telemetry:
     def __init__(self) -> None:
         self.heard_at = -math.inf
         """Any message at all."""
+        self.ticked_at = -math.inf
+        """The latest message whose stamp was newer than all before."""
         self.beat_at = -math.inf
         """The latest HEARTBEAT."""
         self.custom_mode = 0
@@ -52,14 +65,18 @@ class Telemetry:
         self.gps: GpsFix | None = None
         self.battery = Battery(math.nan)
         self.on_ground: bool | None = None
-        self.ready: bool | None = None
-        """Whether its own checks would let it arm; None where it does not say."""
+        self.sensors: Sensors | None = None
+        """Bits of SYS_STATUS; None before it has come."""
+        self.health = Health()
+        """What is wrong, by its name."""
         self.boot_time = math.nan
         """Seconds of the autopilot's own clock since it started."""
         self.clock = math.nan
         """The same clock in seconds since the Unix epoch."""
         self.reboots = 0
+        self._booting = False
         self.software = ""
+        self._stamps: dict[str, int] = {}
         self.seen: dict[str, float] = {}
         """When each kind of message came last."""
         self.texts = Texts()
@@ -84,9 +101,16 @@ class Telemetry:
         self.heard_at = now
         kind = message.get_type()
         self.seen[kind] = now
+        if not self._fresh(kind, message, now):
+            return
+        self.health.take(message, now)
         taker = self._takers.get(kind)
         if taker is not None:
             taker(message, now)
+
+    def silence(self, now: float) -> float:
+        """Seconds since it last said something new; stamps that stand still are nothing new."""
+        return now - min(self.heard_at, self.ticked_at)
 
     def knows_place(self, now: float) -> bool:
         """Tell whether it has said lately where it is and how it stands."""
@@ -100,13 +124,16 @@ class Telemetry:
             mavlink.MAV_STATE_CRITICAL,
             mavlink.MAV_STATE_EMERGENCY,
         }
+        booting = message.system_status == mavlink.MAV_STATE_BOOT
+        if booting and not self._booting:
+            self._restarted()
+        self._booting = booting
 
     def _local_position(self, message: Any, now: float) -> None:  # noqa: ANN401
         position = np.array([message.x, message.y, message.z], dtype=np.float64)
         velocity = np.array([message.vx, message.vy, message.vz], dtype=np.float64)
         if np.isfinite(position).all() and np.isfinite(velocity).all():
             self.position, self.velocity, self.position_at = position, velocity, now
-            self._tick(message.time_boot_ms)
 
     def _attitude(self, message: Any, now: float) -> None:  # noqa: ANN401
         angles = (message.roll, message.pitch, message.yaw, message.yawspeed)
@@ -114,6 +141,10 @@ class Telemetry:
             self.attitude, self.attitude_at = attitude_from_frd(*angles), now
 
     def _global_position(self, message: Any, _: float) -> None:  # noqa: ANN401
+        if message.lat == 0 and message.lon == 0:
+            # That is how an autopilot says that it does not know.
+            self.altitude = self.place = None
+            return
         self.altitude = message.alt / 1e3
         self.place = message.lat / 1e7, message.lon / 1e7
 
@@ -139,9 +170,11 @@ class Telemetry:
             voltage / 1e3 if voltage != _UNKNOWN_VOLTAGE else 0.0,
             max(0, message.current_battery) / 100,
         )
-        check = mavlink.MAV_SYS_STATUS_PREARM_CHECK
-        says = message.onboard_control_sensors_present & check
-        self.ready = bool(message.onboard_control_sensors_health & check) if says else None
+        self.sensors = Sensors(
+            message.onboard_control_sensors_present,
+            message.onboard_control_sensors_enabled,
+            message.onboard_control_sensors_health,
+        )
 
     def _landed(self, message: Any, _: float) -> None:  # noqa: ANN401
         unknown = message.landed_state == mavlink.MAV_LANDED_STATE_UNDEFINED
@@ -154,15 +187,32 @@ class Telemetry:
 
     def _time(self, message: Any, _: float) -> None:  # noqa: ANN401
         self.clock = message.time_unix_usec / 1e6
-        self._tick(message.time_boot_ms)
 
-    def _tick(self, milliseconds: int) -> None:
-        boot_time = milliseconds / 1e3
-        # Packets may overtake each other by a little; only a restart goes back by far.
-        far = 5.0
-        if boot_time < self.boot_time - far:
-            self.reboots += 1
-        self.boot_time = boot_time
+    def _fresh(self, kind: str, message: Any, now: float) -> bool:  # noqa: ANN401
+        """Mind the autopilot's own clock; False for a message no newer than the one before."""
+        stamp = getattr(message, "time_boot_ms", None)
+        if stamp is None:
+            return True
+        boot_time = stamp / 1e3
+        if boot_time < self.boot_time - _FAR:
+            self._restarted()
+        if not boot_time <= self.boot_time:
+            self.boot_time, self.ticked_at = boot_time, now
+        before = self._stamps.get(kind)
+        if before is not None and stamp <= before:
+            return False
+        self._stamps[kind] = stamp
+        return True
+
+    def _restarted(self) -> None:
+        """The autopilot has started anew: what it said before is of another life."""
+        self.reboots += 1
+        self.boot_time = math.nan
+        self._stamps.clear()
+        self.position_at = self.attitude_at = -math.inf
+        self.home = self.place = self.altitude = self.gps = None
+        self.sensors = self.on_ground = None
+        self.health, self.events = Health(), EventReader()
 
     def _version(self, message: Any, _: float) -> None:  # noqa: ANN401
         version = message.flight_sw_version
@@ -174,6 +224,6 @@ class Telemetry:
         self.texts.take(words, message.severity, now, message.id, message.chunk_seq)
 
     def _event(self, message: Any, now: float) -> None:  # noqa: ANN401
-        said = self.events.take(message.event, message.log_levels, message.sequence, now)
+        said = self.events.take(message.event, message.log_levels, message.sequence)
         if said is not None:
             self.texts.add(said.text, said.severity, now)

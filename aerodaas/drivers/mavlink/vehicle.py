@@ -6,6 +6,7 @@ import logging
 import math
 import threading
 import time
+from collections import deque
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,33 +14,31 @@ import numpy as np
 from aerodaas.clock import NANOSECONDS, Clock, ScaledClock
 from aerodaas.config import EnvironmentConfig, RobotConfig
 from aerodaas.data import Odometry
-from aerodaas.drivers.mavlink.climb import Climb
 from aerodaas.drivers.mavlink.commander import Commander, Outcome
 from aerodaas.drivers.mavlink.connecting import Connection, establish
+from aerodaas.drivers.mavlink.departure import Departure
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.finder import Finder, Found
 from aerodaas.drivers.mavlink.frames import LocalFrame
-from aerodaas.drivers.mavlink.guidance import MovingTarget
 from aerodaas.drivers.mavlink.link import MavlinkLink, Message
 from aerodaas.drivers.mavlink.parameters import Parameters
 from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.plans import Item, Progress, download, upload
 from aerodaas.drivers.mavlink.rates import RateKeeper
-from aerodaas.drivers.mavlink.setpoint import position_message, velocity_message
 from aerodaas.drivers.mavlink.settings import mavlink_settings
+from aerodaas.drivers.mavlink.steering import Steering
 from aerodaas.drivers.mavlink.telemetry import Telemetry
+from aerodaas.drivers.mavlink.touchdown import Touchdown
 from aerodaas.drivers.mavlink.watchdog import Watchdog
 from aerodaas.drivers.setpoints import require_finite
 from aerodaas.errors import ConfigError, InvalidWaypointError, VehicleError
 from aerodaas.geometry import GeodeticOrigin, Vector
-from aerodaas.navigation.control import limit_length
 from aerodaas.vehicle import (
     Capabilities,
     PositionSetpoint,
     Setpoint,
     VehicleMode,
     VehicleState,
-    VelocitySetpoint,
 )
 
 __all__ = ["MavlinkVehicle"]
@@ -48,16 +47,13 @@ _log = logging.getLogger(__name__)
 
 _LOST_AFTER = 1.5
 """Seconds without any word, of a vehicle that speaks 40 times a second."""
-_STREAM_GAP = 0.5
-"""Seconds between setpoints after which the stream counts as begun anew."""
-_ASK_AGAIN = 2.0
-"""Seconds after which guided flight is asked for again."""
 _REASONS = 12.0
 """Seconds that the autopilot's words may be old to count as the reason of a refusal."""
 _GRAVE = 3
 """Severity of an error; smaller is graver."""
-_PARTING = 2.0
-"""Seconds that `close` waits for a vehicle in the air to begin its landing."""
+_PARTING = 4.0
+"""Seconds that `close` waits for a vehicle in the air to begin its landing, and for motors that may
+be starting to stand."""
 _STEERED = {VehicleMode.HOLDING, VehicleMode.GUIDED, VehicleMode.RETURNING}
 
 
@@ -77,11 +73,6 @@ class MavlinkVehicle:
         self._home = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
         if settings.frame == "home" and self._home is None:
             raise ConfigError(f'{robot.id}: "frame": "home" needs a home in the environment file')
-        limits = robot.limits
-        self._speed = min(limits.max_speed, settings.max_speed)
-        self._cruise = min(limits.cruise_speed, self._speed)
-        self._climb_rate = min(limits.max_climb, settings.max_climb)
-        self._turn_rate = math.radians(limits.max_yaw_rate)
         self._clock: Clock = ScaledClock()
         self._lock = threading.RLock()
         self._link: MavlinkLink | None = None
@@ -91,16 +82,16 @@ class MavlinkVehicle:
         self._telemetry = Telemetry()
         self._phase = FlightPhase()
         self._watchdog = Watchdog()
-        self._target = MovingTarget(self._robot.limits.max_acceleration, self._turn_rate)
+        self._touchdown = Touchdown()
+        self._steering = Steering(self._robot, self._settings)
+        self._words: deque[str] = deque()
         self._finder = Finder(self._settings)
         self._connection: Connection | None = None
         self._commander: Commander | None = None
         self._rates: RateKeeper | None = None
-        self._climb: Climb | None = None
+        self._departure: Departure | None = None
         self._climb_place: Vector | None = None
-        self._refusal = ""
-        self._stream_since = self._streamed_at = -math.inf
-        self._guided_asked_at = -math.inf
+        self._restarted_text = ""
         self._left_alone: FlightMode | None = None
         self._checked_at = -math.inf
         self._told: VehicleMode | None = None
@@ -140,11 +131,21 @@ class MavlinkVehicle:
             with self._lock:
                 commander = Commander(link.send, target, self._settings.own_system)
                 self._rates = RateKeeper(found.autopilot, commander)
+                self._departure = Departure(
+                    commander,
+                    self._telemetry,
+                    self._phase,
+                    disarm=found.autopilot.disarm(),
+                    flies=lambda: self._touchdown.flew,
+                    words=self._reasons,
+                    land=lambda: self._change(FlightMode.LAND),
+                )
                 self._commander = commander
             self._connection = establish(
                 link,
                 found.autopilot,
                 commander,
+                self._departure,
                 self._telemetry,
                 robot=self._robot,
                 settings=self._settings,
@@ -171,13 +172,26 @@ class MavlinkVehicle:
         link, self._link = self._link, None
         if link is None:
             return
-        if self._connection is not None and self._ours_in_the_air():
-            self._change(FlightMode.LAND)
-            deadline = time.monotonic() + _PARTING
-            while self._phase.shown is not FlightMode.LAND and time.monotonic() < deadline:
-                self._pause()
+        if self._connection is not None:
+            self._part(self._connection)
         link.close()
         self._connection = None
+        self._log()
+
+    def _part(self, connection: Connection) -> None:
+        departure, phase = connection.departure, self._phase
+        with self._lock:
+            if departure.climbs:
+                departure.call_off(time.monotonic())
+            elif self._ours_in_the_air():
+                self._change(FlightMode.LAND)
+            elif not departure.withdrawing:
+                return
+        deadline = time.monotonic() + _PARTING
+        while time.monotonic() < deadline:
+            if phase.shown is FlightMode.LAND or not (departure.withdrawing or phase.armed):
+                return
+            self._pause()
 
     def _ours_in_the_air(self) -> bool:
         phase = self._phase
@@ -195,7 +209,7 @@ class MavlinkVehicle:
             age = now - telemetry.position_at if knows or lost else 0.0
             return VehicleState(
                 max(0, self._clock.now() - int(age * NANOSECONDS)),
-                self._odometry(connection.frame, known=knows or lost),
+                self._odometry(connection.alignment.frame, known=knows or lost),
                 telemetry.battery,
                 VehicleMode.LOST if lost else self._mode(),
                 telemetry.armed,
@@ -206,17 +220,18 @@ class MavlinkVehicle:
                     "autopilot_clock": telemetry.clock,
                     "damaged_packets": connection.link.counts.damaged,
                     "foreign_packets": connection.link.counts.strangers,
-                    "silence": now - telemetry.heard_at,
+                    "silence": telemetry.silence(now),
                 },
             )
 
-    def _odometry(self, frame: LocalFrame, *, known: bool) -> Odometry:
+    def _odometry(self, frame: LocalFrame | None, *, known: bool) -> Odometry:
         telemetry, attitude = self._telemetry, self._telemetry.attitude
-        position = telemetry.position if known else None
-        nowhere: Vector = np.full(3, np.nan)
+        position: Vector = np.full(3, np.nan)
+        if known and frame is not None and telemetry.position is not None:
+            position = frame.position(telemetry.position)
         return Odometry(
-            nowhere if position is None else frame.position(position),
-            frame.velocity(telemetry.velocity),
+            position,
+            LocalFrame.velocity(telemetry.velocity),
             attitude.yaw,
             attitude.roll,
             attitude.pitch,
@@ -224,20 +239,36 @@ class MavlinkVehicle:
         )
 
     def _mode(self) -> VehicleMode:
-        if self._climb is not None and self._phase.taken is None:
-            return VehicleMode.TAKING_OFF
+        if self._touchdown.falling:
+            return VehicleMode.FAILSAFE
+        if self._phase.taken is None and self._departure is not None:
+            if self._departure.withdrawing:
+                return VehicleMode.LANDING
+            if self._departure.climbs:
+                return VehicleMode.TAKING_OFF
         return self._phase.mode
 
     def _lost(self, now: float) -> bool:
-        return now - self._telemetry.heard_at > _LOST_AFTER
+        # Standing motors need no fresh telemetry to be believed: HEARTBEATs tell of them.
+        telemetry = self._telemetry
+        silence = telemetry.silence(now) if telemetry.armed else now - telemetry.heard_at
+        return silence > _LOST_AFTER
+
+    def _frozen(self, now: float) -> bool:
+        return self._lost(now) and now - self._telemetry.heard_at <= _LOST_AFTER
 
     def _faults(self, now: float) -> list[str]:
-        faults = []
-        if self._lost(now):
-            faults.append(f"no word for {now - self._telemetry.heard_at:.0f} s")
-        if self._telemetry.reboots:
-            faults.append("the autopilot's own clock has gone back: it was started anew")
-        return faults + self._telemetry.texts.recent(now, _REASONS, _GRAVE)
+        telemetry = self._telemetry
+        faults = [self._restarted_text, self._touchdown.fault]
+        if self._frozen(now):
+            faults.append("telemetry: packets come, and say nothing new")
+        elif self._lost(now):
+            faults.append("no word from the vehicle")
+        if self._connection is not None:
+            faults.append(self._connection.alignment.fault)
+        faults += telemetry.health.faults(now)
+        faults += telemetry.texts.recent(now, _REASONS, _GRAVE)
+        return list(dict.fromkeys(fault for fault in faults if fault))
 
     def preflight(self) -> list[str]:
         """Reasons for which a take-off would be refused now; empty when ready."""
@@ -246,11 +277,13 @@ class MavlinkVehicle:
                 return ["not connected"]
             now = time.monotonic()
             if self._lost(now):
-                return [f"no word from the vehicle for {now - self._telemetry.heard_at:.0f} s"]
+                return [f"no word from the vehicle for {self._telemetry.silence(now):.0f} s"]
             reasons = []
             if self._phase.armed:
-                reasons.append(f"already {self._phase.mode.value.replace('_', ' ')}")
-            if not self._telemetry.knows_place(now):
+                reasons.append(f"already {self._mode().value.replace('_', ' ')}")
+            elif self._connection.departure.withdrawing:
+                reasons.append("a take-off that was called off is not over yet")
+            if not self._knows_place(now):
                 reasons.append("the autopilot does not know its position")
             return reasons + self._connection.autopilot.objections(self._telemetry, now)
 
@@ -267,35 +300,24 @@ class MavlinkVehicle:
             )
         with self._lock:
             connection = self._connected()
-            if self._climb is not None:
+            departure = connection.departure
+            if departure.climbs:
                 return
-            refusal, self._refusal = self._refusal, ""
+            refusal, departure.refusal = departure.refusal, ""
             reasons = [refusal] if refusal else self.preflight()
             if reasons:
                 raise VehicleError(f"{self._name} refuses to take off: {'; '.join(reasons)}")
-            telemetry, autopilot = self._telemetry, connection.autopilot
-            assert telemetry.position is not None  # noqa: S101 - preflight has seen to it
             self._climb_place = None
-            self._climb = Climb(
-                connection.commander,
-                autopilot.take_off(height, telemetry),
-                height - float(telemetry.position[2]),
-                height=height,
-                armed=lambda: self._phase.armed,
-                climbs=lambda now: self._phase.ask(FlightMode.TAKE_OFF, now),
-                failed=self._refused,
-                now=time.monotonic(),
-            )
+            orders = connection.autopilot.take_off(height, self._telemetry)
+            departure.begin(orders, height, time.monotonic())
 
-    def _refused(self, text: str) -> None:
-        """A take-off has come to nothing; in the link's thread."""
+    def _reasons(self) -> list[str]:
+        """The autopilot's own words about what it has just refused; in the link's thread."""
         now = time.monotonic()
-        telemetry, connection = self._telemetry, self._connection
-        said = telemetry.texts.recent(now, _REASONS)
-        if connection is not None and not said:
-            said = connection.autopilot.objections(telemetry, now)
-        self._refusal = "; ".join([text, *said])
-        self._climb = None
+        said = self._telemetry.texts.recent(now, _REASONS)
+        if self._connection is not None and not said:
+            said = self._connection.autopilot.objections(self._telemetry, now)
+        return said
 
     def send(self, setpoint: Setpoint) -> Setpoint:
         """Send one setpoint and return it after clipping to the limits of the vehicle.
@@ -312,61 +334,24 @@ class MavlinkVehicle:
             return self._steer(setpoint, connection, time.monotonic())
 
     def _steer(self, setpoint: Setpoint, connection: Connection, now: float) -> Setpoint:
-        if now - self._streamed_at > _STREAM_GAP:
-            self._stream_since = now
-            self._target.forget()
-        self._streamed_at = now
-        if not self._telemetry.knows_place(now):
-            setpoint = VelocitySetpoint(np.zeros(3))
-        if isinstance(setpoint, PositionSetpoint):
-            message, sent = self._position(setpoint, connection, now)
-        else:
-            message, sent = self._velocity(setpoint, connection, now)
-        connection.link.send(message)
-        self._guide(connection, now)
-        return sent
-
-    def _position(
-        self, setpoint: PositionSetpoint, connection: Connection, now: float
-    ) -> tuple[Message, Setpoint]:
-        wanted = self._cruise if setpoint.speed is None else float(setpoint.speed)
-        speed = min(wanted, self._speed)
-        odometry = self._odometry(connection.frame, known=True)
-        target = self._target.towards(
-            setpoint.position,
-            setpoint.yaw,
-            speed,
-            vehicle=odometry.position,
-            velocity=odometry.velocity,
-            facing=odometry.yaw,
-            now=now,
+        knows = self._telemetry.knows_place(now)
+        frame = connection.alignment.frame if knows else None
+        message, sent = self._steering.message(
+            setpoint,
+            self._odometry(frame, known=True),
+            frame,
+            connection.target,
+            now,
             waits=self._phase.shown is not FlightMode.GUIDED,
         )
-        message = position_message(target, connection.frame, connection.target, now)
-        return message, PositionSetpoint(setpoint.position, setpoint.yaw, speed)
+        connection.link.send(message)
+        before = connection.autopilot.stream_before
+        self._steering.see_to_guidance(self._phase, before, self._change, now)
+        return sent
 
-    def _velocity(
-        self, setpoint: VelocitySetpoint, connection: Connection, now: float
-    ) -> tuple[Message, Setpoint]:
-        self._target.forget()
-        across = limit_length(setpoint.velocity[:2], self._speed)
-        up = float(np.clip(setpoint.velocity[2], -self._climb_rate, self._climb_rate))
-        rate = float(np.clip(setpoint.yaw_rate, -self._turn_rate, self._turn_rate))
-        sent = VelocitySetpoint(np.array([across[0], across[1], up]), rate)
-        return velocity_message(sent, connection.target, now), sent
-
-    def _guide(self, connection: Connection, now: float) -> None:
-        """See that the autopilot follows what is being streamed."""
-        phase = self._phase
-        if phase.wish is FlightMode.GUIDED and phase.seen:
-            return
-        if now - self._stream_since < connection.autopilot.stream_before:
-            return
-        if phase.shown is FlightMode.GUIDED and phase.wish in {None, FlightMode.TAKE_OFF}:
-            phase.ask(FlightMode.GUIDED, now)
-        elif now - self._guided_asked_at > _ASK_AGAIN:
-            self._guided_asked_at = now
-            self._change(FlightMode.GUIDED)
+    def _knows_place(self, now: float) -> bool:
+        aligned = self._connection is not None and self._connection.alignment.frame is not None
+        return aligned and self._telemetry.knows_place(now)
 
     def hold(self) -> None:
         """Stop and stay by the autopilot's own mode; raise VehicleError on the ground."""
@@ -377,34 +362,44 @@ class MavlinkVehicle:
     def return_home(self) -> None:
         """Return to the place of take-off and land there, by the autopilot's own mode."""
         with self._lock:
-            self._require_flight("return home", climbing=True)
-            self._change(FlightMode.RETURN)
+            connection = self._require_flight("return home", climbing=True)
+            if connection.departure.climbs and not self._touchdown.flew:
+                connection.departure.call_off(time.monotonic())
+            else:
+                self._change(FlightMode.RETURN)
 
     def land(self) -> None:
-        """Land here; does nothing on the ground. Raises VehicleError when somebody else flies."""
+        """Land here; does nothing on the ground. Raises VehicleError when somebody else flies.
+
+        A take-off that has not come to its end is taken back: until its motors surely stand, the
+        mode is LANDING.
+        """
         with self._lock:
-            self._connected()
-            if self._climb is not None or self._phase.armed:
-                if self._phase.armed:
-                    self._require_flight("land", climbing=True, landing=True)
+            connection = self._connected()
+            if connection.departure.climbs:
+                connection.departure.call_off(time.monotonic())
+            elif self._phase.armed and not connection.departure.withdrawing:
+                self._require_flight("land", climbing=True, landing=True)
                 self._change(FlightMode.LAND)
 
     def _change(self, wish: FlightMode) -> None:
-        connection = self._connected()
-        if self._climb is not None and wish is not FlightMode.GUIDED:
-            self._climb.cancel()
-            self._climb = None
+        connection, phase = self._connected(), self._phase
+        waits = connection.commander.waits_for(mavlink.MAV_CMD_DO_SET_MODE)
+        if phase.wish is wish and (waits or phase.shown is wish):
+            return
+        if connection.departure.climbs and wish is not FlightMode.GUIDED:
+            connection.departure.let_go()
         now = time.monotonic()
-        self._phase.ask(wish, now)
+        phase.ask(wish, now)
         order = connection.autopilot.ask_mode(wish)
 
         def done(outcome: Outcome) -> None:
-            if not outcome.accepted and self._phase.wish is wish:
+            if not (outcome.accepted or outcome.replaced) and phase.wish is wish:
                 said = "; ".join(self._telemetry.texts.recent(time.monotonic(), _REASONS))
-                _log.warning("%s: %s: %s %s", self._name, order.what, outcome.text, said)
+                self._words.append(f"{order.what}: {outcome.text} {said}".rstrip())
 
         connection.commander.give(
-            order, done, still=lambda: self._phase.wish is wish and not self._phase.seen, now=now
+            order, done, still=lambda: phase.wish is wish and not phase.seen, now=now
         )
 
     def upload_mission(
@@ -446,28 +441,56 @@ class MavlinkVehicle:
                 if kind == "HEARTBEAT":
                     self._finder.take(message)
                 return
+            reboots = self._telemetry.reboots
             self._telemetry.take(message, now)
+            if self._telemetry.reboots != reboots:
+                self._restarted()
             if kind == "COMMAND_ACK":
                 self._commander.take(message, now)
             elif kind == "HEARTBEAT":
                 self._observe(now)
+            else:
+                self._moved(kind, now)
+
+    def _restarted(self) -> None:
+        """The autopilot has started anew; its first words may already be known."""
+        flew = self._phase.armed or bool(self._touchdown.fault)
+        self._restarted_text = f"autopilot: it started anew{' in flight' if flew else ''}"
+        if self._connection is not None:
+            self._connection.alignment.restart(stands=not flew)
+            self._connection.departure.restart()
+
+    def _moved(self, kind: str, now: float) -> None:
+        telemetry, connection = self._telemetry, self._connection
+        if kind == "LOCAL_POSITION_NED" and telemetry.position_at == now:
+            assert telemetry.position is not None  # noqa: S101 - it has just come
+            up, rise = -float(telemetry.position[2]), -float(telemetry.velocity[2])
+            self._touchdown.move(up, rise, float(np.linalg.norm(telemetry.velocity)), now)
+            if connection is not None:
+                connection.alignment.move()
+        elif kind == "GLOBAL_POSITION_INT" and connection is not None:
+            connection.alignment.place(now, sure=telemetry.health.sure_of_position)
+        elif kind == "EXTENDED_SYS_STATE":
+            self._touchdown.report(on_ground=telemetry.on_ground)
 
     def _observe(self, now: float) -> None:
         found, telemetry, phase = self._finder.found, self._telemetry, self._phase
         assert found is not None  # noqa: S101 - it speaks
         shown = found.autopilot.mode(telemetry.custom_mode)
         was_armed = phase.armed
+        before = phase.shown if was_armed else shown
         phase.observe(shown, now, armed=telemetry.armed, critical=telemetry.critical)
-        if was_armed and not phase.armed and self._climb is not None:
-            self._climb.fail("it stopped its motors again")
+        landing = before in {FlightMode.LAND, FlightMode.RETURN}
+        self._touchdown.observe(now, armed=telemetry.armed, landing=landing)
+        if telemetry.armed and not was_armed:
+            self._restarted_text = ""
+        if self._departure is not None:
+            self._departure.observe(now, was_armed=was_armed)
         if phase.taken is not None and self._told is None:
             name = found.autopilot.mode_name(telemetry.custom_mode)
             said = "; ".join(telemetry.texts.recent(now, _REASONS))
-            _log.warning("%s: the mode is %r now, not by us; %s", self._name, name, said)
+            self._words.append(f"the mode is {name!r} now, not by us; {said}")
         self._told = phase.taken
-        if phase.taken is not None and self._climb is not None:
-            self._climb.cancel()
-            self._climb = None
 
     def _turned(self, now: float) -> None:
         """20 times a second, in the link's thread."""
@@ -476,26 +499,30 @@ class MavlinkVehicle:
                 return
             self._commander.turn(now)
             self._rates.turn(self._telemetry, now)
-            if self._climb is not None and self._telemetry.position is not None:
-                up, rise = -self._telemetry.position[2], -self._telemetry.velocity[2]
-                if self._climb.turn(now, float(up), float(rise)):
-                    self._climb = None
-                elif self._climb.ordered:
-                    self._climb_on(now)
+            self._touchdown.turn(now)
+            if self._connection is not None:
+                self._connection.departure.turn(now)
+                self._climb_on(self._connection, now)
             self._mind_the_loop(now)
+        self._log()
 
-    def _climb_on(self, now: float) -> None:
+    def _log(self) -> None:
+        """Outside the lock, and never in the loop's thread in flight: a log may block."""
+        while self._words:
+            _log.warning("%s: %s", self._name, self._words.popleft())
+
+    def _climb_on(self, connection: Connection, now: float) -> None:
         """Fly the rest ourselves: PX4 calls its take-off done up to 0.8 m below its height."""
-        connection, climb = self._connection, self._climb
+        goal, frame = connection.departure.goal, connection.alignment.frame
         done = self._phase.seen and self._phase.shown in {FlightMode.HOLD, FlightMode.GUIDED}
-        done &= self._finder.found is not None and self._finder.found.autopilot.stops_short
-        if connection is None or climb is None or not done or not self._watchdog.healthy(now):
+        done &= connection.autopilot.stops_short
+        if goal is None or frame is None or not done or not self._watchdog.healthy(now):
             return
         if self._climb_place is None:
-            self._climb_place = self._odometry(connection.frame, known=True).position
-        rest = connection.frame.position(np.array([0.0, 0.0, -climb.goal]))[2]
+            self._climb_place = self._odometry(frame, known=True).position
+        rest = frame.position(np.array([0.0, 0.0, -goal]))[2]
         place = np.array([*self._climb_place[:2], rest])
-        self._steer(PositionSetpoint(place, None, self._climb_rate), connection, now)
+        self._steer(PositionSetpoint(place, None, self._steering.climb_rate), connection, now)
 
     def _mind_the_loop(self, now: float) -> None:
         """If the loop above hangs, hold; if it does not come back, return.
@@ -509,7 +536,7 @@ class MavlinkVehicle:
         steered = self._phase.wish is FlightMode.GUIDED
         if step is not self._left_alone and (steered or step is FlightMode.RETURN):
             self._left_alone = step
-            _log.warning("%s: the control loop is silent: %s", self._name, step.value)
+            self._words.append(f"the control loop is silent: {step.value}")
             self._change(step)
 
     def _connected(self) -> Connection:

@@ -152,14 +152,14 @@ def test_events_are_told_by_their_names() -> None:
     sequence = iter(range(100))
 
     def take(name: str, level: int) -> None:
-        reader.take(event_number(name), level, next(sequence), 0.0)
+        reader.take(event_number(name), level, next(sequence))
 
     take("commander_arming_check_summary", 8)
     take("check_mag_missing", 3)
     take("check_mag_missing", 3)
     take("no_such_event", 2)
     take("commander_health_summary", 8)
-    assert reader.objections[0] == "mag missing"
+    assert reader.objections[0] == "compass: missing"
     assert len(reader.objections) == 2
     take("commander_arming_check_summary", 8)
     take("commander_health_summary", 8)

@@ -213,13 +213,13 @@ def test_acknowledgements_twice_late_or_for_others() -> None:
 
 
 def test_no_answer_at_all_is_an_outcome() -> None:
-    """Four tries, then it is said."""
+    """Six tries, then it is said."""
     ear = Ear()
     ear.commander.give(TAKE_OFF, ear.outcomes.put, now=0.0)
     for second in range(1, 20):
         ear.commander.turn(float(second) * 1.1)
-    assert len(ear.sent) == 4
-    assert ear.outcomes.get_nowait() == Outcome(accepted=False, text="no answer")
+    assert len(ear.sent) == 6
+    assert ear.outcomes.get_nowait() == Outcome(accepted=False, text="no answer", tries=6)
 
 
 @given(st.integers(-(2**31), 2**31 - 1))

@@ -178,7 +178,7 @@ def test_setpoints_come_before_the_mode() -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("family", "words"),
-    [("px4", "estimator hor pos not stable"), ("ardupilot", "PreArm: Need Position Estimate")],
+    [("px4", "estimator: position not stable"), ("ardupilot", "PreArm: Need Position Estimate")],
 )
 def test_a_refusal_comes_with_its_reason(family: str, words: str) -> None:
     """The arming checks' own words: events of PX4, STATUSTEXT of ArduPilot."""
