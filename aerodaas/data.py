@@ -155,7 +155,7 @@ class Battery:
 
 
 @travels
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True)
 class Frame:
     """An immutable picture with what is needed to place it in the world."""
 

@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 
 from aerodaas.data import Odometry
 from aerodaas.geometry import CameraModel
+from aerodaas.records import valued
 
 __all__ = ["Camera", "Picture"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@valued
+@dataclass(frozen=True, slots=True)
 class Picture:
     """What a camera gives: pixels, and when they were taken."""
 

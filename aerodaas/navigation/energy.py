@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.geometry import Vector
+from aerodaas.records import valued
 from aerodaas.waypoints import Waypoint
 
 __all__ = ["EnergyMeter", "EnergyModel"]
@@ -32,6 +33,7 @@ _PARASITE = 0.5 * 0.6 * 1.225 * 0.05 * 0.503 / (79.86 + 88.63)
 """Drag power over V cubed (d0 rho s A / 2), relative to hover."""
 
 
+@valued
 @dataclass(frozen=True)
 class EnergyModel:
     """Charge (0 to 1) that flying takes."""

@@ -20,11 +20,13 @@ from aerodaas.graph import AeroStreamData
 from aerodaas.interfaces import IAeroData, IEnvironment, INavigate
 from aerodaas.names import PaperNames
 from aerodaas.navigation.energy import EnergyModel
+from aerodaas.records import travels
 from aerodaas.waypoints import AeroNavigation, NavigationType, SchedulingType, Waypoint
 
 __all__ = ["NavigationEntry", "NavigationSink", "Situation", "TrajectoryScheduler"]
 
 
+@travels
 @dataclass(frozen=True, slots=True)
 class Situation:
     """What a trajectory scheduler may know when it plans."""
