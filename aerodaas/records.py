@@ -25,7 +25,7 @@ def valued(cls: C) -> C:
     """
     values = _values_of(cls)
 
-    def equal(self: Any, other: object) -> bool:  # noqa: ANN401 - an instance of `cls`
+    def equal(self: Any, other: object) -> Any:  # noqa: ANN401 - an instance of `cls`
         if self is other:
             return True
         if type(other) is not type(self):

@@ -60,7 +60,7 @@ RECORDS: list[Any] = [
     VelocityCommand(1.0),
     Situation(0.0, np.zeros(3), np.ones(3), energy=EnergyModel()),
     EnergyModel(900.0, np.ones(3)),
-    Picture(PIXELS, 4, None, DEPTH),
+    Picture(PIXELS, 4, "a.jpg", ODOMETRY, DEPTH),
 ]
 
 
