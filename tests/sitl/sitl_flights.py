@@ -2,53 +2,45 @@
 
 from __future__ import annotations
 
-import os
-import shlex
-import signal
-import subprocess
+import math
 import time
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections import Counter
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from sitl_relay import Relay
+from typing_extensions import Self
 
 from aerodaas.clock import ScaledClock
 from aerodaas.config import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.navigation.commands import Command, Start
+from aerodaas.navigation.commands import AddNavigation, Command, Start
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
 from aerodaas.navigation.planner import InlinePlanner
 from aerodaas.schedulers.waypoint.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.status import MissionState, MissionStatus
+from aerodaas.testing.channel import Impairment
 from aerodaas.vehicle import VehicleMode, VehicleState
+from aerodaas.waypoints import AeroNavigation, NavigationType, SchedulingType, Waypoint
 
-__all__ = ["SitlFlight", "autopilot", "robot_at"]
+__all__ = ["FAR", "FARM", "PERFECT", "SitlFlight", "robot_at", "survey"]
 
 _PERIOD = 0.05
+PERFECT = Impairment()
+"""A link that loses nothing."""
 
 
-@contextmanager
-def autopilot(named: str) -> Iterator[str]:
-    """The URL of the autopilot that the variable names, started if it says how."""
-    command, separator, url = named.rpartition("=>")
-    if not separator:
-        yield named.strip()
-        return
-    process = subprocess.Popen(
-        shlex.split(command),
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        start_new_session=True,
-    )
-    try:
-        time.sleep(5.0)
-        yield url.strip()
-    finally:
-        os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+def survey(*places: tuple[float, float], hover: float = 1.0) -> AddNavigation:
+    """Waypoints three metres up, in any order."""
+    stops = [Waypoint(f"wp{i}", x, y, 3.0, hover) for i, (x, y) in enumerate(places, 1)]
+    kind = NavigationType.DISTANCE_DRIVEN
+    return AddNavigation(AeroNavigation(kind, stops, SchedulingType.UNORDERED))
+
+
+FARM = survey((0, 0), (0, 10), (10, 10), (10, 0), hover=5.0)
+FAR = survey((0, 60))
 
 
 def robot_at(
@@ -84,10 +76,12 @@ class SitlFlight:
         url: str,
         *commands: Command,
         settings: Mapping[str, str] | None = None,
+        link: Impairment = PERFECT,
         **limits: Any,  # noqa: ANN401
     ) -> None:
-        """Connect through a relay that can be cut, and start the mission of `commands`."""
+        """Connect through a relay with `link`'s faults, and start the mission of `commands`."""
         self.relay = Relay(url)
+        self.relay.spoil(link)
         robot = robot_at(self.relay.url, settings, **limits)
         self.vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
         try:
@@ -109,6 +103,12 @@ class SitlFlight:
             answer = self.tell(command)
             assert answer.accepted, answer.text
         self.tell(Start())
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
 
     def tell(self, command: Command) -> Any:  # noqa: ANN401
         """Hand a command to the mission."""
@@ -158,6 +158,34 @@ class SitlFlight:
         message = mavlink.MAVLink_command_long_message(*target, number, 0, *filled)
         self.relay.inject(message.pack(mav))
 
+    def set_parameter(self, name: str, value: float) -> None:
+        """Set a parameter of the autopilot's, or of its simulator's."""
+        self.vehicle.parameters.set(name, value)
+
+    @property
+    def px4(self) -> bool:
+        """Whether it is PX4 that flies."""
+        return self.vehicle.connection.autopilot.name == "PX4"
+
+    def tell_outcome(self, what: str) -> None:
+        """Print what docs/mavlink.md tells of the flight: the truth, and what people were told."""
+        witness = self.relay.witness
+        up = math.nan if witness.place is None else witness.place[2]
+        told = self._told()
+        lines = [
+            f"{what}: {self.vehicle.connection.autopilot.name}",
+            f"  states {[state.value for state in self.states]}; modes {witness.modes}",
+            f"  ended {self.status.state.value}: {self.status.reason!r}; {self.status.visited}",
+            f"  truly {witness.away:.1f} m from home, {up:.1f} m up; armed {witness.armed}",
+            f"  {len(self.mission.alerts)} alerts: {told}",
+            f"  its texts: {list(dict.fromkeys(witness.texts))[-8:]}",
+        ]
+        print("", *lines, sep="\n")  # noqa: T201 - the result itself
+
+    def _told(self) -> dict[str, int]:
+        """What people were told, and how often."""
+        return dict(Counter(alert.text for alert in self.mission.alerts))
+
     @property
     def status(self) -> MissionStatus:
         """What the mission says."""
@@ -169,7 +197,7 @@ class SitlFlight:
         states = [state.value for state in self.states]
         modes = [mode.value for mode in self.modes]
         texts = self.vehicle.read().faults if self.vehicle.connected else ()
-        alerts = [alert.text for alert in self.mission.alerts]
+        alerts = self._told()
         return f"{states} {self.status.reason!r} {modes} {alerts} {texts}"
 
     def close(self) -> None:

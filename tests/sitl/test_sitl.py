@@ -6,62 +6,34 @@ not named is skipped. These tests fly by the wall clock and take minutes.
 
 from __future__ import annotations
 
-import os
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
-from sitl_flights import SitlFlight, autopilot, robot_at
+from sitl_autopilot import Autopilot
+from sitl_flights import FAR, FARM, SitlFlight, robot_at, survey
 
 from aerodaas.config import EnvironmentConfig, GeofenceConfig
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.fence import upload_fence
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.errors import VehicleError
-from aerodaas.navigation.commands import AddNavigation, End, OpenStream, Pause, Resume, StreamItem
+from aerodaas.navigation.commands import End, OpenStream, Pause, Resume, StreamItem
 from aerodaas.status import MissionState as S
 from aerodaas.vehicle import VehicleMode, VehicleState
 from aerodaas.waypoints import (
     AeroNavigation,
     NavigationType,
-    SchedulingType,
     VelocityCommand,
-    Waypoint,
 )
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock]
 
-VARIABLES = {"px4": "AERODAAS_SITL_PX4", "ardupilot": "AERODAAS_SITL_ARDUPILOT"}
 HERE = Path(__file__).parent
-
-
-@pytest.fixture(params=sorted(VARIABLES))
-def url(request: pytest.FixtureRequest) -> Iterator[str]:
-    """The URL of each autopilot that is named."""
-    named = os.environ.get(VARIABLES[request.param], "")
-    if not named:
-        pytest.skip(
-            f"{VARIABLES[request.param]} names no autopilot in simulation; set it to a URL such "
-            "as udpin:0.0.0.0:14540, or to `start command => URL`"
-        )
-    with autopilot(named) as address:
-        yield address
-
-
-def survey(*places: tuple[float, float], hover: float = 1.0) -> AddNavigation:
-    """Waypoints three metres up, in any order."""
-    stops = [Waypoint(f"wp{i}", x, y, 3.0, hover) for i, (x, y) in enumerate(places, 1)]
-    kind = NavigationType.DISTANCE_DRIVEN
-    return AddNavigation(AeroNavigation(kind, stops, SchedulingType.UNORDERED))
-
-
-FARM = survey((0, 0), (0, 10), (10, 10), (10, 0), hover=5.0)
-FAR = survey((0, 60))
 
 
 def finish(flight: SitlFlight) -> None:
@@ -70,22 +42,19 @@ def finish(flight: SitlFlight) -> None:
     assert flight.mission.state is S.LANDED, flight.story
 
 
-def test_farm_survey(url: str) -> None:
+def test_farm_survey(autopilot: Autopilot) -> None:
     """Four corners, a hover at each, and back to where it took off."""
-    flight = SitlFlight(url, FARM)
-    try:
+    with SitlFlight(autopilot.url, FARM) as flight:
         finish(flight)
         assert set(flight.status.visited) == {"wp1", "wp2", "wp3", "wp4"}
         assert {S.TAKING_OFF, S.ENROUTE, S.LOITERING} <= set(flight.states)
         home = flight.vehicle.read().odometry.position
         assert float(np.linalg.norm(home[:2])) < 1.5
-    finally:
-        flight.close()
 
 
-def test_sensor_driven_flight(url: str) -> None:
+def test_sensor_driven_flight(autopilot: Autopilot) -> None:
     """Velocities from what odometry says, two seconds each way: it follows, then comes home."""
-    flight = SitlFlight(url, OpenStream("eye/commands"))
+    flight = SitlFlight(autopilot.url, OpenStream("eye/commands"))
     fastest = [0.0]
 
     def steer(state: VehicleState) -> None:
@@ -108,10 +77,9 @@ def test_sensor_driven_flight(url: str) -> None:
         flight.close()
 
 
-def test_pause_and_resume(url: str) -> None:
+def test_pause_and_resume(autopilot: Autopilot) -> None:
     """Paused it stays within a metre; resumed it flies on."""
-    flight = SitlFlight(url, survey((0, 15)))
-    try:
+    with SitlFlight(autopilot.url, survey((0, 15))) as flight:
         flight.run_to(S.ENROUTE)
         flight.run(4.0)
         flight.tell(Pause())
@@ -124,28 +92,22 @@ def test_pause_and_resume(url: str) -> None:
         flight.tell(Resume())
         finish(flight)
         assert flight.status.visited == ("wp1",)
-    finally:
-        flight.close()
 
 
-def test_abort(url: str) -> None:
+def test_abort(autopilot: Autopilot) -> None:
     """Landed on the spot, as told."""
-    flight = SitlFlight(url, FAR)
-    try:
+    with SitlFlight(autopilot.url, FAR) as flight:
         flight.run_to(S.ENROUTE)
         flight.run(6.0)
         flight.tell(End("the user said so"))
         finish(flight)
         assert flight.status.reason == "the user said so"
         assert flight.vehicle.read().odometry.position[1] > 1.0
-    finally:
-        flight.close()
 
 
-def test_fence_breach(url: str) -> None:
+def test_fence_breach(autopilot: Autopilot) -> None:
     """Its own fence, smaller than ours: it goes home by itself, and we keep our hands off."""
-    flight = SitlFlight(url, FAR)
-    try:
+    with SitlFlight(autopilot.url, FAR) as flight:
         connection = flight.vehicle.connection
         small = GeofenceConfig(polygon=[(-8, -8), (8, -8), (8, 8), (-8, 8)], ceiling=50)
         origin = connection.alignment.origin
@@ -154,28 +116,23 @@ def test_fence_breach(url: str) -> None:
         assert VehicleMode.FAILSAFE in flight.modes or VehicleMode.MANUAL in flight.modes
         flight.wait_for_ground(240.0)
         assert float(np.linalg.norm(flight.vehicle.read().odometry.position[:2])) < 12.0
-    finally:
-        flight.close()
 
 
-@pytest.mark.parametrize("duration", [3.0, 30.0])
-def test_link_cut(url: str, duration: float) -> None:
+@pytest.mark.parametrize("duration", [3.0, 8.0, 30.0])
+def test_link_cut(autopilot: Autopilot, duration: float) -> None:
     """It holds, lands or returns; the mission says that nothing was heard, and how it ended."""
-    flight = SitlFlight(url, FAR)
-    try:
+    with SitlFlight(autopilot.url, FAR) as flight:
         flight.run_to(S.ENROUTE)
         flight.run(6.0)
-        flight.relay.cut = True
+        flight.relay.cut()
         flight.run(duration)
         assert VehicleMode.LOST in flight.modes, flight.story
-        flight.relay.cut = False
+        flight.relay.cut(off=False)
         flight.run(180.0, lambda: flight.mission.finished)
         ended = {S.LANDED, S.ABORTED}
         assert flight.mission.state in ended, flight.story
         print(f"\nlink cut for {duration:g} s: {flight.story}")  # noqa: T201 - the result itself
         flight.wait_for_ground(240.0)
-    finally:
-        flight.close()
 
 
 def kill_in_flight(url: str, *settings: str) -> None:
@@ -190,10 +147,10 @@ def kill_in_flight(url: str, *settings: str) -> None:
     time.sleep(8.0)
 
 
-def test_killed_as_its_ground_station(url: str) -> None:
+def test_killed_as_its_ground_station(autopilot: Autopilot) -> None:
     """With its failsafes set by us, nobody needs to come: it goes home, or lands, by itself."""
-    kill_in_flight(url, "role=ground_station", "failsafes=set")
-    robot = robot_at(url)
+    kill_in_flight(autopilot.url, "role=ground_station", "failsafes=set")
+    robot = robot_at(autopilot.url)
     vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
     vehicle.connect(30.0)
     try:
@@ -211,10 +168,10 @@ def test_killed_as_its_ground_station(url: str) -> None:
         vehicle.close()
 
 
-def test_process_killed(url: str) -> None:
+def test_process_killed(autopilot: Autopilot) -> None:
     """Killed in flight, nobody takes off again; the vehicle lands, returns, or holds for us."""
-    kill_in_flight(url)
-    robot = robot_at(url)
+    kill_in_flight(autopilot.url)
+    robot = robot_at(autopilot.url)
     vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
     vehicle.connect(30.0)
     try:
@@ -234,10 +191,9 @@ def test_process_killed(url: str) -> None:
         vehicle.close()
 
 
-def test_a_ground_station_takes_over(url: str) -> None:
+def test_a_ground_station_takes_over(autopilot: Autopilot) -> None:
     """Hold asked for by somebody else: the mission ends, no setpoint is sent any more."""
-    flight = SitlFlight(url, FAR)
-    try:
+    with SitlFlight(autopilot.url, FAR) as flight:
         flight.run_to(S.ENROUTE)
         flight.run(5.0)
         px4 = flight.vehicle.connection.autopilot.name == "PX4"
@@ -252,5 +208,3 @@ def test_a_ground_station_takes_over(url: str) -> None:
         land = (1.0, 4.0, 6.0) if px4 else (1.0, 9.0)
         flight.command_as_station(mavlink.MAV_CMD_DO_SET_MODE, *land)
         flight.wait_for_ground()
-    finally:
-        flight.close()
