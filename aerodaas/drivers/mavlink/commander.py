@@ -115,10 +115,11 @@ class Commander:
         with self._lock:
             self._pending.pop(number, None)
 
-    def waits_for(self, number: int) -> bool:
-        """Whether an order of this `number` is still to be answered."""
+    def under_way(self, number: int) -> Order | None:
+        """The order of this `number` that is still to be answered; None if there is none."""
         with self._lock:
-            return number in self._pending
+            pending = self._pending.get(number)
+            return None if pending is None else pending.order
 
     def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Take a COMMAND_ACK."""

@@ -24,11 +24,11 @@ from aerodaas.drivers.mavlink.telemetry import Telemetry
 from aerodaas.errors import VehicleError
 from aerodaas.geometry import GeodeticOrigin, Vector, ned_to_enu
 
-__all__ = ["Connection", "establish"]
+__all__ = ["CHECKS", "Connection", "establish"]
 
 _log = logging.getLogger(__name__)
 
-_CHECKS = 4.0
+CHECKS = 4.0
 """Seconds between requests to run the arming checks and say what they find."""
 _WORDS = 40.0
 """Seconds that the autopilot's words may be old to explain why it is not ready."""
@@ -103,7 +103,7 @@ def _await_ready(
                 f"{name}: {autopilot.name} has not told its position within "
                 f"{settings.ready_timeout:g} s{words}"
             )
-        if now - checked_at > _CHECKS:
+        if now - checked_at > CHECKS:
             checked_at = now
             commander.give(autopilot.check(), now=now)
         pause()

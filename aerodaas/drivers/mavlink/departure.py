@@ -12,6 +12,8 @@ from aerodaas.drivers.mavlink.telemetry import Telemetry
 from aerodaas.drivers.mavlink.withdrawal import Withdrawal
 
 __all__ = ["Departure"]
+_TAKING_OFF = frozenset({FlightMode.TAKE_OFF, FlightMode.HOLD, FlightMode.GUIDED})
+"""Modes that a vehicle may show while a take-off is taken back."""
 
 
 class Departure:
@@ -24,6 +26,7 @@ class Departure:
         phase: FlightPhase,
         *,
         disarm: Order,
+        hold: Order,
         flies: Callable[[], bool],
         words: Callable[[], list[str]],
         land: Callable[[], None],
@@ -38,6 +41,7 @@ class Departure:
         self._telemetry = telemetry
         self._phase = phase
         self._disarm = disarm
+        self._hold = hold
         self._flies = flies
         self._words = words
         self._land = land
@@ -82,10 +86,17 @@ class Departure:
             return
         climb.cancel()
         if climb.may_start:
-            self._phase.ask(FlightMode.LAND, now)
-            self._withdrawal = Withdrawal(
-                self._commander, self._disarm, self._land, now, flies=self._flies()
-            )
+            self.withdraw(now)
+
+    def withdraw(self, now: float) -> None:
+        """Stop motors that turn, or may yet start, on the ground; land what flies after all."""
+        self._phase.ask(FlightMode.LAND, now, meanwhile=_TAKING_OFF)
+        if not self._flies():
+            # In the mode of a take-off, an order to arm that comes late would have it fly.
+            self._commander.give(self._hold, now=now)
+        self._withdrawal = Withdrawal(
+            self._commander, self._disarm, self._land, now, flies=self._flies()
+        )
 
     def restart(self) -> None:
         """The autopilot has started anew."""

@@ -101,6 +101,11 @@ class Health:
             told.insert(0, "GPS: it has fallen silent")
         return list(dict.fromkeys(told))
 
+    def lost(self, now: float) -> bool:
+        """Whether the estimator itself says that it does not know where it is."""
+        complaint = self._complaints.get("lost")
+        return complaint is not None and now - complaint.since >= _STANDS
+
     @property
     def sure_of_position(self) -> bool:
         """Whether the estimator and the GPS have no complaint about where it is."""

@@ -72,11 +72,13 @@ class FlightPhase:
             return VehicleMode.GROUNDED
         return self.taken or _SHOWN[self.shown]
 
-    def ask(self, wish: FlightMode, now: float) -> None:
-        """Take note that the vehicle is being asked for a mode."""
+    def ask(
+        self, wish: FlightMode, now: float, meanwhile: frozenset[FlightMode] = frozenset()
+    ) -> None:
+        """Take note that the vehicle is being asked for a mode; it may show others `meanwhile`."""
         if wish is not self.wish:
             follows = _FOLLOWS[self.wish] if self.wish is not None else frozenset()
-            self._before, self.seen = follows | {self.shown}, False
+            self._before, self.seen = follows | {self.shown} | meanwhile, False
         self.wish, self._asked_at = wish, now
 
     def rest(self) -> None:

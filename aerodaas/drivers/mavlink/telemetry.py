@@ -113,13 +113,18 @@ class Telemetry:
         return now - min(self.heard_at, self.ticked_at)
 
     def knows_place(self, now: float) -> bool:
-        """Tell whether it has said lately where it is and how it stands."""
-        return now - self.position_at < _FRESH and now - self.attitude_at < _FRESH
+        """Tell whether it has said lately where it is and how it stands, and believes it itself."""
+        fresh = now - self.position_at < _FRESH and now - self.attitude_at < _FRESH
+        return fresh and not self.health.lost(now)
 
     def _heartbeat(self, message: Any, now: float) -> None:  # noqa: ANN401
         self.beat_at = now
         self.custom_mode = message.custom_mode
-        self.armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        # Terminated, it calls itself armed for ever, and no motor turns.
+        self.armed = (
+            bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+            and message.system_status != mavlink.MAV_STATE_FLIGHT_TERMINATION
+        )
         self.critical = message.system_status in {
             mavlink.MAV_STATE_CRITICAL,
             mavlink.MAV_STATE_EMERGENCY,

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+from aerodaas.drivers.mavlink.phase import FlightMode
+
 __all__ = ["Touchdown"]
 
 _LIFTED = 0.5
@@ -18,10 +20,18 @@ _MOVING = 1.0
 """m/s in all, below which it may stand: an estimate drifts on the ground."""
 _STILL = 0.5
 """Seconds of that in a row for it to stand."""
+_NEAR = 1.0
+"""Metres above the place of arming at which a return may have ended."""
 _FRESH = 1.0
 """Seconds for which a position says something of the present."""
+_SAID = 1.8
+"""Seconds of its own word for it to stand though its estimate moves: who is stopped in the air says
+so too, but is heard to be disarmed within a second."""
+_FALLS = 2.0
+"""m/s downwards at which it does not stand, whatever it says."""
 _FALLEN = 10.0
 """Seconds after which whatever fell lies."""
+_LANDINGS = frozenset({FlightMode.LAND, FlightMode.RETURN})
 
 
 class Touchdown:
@@ -35,50 +45,74 @@ class Touchdown:
         self.flew = False
         """Whether it has left the ground since motors started."""
         self._armed: bool | None = None
-        self._landing = False
+        self._mode = FlightMode.OTHER
         self._on_ground: bool | None = None
+        self._on_ground_since = math.inf
         self._up = math.nan
         self._ground = math.nan
         self._still_since = math.inf
         self._moved_at = -math.inf
+        self._rise = 0.0
         self._stopped_at = -math.inf
+        self._blind = False
+        """The positions that come are of another life of the autopilot."""
 
     def move(self, up: float, rise: float, speed: float, now: float) -> None:
         """Take note of a position: `up` metres, rising at `rise`, moving at `speed` in all."""
         stands = abs(rise) < _SINKING and speed < _MOVING
         self._still_since = min(self._still_since, now) if stands else math.inf
-        self._up, self._moved_at = up, now
+        self._up, self._rise, self._moved_at = up, rise, now
         self.flew |= self._armed is True and up - self._ground > _LIFTED
 
-    def report(self, *, on_ground: bool | None) -> None:
+    def report(self, now: float, *, on_ground: bool | None) -> None:
         """Take note of the autopilot's own word about where it is; None: it does not say."""
         self._on_ground = on_ground
+        self._on_ground_since = min(self._on_ground_since, now) if on_ground else math.inf
         self.flew |= self._armed is True and on_ground is False
 
-    def observe(self, now: float, *, armed: bool, landing: bool) -> None:
-        """Take note of a HEARTBEAT; `landing`: its mode is one that ends on the ground."""
+    def observe(self, mode: FlightMode, now: float, *, armed: bool) -> None:
+        """Take note of a HEARTBEAT."""
         if armed:
             if not self._armed:
                 # Found armed, it is taken to fly: nobody saw it stand.
                 self.flew = self._armed is None and self._on_ground is not True
                 self._ground = self._up
-                self.fault, self.falling = "", False
-            self._landing, self._stopped_at = landing, now
+                self.fault, self.falling, self._blind = "", False, False
+            self._mode, self._stopped_at = mode, now
         elif self._armed and self.flew and not self._stands(now):
-            self.falling = True
-            height = self._up - self._ground
-            where = f", {height:.0f} m above where they started" if math.isfinite(height) else ""
-            self.fault = f"motors: stopped in flight{where}"
+            self._fall()
         self._armed = armed
+
+    def restart(self, now: float) -> None:
+        """The autopilot starts anew: no motor turns meanwhile."""
+        if self._armed and self.flew:
+            self._fall()
+            self._stopped_at = now
+        self._armed, self._blind = False, True
+
+    def _fall(self) -> None:
+        self.falling = True
+        self._still_since = math.inf
+        height = self._up - self._ground
+        where = f", {height:.0f} m above where they started" if math.isfinite(height) else ""
+        self.fault = f"motors: stopped in flight{where}"
 
     def turn(self, now: float) -> None:
         """See whether it has come to lie."""
         lies = now - self._moved_at < _FRESH and now - self._still_since > 2 * _STILL
-        if lies or now - self._stopped_at > _FALLEN:
+        if (lies and not self._blind) or now - self._stopped_at > _FALLEN:
             self.falling = False
 
     def _stands(self, now: float) -> bool:
+        """Whether it stood on the ground in the mode that it had when its motors stopped."""
         if now - self._moved_at > _FRESH:
-            return self._landing and self._on_ground is not False
-        still = now - self._still_since >= _STILL
-        return still and (self._landing or self._on_ground is True)
+            return self._mode in _LANDINGS and self._on_ground is not False
+        said = now - self._on_ground_since
+        if now - self._still_since < _STILL:
+            return said >= _SAID and self._rise > -_FALLS
+        if self._mode is FlightMode.LAND:
+            return True
+        if self._mode is FlightMode.RETURN and self._up - self._ground < _NEAR:
+            return True
+        # The word of one that has just been stopped in the air is this, too, and soon it falls.
+        return said >= _STILL

@@ -15,7 +15,7 @@ from aerodaas.clock import NANOSECONDS, Clock, ScaledClock
 from aerodaas.config import EnvironmentConfig, RobotConfig
 from aerodaas.data import Odometry
 from aerodaas.drivers.mavlink.commander import Commander, Outcome
-from aerodaas.drivers.mavlink.connecting import Connection, establish
+from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish
 from aerodaas.drivers.mavlink.departure import Departure
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.finder import Finder, Found
@@ -136,6 +136,7 @@ class MavlinkVehicle:
                     self._telemetry,
                     self._phase,
                     disarm=found.autopilot.disarm(),
+                    hold=found.autopilot.ask_mode(FlightMode.HOLD),
                     flies=lambda: self._touchdown.flew,
                     words=self._reasons,
                     land=lambda: self._change(FlightMode.LAND),
@@ -285,7 +286,11 @@ class MavlinkVehicle:
                 reasons.append("a take-off that was called off is not over yet")
             if not self._knows_place(now):
                 reasons.append("the autopilot does not know its position")
-            return reasons + self._connection.autopilot.objections(self._telemetry, now)
+            said = self._connection.autopilot.objections(self._telemetry, now)
+            if said and now - self._checked_at > CHECKS:
+                self._checked_at = now
+                self._connection.commander.give(self._connection.autopilot.check(), now=now)
+            return reasons + said
 
     def take_off(self, height: float) -> None:
         """Arm and climb to `height` metres above here; returns at once.
@@ -380,12 +385,17 @@ class MavlinkVehicle:
                 connection.departure.call_off(time.monotonic())
             elif self._phase.armed and not connection.departure.withdrawing:
                 self._require_flight("land", climbing=True, landing=True)
-                self._change(FlightMode.LAND)
+                if self._touchdown.flew:
+                    self._change(FlightMode.LAND)
+                else:
+                    # A landing mode stops no motors that have never lifted it.
+                    connection.departure.withdraw(time.monotonic())
 
     def _change(self, wish: FlightMode) -> None:
         connection, phase = self._connected(), self._phase
-        waits = connection.commander.waits_for(mavlink.MAV_CMD_DO_SET_MODE)
-        if phase.wish is wish and (waits or phase.shown is wish):
+        under_way = connection.commander.under_way(mavlink.MAV_CMD_DO_SET_MODE)
+        asked = under_way is not None and under_way.mode is wish
+        if phase.wish is wish and (asked or phase.shown is wish):
             return
         if connection.departure.climbs and wish is not FlightMode.GUIDED:
             connection.departure.let_go()
@@ -454,7 +464,8 @@ class MavlinkVehicle:
 
     def _restarted(self) -> None:
         """The autopilot has started anew; its first words may already be known."""
-        flew = self._phase.armed or bool(self._touchdown.fault)
+        self._touchdown.restart(self._telemetry.heard_at)
+        flew = self._touchdown.falling or bool(self._touchdown.fault)
         self._restarted_text = f"autopilot: it started anew{' in flight' if flew else ''}"
         if self._connection is not None:
             self._connection.alignment.restart(stands=not flew)
@@ -471,17 +482,15 @@ class MavlinkVehicle:
         elif kind == "GLOBAL_POSITION_INT" and connection is not None:
             connection.alignment.place(now, sure=telemetry.health.sure_of_position)
         elif kind == "EXTENDED_SYS_STATE":
-            self._touchdown.report(on_ground=telemetry.on_ground)
+            self._touchdown.report(now, on_ground=telemetry.on_ground)
 
     def _observe(self, now: float) -> None:
         found, telemetry, phase = self._finder.found, self._telemetry, self._phase
         assert found is not None  # noqa: S101 - it speaks
         shown = found.autopilot.mode(telemetry.custom_mode)
         was_armed = phase.armed
-        before = phase.shown if was_armed else shown
         phase.observe(shown, now, armed=telemetry.armed, critical=telemetry.critical)
-        landing = before in {FlightMode.LAND, FlightMode.RETURN}
-        self._touchdown.observe(now, armed=telemetry.armed, landing=landing)
+        self._touchdown.observe(shown, now, armed=telemetry.armed)
         if telemetry.armed and not was_armed:
             self._restarted_text = ""
         if self._departure is not None:

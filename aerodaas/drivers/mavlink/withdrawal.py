@@ -50,7 +50,7 @@ class Withdrawal:
 
     def observe(self, now: float, *, armed: bool) -> None:
         """Take note of a HEARTBEAT."""
-        waits = self._commander.waits_for(self._disarm.number)
+        waits = self._commander.under_way(self._disarm.number) is not None
         if armed:
             self._last_word, self._calm = now, 0
             if not waits:

@@ -58,6 +58,10 @@ class EmulatedArduPilot(Firmware):
         """Guided."""
         return self._mode == _GUIDED
 
+    def forget_mode(self) -> None:
+        """Stabilize."""
+        self._mode = _STABILIZE
+
     def hear_heartbeat(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
         """Somebody else's HEARTBEAT."""
         if message.get_srcSystem() == int(self.parameters.values["SYSID_MYGCS"]):

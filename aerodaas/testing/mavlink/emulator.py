@@ -10,6 +10,7 @@ from typing import Any
 
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.signing import sign_with
+from aerodaas.geometry import Vector
 from aerodaas.simulation.dynamics import STEP
 from aerodaas.testing.channel import Channel, Impairment
 from aerodaas.testing.emulated import LONGEST_LEAP, EmulatedVehicle
@@ -78,6 +79,32 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
         """Let its own protection take it home."""
         with self._lock:
             self.firmware.enter_return()
+
+    def stop_motors(self) -> None:
+        """Use the kill switch."""
+        with self._lock:
+            self.firmware.stop_motors()
+
+    def restart(self) -> None:
+        """Have the autopilot start anew, in flight or not."""
+        with self._lock:
+            self.firmware.restart()
+            self._due.clear()
+
+    def freeze(self, *, off: bool = False) -> None:
+        """Let the stamps of its telemetry stand still while packets go on, or let them run."""
+        with self._lock:
+            self.firmware.frozen_at = None if off else int(self.firmware.now * 1e3)
+
+    def lose_gps(self, *, off: bool = False) -> None:
+        """Let its GPS have no fix, or have one again."""
+        with self._lock:
+            self.firmware.gps_fix = off
+
+    def shift_frame(self, by: Vector) -> None:
+        """Let its local position jump by `by` (NED metres), while it flies on."""
+        with self._lock:
+            self._flight.shift_frame(by)
 
     def spoil(self, *, up: Impairment | None = None, down: Impairment | None = None) -> None:
         """Change how bad the link is from now on, for each way that is given."""

@@ -24,7 +24,7 @@ Result: TypeAlias = Any
 
 _OK = mavlink.MAV_RESULT_ACCEPTED
 _IGNORE_PLACE, _IGNORE_VELOCITY, _IGNORE_YAW, _IGNORE_RATE = 0b111, 0b111000, 1 << 10, 1 << 11
-_SENSORS = mavlink.MAV_SYS_STATUS_PREARM_CHECK | mavlink.MAV_SYS_STATUS_SENSOR_GPS
+_CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
 
 class Firmware(ABC):
@@ -35,6 +35,8 @@ class Firmware(ABC):
     idle_disarm: ClassVar[float] = 10.0
     """Seconds armed on the ground after which it disarms."""
     default_rates: ClassVar[dict[int, float]]
+    lists_check: ClassVar[bool] = True
+    """Whether SYS_STATUS lists the arming checks as present, beside telling whether they pass."""
 
     def __init__(
         self,
@@ -56,6 +58,9 @@ class Firmware(ABC):
         self.home = enu_to_ned(np.array(options.start) - np.array(options.estimator_origin))
         self.motions: list[str] = []
         """Every deed that moved it, in order: the tests' witness."""
+        self.frozen_at: int | None = None
+        """Milliseconds at which the stamps of its telemetry stand still; None: they do not."""
+        self.gps_fix = True
         self._say = say
         self._armed_at = 0.0
         self._setpoint_at = -math.inf
@@ -151,6 +156,24 @@ class Firmware(ABC):
         self.armed = self.failsafe = False
         return _OK
 
+    def stop_motors(self) -> None:
+        """Stop its motors wherever it is: a kill switch, a forced disarm."""
+        self.armed = self.failsafe = self._lifted = False
+        self.flight.drop()
+
+    def restart(self) -> None:
+        """Start anew, as after a loss of power: motors, clock, rates and local frame."""
+        self.stop_motors()
+        self.now, self._setpoint_at = 0.0, -math.inf
+        self.rates = dict(self.default_rates)
+        self.flight.begin_frame_here()
+        self.home = self.flight.ned
+        self.forget_mode()
+
+    @abstractmethod
+    def forget_mode(self) -> None:
+        """The mode after its start."""
+
     def lift(self, height: float) -> None:
         """Take off."""
         self._lifted = True
@@ -242,7 +265,7 @@ class Firmware(ABC):
 
     @property
     def _boot(self) -> int:
-        return int(self.now * 1e3)
+        return int(self.now * 1e3) if self.frozen_at is None else self.frozen_at
 
     def _local_position(self) -> Any:  # noqa: ANN401
         velocity = enu_to_ned(self.flight.believed.velocity)
@@ -270,17 +293,23 @@ class Firmware(ABC):
     def _gps(self) -> Any:  # noqa: ANN401
         latitude, longitude, _ = self.flight.origin.to_geodetic(self.flight.believed.position)
         place = (round(latitude * 1e7), round(longitude * 1e7), round(self.flight.altitude * 1e3))
-        fix = mavlink.GPS_FIX_TYPE_3D_FIX if self.ready else mavlink.GPS_FIX_TYPE_NO_FIX
+        fix = (
+            mavlink.GPS_FIX_TYPE_3D_FIX
+            if self.ready and self.gps_fix
+            else mavlink.GPS_FIX_TYPE_NO_FIX
+        )
         return mavlink.MAVLink_gps_raw_int_message(
             int(self.now * 1e6), fix, *place, 80, 80, 0, 0, 12, place[2] + 47_000, 800, 1200
         )
 
     def _status(self) -> Any:  # noqa: ANN401
-        healthy = _SENSORS if self.ready else 0
+        gps = mavlink.MAV_SYS_STATUS_SENSOR_GPS
+        there = gps | (_CHECK if self.lists_check else 0)
+        healthy = (gps if self.ready and self.gps_fix else 0) | (_CHECK if self.may_arm() else 0)
         left = round(100 * self.flight.charge)
         volts = round(1e3 * self.flight.voltage)
         return mavlink.MAVLink_sys_status_message(
-            _SENSORS, _SENSORS, healthy, 100, volts, 500, left, 0, 0, 0, 0, 0, 0
+            there, there, healthy, 100, volts, 500, left, 0, 0, 0, 0, 0, 0
         )
 
     def _landed(self) -> Any:  # noqa: ANN401

@@ -15,6 +15,7 @@ from aerodaas.simulation.noise import SensorNoise
 from aerodaas.simulation.wind import Wind
 from aerodaas.testing.emulated import EmulatedFlight
 from aerodaas.testing.mavlink.options import AutopilotOptions
+from aerodaas.vehicle import VehicleMode
 
 __all__ = ["GuidedTarget", "MavFlight"]
 
@@ -114,6 +115,20 @@ class MavFlight(EmulatedFlight):
         self.target = None
         if self.flying:
             self._autopilot.land()
+
+    def drop(self) -> None:
+        """Stop its motors wherever it is."""
+        self.target = None
+        self._autopilot.armed = False
+        self._autopilot.mode = VehicleMode.GROUNDED
+
+    def begin_frame_here(self) -> None:
+        """Begin the local frame anew where it is."""
+        self._shift = self.believed.position
+
+    def shift_frame(self, by: Vector) -> None:
+        """Believe from now on to be elsewhere in the local frame, by NED metres."""
+        self._shift = self._shift - enu_to_ned(by)
 
     def advance(self, duration: float) -> None:
         """Fly on for `duration` seconds, in whole steps of the simulator."""

@@ -30,6 +30,7 @@ class EmulatedPX4(Firmware):
 
     number: ClassVar[int] = mavlink.MAV_AUTOPILOT_PX4
     arming_refused: ClassVar[int] = _LATER
+    lists_check: ClassVar[bool] = False
     default_rates: ClassVar[dict[int, float]] = {
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
         mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
@@ -65,6 +66,10 @@ class EmulatedPX4(Firmware):
     def guided(self) -> bool:
         """Offboard."""
         return self._main == _OFFBOARD
+
+    def forget_mode(self) -> None:
+        """Hold."""
+        self._main, self._sub = _AUTO, _HOLD
 
     def may_arm(self) -> bool:
         """Not in offboard without setpoints, though that mode itself was accepted."""

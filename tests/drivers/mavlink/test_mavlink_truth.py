@@ -1,0 +1,156 @@
+"""What the driver says is so: motors that stopped, restarts, jumps, packets that say nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from stepped import Stepped
+
+from aerodaas.errors import VehicleError
+from aerodaas.testing.mavlink import AutopilotOptions
+from aerodaas.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
+
+THERE = np.array([6.0, 3.0, 12.0])
+
+
+@pytest.fixture(params=["px4", "ardupilot"])
+def world(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[Stepped]:
+    """One of each family, 12 m up, guided to a place off home; it does not begin at zero."""
+    options = AutopilotOptions(family=request.param, estimator_origin=(20.0, -9.0, 3.0))
+    with Stepped(monkeypatch, options) as flown:
+        flown.guide(12.0)
+        fly(flown, THERE, 8.0)
+        yield flown
+
+
+def fly(world: Stepped, place: np.ndarray, duration: float) -> VehicleState:
+    """Stream a place for `duration` seconds."""
+    for _ in range(round(duration / 0.05)):
+        world.vehicle.send(PositionSetpoint(place, None, 3.0))
+        state = world.turn()
+    return state
+
+
+def told(state: VehicleState, words: str) -> bool:
+    """Whether one of the faults says so."""
+    return any(words in fault for fault in state.faults)
+
+
+def test_motors_stopped_in_the_air_are_no_landing(world: Stepped) -> None:
+    """Disarmed at once, grounded only when it lies, and said by name until motors start again."""
+    world.autopilot.stop_motors()
+    state = world.turn()
+    while state.armed:
+        state = world.turn()
+    assert state.mode is VehicleMode.FAILSAFE
+    assert told(state, "motors: stopped in flight")
+    with pytest.raises(VehicleError, match="own protection"):
+        world.vehicle.send(VelocitySetpoint(np.zeros(3)))
+    state = world.until(VehicleMode.GROUNDED)
+    assert float(world.autopilot.truth.position[2]) < 0.1
+    assert not state.armed
+    assert told(world.watch(20.0)[-1], "motors: stopped in flight")
+    world.vehicle.preflight()
+    world.watch(1.0)
+    world.vehicle.take_off(2.0)
+    assert not told(world.until(VehicleMode.HOLDING, VehicleMode.GUIDED), "motors")
+
+
+def test_motors_stopped_during_a_landing_are_no_landing_either(world: Stepped) -> None:
+    """Sinking in its landing mode, it has not landed yet."""
+    world.vehicle.land()
+    world.until(VehicleMode.LANDING)
+    world.watch(2.0)
+    height = float(world.autopilot.truth.position[2])
+    assert height > 4.0
+    world.autopilot.stop_motors()
+    state = world.turn()
+    while state.armed:
+        state = world.turn()
+    assert state.mode is not VehicleMode.GROUNDED or world.autopilot.truth.position[2] < 0.1
+    assert told(state, "motors: stopped in flight")
+
+
+def test_a_landing_is_one(world: Stepped) -> None:
+    """Down by its own mode: grounded in the very moment it is disarmed, without a fault."""
+    world.vehicle.land()
+    state = world.turn()
+    while state.armed:
+        state = world.turn()
+    assert state.mode is VehicleMode.GROUNDED
+    assert state.faults == ()
+
+
+def test_an_autopilot_that_starts_anew_in_flight(world: Stepped) -> None:
+    """Told, disarmed, and its new frame is laid over the earth before a position is believed."""
+    world.autopilot.restart()
+    states = world.watch(12.0)
+    assert not states[-1].armed
+    assert all(state.armed or state.mode is not VehicleMode.RETURNING for state in states)
+    assert told(states[-1], "autopilot: it started anew in flight")
+    lying = world.autopilot.truth.position
+    for state in states[20:]:
+        position = state.odometry.position
+        assert not np.isfinite(position).all() or np.allclose(position, lying, atol=1.0)
+    assert states[-1].odometry.position == pytest.approx(lying, abs=1.0)
+    assert states[-1].mode is VehicleMode.GROUNDED
+
+
+@pytest.mark.parametrize("family", ["px4", "ardupilot"])
+def test_an_autopilot_that_starts_anew_on_the_ground(
+    monkeypatch: pytest.MonkeyPatch, family: str
+) -> None:
+    """It stands where it stood, whatever its new frame says, and flies from there."""
+    options = AutopilotOptions(family=family, estimator_origin=(20.0, -9.0, 3.0))  # type: ignore[arg-type]
+    with Stepped(monkeypatch, options) as world:
+        world.watch(8.0)
+        world.autopilot.restart()
+        state = world.watch(15.0)[-1]
+        assert told(state, "autopilot: it started anew")
+        assert not told(state, "in flight")
+        assert state.odometry.position == pytest.approx([0.0, 0.0, 0.0], abs=0.1)
+        assert world.vehicle.preflight() == []
+        assert world.guide(2.0).odometry.height == pytest.approx(2.0, abs=0.3)
+
+
+def test_a_local_frame_that_jumps(world: Stepped) -> None:
+    """Not believed until global positions show where the frame lies now; nothing chases it."""
+    world.autopilot.shift_frame(np.array([30.0, -40.0, 0.0]))
+    state = world.turn()
+    while np.isfinite(state.odometry.position).all():
+        assert np.allclose(state.odometry.position, THERE, atol=1.0)
+        state = world.turn()
+    assert told(state, "position: jumped by 50 m")
+    sent = world.vehicle.send(PositionSetpoint(np.array([50.0, 0.0, 12.0])))
+    assert isinstance(sent, VelocitySetpoint)
+    assert float(np.linalg.norm(sent.velocity)) == 0.0
+    while not np.isfinite(state.odometry.position).all():
+        world.vehicle.send(VelocitySetpoint(np.zeros(3)))
+        state = world.turn()
+    assert state.odometry.position == pytest.approx(world.autopilot.truth.position, abs=0.5)
+    state = fly(world, THERE, 12.0)
+    assert world.autopilot.truth.position == pytest.approx(THERE, abs=0.5)
+    assert not told(state, "position")
+
+
+def test_telemetry_that_stands_still_is_a_loss(world: Stepped) -> None:
+    """Packets that come with old stamps say nothing: lost within two seconds, and its age shows."""
+    world.autopilot.freeze()
+    for _ in range(40):
+        state = world.turn()
+    assert state.mode is VehicleMode.LOST
+    assert told(state, "telemetry: packets come, and say nothing new")
+    world.autopilot.freeze(off=True)
+    assert world.turn().mode is not VehicleMode.LOST
+
+
+def test_a_gps_that_is_lost_is_told_by_its_name(world: Stepped) -> None:
+    """Within seconds, and no more when it is back."""
+    world.autopilot.lose_gps()
+    state = fly(world, THERE, 3.0)
+    assert told(state, "GPS: no fix")
+    assert told(state, "GPS: unhealthy")
+    world.autopilot.lose_gps(off=True)
+    assert fly(world, THERE, 3.0).faults == ()
