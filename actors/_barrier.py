@@ -31,7 +31,7 @@ class Barrier:
 
     def __init__(self, windows: dict[str, int]) -> None:
         """Let `windows[source]` measurements of each source be under way while time goes on."""
-        self._windows = windows
+        self.windows = windows
         self._missing: dict[str, dict[int, int]] = defaultdict(dict)
 
     def expect(self, source: str, stamp: int, acknowledgements: int) -> None:
@@ -46,7 +46,7 @@ class Barrier:
 
         Sources without a window are nobody's to wait for.
         """
-        if source in self._windows:
+        if source in self.windows:
             self.expect(source, stamp, -1)
 
     def forget(self) -> None:
@@ -56,7 +56,7 @@ class Barrier:
     def clear(self, *, drain: bool = False) -> bool:
         """Tell whether time may go on; with `drain`, whether nothing at all is under way."""
         return all(
-            len(missing) <= (0 if drain else self._windows[source])
+            len(missing) <= (0 if drain else self.windows[source])
             for source, missing in self._missing.items()
         )
 
@@ -65,5 +65,5 @@ class Barrier:
         return sorted(
             source
             for source, missing in self._missing.items()
-            if len(missing) > self._windows[source]
+            if len(missing) > self.windows[source]
         )

@@ -23,7 +23,7 @@ from aerodaas.actors.session import Session
 from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteReader
 from aerodaas.clock import LockstepClock, host_time_ns
 from aerodaas.data import Alert, Header
-from aerodaas.errors import AeroDaaSError
+from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.vitals import Vitals, read_vitals
 
 __all__ = [
@@ -36,6 +36,8 @@ __all__ = [
 ]
 
 _ALERTS_KEPT = 50
+_LISTENING = 5.0
+"""Wall seconds that an actor's own thread may take to turn to further streams."""
 Phase = Literal["new", "ready", "running", "done", "failed"]
 
 
@@ -131,14 +133,27 @@ class StreamActor:
         self.alerts = self.outlet(alert_stream(self.name))
         self._open()
         self._phase = "ready"
+        return self.info()
+
+    def info(self) -> ActorInfo:
+        """Where the actor lives, and what it reads and publishes by now."""
         return ActorInfo(
             ray.get_runtime_context().get_node_id(),
             os.getpid(),
-            self.inbox.shared,
+            self.inbox is not None and self.inbox.shared,
             tuple(self.outlets),
             tuple(self.reads()),
             host_time_ns(),
         )
+
+    def listen(self, depths: dict[str, int]) -> ActorInfo:
+        """Read further streams from now on, with these depths; returns once it does."""
+        if self.inbox is not None:
+            subscribed = self.inbox.add(depths)
+            self._reads.update(depths)
+            if not subscribed.wait(_LISTENING) and not self.stopping:
+                raise MissionError(f"{self.name} is busy and listens to nothing new")
+        return self.info()
 
     def connect(self, readers: dict[str, list[Any]]) -> None:
         """Learn which actors on other nodes read this actor's streams."""
@@ -241,7 +256,7 @@ class StreamActor:
             return {}
         return {
             stream: StreamCount(received, self.inbox.dropped[stream])
-            for stream, received in self.inbox.received.items()
+            for stream, received in list(self.inbox.received.items())
         }
 
     def sent(self) -> dict[str, SentCount]:

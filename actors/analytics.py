@@ -84,6 +84,7 @@ class AnalyticsActor(StreamActor):
         """Belong to `session` as `name`."""
         super().__init__(session, name, {})
         self._workers: list[_Worker] = []
+        self._threads: list[threading.Thread] = []
 
     def prepare(self, *nodes: NodeSpec) -> ActorInfo:
         """Open the analyses `nodes`; raises what their `open` raises."""
@@ -91,23 +92,48 @@ class AnalyticsActor(StreamActor):
         self._workers = [_Worker(self, node) for node in nodes]
         return super().prepare()
 
+    def join(self, *nodes: NodeSpec) -> ActorInfo:
+        """Run further analyses in flight; raises what their `open` raises, and runs none then."""
+        fresh = [_Worker(self, node) for node in nodes]
+        before = set(self.outlets)
+        try:
+            for worker in fresh:
+                worker.open()
+        except BaseException:
+            for worker in fresh:
+                worker.close()
+            for stream in set(self.outlets) - before:
+                self.outlets.pop(stream).close()
+            raise
+        self._workers += fresh
+        for worker in fresh:
+            self._begin(worker)
+        return self.info()
+
+    def acknowledge(self, streams: dict[str, bool]) -> None:
+        """In lockstep, whether the analyses of these streams are the last of their path by now."""
+        for worker in self._workers:
+            if worker.node.stream in streams:
+                worker.acknowledge(wanted=streams[worker.node.stream])
+
     def _open(self) -> None:
         for worker in self._workers:
             worker.open()
 
+    def _begin(self, worker: _Worker) -> None:
+        thread = threading.Thread(target=worker.run, name=worker.node.stream, daemon=True)
+        self._threads.append(thread)
+        thread.start()
+
     def _run(self) -> None:
-        threads = [
-            threading.Thread(target=worker.run, name=worker.node.stream, daemon=True)
-            for worker in self._workers
-        ]
-        for thread in threads:
-            thread.start()
+        for worker in self._workers:
+            self._begin(worker)
         given_up = math.inf
-        while any(thread.is_alive() for thread in threads) and time.monotonic() < given_up:
+        while any(one.is_alive() for one in self._threads) and time.monotonic() < given_up:
             if self.stopping:
                 given_up = min(given_up, time.monotonic() + _PARTING)
-            for thread in threads:
-                thread.join(_LOOK_INTERVAL / len(threads))
+            for thread in tuple(self._threads):
+                thread.join(_LOOK_INTERVAL / len(self._threads))
             for worker in self._workers:
                 worker.look_after()
 
@@ -191,12 +217,18 @@ class _Worker:
             trigger.stream: self._actor.outlet(trigger.stream) for trigger in self.node.triggers
         }
         self._acks: Outlet | None = None
-        if session.lockstep and self.node.acknowledges:
-            self._acks = self._actor.outlet(f"{ACKS}/{self.node.stream}")
+        if session.lockstep:
+            self.acknowledge(wanted=self.node.acknowledges)
         if self._link is not None:
             self._link.open()
         self.node.work.open()
         self.opened = True
+
+    def acknowledge(self, *, wanted: bool) -> None:
+        """Say, or say no longer, when an item has been worked through."""
+        stream = f"{ACKS}/{self.node.stream}"
+        known = self._actor.outlets.get(stream)
+        self._acks = (known or self._actor.outlet(stream)) if wanted else None
 
     def run(self) -> None:
         self._begin()

@@ -10,10 +10,12 @@ from __future__ import annotations
 import threading
 import time
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from aerodaas.actors._barrier import Barrier
-from aerodaas.actors._base import StreamActor
+from aerodaas.actors._base import ActorInfo, StreamActor
+from aerodaas.actors._growth_gate import GrowthGate
 from aerodaas.actors._names import ACKS, end_stream, reply_stream, request_stream, state_stream
 from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import (
@@ -28,6 +30,7 @@ from aerodaas.errors import AeroDaaSError
 from aerodaas.navigation.commands import Answer, Command, ReturnHome
 from aerodaas.navigation.safety import Neighbour
 from aerodaas.recording.pace import NEVER
+from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.status import Message, MissionStatus
 from aerodaas.vehicle import VehicleState
 
@@ -80,9 +83,7 @@ class DroneActor(StreamActor):
 
         `neighbours` are the robots that other actors fly, to be kept away from.
         """
-        streams = [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
-        streams += [request_stream(node) for robot in robots for node in robot.requesters]
-        depths = dict.fromkeys([*streams, *conduct.readers], MESSAGE_DEPTH)
+        depths = dict.fromkeys(_streams(robots, conduct), MESSAGE_DEPTH)
         depths.update(dict.fromkeys((state_stream(other) for other in neighbours), 1))
         super().__init__(session, name, depths)
         self._conduct = conduct
@@ -93,6 +94,8 @@ class DroneActor(StreamActor):
         self._pilots: dict[str, Pilot] = {}
         self._obeying = threading.Lock()
         """A mission is used by one thread at a time: the loop's, or one that brings a command."""
+        self._gate = GrowthGate()
+        self._due: dict[str, int] = {}
         self._late = 0
         self._heard = time.monotonic()
         self._orphaned = False
@@ -108,6 +111,50 @@ class DroneActor(StreamActor):
         """Tell one robot's mission something; called by the application's process."""
         with self._obeying:
             return self._pilots[robot].handle(command, self.clock.now())
+
+    def hold(self, timeout: float) -> bool:
+        """In lockstep, have mission time stand still; False if it does not in `timeout` seconds."""
+        return self._gate.hold(timeout)
+
+    def release(self) -> None:
+        """Let mission time go on."""
+        self._gate.release()
+
+    def grow(self, robots: tuple[RobotSpec, ...], conduct: Conduct, timeout: float) -> ActorInfo:
+        """Fly by the streams that `robots` have by now; returns once the loop does.
+
+        Raises MissionError if the loop turns no more.
+        """
+        self._gate.change(lambda: self._grow(robots, conduct), timeout)
+        return self.info()
+
+    def use_scheduler(self, scheduler: TrajectoryScheduler, timeout: float) -> None:
+        """Have all robots plan by `scheduler` from now on.
+
+        Raises MissionError if the loop turns no more.
+        """
+        for pilot in self._pilots.values():
+            # In this thread: a planner's process takes seconds to start.
+            planner = pilot.make_planner(scheduler)
+            self._gate.change(partial(pilot.use_planner, planner), timeout)
+
+    def _grow(self, robots: tuple[RobotSpec, ...], conduct: Conduct) -> None:
+        assert self.inbox is not None  # noqa: S101 - prepare came first
+        for spec in robots:
+            pilot = self._pilots[spec.robot.id]
+            replies = [reply_stream(node) for node in spec.requesters]
+            fresh = {one: self.outlet(one) for one in replies if one not in self.outlets}
+            pilot.grow(spec, fresh)
+        depths = dict.fromkeys(_streams(robots, conduct), MESSAGE_DEPTH)
+        self.inbox.add(depths)
+        self.inbox.subscribe_added()
+        self._reads.update(depths)
+        self._specs, self._conduct = robots, conduct
+        self._steering = {stream for robot in robots for stream in robot.navigation}
+        if self.session.lockstep:
+            self._barrier.windows = conduct.windows
+            for source in conduct.rates:
+                self._due.setdefault(source, self._next_due(source, self.clock.now()))
 
     def note(self, kind: str, text: str) -> None:
         """Have recorded what the application has found out."""
@@ -139,6 +186,7 @@ class DroneActor(StreamActor):
         assert self.inbox is not None  # noqa: S101 - prepare came first
         due = self.clock.now()
         while not self._over():
+            self._gate.visit()
             wait = self.session.host_seconds(max(0, due - self.clock.now()))
             for message in self.inbox.receive(wait):
                 self._take(message, self.clock.now())
@@ -157,12 +205,12 @@ class DroneActor(StreamActor):
     def _run_lockstep(self) -> None:
         assert isinstance(self.clock, LockstepClock)  # noqa: S101 - the session says so
         self._barrier = Barrier(self._conduct.windows)
-        rates = self._conduct.rates
-        due = {source: self.session.next_due(source, rates[source], -1) for source in rates}
+        self._due = {source: self._next_due(source, -1) for source in self._conduct.rates}
         turns = {name: self.session.next_turn(name, -1) for name in self._pilots}
         while not self._over():
+            self._gate.visit(settle=lambda: self._await(drain=True))
             readings = [pilot.next_reading for pilot in self._pilots.values()]
-            now = min([*turns.values(), *due.values(), *readings])
+            now = min([*turns.values(), *self._due.values(), *readings])
             if now == NEVER:
                 break
             self.clock.advance_to(now)
@@ -173,17 +221,20 @@ class DroneActor(StreamActor):
                 if now == turns[name]:
                     self._turn(pilot, now)
                     turns[name] = self.session.next_turn(name, now)
-            self._measure(now, due)
+            self._measure(now)
             self._await(drain=False)
         self._await(drain=True)
 
-    def _measure(self, now: int, due: dict[str, int]) -> None:
+    def _next_due(self, source: str, after: int) -> int:
+        return self.session.next_due(source, self._conduct.rates[source], after)
+
+    def _measure(self, now: int) -> None:
         """Publish what is known now, and expect what the sensors that are due make of it."""
         counts = self._conduct.acknowledgements
-        for source, stamp in due.items():
+        for source, stamp in self._due.items():
             if stamp == now:
                 self._barrier.expect(source, now, counts.get(source, 0))
-                due[source] = self.session.next_due(source, self._conduct.rates[source], now)
+                self._due[source] = self._next_due(source, now)
         for pilot in self._pilots.values():
             for stream, stamp in pilot.observe(now):
                 self._barrier.expect(stream, stamp, counts.get(stream, 0))
@@ -257,6 +308,13 @@ class DroneActor(StreamActor):
     def _close(self) -> None:
         for pilot in self._pilots.values():
             pilot.vehicle.close()
+
+
+def _streams(robots: tuple[RobotSpec, ...], conduct: Conduct) -> list[str]:
+    """What the actor of these robots reads."""
+    streams = [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
+    streams += [request_stream(node) for robot in robots for node in robot.requesters]
+    return [*streams, *conduct.readers]
 
 
 def _order(message: Message[Any]) -> tuple[bool, str, int]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -25,8 +25,9 @@ from aerodaas.actors.cluster import Place, nodes_at, options_for, outlives_appli
 from aerodaas.actors.dispatcher import DispatcherActor
 from aerodaas.actors.drone import DroneActor, RobotReport
 from aerodaas.actors.executor import CloudExecutor
+from aerodaas.actors.growth import Growth, growth
 from aerodaas.actors.isolation import isolation_options
-from aerodaas.actors.plan import Analyses, Dispatching, FlightPlan
+from aerodaas.actors.plan import Analyses, Cameras, Dispatching, FlightPlan
 from aerodaas.actors.recorder import RecorderActor
 from aerodaas.actors.sensor import SensorActor
 from aerodaas.clock import NANOSECONDS, host_time_ns
@@ -34,10 +35,13 @@ from aerodaas.data import Alert
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.navigation.commands import Answer, Command
 from aerodaas.recording.provenance import Provenance
+from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 
 __all__ = ["Flight", "FlightState"]
 
 _PREPARE_TIMEOUT = 90.0
+_GROWING = 10.0
+"""Wall seconds that an actor may take to join in, or to come to rest for it."""
 _ANSWER_TIMEOUT = 5.0
 _REPORT_INTERVAL = 0.5
 _RESTARTS = 3
@@ -73,6 +77,8 @@ class _Member:
     """What `prepare` is given."""
     restarts: int
     """How often Ray restarts it."""
+    further: dict[str, int] = field(default_factory=dict)
+    """Streams that it has come to read in flight, and how many messages of each may wait."""
     info: ActorInfo | None = None
     report: ActorReport = field(default_factory=lambda: ActorReport("new"))
     pending: ray.ObjectRef[ActorReport] | None = None
@@ -107,7 +113,7 @@ class Flight:
         self._job = ray.get_runtime_context().get_job_id()
         self._caretaker: Any = None
         self._opening: list[Any] = []
-        self._lifelines: Lifelines | None = None
+        self._lifelines: list[Lifelines] = []
         session, edge = plan.session, Place()
         environments = _environments(plan)
         for specs, place in zip(plan.drones, plan.edges, strict=True):
@@ -121,20 +127,8 @@ class Flight:
                 if spec.robot.id not in mine
             )
             self._create(name, DroneActor, place, (session, name, specs, plan.conduct, others))
-        for camera in plan.cameras:
-            args = (session, camera.stream, camera.sensor, camera.state)
-            name = f"sensor/{camera.stream}"
-            self._create(name, SensorActor, camera.place, args, ends=camera.ends)
-        for actor in plan.analyses:
-            self._create(
-                actor.name,
-                AnalyticsActor,
-                actor.place,
-                (session, actor.name),
-                setup=actor.nodes,
-                restarts=_RESTARTS,
-                options=environments[actor.name],
-            )
+        self._create_cameras(plan.cameras)
+        self._create_analyses(plan.analyses, environments)
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch, environments)
         if self.recording is not None and provenance is not None:
@@ -163,12 +157,15 @@ class Flight:
         for reference in self._opening:
             self._ask(reference, _PREPARE_TIMEOUT)
         self._origin = host_time_ns()
+        self._start(list(self._members.values()))
+
+    def _start(self, members: list[_Member]) -> None:
         # Those that only listen go first, so that nobody speaks to an empty room.
-        for member in reversed(self._members.values()):
+        for member in reversed(members):
             member.handle.start.remote(self._origin)
             member.report = ActorReport("running")
-        mortal = {name: m.handle for name, m in self._members.items() if m.restarts}
-        self._lifelines = Lifelines(mortal, self._life_of)
+        mortal = {member.name: member.handle for member in members if member.restarts}
+        self._lifelines.append(Lifelines(mortal, self._life_of))
 
     def poll(self, newest: int = 200) -> FlightState:
         """Ask how everyone fares, with the `newest` latencies of each robot.
@@ -191,6 +188,58 @@ class Flight:
     def reachable(self) -> bool:
         """False once this process has left the cluster that the actors live in."""
         return ray.is_initialized() and ray.get_runtime_context().get_job_id() == self._job
+
+    def grow(self, plan: FlightPlan) -> None:
+        """Fly on by `plan`, the graph as it is now; returns when all that is new runs.
+
+        Raises GraphError for what cannot be changed in flight, and what a new actor could not
+        open; then everything goes on as it was.
+        """
+        change = growth(self.plan, plan)
+        drones = [self._members[name].handle for name in sorted(self._ids())]
+        held = drones if plan.session.lockstep else []
+        try:
+            if not all(self._ask(one.hold.remote(_GROWING), 2 * _GROWING) for one in held):
+                raise MissionError("the mission did not come to rest, so nothing can join it")
+            self._join(change)
+        finally:
+            for drone in held:
+                drone.release.remote()
+        self.plan = plan
+
+    def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
+        """Have all robots plan by `scheduler` from now on."""
+        for name in sorted(self._ids()):
+            handle = self._members[name].handle
+            self._ask(handle.use_scheduler.remote(scheduler, _GROWING), _PREPARE_TIMEOUT)
+
+    def _join(self, change: Growth) -> None:
+        known = set(self._members)
+        environments = _environments(replace(self.plan, analyses=change.analyses))
+        try:
+            self._create_cameras(change.cameras)
+            self._create_analyses(change.analyses, environments)
+            fresh = [member for name, member in self._members.items() if name not in known]
+            self._prepare(fresh, lambda _: None)
+            for name, nodes in change.joining.items():
+                member = self._members[name]
+                member.info = self._ask(member.handle.join.remote(*nodes), _PREPARE_TIMEOUT)
+                member.setup += nodes
+        except BaseException:
+            for name in set(self._members) - known:
+                ray.kill(self._members.pop(name).handle)
+            raise
+        for name, streams in change.acknowledging.items():
+            self._ask(self._members[name].handle.acknowledge.remote(streams))
+        if (recorder := self._members.get("recorder")) is not None and change.recorded:
+            recorder.further |= change.recorded
+            recorder.info = self._ask(recorder.handle.listen.remote(change.recorded), _GROWING)
+        for robots in change.drones:
+            drone = self._members[self._drones[robots[0].robot.id]]
+            grown = drone.handle.grow.remote(robots, change.conduct, _GROWING)
+            drone.info = self._ask(grown, 2 * _GROWING)
+        self._connect_all()
+        self._start(fresh)
 
     def command(self, robot: str, command: Command) -> Answer:
         """Tell a robot's mission something."""
@@ -218,8 +267,8 @@ class Flight:
         if self._stopped:
             return self.reports()
         self._stopped = True
-        if self._lifelines is not None:
-            self._lifelines.end()
+        for lifelines in self._lifelines:
+            lifelines.end()
         last = end_actors(self._in_ending_order(), self._helpers)
         for member in self._members.values():
             member.report = last.get(member.handle, member.report)
@@ -269,6 +318,26 @@ class Flight:
             options |= {"lifetime": "detached", "name": f"{self.plan.session.id}/{name}"}
         return options
 
+    def _create_cameras(self, cameras: Iterable[Cameras]) -> None:
+        for camera in cameras:
+            args = (self.plan.session, camera.stream, camera.sensor, camera.state)
+            name = f"sensor/{camera.stream}"
+            self._create(name, SensorActor, camera.place, args, ends=camera.ends)
+
+    def _create_analyses(
+        self, actors: Iterable[Analyses], environments: Mapping[str, Mapping[str, Any]]
+    ) -> None:
+        for actor in actors:
+            self._create(
+                actor.name,
+                AnalyticsActor,
+                actor.place,
+                (self.plan.session, actor.name),
+                setup=actor.nodes,
+                restarts=_RESTARTS,
+                options=environments[actor.name],
+            )
+
     def _create_dispatcher(
         self, dispatch: Dispatching, environments: Mapping[str, Mapping[str, Any]]
     ) -> None:
@@ -313,7 +382,10 @@ class Flight:
             _require_clock(member.name, info, began)
             member.info = info
             progress(member.name)
-        for reference in [self._connect(member) for member in members]:
+        self._connect_all()
+
+    def _connect_all(self) -> None:
+        for reference in [self._connect(member) for member in self._members.values()]:
             self._ask(reference)
 
     def _connect(self, member: _Member) -> Any:  # noqa: ANN401 - Ray's reference
@@ -400,6 +472,8 @@ class Flight:
             try:
                 if ray.get(actor.report.remote()).phase == "new":
                     member.info = ray.get(actor.prepare.remote(*member.setup))
+                    if member.further:
+                        member.info = ray.get(actor.listen.remote(member.further))
                     self._connect(member)
                     ray.get(actor.start.remote(self._origin))
             except ActorUnavailableError:

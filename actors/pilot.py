@@ -29,7 +29,7 @@ from aerodaas.geometry import GeodeticOrigin
 from aerodaas.navigation.commands import Answer, Command, Reply, Request, Start, StreamItem
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
-from aerodaas.navigation.planner import BackgroundPlanner, solve
+from aerodaas.navigation.planner import BackgroundPlanner, Planner, solve
 from aerodaas.navigation.safety import Neighbour
 from aerodaas.plugins import load_plugin
 from aerodaas.recording.pace import NEVER
@@ -108,13 +108,7 @@ class Pilot:
         robot, environment = self.spec.robot, self._session.environment
         takeoff = self.vehicle.read().odometry.position
         home = environment.home
-        # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
-        inline = self._session.lockstep
-        self._planner = WatchedPlanner(
-            as_planned(self.spec.scheduler, self._session.pace.plans.get(self.id, ()))
-            if inline
-            else self._background()
-        )
+        self._planner = WatchedPlanner(self.make_planner(self.spec.scheduler))
         self.mission = Mission(
             robot,
             self._planner,
@@ -129,8 +123,11 @@ class Pilot:
                 reasons = [answer.text, *(f"{name}: {why}" for name, why in answer.refused.items())]
                 raise MissionError(f"{self.id}: {'; '.join(text for text in reasons if text)}")
 
-    def _background(self) -> BackgroundPlanner:
-        scheduler = self.spec.scheduler
+    def make_planner(self, scheduler: TrajectoryScheduler) -> Planner:
+        """What plans by `scheduler`; may take seconds to start."""
+        # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
+        if self._session.lockstep:
+            return as_planned(scheduler, self._session.pace.plans.get(self.id, ()))
         if not scheduler.isolated:
             return BackgroundPlanner(scheduler)
         patience = _PLANS_PATIENCE * self.spec.robot.mission.plan_timeout
@@ -154,6 +151,19 @@ class Pilot:
         if isinstance(self.vehicle, ClockedVehicle):
             self.vehicle.use_clock(clock)
         self.handle(Start(), clock.now())
+
+    def grow(self, spec: RobotSpec, outlets: dict[str, Outlet]) -> None:
+        """Hear further streams, and answer analyses that command the mission through `outlets`."""
+        self.spec = spec
+        self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
+        self._outlets.update(outlets)
+
+    def use_planner(self, planner: Planner) -> None:
+        """Plan by `planner` from now on, beginning with what is queued."""
+        former, self._planner.planner = self._planner.planner, planner
+        if isinstance(former, BackgroundPlanner):
+            former.close()
+        self.mission.replan()
 
     def advance_to(self, stamp: int) -> None:
         """Move a simulated vehicle's time on."""

@@ -80,27 +80,28 @@ class WatchedPlanner:
 
     def __init__(self, planner: Planner) -> None:
         """Watch `planner`."""
-        self._planner = planner
+        self.planner = planner
+        """May be replaced in flight."""
         self.answered = False
 
     def turn(self, now: int) -> None:
         """A turn begins at mission time `now`."""
         self.answered = False
-        if isinstance(self._planner, _RecordedPlanner):
-            self._planner.now = now
+        if isinstance(self.planner, _RecordedPlanner):
+            self.planner.now = now
 
     @property
     def replans_on_arrival(self) -> bool:
         """Whether the scheduler wants to be asked again after each arrival."""
-        return self._planner.replans_on_arrival
+        return self.planner.replans_on_arrival
 
     def submit(self, request: PlanRequest) -> None:
         """Have a plan made."""
-        self._planner.submit(request)
+        self.planner.submit(request)
 
     def poll(self) -> Plan | None:
         """Return a plan that is ready."""
-        plan = self._planner.poll()
+        plan = self.planner.poll()
         self.answered = self.answered or plan is not None
         return plan
 

@@ -14,7 +14,14 @@ from aerodaas.graph import Graph, NavigationEdge
 from aerodaas.handles import Compute, Sensor
 from aerodaas.interfaces import IAeroData, IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.names import PaperNames
-from aerodaas.navigation.commands import AddNavigation, Command, End, Pause, Resume
+from aerodaas.navigation.commands import (
+    AddNavigation,
+    Command,
+    End,
+    Pause,
+    Resume,
+    initial_commands,
+)
 from aerodaas.options import current_options
 from aerodaas.overrides import located, overridden
 from aerodaas.plugins import load_plugin
@@ -56,6 +63,9 @@ class Environment(PaperNames, IEnvironment):
         """The environment file's content, for analyses that want it."""
         self.graph = Graph()
         self.run: Run | None = None
+        self._flights = 0
+        self._flown = 0
+        """How much of the graph's navigation the flights that have ended were given."""
         self._robots = {robot.id: Robot(self, robot) for robot in self.config.robots}
         self._trajectory: TrajectoryScheduler | None = None
         self._dispatch_with: AnalyticsScheduler | None = None
@@ -107,10 +117,15 @@ class Environment(PaperNames, IEnvironment):
         raise UnknownIdError("compute resource", compute_id, [one.id for one in self.compute()])
 
     def set_trajectory_scheduler(self, scheduler: INavigate) -> None:
-        """Plug in the trajectory scheduler; raises ConfigError if it is none."""
+        """Plug in the trajectory scheduler; raises ConfigError if it is none.
+
+        In flight, all that is queued is planned anew by it.
+        """
         if not isinstance(scheduler, TrajectoryScheduler):
             kind = type(scheduler).__name__
             raise ConfigError(f"a trajectory scheduler is a TrajectoryScheduler, not {kind}")
+        if self.run is not None and self.graph.flying:
+            self.run.use_scheduler(scheduler)
         self._trajectory = scheduler
 
     def set_analytics_scheduler(self, scheduler: Any) -> None:  # noqa: ANN401 - as the interface
@@ -151,14 +166,47 @@ class Environment(PaperNames, IEnvironment):
 
     def navigation_added(self, entry: NavigationEntry) -> bool:
         """Take navigation that a scheduler was given; False before the mission starts."""
-        if self.run is None:
+        if not self.graph.flying:
             return False
-        navigation = AddNavigation(
-            entry.navigation, entry.index, entry.deadline, clear_first=entry.clear_first
-        )
-        for robot in {edge.robot for edge in self.graph.navigation}:
-            self.command(robot, navigation)
+        stream = entry.navigation.stream
+        clear_on = stream.name if entry.clear_first and stream is not None else None
+        for robot in sorted({edge.robot for edge in self.graph.navigation}):
+            if stream is None:
+                self.command(
+                    robot,
+                    AddNavigation(
+                        entry.navigation, entry.index, entry.deadline, clear_first=entry.clear_first
+                    ),
+                )
+            else:
+                self.fly_by(
+                    NavigationEdge(robot, entry.navigation, entry.index, entry.deadline, clear_on)
+                )
         return True
+
+    def fly_by(self, edge: NavigationEdge) -> None:
+        """Record navigation of a robot; in flight, have the robot take it at once.
+
+        Raises GraphError for what cannot be added in flight, MissionError for what the mission
+        refuses.
+        """
+        graph = self.graph
+        flying = {one.robot for one in graph.navigation}
+        if graph.flying and edge.robot not in flying:
+            raise GraphError(
+                f"{edge.robot} cannot join a mission in flight: call navigate() for every robot "
+                "that is to fly before start_mission(), or fly it when this mission has ended"
+            )
+        graph.navigation.append(edge)
+        if graph.on_growth is None:
+            return
+        try:
+            graph.on_growth()
+            for command in initial_commands([edge]):
+                self.command(edge.robot, command)
+        except BaseException:
+            graph.navigation.remove(edge)
+            raise
 
     def command(self, robot: str, command: Command) -> None:
         """Tell a flying robot something; raises MissionError if it does not fly or refuses."""
@@ -171,23 +219,54 @@ class Environment(PaperNames, IEnvironment):
     def launch(self) -> Run:
         """Start the mission of every robot that navigates; once."""
         if self.run is None:
-            self._place_entries()
             for guest in current_options.get().guests:
                 sharing.welcome(guest, self)
-            self.run = Run(self)
-            self.run.start()
+            self._start()
+        assert self.run is not None  # noqa: S101 - started just now
         return self.run
+
+    def launch_again(self) -> Run:
+        """Start the first mission, or once that has ended the next one; else the one that flies.
+
+        The next mission flies what was given to it since the last one ended, and the streams of
+        those before; where nothing was given, it flies the same again.
+        """
+        if self.run is None or not self.run.over:
+            return self.launch()
+        self.run.wait()
+        edges = self.graph.navigation
+        if self._flown < len(edges) or self.trajectory_scheduler().entries:
+            old, new = edges[: self._flown], edges[self._flown :]
+            edges[:] = [edge for edge in old if edge.navigation.stream is not None] + new
+        self._start()
+        return self.run
+
+    def _start(self) -> None:
+        self._place_entries()
+        self._flights += 1
+        run = self.run = Run(self, self._flights)
+        run.on_end.append(self._note_flown)
+        try:
+            run.start()
+        except BaseException:
+            self.run = None
+            raise
+
+    def _note_flown(self) -> None:
+        self._flown = len(self.graph.navigation)
 
     def _place_entries(self) -> None:
         """Hand what was added to the scheduler to the robot that navigates."""
         robots = list(dict.fromkeys(edge.robot for edge in self.graph.navigation))
-        for entry in self.trajectory_scheduler().entries:
+        entries = self.trajectory_scheduler().entries
+        for entry in entries:
             stream = entry.navigation.stream
             clear_on = stream.name if entry.clear_first and stream is not None else None
             self.graph.navigation.extend(
                 NavigationEdge(robot, entry.navigation, entry.index, entry.deadline, clear_on)
                 for robot in robots
             )
+        entries.clear()
 
 
 class Robot(PaperNames, IRobot):
@@ -225,9 +304,10 @@ class Robot(PaperNames, IRobot):
         return bool(capabilities.position_setpoints or capabilities.velocity_setpoints)
 
     def navigate(self, data: IAeroData[Any]) -> None:
-        """Fly by this navigation: waypoints, or a stream of navigation.
+        """Fly by this navigation: waypoints, or a stream of navigation; in flight, from now on.
 
-        Raises GraphError if `data` is neither.
+        Raises GraphError if `data` is neither, or if this robot is not in the mission that flies,
+        and MissionError for what the mission refuses in flight.
         """
         navigation = data
         if not isinstance(navigation, AeroNavigation):
@@ -240,21 +320,22 @@ class Robot(PaperNames, IRobot):
             )
         if stream is not None and stream.graph is not self._environment.graph:
             raise GraphError(f"{stream.name} belongs to another Environment than {self.robot_id}")
-        self._environment.graph.navigation.append(NavigationEdge(self.robot_id, navigation))
+        self._environment.fly_by(NavigationEdge(self.robot_id, navigation))
 
     def start_mission(self, hook: Callable[[], None] | None = None, *, wait: bool = True) -> None:
         """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
 
         With `wait=False`, return as soon as it flies; as a guest of another application, which
-        flies, at once. Raises the project's errors; whatever
-        happens, the drone is landed and the recording closed first.
+        flies, at once. While the mission flies, this waits for it; after it has ended, it flies
+        anew: what was given to `navigate` since, or where that is nothing, the same again. Raises
+        the project's errors; whatever happens, the drone is landed and the recording closed first.
         """
         for each in [*self._start_hooks, *([hook] if hook else [])]:
             each()
         if sharing.offer(self._environment):
             return
-        run = self._environment.launch()
-        run.on_end.extend(self._end_hooks)
+        run = self._environment.launch_again()
+        run.on_end += [each for each in self._end_hooks if each not in run.on_end]
         if wait:
             run.wait()
 

@@ -126,6 +126,8 @@ class Graph:
         """Opens a live subscription by stream; set by the runtime while a mission runs."""
         self.on_launch: list[Callable[[], None]] = []
         """Called once the streams are live."""
+        self.on_growth: Callable[[], None] | None = None
+        """Has the runtime start what was added; set by it while a mission runs."""
 
     def add(self, node: Node) -> Node:
         """Add a node, giving it a fresh id where its own is taken by another."""
@@ -135,6 +137,33 @@ class Graph:
             count += 1
         self.nodes[node.id] = node
         return node
+
+    @property
+    def flying(self) -> bool:
+        """Whether a mission runs by this graph."""
+        return self.on_growth is not None
+
+    def launch(self, node: Node) -> None:
+        """Start `node`, which was just added, if a mission runs; it is taken out if that fails.
+
+        Raises what the runtime raises.
+        """
+        if self.on_growth is None:
+            return
+        try:
+            self.on_growth()
+        except BaseException:
+            del self.nodes[node.id]
+            raise
+
+    def require_idle(self, node: Node, what: str) -> None:
+        """Raise GraphError, with the line, if `node` runs already, so that `what` is too late."""
+        if self.flying and node.id in self.nodes:
+            message = (
+                f"{node.id} runs already, too late to {what}; do that before analyse(), or with a "
+                "further analysis"
+            )
+            raise _refuse(message)
 
     def connect(self, source: AeroStreamData[Any], target: Node, accepts: tuple[type, ...]) -> None:
         """Draw an edge; raises GraphError for a wrong type, a foreign graph or a cycle."""
@@ -179,6 +208,7 @@ class AeroStreamData(PaperNames, IAeroData[E], Generic[E]):
         self.name = name
         self.item = item
         self._reader: StreamReader[E] | None = None
+        self._opened_by: Callable[[str], StreamReader[Any]] | None = None
 
     @property
     def data(self) -> AeroStreamData[E]:
@@ -201,14 +231,15 @@ class AeroStreamData(PaperNames, IAeroData[E], Generic[E]):
         return self._live().newest(timeout)
 
     def _live(self) -> StreamReader[E]:
-        if self._reader is None:
-            if self.graph.reader is None:
-                message = (
-                    f"{self.name} has no data before the mission starts; "
-                    "call start_mission(wait=False) first"
-                )
-                raise _refuse(message)
-            self._reader = self.graph.reader(self.name)
+        opener = self.graph.reader
+        if opener is None:
+            message = (
+                f"{self.name} has no data before the mission starts; "
+                "call start_mission(wait=False) first"
+            )
+            raise _refuse(message)
+        if self._reader is None or self._opened_by is not opener:
+            self._reader, self._opened_by = opener(self.name), opener
         return self._reader
 
     def set_data(self, data: E) -> None:

@@ -60,15 +60,19 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
         return str(known[name])
 
     def get_data_stream(self) -> AeroStreamData[E]:
-        """Return the stream of the sensor's data."""
+        """Return the stream of the sensor's data; in flight, a camera that is off is started."""
         name = f"{self._robot}/{self._config.id}" if self._robot else self._config.id
         item = SENSOR_ITEMS[self._config.type]
         if name not in self._graph.nodes:
-            self._graph.add(Node(name, "sensor", item, self._config, self._robot))
+            node = self._graph.add(Node(name, "sensor", item, self._config, self._robot))
+            self._graph.launch(node)
         return AeroStreamData(self._graph, name, item)
 
     def subscribe(self, callback: Callable[[E], None]) -> None:
-        """Call `callback` with each item while the mission runs, in a thread of this process."""
+        """Call `callback` with each item while the mission runs, in a thread of this process.
+
+        Before the mission, from its start; in flight, from now on.
+        """
         stream = self.get_data_stream()
 
         def deliver() -> None:
@@ -78,7 +82,10 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
         def start() -> None:
             threading.Thread(target=deliver, name=f"push {stream.name}", daemon=True).start()
 
-        self._graph.on_launch.append(start)
+        if self._graph.flying:
+            start()
+        else:
+            self._graph.on_launch.append(start)
 
     def poll(self, timeout: float = 1.0) -> E:
         """Return the newest item, waiting up to `timeout` seconds for the first one.

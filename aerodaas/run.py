@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from aerodaas.actors.plan import FlightPlan
     from aerodaas.environment import Environment
     from aerodaas.recording.pace import Pace
+    from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 
 __all__ = ["Run"]
 
@@ -40,12 +41,13 @@ _STEPPED = {"simulated", "replayed"}
 class Run:
     """The flight of one environment's robots; made by `Environment.launch`."""
 
-    def __init__(self, environment: Environment) -> None:
+    def __init__(self, environment: Environment, number: int = 1) -> None:
+        """The flight `number` of this environment, counted from 1."""
         self.options = current_options.get()
         self.config = environment.config
         self.graph = environment.graph
         self.on_end: list[Callable[[], None]] = []
-        self.recording = _recording_path(self.options, self.config)
+        self.recording = _recording_path(self.options, self.config, number)
         self.state: FlightState | None = None
         self._environment = environment
         self._flight: Flight | None = None
@@ -110,6 +112,7 @@ class Run:
             return LiveReader(session, stream, *publisher, lambda: self._over)
 
         self.graph.reader = read
+        self.graph.on_growth = self.grow
         for callback in self.graph.on_launch:
             callback()
         threading.Thread(target=self._keep_alive, name="heartbeat", daemon=True).start()
@@ -120,6 +123,36 @@ class Run:
         if self._flight is None or self._finished.is_set():
             raise MissionError(f"{robot} is no longer flying")
         return self._flight.command(robot, command)
+
+    @property
+    def over(self) -> bool:
+        """True once every mission has ended."""
+        return self._over
+
+    def grow(self) -> None:
+        """Start what the application has added to the graph since; raises why that cannot be."""
+        from aerodaas.actors.plan import make_plan  # noqa: PLC0415 - ray only where it is needed
+
+        flight = self._flying("nothing can be added")
+        self._change_models()
+        flight.grow(
+            make_plan(
+                flight.plan.session,
+                self.graph,
+                self._environment.compute(),
+                self._environment.trajectory_scheduler(),
+                self._environment.analytics_scheduler(),
+            )
+        )
+
+    def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
+        """Have all robots plan by `scheduler` from now on; raises MissionError once it is over."""
+        self._flying("no scheduler can be set").use_scheduler(scheduler)
+
+    def _flying(self, hence: str) -> Flight:
+        if self._flight is None or self._over:
+            raise MissionError(f"the mission is over: {hence}")
+        return self._flight
 
     def look(self, newest: int = 200) -> FlightState:
         """Return the present state, with the `newest` latencies of each robot."""
@@ -245,6 +278,7 @@ class Run:
         assert self._flight is not None  # noqa: S101 - launched
         self._finished.set()
         self._over = True
+        self.graph.on_growth = None
         atexit.unregister(self.abandon)
         flown = time.monotonic() - self._launched
         with self._polling:
@@ -281,7 +315,7 @@ class Run:
             raise MissionError("; ".join(dict.fromkeys(problems)))
 
 
-def _recording_path(options: RunOptions, config: EnvironmentConfig) -> Path | None:
+def _recording_path(options: RunOptions, config: EnvironmentConfig, number: int) -> Path | None:
     if not config.recording.enabled:
         return None
     wanted = options.record or (Path(config.recording.path) if config.recording.path else None)
@@ -289,4 +323,6 @@ def _recording_path(options: RunOptions, config: EnvironmentConfig) -> Path | No
         name = options.application.stem if options.application else config.name
         now = datetime.now().astimezone()
         wanted = Path("runs") / f"{name}-{now:%Y%m%d-%H%M%S}"
-    return wanted if wanted.suffix == ".mcap" else wanted / _RECORDING
+    path = wanted if wanted.suffix == ".mcap" else wanted / _RECORDING
+    # One environment may fly several times.
+    return path if number == 1 else path.with_stem(f"{path.stem}-{number}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections import deque
 from collections.abc import Mapping
+from queue import SimpleQueue
 from typing import Any
 
 from aerodaas.actors.streams._codec import decode
@@ -39,14 +40,34 @@ class Inbox:
         }
         self._called = threading.Condition()
         self._calls = 0
+        self._scope = scope
+        self._added: SimpleQueue[tuple[Mapping[str, int], threading.Event]] = SimpleQueue()
         self._subscribers: dict[str, SharedSubscriber] = {}
         self._waiter: SharedWaiter | None = None
         if shared_memory_available():
             self._waiter = SharedWaiter(f"{scope}/inbox/{name}")
-            for stream, depth in depths.items():
-                subscriber = SharedSubscriber(f"{scope}/{stream}", min(depth, MAX_DEPTH))
-                self._waiter.attach(subscriber)
-                self._subscribers[stream] = subscriber
+            self._subscribe(depths)
+
+    def add(self, depths: Mapping[str, int]) -> threading.Event:
+        """Read these streams, too; any thread may ask.
+
+        The event is set once the reading thread has subscribed: what is published later arrives.
+        """
+        subscribed = threading.Event()
+        self._added.put((depths, subscribed))
+        self.wake()
+        return subscribed
+
+    def subscribe_added(self) -> None:
+        """Subscribe to what was added; for the reading thread, whose `receive` does it, too."""
+        while not self._added.empty():
+            depths, subscribed = self._added.get()
+            fresh = {name: depth for name, depth in depths.items() if name not in self._delivered}
+            self._subscribe(fresh)
+            for stream, depth in fresh.items():
+                self.received[stream] = self.dropped[stream] = 0
+                self._delivered[stream] = deque(maxlen=depth)
+            subscribed.set()
 
     @property
     def shared(self) -> bool:
@@ -59,6 +80,7 @@ class Inbox:
         Returns early, perhaps empty-handed, when woken. Streams come in the order in which they
         were named, whatever the order of arrival.
         """
+        self.subscribe_added()
         messages = self._collect()
         if not messages and timeout > 0:
             self._wait(timeout)
@@ -86,6 +108,14 @@ class Inbox:
             subscriber.close()
         if self._waiter is not None:
             self._waiter.close()
+
+    def _subscribe(self, depths: Mapping[str, int]) -> None:
+        if self._waiter is None:
+            return
+        for stream, depth in depths.items():
+            subscriber = SharedSubscriber(f"{self._scope}/{stream}", min(depth, MAX_DEPTH))
+            self._waiter.attach(subscriber)
+            self._subscribers[stream] = subscriber
 
     def _wait(self, timeout: float) -> None:
         if self._waiter is not None:

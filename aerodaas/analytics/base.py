@@ -121,6 +121,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         if runtime_env is not None:
             self._runtime_env = as_runtime_env(runtime_env, f"{type(self).__name__}.deploy")
         if self.node is not None:
+            self._require_idle("deploy it elsewhere")
             self.node.compute = self._compute
             self.node.runtime_env = self._runtime_env
         return self
@@ -134,7 +135,9 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co]:
         """Analyse a stream; called again, the same analysis reads a further stream.
 
-        Raises GraphError if `data` is no stream or carries the wrong type.
+        While a mission flies, the analysis starts at once; it can then not be changed any more.
+        Raises GraphError if `data` is no stream or carries the wrong type, and in flight whatever
+        the analysis' `open` raises.
         """
         if not isinstance(data, AeroStreamData):
             message = (
@@ -142,10 +145,17 @@ class Analytics(PaperNames, IAnalyse[O_co]):
                 "get one with sensor.get_data_stream() or another analysis"
             )
             raise GraphError(message)
-        robot = data.graph.nodes[data.name].robot
-        node = self._node_in(data.graph, robot)
-        data.graph.connect(data, node, self.accepts)
-        return AeroStreamData(data.graph, node.id, self.produces)
+        graph = data.graph
+        if self.node is not None:
+            self._require_idle("read a further stream")
+        node = self._node_in(graph, graph.nodes[data.name].robot)
+        try:
+            graph.connect(data, node, self.accepts)
+            graph.launch(node)
+        except BaseException:
+            self._leave_flying(graph)
+            raise
+        return AeroStreamData(graph, node.id, self.produces)
 
     def instantiate(self) -> AeroStreamData[O_co]:
         """Start without an input stream: `process(None, …)` is called at the analysis' own pace.
@@ -155,8 +165,15 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         if self._graph is None:
             message = f"{type(self).__name__}: call deploy(compute) before instantiate()"
             raise GraphError(message)
+        if self.node is not None:
+            self._require_idle("instantiate it")
         node = self._node_in(self._graph, None)
         node.kind = "external"
+        try:
+            self._graph.launch(node)
+        except BaseException:
+            self._leave_flying(self._graph)
+            raise
         return AeroStreamData(self._graph, node.id, self.produces)
 
     def trigger(
@@ -173,6 +190,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
             if target.node is None:
                 message = f"{type(target).__name__}: call analyse() before it is a trigger's target"
                 raise GraphError(message)
+            target._require_idle("be woken")  # noqa: SLF001 - of the same class
             target.node.dormant = True
             trigger = Trigger(target.node.id, when=when)
         else:
@@ -185,12 +203,24 @@ class Analytics(PaperNames, IAnalyse[O_co]):
                 )
                 raise GraphError(message)
             trigger = Trigger(robot, command, when)
-        self._triggers = (*self._triggers, trigger)
         if self.node is not None:
+            self._require_idle("give it triggers")
             self.node.triggers.append(trigger)
+        self._triggers = (*self._triggers, trigger)
         return self
 
+    def _require_idle(self, what: str) -> None:
+        if self.node is not None and self._graph is not None:
+            self._graph.require_idle(self.node, what)
+
+    def _leave_flying(self, graph: Graph) -> None:
+        """Be in no graph, as before: it could not start in flight."""
+        if graph.flying and self.node is not None:
+            graph.nodes.pop(self.node.id, None)
+            self.node = None
+
     def _node_in(self, graph: Graph, robot: str | None) -> Node:
+        self._graph = graph
         if self.node is None:
             own = snake_case(type(self).__name__).removesuffix("_analytics")
             name = require_name(self.name or own, type(self).__name__)

@@ -227,6 +227,10 @@ class Mission:
         }
         return turns.get(self.state, self._fly)(state)
 
+    def replan(self) -> None:
+        """Have everything that is queued planned anew: another scheduler plans from now on."""
+        self._navigator.replan()
+
     def vehicle_refused(self, text: str) -> None:
         """Take note that the vehicle did not carry out an action, in its own words."""
         if self.state is MissionState.TAKING_OFF:

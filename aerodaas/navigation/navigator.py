@@ -113,6 +113,11 @@ class Navigator:
         valid_for = min(round(command.valid_for * NANOSECONDS), self._command_timeout)
         self.command = LiveCommand(command, now + valid_for, cause)
 
+    def replan(self) -> None:
+        """Have everything that is queued planned anew: another scheduler plans from now on."""
+        self._unanswered = None
+        self._unplanned |= {stop.waypoint.priority for stop in self.queue}
+
     def clear(self) -> list[str]:
         """Forget everything that is queued, interrupted or commanded; returns the ids."""
         self.command = None

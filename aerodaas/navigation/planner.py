@@ -152,10 +152,9 @@ class BackgroundPlanner(SerialPlanner):
     """
 
     def __init__(self, scheduler: TrajectoryScheduler, executor: Executor | None = None) -> None:
-        """Plan with `scheduler` on `executor`, which stays the caller's to shut down."""
+        """Plan with `scheduler` on `executor`, which is shut down by `close`."""
         super().__init__(scheduler)
-        self._own = ThreadPoolExecutor(1, "planner") if executor is None else None
-        self._executor = executor or self._own
+        self._executor = executor or ThreadPoolExecutor(1, "planner")
         self._running: Future[Plan] | None = None
         self._request: PlanRequest | None = None
 
@@ -176,16 +175,14 @@ class BackgroundPlanner(SerialPlanner):
         return plan
 
     def close(self) -> None:
-        """Let go of the planner's own thread; a plan being made is not waited for."""
-        if self._own is not None:
-            self._own.shutdown(wait=False, cancel_futures=True)
+        """Let go of the executor; a plan being made is not waited for."""
+        self._executor.shutdown(wait=False, cancel_futures=True)
 
     @property
     def _busy(self) -> bool:
         return self._running is not None
 
     def _begin(self, request: PlanRequest) -> None:
-        assert self._executor is not None  # noqa: S101 - given or own
         self._request = request
         try:
             self._running = self._executor.submit(solve, self._scheduler, request)
