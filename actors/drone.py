@@ -7,16 +7,17 @@ measured there, and goes on once everyone whose work can reach a drone is done.
 
 from __future__ import annotations
 
-import threading
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
 from aerodaas.actors._barrier import Barrier
 from aerodaas.actors._base import ActorInfo, StreamActor
 from aerodaas.actors._growth_gate import GrowthGate
+from aerodaas.actors._loop_calls import LoopCalls, LoopOverError
 from aerodaas.actors._names import ACKS, end_stream, reply_stream, request_stream, state_stream
+from aerodaas.actors._robot_report import RobotReport
 from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import (
     CONTROL_PERIOD_NS,
@@ -31,13 +32,17 @@ from aerodaas.navigation.commands import Answer, Command, ReturnHome
 from aerodaas.navigation.safety import Neighbour
 from aerodaas.recording.pace import NEVER
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
-from aerodaas.status import Message, MissionStatus
+from aerodaas.status import Message
 from aerodaas.vehicle import VehicleState
 
-__all__ = ["Conduct", "DroneActor", "RobotReport"]
+__all__ = ["COMMANDS", "Conduct", "DroneActor"]
 
 _APPLICATION_TIMEOUT = 5.0
 """Seconds without a word from the application's process after which the drone comes home."""
+_ANSWER_TIMEOUT = 4.0
+"""Wall seconds within which the loop must have come to a command; less than its sender waits."""
+COMMANDS = "commands"
+"""Concurrency group of an actor in which commands wait for the loop, and nothing else with them."""
 
 
 @dataclass(frozen=True)
@@ -54,18 +59,6 @@ class Conduct:
     """Streams of acknowledgements."""
     patience: float = 20.0
     """Wall seconds to wait for an acknowledgement before its reader is given up."""
-
-
-@dataclass(frozen=True)
-class RobotReport:
-    """One robot at one moment."""
-
-    status: MissionStatus
-    state: VehicleState | None
-    latencies: tuple[float, ...]
-    """Milliseconds from capture to command, newest last."""
-    loop_late: int
-    """Turns of the setpoint loop that came more than half a period late."""
 
 
 class DroneActor(StreamActor):
@@ -92,9 +85,10 @@ class DroneActor(StreamActor):
         self._steering = {stream for robot in robots for stream in robot.navigation}
         self._specs = robots
         self._pilots: dict[str, Pilot] = {}
-        self._obeying = threading.Lock()
-        """A mission is used by one thread at a time: the loop's, or one that brings a command."""
-        self._gate = GrowthGate()
+        self._reports: dict[str, RobotReport] = {}
+        """How each robot fares: replaced by the loop, never changed."""
+        self._calls = LoopCalls(self._wake)
+        self._gate = GrowthGate(self._serve)
         self._due: dict[str, int] = {}
         self._late = 0
         self._heard = time.monotonic()
@@ -106,11 +100,19 @@ class DroneActor(StreamActor):
             streams = (*Pilot.streams(spec), *map(reply_stream, spec.requesters))
             pilot.open({stream: self.outlet(stream) for stream in streams})
             self._pilots[pilot.id] = pilot
+        self._publish_reports()
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Tell one robot's mission something; called by the application's process."""
-        with self._obeying:
-            return self._pilots[robot].handle(command, self.clock.now())
+        """Tell one robot's mission something; called by the application's process.
+
+        Raises MissionError if the loop does not come to it.
+        """
+        pilot = self._pilots[robot]
+        try:
+            return self._calls.ask(lambda: pilot.handle(command, self.clock.now()), _ANSWER_TIMEOUT)
+        except LoopOverError as over:
+            state = self._reports[robot].status.state.value
+            return Answer(accepted=False, text=f"{over}: {state}")
 
     def hold(self, timeout: float) -> bool:
         """In lockstep, have mission time stand still; False if it does not in `timeout` seconds."""
@@ -125,7 +127,7 @@ class DroneActor(StreamActor):
 
         Raises MissionError if the loop turns no more.
         """
-        self._gate.change(lambda: self._grow(robots, conduct), timeout)
+        self._calls.ask(lambda: self._grow(robots, conduct), timeout)
         return self.info()
 
     def use_scheduler(self, scheduler: TrajectoryScheduler, timeout: float) -> None:
@@ -136,7 +138,7 @@ class DroneActor(StreamActor):
         for pilot in self._pilots.values():
             # In this thread: a planner's process takes seconds to start.
             planner = pilot.make_planner(scheduler)
-            self._gate.change(partial(pilot.use_planner, planner), timeout)
+            self._calls.ask(partial(pilot.use_planner, planner), timeout)
 
     def _grow(self, robots: tuple[RobotSpec, ...], conduct: Conduct) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first
@@ -161,35 +163,54 @@ class DroneActor(StreamActor):
         self.alert(kind, text)
 
     def robots(self, newest: int = 200) -> dict[str, RobotReport]:
-        """How each robot fares; also the sign that the application's process is alive."""
+        """How each robot fared at its last turn, with the `newest` latencies.
+
+        Also the sign that the application's process is alive.
+        """
         self._heard = time.monotonic()
+        pilots = self._pilots
         return {
-            name: RobotReport(
-                pilot.mission.status,
-                pilot.vehicle.read() if self._phase != "new" else None,
-                tuple(pilot.latencies)[-newest:],
-                self._late,
-            )
+            name: replace(report, latencies=pilots[name].latencies.newest(newest))
+            for name, report in self._reports.items()
+        }
+
+    def _publish_reports(self) -> None:
+        """Let others know how each robot fares; in the loop's thread only."""
+        self._reports = {
+            name: RobotReport(pilot.status, pilot.state, (), self._late)
             for name, pilot in self._pilots.items()
         }
+
+    def _wake(self) -> None:
+        if self.inbox is not None:
+            self.inbox.wake()
+
+    def _serve(self) -> None:
+        """Obey the commands that have come since, between two turns."""
+        if self._calls.serve():
+            self._publish_reports()
 
     def _run(self) -> None:
         self._heard = time.monotonic()
         for pilot in self._pilots.values():
             pilot.start(self.clock)
-        if self.session.lockstep:
-            self._run_lockstep()
-        else:
-            self._run_real_time()
+        try:
+            if self.session.lockstep:
+                self._run_lockstep()
+            else:
+                self._run_real_time()
+        finally:
+            self._calls.close("the mission is over")
+            self._publish_reports()
 
     def _run_real_time(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first
         due = self.clock.now()
         while not self._over():
-            self._gate.visit()
             wait = self.session.host_seconds(max(0, due - self.clock.now()))
             for message in self.inbox.receive(wait):
                 self._take(message, self.clock.now())
+            self._serve()
             now = self.clock.now()
             if now < due:
                 continue
@@ -200,6 +221,7 @@ class DroneActor(StreamActor):
             for pilot in self._pilots.values():
                 pilot.observe(now)
             self._watch_application()
+            self._publish_reports()
             due = next_due(CONTROL_RATE, now)
 
     def _run_lockstep(self) -> None:
@@ -208,7 +230,7 @@ class DroneActor(StreamActor):
         self._due = {source: self._next_due(source, -1) for source in self._conduct.rates}
         turns = {name: self.session.next_turn(name, -1) for name in self._pilots}
         while not self._over():
-            self._gate.visit(settle=lambda: self._await(drain=True))
+            self._gate.visit(lambda: self._await(drain=True))
             readings = [pilot.next_reading for pilot in self._pilots.values()]
             now = min([*turns.values(), *self._due.values(), *readings])
             if now == NEVER:
@@ -216,12 +238,12 @@ class DroneActor(StreamActor):
             self.clock.advance_to(now)
             for name, pilot in self._pilots.items():
                 pilot.advance_to(now)
-                with self._obeying:
-                    pilot.listen(now)
+                pilot.listen(now)
                 if now == turns[name]:
                     self._turn(pilot, now)
                     turns[name] = self.session.next_turn(name, now)
             self._measure(now)
+            self._publish_reports()
             self._await(drain=False)
         self._await(drain=True)
 
@@ -246,6 +268,7 @@ class DroneActor(StreamActor):
         while not self.stopping:
             clear = self._barrier.clear(drain=drain)
             messages = self.inbox.receive(0.0 if clear else 0.5)
+            self._serve()
             for message in messages:
                 self._acknowledge(message)
                 if not message.stream.startswith(ACKS):
@@ -272,8 +295,7 @@ class DroneActor(StreamActor):
 
     def _turn(self, pilot: Pilot, now: int) -> None:
         others = [where for name, where in self._whereabouts.items() if name != pilot.id]
-        with self._obeying:
-            pilot.turn(now, others)
+        pilot.turn(now, others)
         state = pilot.loop.state
         if state is not None:
             self._whereabouts[pilot.id] = _neighbour(state)
@@ -285,8 +307,7 @@ class DroneActor(StreamActor):
             self._whereabouts[self._neighbours[message.stream]] = _neighbour(message.item)
             return
         for pilot in self._pilots.values():
-            with self._obeying:
-                pilot.take(message, now)
+            pilot.take(message, now)
 
     def _over(self) -> bool:
         return self.stopping or all(pilot.over for pilot in self._pilots.values())
@@ -306,6 +327,7 @@ class DroneActor(StreamActor):
         super()._fail(error)
 
     def _close(self) -> None:
+        self._calls.close("the drone's actor has been stopped")
         for pilot in self._pilots.values():
             pilot.vehicle.close()
 

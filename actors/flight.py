@@ -19,11 +19,12 @@ from aerodaas.actors._ending import end_actors
 from aerodaas.actors._lifeline import ASKED_AGAIN, LIFE, LIFELINES, Life, Lifelines
 from aerodaas.actors._names import done_stream
 from aerodaas.actors._offload import CloudProcess
+from aerodaas.actors._robot_report import RobotReport
 from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.caretaker import Caretaker
 from aerodaas.actors.cluster import Place, nodes_at, options_for, outlives_application
 from aerodaas.actors.dispatcher import DispatcherActor
-from aerodaas.actors.drone import DroneActor, RobotReport
+from aerodaas.actors.drone import COMMANDS, DroneActor
 from aerodaas.actors.executor import CloudExecutor
 from aerodaas.actors.growth import Growth, growth
 from aerodaas.actors.isolation import isolation_options
@@ -43,6 +44,8 @@ _PREPARE_TIMEOUT = 90.0
 _GROWING = 10.0
 """Wall seconds that an actor may take to join in, or to come to rest for it."""
 _ANSWER_TIMEOUT = 5.0
+_SILENT_FOR = 30.0
+"""Seconds that a drone's actor may not answer before the run counts as failed; it flies on."""
 _REPORT_INTERVAL = 0.5
 _RESTARTS = 3
 _LOOKS = 2
@@ -65,6 +68,10 @@ class FlightState:
         """The newest alerts of all actors, oldest first."""
         alerts = [alert for report in self.reports.values() for alert in report.alerts]
         return sorted(alerts, key=lambda alert: alert.header.stamp)
+
+
+class _SilentError(MissionError):
+    """An actor did not answer in time; it may be busy."""
 
 
 @dataclass
@@ -137,6 +144,8 @@ class Flight:
         if self._detached:
             self._appoint_caretaker()
         self._origin = 0
+        self._answers: dict[str, tuple[float, dict[str, RobotReport]]] = {}
+        """When each drone's actor last answered, monotonic seconds, and what."""
         self._next_reports = 0.0
         self._stopped = False
 
@@ -180,9 +189,23 @@ class Flight:
             self._caretaker.heard.remote()
         robots: dict[str, RobotReport] = {}
         for name in set(self._drones.values()):
-            robots.update(self._ask(self._members[name].handle.robots.remote(newest)))
+            robots.update(self._robots_of(name, newest))
         over = all(self._members[name].report.phase in {"done", "failed"} for name in self._ids())
         return FlightState(robots, self.reports(), over)
+
+    def _robots_of(self, name: str, newest: int) -> dict[str, RobotReport]:
+        """What a drone's actor says; its last word while it is too busy to say anything."""
+        before = self._answers.get(name)
+        try:
+            robots: dict[str, RobotReport] = self._ask(
+                self._members[name].handle.robots.remote(newest)
+            )
+        except _SilentError:
+            if before is None or time.monotonic() - before[0] > _SILENT_FOR:
+                raise
+            return before[1]
+        self._answers[name] = time.monotonic(), robots
+        return robots
 
     @property
     def reachable(self) -> bool:
@@ -244,7 +267,8 @@ class Flight:
     def command(self, robot: str, command: Command) -> Answer:
         """Tell a robot's mission something."""
         handle = self._members[self._drones[robot]].handle
-        answer: Answer = self._ask(handle.command.remote(robot, command))
+        method = handle.command.options(concurrency_group=COMMANDS)
+        answer: Answer = self._ask(method.remote(robot, command))
         return answer
 
     def reports(self) -> dict[str, ActorReport]:
@@ -304,9 +328,11 @@ class Flight:
         **kwargs: Any,  # noqa: ANN401
     ) -> None:
         remote: Any = ray.remote
-        if restarts:
-            # Calls that wait for its life to end must not keep others waiting.
-            remote = remote(concurrency_groups={LIFE: LIFELINES})
+        # Calls that wait, for its life to end or for its loop, must not keep others waiting.
+        groups = {LIFE: LIFELINES} if restarts else {}
+        groups |= {COMMANDS: 1} if kind is DroneActor else {}
+        if groups:
+            remote = remote(concurrency_groups=groups)
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}
         made = remote(kind).options(**placed)
         self._members[name] = _Member(name, made.remote(*args, **kwargs), setup, restarts)
@@ -499,7 +525,7 @@ class Flight:
             reason = str(error).strip().splitlines()[-1]
             raise MissionError(f"an actor died: {reason}") from None
         except ray.exceptions.GetTimeoutError:
-            raise MissionError(f"an actor did not answer within {timeout:.0f} s") from None
+            raise _SilentError(f"an actor did not answer within {timeout:.0f} s") from None
 
 
 def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,6 +16,7 @@ from aerodaas.actors._names import (
     state_stream,
     status_stream,
 )
+from aerodaas.actors._robot_report import Latencies
 from aerodaas.actors.planner import PlannerExecutor
 from aerodaas.actors.replayed import Arrivals, WatchedPlanner, as_planned
 from aerodaas.actors.session import Session
@@ -45,7 +45,6 @@ from aerodaas.vehicle import (
 
 __all__ = ["Pilot", "RobotSpec", "sensor_item"]
 
-_LATENCIES_KEPT = 100_000
 _PLANS_PATIENCE = 4.0
 """Times the plan's time-out, after which a scheduler that has not answered is stopped."""
 _LEAST_PATIENCE = 5.0
@@ -88,7 +87,7 @@ class Pilot:
         """Build the vehicle and the mission; nothing is connected yet."""
         self.spec = spec
         self.id = spec.robot.id
-        self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
+        self.latencies = Latencies()
         """Milliseconds from capture to the arrival of the command made from it."""
         self._session = session
         self._told = 0
@@ -117,6 +116,8 @@ class Pilot:
             wind=np.array(environment.simulation.wind, dtype=np.float64),
         )
         self.loop = SetpointLoop(self.vehicle, self.mission)
+        self.state: VehicleState = self.vehicle.read()
+        """The newest state that the loop or a sensor went by."""
         for command in self.spec.initial:
             answer = self.handle(command, 0)
             if not answer.accepted or answer.refused:
@@ -220,7 +221,7 @@ class Pilot:
         went by, so that a replay finds the mission's own input.
         """
         seen = self.loop.state if self._turned == now else None
-        state = seen or self.vehicle.read()
+        state = self.state = seen or self.vehicle.read()
         published = [self._publish(state_stream(self.id), state, now)]
         for sensor in self.spec.sensors:
             if self._due[sensor.id] <= now:
@@ -242,6 +243,11 @@ class Pilot:
         """True once the mission has ended, on the ground or out of our hands, or was replayed."""
         played = isinstance(self.vehicle, PlayedVehicle) and self.vehicle.finished
         return self.mission.finished or played
+
+    @property
+    def status(self) -> MissionStatus:
+        """What the mission says about itself."""
+        return self.mission.status
 
     def new_alerts(self) -> list[Alert]:
         """What the mission has had to say since the last call."""

@@ -1,0 +1,68 @@
+"""A drone's actor in the test's own process, without Ray."""
+
+from __future__ import annotations
+
+import uuid
+from typing import Any
+
+from flying import robot
+
+from aerodaas.actors._names import state_stream
+from aerodaas.actors.drone import Conduct, DroneActor
+from aerodaas.actors.pilot import RobotSpec
+from aerodaas.actors.session import Session
+from aerodaas.actors.streams import Inbox
+from aerodaas.config import EnvironmentConfig
+from aerodaas.navigation.commands import Command
+from aerodaas.schedulers.waypoint.nearest_neighbor import NearestNeighborScheduler
+
+__all__ = ["DroneByHand", "drone_by_hand"]
+
+
+class DroneByHand(DroneActor):
+    """As Ray would run it, but for its place."""
+
+    @property
+    def scope(self) -> str:
+        """Prefix of this test's streams."""
+        return f"{self.session.id}/here"
+
+    def open_here(self) -> None:
+        """What `prepare` does on a node of Ray's."""
+        self.inbox = Inbox(self.scope, self.name, self._reads)
+        self.alerts = self.outlet(f"alerts/{self.name}")
+        self._open()
+        self._phase = "ready"
+
+
+class _InThisProcess(NearestNeighborScheduler):
+    isolated = False
+
+
+def drone_by_hand(
+    *initial: Command,
+    speed: float | None,
+    navigation: tuple[str, ...] = (),
+    requesters: tuple[str, ...] = (),
+    **settings: Any,  # noqa: ANN401
+) -> DroneByHand:
+    """An actor that flies one simulated robot called `drone` and is ready to start."""
+    content = {
+        "name": f"by-hand-{uuid.uuid4().hex[:6]}",
+        "robots": [robot(sensors=[], **settings)],
+        "simulation": {"world": "empty"},
+    }
+    environment = EnvironmentConfig.model_validate(content)
+    spec = RobotSpec(
+        robot=environment.robots[0],
+        sensors=(),
+        navigation=navigation,
+        commands=(),
+        requesters=requesters,
+        initial=tuple(initial),
+        scheduler=_InThisProcess(),
+    )
+    conduct = Conduct(windows={state_stream("drone"): 0})
+    actor = DroneByHand(Session(environment, speed), "drone/drone", (spec,), conduct)
+    actor.open_here()
+    return actor

@@ -1,0 +1,160 @@
+"""What a drone's actor says of its robots while its loop flies them and commands come in."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+import threading
+import time
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from drone_by_hand import DroneByHand, drone_by_hand
+from flying import hop
+
+from aerodaas import AeroNavigation, NavigationType, Waypoint
+from aerodaas.actors._loop_calls import LoopCalls, LoopOverError
+from aerodaas.actors._robot_report import Latencies
+from aerodaas.errors import MissionError
+from aerodaas.navigation.commands import AddNavigation, ClearNavigation, End
+from aerodaas.status import MissionState
+
+_READS = 100_000
+_HOLD = {"on_complete": "hold"}
+
+
+def _square(name: str) -> AeroNavigation:
+    places = [(3, 0), (3, 3), (0, 3), (0, 0)]
+    stops = [Waypoint(f"{name}-{i}", x, y, 2.0) for i, (x, y) in enumerate(places)]
+    return AeroNavigation(NavigationType.DISTANCE_DRIVEN, stops, priority=len(name) % 3)
+
+
+@pytest.mark.parametrize("speed", [None, 40.0], ids=["lockstep", "real time"])
+def test_reading_never_meets_a_mission_that_changes(speed: float | None) -> None:
+    """100,000 reads from four threads while commands and plans turn the queue over: none raises.
+
+    Reports are whole: the target is not among what is pending, nothing is visited twice.
+    """
+    actor = drone_by_hand(AddNavigation(_square("first")), speed=speed, mission=_HOLD)
+    actor.start(actor.session.origin_ns)
+    done = threading.Event()
+    interval = sys.getswitchinterval()
+    sys.setswitchinterval(1e-5)
+
+    def read() -> int:
+        stamps = []
+        for _ in range(_READS // 4):
+            report = actor.robots()["drone"]
+            status = report.status
+            assert status.target not in status.pending
+            assert len(set(status.visited)) == len(status.visited)
+            stamps.append(status.stamp)
+        assert stamps == sorted(stamps)
+        return len(set(stamps))
+
+    def command(sender: str) -> int:
+        for number in itertools.count():
+            if done.is_set():
+                return number
+            adding = AddNavigation(_square(f"{sender * (1 + number % 3)}{number}"))
+            answer = actor.command("drone", adding if number % 4 else ClearNavigation())
+            assert answer.accepted, answer.text
+            assert not answer.refused
+        raise AssertionError
+
+    try:
+        with ThreadPoolExecutor(6) as pool:
+            commanding = [pool.submit(command, sender) for sender in "ab"]
+            seen = [future.result() for future in [pool.submit(read) for _ in range(4)]]
+            done.set()
+            obeyed = [future.result() for future in commanding]
+    finally:
+        done.set()
+        sys.setswitchinterval(interval)
+    assert min(seen) > 1
+    assert min(obeyed) > 10
+    assert actor.report().error is None
+    _land(actor)
+
+
+def test_a_report_says_what_a_command_did_as_soon_as_it_is_answered() -> None:
+    """Who commands and then reads sees its own command's effect."""
+    actor = drone_by_hand(AddNavigation(hop((5, 0), hover=900)), speed=1.0, mission=_HOLD)
+    assert actor.robots()["drone"].status.state is MissionState.IDLE
+    actor.start(actor.session.origin_ns)
+    assert actor.command("drone", AddNavigation(_square("more"))).accepted
+    assert len(actor.robots()["drone"].status.pending) == 5
+    assert actor.command("drone", ClearNavigation()).accepted
+    assert actor.robots()["drone"].status.pending == ()
+    _land(actor)
+
+
+def test_commands_after_the_end_are_refused_at_once() -> None:
+    """The loop turns no more, and the answer says how the mission ended."""
+    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=None)
+    actor.start(0)
+    _until_over(actor)
+    before = actor.robots()["drone"]
+    assert before.status.state is MissionState.LANDED
+    began = time.monotonic()
+    answer = actor.command("drone", End())
+    assert time.monotonic() - began < 1.0
+    assert not answer.accepted
+    assert answer.text == "the mission is over: landed"
+    actor.stop()
+    assert actor.robots()["drone"] == before
+
+
+def test_a_command_that_raises_is_its_senders_failure() -> None:
+    """What the loop carries out for somebody raises there, and the loop goes on."""
+    calls = LoopCalls(lambda: None)
+    loop = threading.Thread(target=lambda: _serve_until(calls, 3))
+    loop.start()
+    with pytest.raises(ZeroDivisionError):
+        calls.ask(lambda: 1 // 0, 5.0)
+    assert calls.ask(lambda: 7, 5.0) == 7
+    assert calls.ask(threading.get_ident, 5.0) == loop.ident
+    loop.join()
+    calls.close("the mission is over")
+    with pytest.raises(LoopOverError, match="the mission is over"):
+        calls.ask(lambda: 8, 5.0)
+
+
+def test_a_command_that_nobody_came_to_is_not_obeyed_later() -> None:
+    """Its sender was told that it was withdrawn."""
+    made: list[int] = []
+    calls = LoopCalls(lambda: None)
+    with pytest.raises(MissionError, match="withdrawn"):
+        calls.ask(lambda: made.append(1), 0.01)
+    assert calls.serve() == 0
+    assert made == []
+
+
+def test_the_newest_latencies_are_given_in_their_order() -> None:
+    """As many as asked for, or all there are."""
+    known = Latencies()
+    assert known.newest(3) == ()
+    for value in (1.0, 2.0, 3.0):
+        known.append(value)
+    assert known.newest(2) == (2.0, 3.0)
+    assert known.newest(9) == (1.0, 2.0, 3.0)
+    assert known.newest(0) == ()
+
+
+def _serve_until(calls: LoopCalls, count: int) -> None:
+    while count > 0:
+        count -= calls.serve()
+
+
+def _until_over(actor: DroneByHand) -> None:
+    end = time.monotonic() + 60.0
+    while actor.report().phase == "running":
+        assert time.monotonic() < end
+        time.sleep(0.01)
+
+
+def _land(actor: DroneByHand) -> None:
+    assert actor.command("drone", End()).accepted
+    _until_over(actor)
+    assert actor.robots()["drone"].status.state is MissionState.LANDED
+    actor.stop()
