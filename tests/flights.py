@@ -129,9 +129,21 @@ class KinematicVehicle:
             self._now += step
             self._step(0.01)
 
+    def kill(self) -> None:
+        """Stop the motors wherever it is."""
+        self.mode = VehicleMode.GROUNDED
+
+    def _fall(self, duration: float) -> None:
+        if self.position[2] <= self._ground:
+            self.velocity[:] = 0.0
+            self.position[2] = self._ground
+            return
+        self.velocity[2] -= 9.81 * duration
+        self.position += self.velocity * duration
+
     def _step(self, duration: float) -> None:
         if self.mode is VehicleMode.GROUNDED:
-            self.velocity[:] = 0.0
+            self._fall(duration)
             return
         wanted, turn = self._wanted()
         self.velocity += (wanted - self.velocity) * (duration / self.LAG)

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from aerodaas.clock import seconds
+from aerodaas.clock import NANOSECONDS, seconds
 from aerodaas.config import RobotConfig
 from aerodaas.data import Alert
 from aerodaas.geometry import GeodeticOrigin, Vector, body_to_enu
@@ -37,12 +37,13 @@ from aerodaas.navigation.energy import EnergyMeter, EnergyModel
 from aerodaas.navigation.geofence import Geofence
 from aerodaas.navigation.intake import DONE, Intake
 from aerodaas.navigation.leg import Leg, LegPhase, setpoint_towards
-from aerodaas.navigation.log import MissionLog
+from aerodaas.navigation.log import MissionLog, words
+from aerodaas.navigation.motors import Motors, MotorWatch
 from aerodaas.navigation.navigator import LiveCommand, Navigator
 from aerodaas.navigation.planner import Planner
 from aerodaas.navigation.queue import Stop
 from aerodaas.navigation.state_machine import TERMINAL, MissionStateMachine
-from aerodaas.navigation.supervisor import CALM, Demand, Supervisor, has_position
+from aerodaas.navigation.supervisor import CALM, Demand, Finding, Supervisor, has_position
 from aerodaas.schedulers.waypoint.base import Situation
 from aerodaas.status import MissionState, MissionStatus
 from aerodaas.vehicle import VehicleMode, VehicleState, VelocitySetpoint
@@ -53,6 +54,9 @@ _ON_GROUND = frozenset({MissionState.IDLE, MissionState.PREFLIGHT})
 _LEAVING = frozenset({MissionState.RETURNING, MissionState.LANDING})
 _DRIFT = 0.5
 """m/s along the ground, up to which the drone may begin to land; beyond, it flies past home."""
+_FORECAST_PERIOD = NANOSECONDS
+_FORECAST_PATIENCE = 10 * NANOSECONDS
+"""Nanoseconds for which the battery must be found too small before people are told."""
 _SETTLED = frozenset({VehicleMode.HOLDING, VehicleMode.GUIDED})
 
 
@@ -104,12 +108,17 @@ class Mission:
         self._intake = Intake(self._navigator, self._log)
         self._assessment = CALM
         self._plan_fault = ""
+        self._forecast_due = 0
+        self._forecast_told = False
+        self._short_since: int | None = None
+        """Since when the battery would not last for the plan, by every look at it."""
         self._paused = False
         self._last: VehicleState | None = None
         self._now = 0
         self._turned_at = 0
         self._elapsed = 0.0
         self._leg: Leg | None = None
+        self._motors = MotorWatch(self.home)
         self._anchor: Vector | None = None
         """Where the drone holds."""
         self._return_height: float | None = None
@@ -149,8 +158,19 @@ class Mission:
         )
 
     def handle(self, command: Command, now: int) -> Answer:
-        """Obey `command` at `now` (mission clock, nanoseconds), or say why not; raises nothing."""
+        """Obey `command` at `now` (mission clock, nanoseconds), or say why not; raises nothing.
+
+        Whatever a command or an item of a stream raises is its own failure, and people are told.
+        """
         self._now = max(self._now, now)
+        try:
+            return self._obey(command)
+        except Exception as error:  # noqa: BLE001 - what others send may raise anything
+            text = f"{type(command).__name__} failed: {type(error).__name__}: {error}"
+            self._log.alert(self._now, "command_failed", text)
+            return Answer(accepted=False, text=text)
+
+    def _obey(self, command: Command) -> Answer:
         if self.finished:
             return Answer(accepted=False, text=f"the mission is over: {self.state.value}")
         match command:
@@ -217,6 +237,8 @@ class Mission:
             return Wait()
         if self.state is MissionState.PREFLIGHT:
             return self._preflight(state, objections)
+        if self._motors_stopped(state):
+            return Wait()
         self._protect(state)
         turns = {
             MissionState.TAKING_OFF: self._take_off,
@@ -249,8 +271,30 @@ class Mission:
             state.battery.fraction, state.odometry.velocity, seconds(state.stamp - last.stamp)
         )
 
+    def _motors_stopped(self, state: VehicleState) -> bool:
+        """Whether the motors stand, so that there is nothing to fly; ends the mission by it."""
+        motors = self._motors.observe(state, self._now)
+        leaving, reason = self.state in _LEAVING, self._machine.reason
+        if motors is Motors.RUNNING:
+            return False
+        if motors in {Motors.IDLE, Motors.NEVER_LIFTED}:
+            grounded = state.mode is VehicleMode.GROUNDED
+            if leaving and grounded:
+                self._to(MissionState.ABORTED, f"{reason} before take-off")
+            return leaving and grounded
+        if leaving and motors is not Motors.STOPPED_IN_FLIGHT:
+            if motors is Motors.LANDED:
+                self._to(MissionState.LANDED, reason)
+            return True
+        east, north, up = self._motors.place
+        text = f"motors stopped in flight at E {east:.1f}, N {north:.1f}, up {up:.1f} m"
+        self._to(MissionState.ABORTED, text)
+        self._log.alert(self._now, "motors_stopped", text)
+        return True
+
     def _preflight(self, state: VehicleState, objections: Sequence[str]) -> Action:
         self._plan(state)
+        self._forecast(state)
         reasons = self._supervisor.objections(state)
         waits = self._intake.is_fed or self._options.on_complete == "hold"
         if not (waits or len(self._navigator.queue)):
@@ -270,10 +314,10 @@ class Mission:
         return Wait()
 
     def _protect(self, state: VehicleState) -> None:
-        before = {finding.kind for finding in self._assessment.findings}
+        before = {_subject(finding) for finding in self._assessment.findings}
         self._assessment = self._supervisor.assess(state, self._now)
         for finding in self._assessment.findings:
-            if finding.kind not in before:
+            if _subject(finding) not in before:
                 self._log.alert(self._now, finding.kind, finding.text)
         demand, reason = self._assessment.demand, self._assessment.gravest.text
         if demand is Demand.RELEASE:
@@ -304,6 +348,7 @@ class Mission:
             self._to(MissionState.HOLDING, self._assessment.gravest.text)
             return self._hover(state)
         self._plan(state)
+        self._forecast(state)
         served = self._navigator.served(self._now)
         if isinstance(served, Stop):
             return self._serve(served, state)
@@ -409,9 +454,6 @@ class Mission:
             state.mode is VehicleMode.LOST or not has_position(state)
         ):
             return Return()
-        if state.mode is VehicleMode.GROUNDED:
-            self._to(MissionState.LANDED, self._machine.reason)
-            return Wait()
         position = state.odometry.position
         if self._return_height is None:
             lowest = float(self.home[2]) + self.limits.takeoff_height
@@ -435,9 +477,6 @@ class Mission:
 
     def _land(self, state: VehicleState) -> Action:
         self._leg = None
-        if state.mode is VehicleMode.GROUNDED and not state.armed:
-            self._to(MissionState.LANDED, self._machine.reason)
-            return Wait()
         waited = seconds(self._now - self._machine.since)
         if state.mode is VehicleMode.LOST and waited > self.limits.return_timeout:
             self._to(MissionState.ABORTED, "the vehicle is lost")
@@ -471,20 +510,43 @@ class Mission:
             )
         if self._navigator.fault and self._navigator.fault != fault:
             self._log.alert(self._now, "scheduler", self._navigator.fault)
-        self._check_energy(situation)
 
-    def _check_energy(self, situation: Situation) -> None:
+    def _forecast(self, state: VehicleState) -> None:
+        """Compare the battery with what the rest of the plan takes.
+
+        On the ground people are told at once. In the air they are told what is found for a while:
+        a battery's gauge is coarse and a climb is dear, so that a single look says little.
+        """
+        if self._now < self._forecast_due or not has_position(state):
+            return
+        self._forecast_due = self._now + _FORECAST_PERIOD
         route = [stop.waypoint for stop in self._navigator.queue]
-        needed = self._meter.route(situation.position, route, self.home, situation.speed)
-        available = situation.battery - situation.reserve
-        before, self._plan_fault = self._plan_fault, ""
-        if route and needed > available:
-            self._plan_fault = (
-                f"the plan and the way home need {needed:.0%} of a battery, and {available:.0%} "
-                "is there to spend: the drone will return before the plan is done"
-            )
-            if not before:
-                self._log.alert(self._now, "unreachable_plan", self._plan_fault)
+        needed = self._meter.route(
+            state.odometry.position, route, self.home, self.limits.cruise_speed
+        )
+        available = state.battery.fraction - self.limits.battery_land
+        if not (route and needed > available):
+            self._plan_fault, self._short_since = "", None
+            return
+        self._plan_fault = (
+            f"at this rate the plan and the way home need {needed:.0%} of a battery, and "
+            f"{max(0.0, available):.0%} is there to spend: the drone returns when only the way "
+            "home is left"
+        )
+        if self._short_since is None:
+            self._short_since = self._now
+        surely = (
+            self.state is MissionState.PREFLIGHT
+            or self._now - self._short_since >= _FORECAST_PATIENCE
+        )
+        if surely and not self._forecast_told:
+            self._forecast_told = True
+            self._log.alert(self._now, "unreachable_plan", self._plan_fault)
 
     def _to(self, state: MissionState, reason: str = "") -> None:
         self._machine.to(state, self._now, reason)
+
+
+def _subject(finding: Finding) -> tuple[str, str]:
+    """What a finding is about: the vehicle complains of several things by one kind."""
+    return finding.kind, words(finding.text) if finding.kind == "vehicle" else ""

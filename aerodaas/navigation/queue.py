@@ -83,14 +83,16 @@ class WaypointQueue:
                 continue
             if known is not None:
                 self.remove(known.id)
-            level = self._levels.setdefault(waypoint.priority, [])
+            level = self._levels.get(waypoint.priority, [])
             if index is None:
                 level.append(stop)
             else:
-                place = index + offset.get(waypoint.priority, 0)
+                # An index comes from remote users, and may be larger than a list can count.
+                place = min(index + offset.get(waypoint.priority, 0), len(level))
                 offset[waypoint.priority] = offset.get(waypoint.priority, 0) + 1
                 level.insert(place, stop)
                 self._leave(level[1:])
+            self._levels[waypoint.priority] = level
 
     def _check(self, arriving: list[Waypoint], index: int | None, source: str) -> None:
         if index is not None and index < 0:

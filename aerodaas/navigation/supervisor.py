@@ -72,16 +72,21 @@ class Supervisor:
         self._home = home
         self._fence = fence
         self._meter = meter
-        self._out_of_touch_since: int | None = None
+        self._lost_since: int | None = None
+        self._blind_for = 0
+        """Nanoseconds in touch since the vehicle last knew its position."""
+        self._assessed_at: int | None = None
 
     def assess(self, state: VehicleState, now: int) -> Assessment:
         """Judge `state`, read at `now` (mission clock, nanoseconds)."""
         checks = (
             self._mode(state),
-            self._touch(state, now),
+            self._link(state, now),
+            self._position(state, now),
             self._battery(state),
             self._place(state),
         )
+        self._assessed_at = now
         findings = [finding for finding in checks if finding is not None]
         findings += [Finding(Demand.NOTHING, "vehicle", text) for text in state.faults]
         if not findings:
@@ -121,20 +126,35 @@ class Supervisor:
             return Finding(Demand.RELEASE, "failsafe", text)
         return None
 
-    def _touch(self, state: VehicleState, now: int) -> Finding | None:
-        lost = state.mode is VehicleMode.LOST or seconds(now - state.stamp) > self._STALE
-        if not lost and has_position(state):
-            self._out_of_touch_since = None
+    def _link(self, state: VehicleState, now: int) -> Finding | None:
+        if not self._is_lost(state, now):
+            self._lost_since = None
             return None
-        if self._out_of_touch_since is None:
-            self._out_of_touch_since = now
-        duration = seconds(now - self._out_of_touch_since)
-        kind = "link_lost" if lost else "no_position"
-        what = "no word from the vehicle" if lost else "the vehicle does not know its position"
+        if self._lost_since is None:
+            self._lost_since = now
+        duration = seconds(now - self._lost_since)
+        what = "no word from the vehicle"
         if duration < self._limits.link_timeout:
-            return Finding(Demand.HOLD, kind, what)
-        grave = Demand.RETURN if lost else Demand.LAND
-        return Finding(grave, kind, f"{what} for {duration:.0f} s")
+            return Finding(Demand.HOLD, "link_lost", what)
+        return Finding(Demand.RETURN, "link_lost", f"{what} for {duration:.0f} s")
+
+    def _position(self, state: VehicleState, now: int) -> Finding | None:
+        """Judge by the time in touch alone: what is not heard of may know its position."""
+        if self._is_lost(state, now):
+            return None
+        if has_position(state):
+            self._blind_for = 0
+            return None
+        if self._assessed_at is not None and self._lost_since is None:
+            self._blind_for += now - self._assessed_at
+        what = "; ".join(["the vehicle does not know its position", *state.faults])
+        duration = seconds(self._blind_for)
+        if duration < self._limits.link_timeout:
+            return Finding(Demand.HOLD, "no_position", what)
+        return Finding(Demand.LAND, "no_position", f"{what}, for {duration:.0f} s")
+
+    def _is_lost(self, state: VehicleState, now: int) -> bool:
+        return state.mode is VehicleMode.LOST or seconds(now - state.stamp) > self._STALE
 
     def _battery(self, state: VehicleState) -> Finding | None:
         limits, charge = self._limits, state.battery.fraction
