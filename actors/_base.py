@@ -92,7 +92,11 @@ def failure_line(error: BaseException) -> str:
     """Where an exception was raised, by file and line, and what it says."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""  # noqa: PTH119
-    return f"{type(error).__name__}: {error}{place}"
+    try:
+        said = str(error)
+    except Exception:  # noqa: BLE001 - somebody's class, whose words fail, too
+        said = "it cannot say why"
+    return f"{type(error).__name__}: {said}{place}"
 
 
 class _AlertHandler(logging.Handler):

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from aerodaas.actors._base import failure_line
 from aerodaas.actors._names import (
     reply_stream,
     request_stream,
@@ -26,7 +27,15 @@ from aerodaas.config import RobotConfig, SensorConfig
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.geometry import GeodeticOrigin
-from aerodaas.navigation.commands import Answer, Command, Reply, Request, Start, StreamItem
+from aerodaas.navigation.commands import (
+    Answer,
+    ClearNavigation,
+    Command,
+    Reply,
+    Request,
+    Start,
+    StreamItem,
+)
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
 from aerodaas.navigation.planner import BackgroundPlanner, Planner, solve
@@ -47,6 +56,8 @@ __all__ = ["Pilot", "RobotSpec", "sensor_item"]
 
 _PLANS_PATIENCE = 4.0
 """Times the plan's time-out, after which a scheduler that has not answered is stopped."""
+_TURNS_FAILED = 20
+"""Turns in a row that raise, a second of them, after which the vehicle is left to itself."""
 _LEAST_PATIENCE = 5.0
 """Wall seconds; enough for an actor that is starting anew, whatever the speed of the mission."""
 
@@ -97,6 +108,11 @@ class Pilot:
         self._arrivals = Arrivals(session.pace.heard.get(self.id, ()), spec.commands)
         self._heard: list[Heard] = []
         """Since the last turn."""
+        self._failures = 0
+        """Turns in a row that raised."""
+        self._blamed: set[tuple[str, type[Exception]]] = set()
+        """Whose failure people have been told of already."""
+        self._alerts: list[Alert] = []
         plugin = load_plugin("drivers", spec.robot.driver)
         self.vehicle: Vehicle = plugin(spec.robot, session.environment)
 
@@ -172,14 +188,40 @@ class Pilot:
             self.vehicle.advance_to(stamp)
 
     def handle(self, command: Command, now: int) -> Answer:
-        """Pass a command on to the mission."""
-        return self.mission.handle(command, now)
+        """Pass a command on to the mission; what it raises is refused, and told."""
+        return self._obey(command, now, f"the command {type(command).__name__}")
+
+    def _obey(self, command: Command, now: int, source: str) -> Answer:
+        try:
+            answer: object = self.mission.handle(command, now)
+            if isinstance(answer, Answer):
+                return answer
+            raise TypeError(f"{type(command).__name__} is no command")  # noqa: TRY301 - as any
+        except Exception as error:  # noqa: BLE001 - the command's failure, never the loop's
+            return self._refuse(source, error, now)
+
+    def _refuse(self, source: str, error: Exception, now: int) -> Answer:
+        """Take note of what `source` brought upon itself; people are told once of each kind."""
+        text = f"{source} was refused, for it raised {failure_line(error)}"
+        if (source, type(error)) not in self._blamed:
+            self._blamed.add((source, type(error)))
+            self._tell(now, "refused", text)
+        return Answer(accepted=False, text=text)
+
+    def _tell(self, now: int, kind: str, text: str) -> None:
+        self._alerts.append(Alert(Header(len(self._alerts), now, self.id), kind, text))
 
     def take(self, message: Message[Any], now: int) -> None:
         """Pass on what came by stream: navigation, or a command of a trigger.
 
         In a replay, it counts when it did in the recorded flight: `listen` passes it on.
         """
+        try:
+            self._take(message, now)
+        except Exception as error:  # noqa: BLE001 - the item's failure, never the loop's
+            self._refuse(f"an item of {message.stream}", error, now)
+
+    def _take(self, message: Message[Any], now: int) -> None:
         if message.item is None:
             return
         if message.stream in self.spec.navigation:
@@ -189,7 +231,8 @@ class Pilot:
             if not self._session.lockstep:
                 self.listen(now + 1)
         elif message.stream in self._replies and isinstance(message.item, Request):
-            reply = Reply(message.item.number, self.handle(message.item.command, now))
+            answer = self._obey(message.item.command, now, f"a request on {message.stream}")
+            reply = Reply(message.item.number, answer)
             self._publish(self._replies[message.stream], reply, now)
 
     def listen(self, now: int) -> None:
@@ -198,21 +241,40 @@ class Pilot:
             item: Any = message.item
             header = message.header
             self._heard.append(Heard(message.stream, header.source, header.stamp, at))
-            if message.stream in self.spec.navigation:
-                self.handle(StreamItem(message.stream, item, header), at)
-            else:
-                self.handle(item, at)
+            steers = message.stream in self.spec.navigation
+            command = StreamItem(message.stream, item, header) if steers else item
+            self._obey(command, at, f"an item of {message.stream}")
 
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
-        """One turn of the setpoint loop; publishes what was decided."""
-        self._planner.turn(now)
-        record = self.loop.turn(now, neighbours)
+        """One turn of the setpoint loop; publishes what was decided.
+
+        A turn that raises, for what somebody's data did to the mission, empties the queue and lets
+        the drone hover; the error is raised only once a second of turns has ended so.
+        """
+        try:
+            self._planner.turn(now)
+            record = self.loop.turn(now, neighbours)
+            self._failures = 0
+        except Exception as error:
+            self._failures += 1
+            if self._failures >= _TURNS_FAILED or self.loop.state is None:
+                raise
+            record = self._recover(error, now)
         record = replace(record, heard=tuple(self._heard), planned=self._planner.answered)
         self._heard.clear()
         self._turned = now
         self._publish(setpoint_stream(self.id), record, now)
         self._publish(status_stream(self.id), self.mission.status, now)
         return record
+
+    def _recover(self, error: Exception, now: int) -> SetpointRecord:
+        if self._failures == 1:
+            text = f"the queue was emptied, for flying by it raised {failure_line(error)}"
+            self._tell(now, "turn_failed", text)
+            self._obey(ClearNavigation(), now, "emptying the queue")
+            with contextlib.suppress(AeroDaaSError):
+                self.vehicle.hold()
+        return SetpointRecord(now, None, None)
 
     def observe(self, now: int) -> list[tuple[str, int]]:
         """Publish the vehicle's state and the readings of the sensors that are due by now.
@@ -253,6 +315,8 @@ class Pilot:
         """What the mission has had to say since the last call."""
         alerts = list(self.mission.alerts[self._told :])
         self._told += len(alerts)
+        alerts += self._alerts
+        self._alerts.clear()
         return alerts
 
     def abandon(self) -> None:
