@@ -26,6 +26,7 @@ from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.analytics.endpoint.analysis import endpoint_analysis
+from aerodaas.checks import check_graph, check_plugins, check_tasks
 from aerodaas.config import (
     ComputeConfig,
     RobotConfig,
@@ -34,11 +35,10 @@ from aerodaas.config import (
     TaskConfig,
 )
 from aerodaas.data import Frame
-from aerodaas.errors import GraphError, UnknownIdError
+from aerodaas.errors import GraphError
 from aerodaas.graph import Graph, NavigationEdge, Node
 from aerodaas.handles import SENSOR_ITEMS
-from aerodaas.navigation.commands import Command, End, Pause, Resume, initial_commands
-from aerodaas.plugins import require_plugin
+from aerodaas.navigation.commands import TRIGGERED, initial_commands
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
     Resources,
@@ -50,11 +50,6 @@ __all__ = ["Analyses", "Cameras", "Dispatching", "FlightPlan", "make_plan"]
 
 _CAMERA_WINDOW = 4
 _STATE_WINDOW = 16
-_COMMANDS: dict[str, Command] = {
-    "end_mission": End("an analysis asked to land"),
-    "pause_mission": Pause(),
-    "resume_mission": Resume(),
-}
 
 
 @dataclass(frozen=True)
@@ -138,13 +133,6 @@ class _Planner:
                     continue
                 item = SENSOR_ITEMS[sensor.type]
                 self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
-
-    def require_plugins(self) -> None:
-        for robot in self.robots:
-            require_plugin("drivers", robot.driver)
-        for sensor in (node.work for node in self.sensors()):
-            if sensor.type == "camera":
-                require_plugin("cameras", self.session.environment.camera_driver(sensor))
 
     def sensors(self) -> list[Node]:
         return [node for node in self.graph.nodes.values() if node.kind == "sensor"]
@@ -232,7 +220,7 @@ class _Planner:
         triggers = tuple(
             TriggerSpec(
                 trigger_stream(trigger.target, node.id),
-                _COMMANDS[trigger.method] if trigger.method else Wake(),
+                TRIGGERED[trigger.method] if trigger.method else Wake(),
                 trigger.when,
             )
             for trigger in node.triggers
@@ -287,12 +275,6 @@ class _Planner:
     def runtime_env_of(self, node: Node) -> RuntimeEnvConfig | None:
         """What an analysis has for itself: the environment file's word comes last."""
         return self.session.environment.runtime_env.get(short_name(node), node.runtime_env)
-
-    def require_runtime_envs(self) -> None:
-        known = {short_name(node) for node in self.analyses()}
-        for name in self.session.environment.runtime_env:
-            if name not in known:
-                raise UnknownIdError("analysis (under runtime_env)", name, sorted(known))
 
     def analyses_by_actor(self) -> tuple[Analyses, ...]:
         shared: dict[Place, list[NodeSpec]] = {}
@@ -370,17 +352,23 @@ def make_plan(
     compute: list[ComputeConfig],
     scheduler: TrajectoryScheduler,
     dispatch_with: AnalyticsScheduler | None = None,
+    *,
+    here: bool = True,
 ) -> FlightPlan:
     """Decide which actors a graph becomes.
 
-    With an analytics scheduler to `dispatch_with`, heavy analyses run when and where it says.
-    Raises GraphError if nothing flies, UnknownIdError for a driver that there is not.
+    With an analytics scheduler to `dispatch_with`, heavy analyses run when and where it says;
+    `here` is False where actors may run on other machines. Raises the project's errors for a
+    graph that cannot fly, with what is wrong and what to do about it.
     """
     planner = _Planner(session, graph, compute, scheduler, dispatch_with)
     if not planner.robots:
         raise GraphError("no robot navigates: call drone.navigate(…) before start_mission()")
-    planner.require_plugins()
-    planner.require_runtime_envs()
+    check_graph(graph, session.environment, {robot.id for robot in planner.robots})
+    if dispatch_with is not None:
+        check_tasks(graph, session.environment)
+    lenses = [node.work for node in planner.sensors() if node.work.type == "camera"]
+    check_plugins(session.environment, planner.robots, lenses, here=here)
     specs = tuple(planner.robot_spec(robot) for robot in planner.robots)
     cameras = planner.cameras()
     analyses = planner.analyses_by_actor()

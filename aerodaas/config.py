@@ -12,9 +12,10 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from packaging.requirements import InvalidRequirement, Requirement
-from pydantic import BaseModel, ConfigDict, Field, SecretStr, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, SecretStr, model_validator
 from typing_extensions import Self
 
+from aerodaas.checked import checked
 from aerodaas.errors import ConfigError
 from aerodaas.identifiers import Identifier
 
@@ -120,6 +121,27 @@ class LimitsConfig(_Strict):
     battery_land: Annotated[float, Field(ge=0, le=1)] = 0.12
     """Charge at which it lands where it is, and that a return keeps in reserve."""
     geofence: GeofenceConfig = GeofenceConfig()
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        fence = self.geofence
+        contradictions = {
+            f"battery_return ({self.battery_return:g}) must be at least battery_land "
+            f"({self.battery_land:g}): raise the one or lower the other": (
+                self.battery_return < self.battery_land
+            ),
+            f"cruise_speed ({self.cruise_speed:g} m/s) must not exceed max_speed "
+            f"({self.max_speed:g} m/s): lower the one or raise the other": self.cruise_speed
+            > self.max_speed,
+            f"takeoff_height ({self.takeoff_height:g} m) must lie between the geofence's floor "
+            f"({fence.floor:g} m) and ceiling ({fence.ceiling:g} m)": not (
+                fence.floor <= self.takeoff_height <= fence.ceiling
+            ),
+        }
+        found = [text for text, wrong in contradictions.items() if wrong]
+        if found:
+            raise ValueError("; ".join(found))
+        return self
 
 
 class MissionConfig(_Strict):
@@ -423,23 +445,9 @@ class EnvironmentConfig(_Strict):
 
 def validated(content: object, place: str) -> EnvironmentConfig:
     """Check the content of an environment file; raises ConfigError that names `place`."""
-    try:
-        return EnvironmentConfig.model_validate(content)
-    except ValidationError as error:
-        raise ConfigError(f"{place}: {_explain(error)}") from None
+    return checked(EnvironmentConfig, content, place, " (see `aerodaas schema`)")
 
 
 def as_runtime_env(content: object, place: str) -> RuntimeEnvConfig:
     """Check what an application says of a runtime_env; raises ConfigError that names `place`."""
-    try:
-        return RuntimeEnvConfig.model_validate(content)
-    except ValidationError as error:
-        raise ConfigError(f"{place}: runtime_env: {_explain(error)}") from None
-
-
-def _explain(error: ValidationError) -> str:
-    problems = [
-        f"{'.'.join(str(part) for part in problem['loc']) or 'file'}: {problem['msg']}"
-        for problem in error.errors()
-    ]
-    return "; ".join(problems) + " (see `aerodaas schema`)"
+    return checked(RuntimeEnvConfig, content, f"{place}: runtime_env")

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas import sharing
+from aerodaas.checks import check_environment
 from aerodaas.config import ComputeConfig, EnvironmentConfig, RobotConfig
 from aerodaas.errors import ConfigError, GraphError, MissionError, UnknownIdError
 from aerodaas.graph import Graph, NavigationEdge
@@ -59,6 +60,7 @@ class Environment(PaperNames, IEnvironment):
 
             config = overridden(replay_environment(options.replay), options.overrides)
         self.config: EnvironmentConfig = located(config, self.path.parent)
+        check_environment(self.config, str(options.replay or self.path))
         self.env_data = self.config.model_dump(by_alias=True)
         """The environment file's content, for analyses that want it."""
         self.graph = Graph()

@@ -6,6 +6,8 @@ something failed that the input could not have told.
 
 from __future__ import annotations
 
+import difflib
+
 __all__ = [
     "AeroDaaSError",
     "ClockError",
@@ -43,7 +45,9 @@ class UnknownIdError(AeroDaaSError):
     def __init__(self, kind: str, wanted: str, known: list[str]) -> None:
         """Say which `kind` of thing was `wanted` and which ones are `known`."""
         choices = ", ".join(sorted(known)) or "none"
-        super().__init__(f"no {kind} is called {wanted!r}; known: {choices}")
+        close = difflib.get_close_matches(wanted, known, n=1)
+        meant = f" (did you mean {close[0]}?)" if close else ""
+        super().__init__(f"no {kind} is called {wanted!r}; known: {choices}{meant}")
         self._args = (kind, wanted, known)
 
     def __reduce__(self) -> tuple[type[UnknownIdError], tuple[str, str, list[str]]]:

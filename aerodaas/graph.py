@@ -32,6 +32,7 @@ __all__ = [
     "StreamReader",
     "Trigger",
     "application_line",
+    "refusal",
 ]
 
 E = TypeVar("E")
@@ -54,7 +55,8 @@ def application_line() -> str:
     return ""
 
 
-def _refuse(message: str) -> GraphError:
+def refusal(message: str) -> GraphError:
+    """An error that names the application's own line."""
     line = application_line()
     return GraphError(f"{message}\n  at {line}" if line else message)
 
@@ -163,23 +165,23 @@ class Graph:
                 f"{node.id} runs already, too late to {what}; do that before analyse(), or with a "
                 "further analysis"
             )
-            raise _refuse(message)
+            raise refusal(message)
 
     def connect(self, source: AeroStreamData[Any], target: Node, accepts: tuple[type, ...]) -> None:
         """Draw an edge; raises GraphError for a wrong type, a foreign graph or a cycle."""
         if source.graph is not self:
             message = f"{source.name} belongs to another Environment than {target.id}"
-            raise _refuse(message)
+            raise refusal(message)
         if not issubclass(source.item, accepts):
             wanted = " or ".join(kind.__name__ for kind in accepts)
             message = (
                 f"{type(target.work).__name__} takes a stream of {wanted}, "
                 f"but {source.name} carries {source.item.__name__}"
             )
-            raise _refuse(message)
+            raise refusal(message)
         if target.id in self.upstream(source.name):
             message = f"{target.id} would analyse its own results by way of {source.name}"
-            raise _refuse(message)
+            raise refusal(message)
         if source.name not in target.inputs:
             target.inputs.append(source.name)
 
@@ -237,7 +239,7 @@ class AeroStreamData(PaperNames, IAeroData[E], Generic[E]):
                 f"{self.name} has no data before the mission starts; "
                 "call start_mission(wait=False) first"
             )
-            raise _refuse(message)
+            raise refusal(message)
         if self._reader is None or self._opened_by is not opener:
             self._reader, self._opened_by = opener(self.name), opener
         return self._reader
@@ -245,7 +247,7 @@ class AeroStreamData(PaperNames, IAeroData[E], Generic[E]):
     def set_data(self, data: E) -> None:
         """Refuse: a stream's data comes from its node."""
         message = f"{self.name} is a stream: its data comes from its node, not from {data!r}"
-        raise _refuse(message)
+        raise refusal(message)
 
     def __iter__(self) -> Iterator[E]:
         """Iterate over items as they arrive."""

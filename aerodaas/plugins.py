@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from aerodaas.errors import AeroDaaSError, ConfigError, UnknownIdError
 
-__all__ = ["PluginKind", "load_plugin", "plugin_names", "require_plugin"]
+__all__ = ["PluginKind", "is_built_in", "load_plugin", "plugin_names", "require_plugin"]
 
 PluginKind = Literal["drivers", "cameras", "waypoint_schedulers", "analytics_schedulers"]
 
@@ -72,6 +72,11 @@ def plugin_names(kind: PluginKind) -> list[str]:
 def require_plugin(kind: PluginKind, name: str) -> None:
     """Import nothing, but raise UnknownIdError if nothing is called `name`."""
     _target(kind, name)
+
+
+def is_built_in(kind: PluginKind, name: str) -> bool:
+    """Tell whether the project itself brings what is called `name`."""
+    return name in _BUILT_IN[kind]
 
 
 def load_plugin(kind: PluginKind, name: str) -> Any:  # noqa: ANN401 - a class of the caller's kind

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import os
 import threading
 import time
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from aerodaas.checks import check_served
 from aerodaas.clock import seconds
 from aerodaas.config import EnvironmentConfig, TaskConfig
 from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, MissionError, RecordingError
@@ -75,6 +77,8 @@ class Run:
         from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
 
         # Before Ray, which takes seconds: what is wrong with the graph should be told at once.
+        check_served("--live-address", self.options.live)
+        check_served("--view-address", self.options.page)
         plan = self._plan()
         if self.recording is not None and self.recording.exists():
             raise RecordingError(
@@ -209,7 +213,8 @@ class Run:
         dispatch_with = self._environment.analytics_scheduler()
         self._change_models()
         compute = self._environment.compute()
-        return make_plan(session, self.graph, compute, scheduler, dispatch_with)
+        joins = self.options.address or os.environ.get("RAY_ADDRESS")
+        return make_plan(session, self.graph, compute, scheduler, dispatch_with, here=not joins)
 
     def _check_world(self) -> None:
         """Raise ConfigError for a broken scenario here rather than in some actor."""

@@ -18,8 +18,8 @@ ROOT = Path(__file__).parents[1]
 names = st.from_regex(r"[A-Za-z][A-Za-z0-9_\-]{0,10}", fullmatch=True)
 numbers = st.floats(0.01, 1e4)
 limits = st.fixed_dictionaries(
-    {},
-    optional={"cruise_speed": numbers, "max_speed": numbers, "arrival_radius": numbers},
+    {"max_speed": st.floats(1.0, 1e4)},
+    optional={"cruise_speed": st.floats(0.01, 1.0), "arrival_radius": numbers},
 )
 sensors = st.fixed_dictionaries(
     {"type": st.sampled_from(["camera", "odometry", "gps", "battery", "status"])},
@@ -54,7 +54,7 @@ def test_what_is_read_is_what_was_written(content: dict[str, Any]) -> None:
         assert {key: getattr(robot.limits, key) for key in told["limits"]} == told["limits"]
 
 
-@given(environments(), numbers)
+@given(environments(), st.floats(1.0, 1e4))
 def test_a_setting_changes_what_it_names_and_nothing_else(
     content: dict[str, Any], speed: float
 ) -> None:

@@ -23,10 +23,11 @@ from typing_extensions import Self
 from aerodaas.config import RuntimeEnvConfig, TaskConfig, as_runtime_env
 from aerodaas.data import Alert
 from aerodaas.errors import GraphError
-from aerodaas.graph import AeroStreamData, Graph, Node, Trigger
+from aerodaas.graph import AeroStreamData, Graph, Node, Trigger, refusal
 from aerodaas.identifiers import require_name
 from aerodaas.interfaces import IAeroData, IAnalyse, ICompute, INavigableAnalyse
 from aerodaas.names import PaperNames, snake_case
+from aerodaas.navigation.commands import TRIGGERED
 from aerodaas.vehicle import VehicleState
 from aerodaas.waypoints import AeroNavigation
 
@@ -186,6 +187,8 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         `when` gets each result; without it, every result that is not None triggers. An analysis
         that is a target sleeps until it is woken. Raises GraphError for any other target.
         """
+        if when is not None and not callable(when):
+            raise refusal(f"a trigger's `when` is a function of a result, not {when!r}")
         if isinstance(target, Analytics):
             if target.node is None:
                 message = f"{type(target).__name__}: call analyse() before it is a trigger's target"
@@ -195,13 +198,11 @@ class Analytics(PaperNames, IAnalyse[O_co]):
             trigger = Trigger(target.node.id, when=when)
         else:
             robot = getattr(getattr(target, "__self__", None), "robot_id", None)
-            command = getattr(target, "__name__", None)
-            if robot is None or command is None:
-                message = (
-                    f"a trigger wakes an analysis or a robot's method such as "
-                    f"drone.end_mission, not {target!r}"
-                )
-                raise GraphError(message)
+            command = getattr(target, "__name__", "")
+            if robot is None or command not in TRIGGERED:
+                what = f"{robot}.{command}" if robot is not None else repr(target)
+                methods = ", ".join(f"drone.{method}" for method in TRIGGERED)
+                raise refusal(f"a trigger wakes an analysis or calls {methods}; not {what}")
             trigger = Trigger(robot, command, when)
         if self.node is not None:
             self._require_idle("give it triggers")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from aerodaas.cameras.base import Picture
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
 from aerodaas.clock import seconds
-from aerodaas.config import EnvironmentConfig, SensorConfig
+from aerodaas.config import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.data import Odometry
 from aerodaas.errors import SourceError
 from aerodaas.geometry import CameraModel
@@ -31,6 +31,8 @@ class FolderCamera:
     picture is shown depends on the mission's stamps only. Grey, 16-bit and transparent pictures
     become 8-bit BGR; their sizes may differ.
     """
+
+    settings_model = CameraConfig
 
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
         """Check the settings of `sensor`; raises ConfigError."""

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from aerodaas.cameras.base import Picture
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
-from aerodaas.config import EnvironmentConfig, SensorConfig
+from aerodaas.config import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.data import Odometry
 from aerodaas.errors import RecordingError, SourceError
 from aerodaas.geometry import CameraModel
@@ -27,6 +27,8 @@ class McapCamera:
     `loop`, and the lens and mount of `CameraConfig`. Reads Foxglove's CompressedImage,
     CompressedVideo (H.264) and RawImage, and ROS 2's sensor_msgs/CompressedImage and Image.
     """
+
+    settings_model = CameraConfig
 
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
         """Check the settings of `sensor`; raises ConfigError."""

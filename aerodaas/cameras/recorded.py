@@ -8,7 +8,7 @@ from aerodaas.cameras.base import Camera
 from aerodaas.cameras.folder import FolderCamera
 from aerodaas.cameras.settings import camera_settings
 from aerodaas.cameras.video import VideoCamera
-from aerodaas.config import EnvironmentConfig, SensorConfig
+from aerodaas.config import CameraConfig, EnvironmentConfig, SensorConfig
 
 __all__ = ["recorded_camera"]
 
@@ -18,3 +18,6 @@ def recorded_camera(sensor: SensorConfig, environment: EnvironmentConfig) -> Cam
     path = camera_settings(sensor).path
     kind = FolderCamera if path is None or Path(path).is_dir() else VideoCamera
     return kind(sensor, environment)
+
+
+recorded_camera.settings_model = CameraConfig  # type: ignore[attr-defined]

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from pydantic import ValidationError
-
+from aerodaas.checked import checked
 from aerodaas.config import CameraConfig, SensorConfig
 from aerodaas.errors import ConfigError
 from aerodaas.geometry import CameraModel
@@ -15,14 +14,7 @@ __all__ = ["camera_model", "camera_settings", "required_path"]
 
 def camera_settings(sensor: SensorConfig) -> CameraConfig:
     """Check the settings of `sensor`; raises ConfigError that names the sensor and the setting."""
-    try:
-        return CameraConfig.model_validate(sensor.settings)
-    except ValidationError as error:
-        problems = "; ".join(
-            f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}"
-            for problem in error.errors()
-        )
-        raise ConfigError(f"sensor {sensor.id}: settings: {problems}") from None
+    return checked(CameraConfig, sensor.settings, f"sensor {sensor.id}: settings")
 
 
 def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> str:

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from pydantic import ValidationError
-
 from aerodaas.cameras.base import Picture
+from aerodaas.cameras.settings import camera_settings
 from aerodaas.clock import seconds
 from aerodaas.config import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.data import Odometry
-from aerodaas.errors import ConfigError, SourceError
+from aerodaas.errors import SourceError
 from aerodaas.geometry import CameraModel
 from aerodaas.simulation.world import World
 
@@ -28,12 +27,11 @@ class SimulatedCamera:
     environment's world is broken.
     """
 
+    settings_model = CameraConfig
+
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
         """Check the settings and load the world; the renderer starts in `open`."""
-        try:
-            config = CameraConfig.model_validate(sensor.settings)
-        except ValidationError as error:
-            raise ConfigError(_explain(sensor.id, error)) from None
+        config = camera_settings(sensor)
         self._name = sensor.id
         self._world = World.load(environment.simulation)
         self._model = CameraModel.from_fov(
@@ -87,12 +85,3 @@ class SimulatedCamera:
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
-
-
-def _explain(name: str, error: ValidationError) -> str:
-    problems = "; ".join(
-        f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}"
-        for problem in error.errors()
-    )
-    known = ", ".join(sorted(CameraConfig.model_fields))
-    return f"settings of camera {name}: {problems} (a camera knows {known})"

@@ -19,7 +19,11 @@ from aerodaas.cameras.settings import camera_model
 from aerodaas.clock import host_time_ns
 from aerodaas.config import EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.data import Odometry
-from aerodaas.drivers.tello.settings import tello_camera_settings, tello_settings
+from aerodaas.drivers.tello.settings import (
+    TelloCameraSettings,
+    tello_camera_settings,
+    tello_settings,
+)
 from aerodaas.drivers.tello.sockets import bound_socket, datagrams
 from aerodaas.errors import ConfigError, SourceError
 from aerodaas.geometry import CameraModel
@@ -65,6 +69,8 @@ class TelloCamera:
     Settings: those of `TelloCameraSettings`. Raises ConfigError if the sensor does not belong to a
     robot whose driver is `tello`.
     """
+
+    settings_model = TelloCameraSettings
 
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
         """Check the settings; nothing is opened yet."""

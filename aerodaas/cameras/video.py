@@ -8,7 +8,7 @@ from aerodaas.cameras.base import Picture
 from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
 from aerodaas.cameras.video_file import VideoFile
-from aerodaas.config import EnvironmentConfig, SensorConfig
+from aerodaas.config import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.data import Odometry
 from aerodaas.geometry import CameraModel
 
@@ -23,6 +23,8 @@ class VideoCamera:
     Settings: `path` (a file, a URL such as `rtsp://…` or `udp://…`, or `/dev/video0`), `loop`
     for files, and the lens and mount of `CameraConfig`.
     """
+
+    settings_model = CameraConfig
 
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
         """Check the settings of `sensor`; raises ConfigError."""

@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pydantic import ValidationError
 
+from aerodaas.checked import checked
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.setpoints import require_finite
-from aerodaas.errors import ClockError, ConfigError, InvalidWaypointError, VehicleError
+from aerodaas.errors import ClockError, InvalidWaypointError, VehicleError
 from aerodaas.geometry import GeodeticOrigin
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
@@ -40,12 +40,11 @@ class SimulatedVehicle:
     Raises ConfigError if the robot's settings are not those of an `Airframe`.
     """
 
+    settings_model = Airframe
+
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
         """Make the drone of `robot`, standing at its start."""
-        try:
-            airframe = Airframe.model_validate(robot.settings)
-        except ValidationError as error:
-            raise ConfigError(_explain(robot.id, error)) from None
+        airframe = checked(Airframe, robot.settings, f"robot {robot.id}: settings")
         limits, simulation, home = robot.limits, environment.simulation, environment.home
         self._name = robot.id
         self._airframe = airframe
@@ -222,12 +221,3 @@ class SimulatedVehicle:
             raise VehicleError(f"{self._name} cannot {deed} on the ground; take off first")
         if self._autopilot.mode is VehicleMode.FAILSAFE:
             raise VehicleError(f"{self._name} cannot {deed}: it is landing on its last charge")
-
-
-def _explain(name: str, error: ValidationError) -> str:
-    problems = "; ".join(
-        f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}"
-        for problem in error.errors()
-    )
-    known = ", ".join(sorted(Airframe.model_fields))
-    return f"settings of robot {name}: {problems} (the simulated drone knows {known})"

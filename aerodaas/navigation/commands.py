@@ -11,6 +11,7 @@ from aerodaas.graph import NavigationEdge
 from aerodaas.waypoints import AeroNavigation, SchedulingType
 
 __all__ = [
+    "TRIGGERED",
     "AddNavigation",
     "Answer",
     "ClearNavigation",
@@ -129,6 +130,14 @@ Command: TypeAlias = (
     | ReturnHome
     | End
 )
+
+
+TRIGGERED: Mapping[str, Command] = {
+    "end_mission": End("an analysis asked to land"),
+    "pause_mission": Pause(),
+    "resume_mission": Resume(),
+}
+"""What an analysis' trigger may have a robot do, by the robot's method."""
 
 
 @dataclass(frozen=True, slots=True)

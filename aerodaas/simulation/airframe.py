@@ -9,7 +9,8 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from typing_extensions import Self
 
 __all__ = ["AIR_DENSITY", "GRAVITY", "Airframe"]
 
@@ -62,6 +63,16 @@ class Airframe(BaseModel):
     """Charge below which it refuses to take off."""
     battery_failsafe: Fraction = 0.05
     """Charge below which it lands by itself, whatever it is told."""
+
+    @model_validator(mode="after")
+    def _agree(self) -> Self:
+        if self.battery_failsafe > self.battery_minimum:
+            message = (
+                f"battery_failsafe ({self.battery_failsafe:g}) must not exceed "
+                f"battery_minimum ({self.battery_minimum:g})"
+            )
+            raise ValueError(message)
+        return self
 
     @property
     def disc_area(self) -> float:

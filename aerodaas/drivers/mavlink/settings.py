@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from aerodaas.checked import checked
 from aerodaas.config import RobotConfig
-from aerodaas.errors import ConfigError
 
 __all__ = ["KEY_VARIABLE", "MavlinkSettings", "mavlink_settings"]
 
@@ -68,12 +68,4 @@ class MavlinkSettings(BaseModel):
 
 def mavlink_settings(robot: RobotConfig) -> MavlinkSettings:
     """Check the settings of `robot`; raises ConfigError that names the robot and the setting."""
-    try:
-        return MavlinkSettings.model_validate(robot.settings)
-    except ValidationError as error:
-        problems = "; ".join(
-            f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}"
-            for problem in error.errors()
-        )
-        known = ", ".join(sorted(MavlinkSettings.model_fields))
-        raise ConfigError(f"robot {robot.id}: settings: {problems} (known: {known})") from None
+    return checked(MavlinkSettings, robot.settings, f"robot {robot.id}: settings")

@@ -25,7 +25,7 @@ from aerodaas.drivers.mavlink.parameters import Parameters
 from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.plans import Item, Progress, download, upload
 from aerodaas.drivers.mavlink.rates import RateKeeper
-from aerodaas.drivers.mavlink.settings import mavlink_settings
+from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
 from aerodaas.drivers.mavlink.steering import Steering
 from aerodaas.drivers.mavlink.telemetry import Telemetry
 from aerodaas.drivers.mavlink.touchdown import Touchdown
@@ -63,6 +63,8 @@ class MavlinkVehicle:
     One thread at a time may use it, the link's own apart. Raises ConfigError for settings that it
     does not know.
     """
+
+    settings_model = MavlinkSettings
 
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
         """Prepare for `robot`; nothing is sent or opened."""

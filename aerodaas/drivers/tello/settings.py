@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, TypeVar
+from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field
 
+from aerodaas.checked import checked
 from aerodaas.config import CameraConfig, RobotConfig, SensorConfig
 from aerodaas.errors import ConfigError
 
@@ -75,17 +76,14 @@ class TelloCameraSettings(CameraConfig):
     but come."""
 
 
-Settings = TypeVar("Settings", bound=BaseModel)
-
-
 def tello_settings(robot: RobotConfig) -> TelloSettings:
     """Check the settings of `robot`; raises ConfigError that names the robot and the setting."""
-    return _checked(TelloSettings, robot.settings, f"robot {robot.id}")
+    return checked(TelloSettings, robot.settings, f"robot {robot.id}: settings")
 
 
 def tello_camera_settings(sensor: SensorConfig) -> TelloCameraSettings:
     """Check the settings of `sensor`; raises ConfigError that names the sensor and the setting."""
-    return _checked(TelloCameraSettings, sensor.settings, f"sensor {sensor.id}")
+    return checked(TelloCameraSettings, sensor.settings, f"sensor {sensor.id}: settings")
 
 
 def video_port(robot: RobotConfig) -> int | None:
@@ -102,15 +100,3 @@ def video_port(robot: RobotConfig) -> int | None:
         names = ", ".join(sensor.id for sensor in cameras)
         raise ConfigError(f"robot {robot.id}: a Tello has one video stream, not one for {names}")
     return tello_camera_settings(cameras[0]).video_port if cameras else None
-
-
-def _checked(kind: type[Settings], settings: dict[str, object], place: str) -> Settings:
-    try:
-        return kind.model_validate(settings)
-    except ValidationError as error:
-        problems = "; ".join(
-            f"{'.'.join(str(part) for part in problem['loc'])}: {problem['msg']}"
-            for problem in error.errors()
-        )
-        known = ", ".join(sorted(kind.model_fields))
-        raise ConfigError(f"{place}: settings: {problems} (known: {known})") from None

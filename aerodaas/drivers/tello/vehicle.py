@@ -25,7 +25,7 @@ from aerodaas.drivers.tello.greeting import explain_no_states, greet, meaning
 from aerodaas.drivers.tello.link import TelloLink
 from aerodaas.drivers.tello.phase import LIFTED, FlightPhase
 from aerodaas.drivers.tello.reckoning import DeadReckoning
-from aerodaas.drivers.tello.settings import tello_settings, video_port
+from aerodaas.drivers.tello.settings import TelloSettings, tello_settings, video_port
 from aerodaas.drivers.tello.state import TelloState
 from aerodaas.errors import InvalidWaypointError, VehicleError
 from aerodaas.geometry import Vector, enu_to_body, wrap_angle
@@ -80,6 +80,8 @@ class TelloVehicle:
 
     Raises ConfigError if the robot's settings are not those of a `TelloSettings`.
     """
+
+    settings_model = TelloSettings
 
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
         """Prepare for `robot`, standing at its start; nothing is sent or opened."""
