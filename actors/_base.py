@@ -84,6 +84,8 @@ class ActorReport:
     """What its process takes; None before it has said anything."""
     alerts: tuple[Alert, ...] = ()
     """The newest alerts, oldest first."""
+    problems: tuple[str, ...] = ()
+    """What could not be sent or read."""
     values: dict[str, Any] = field(default_factory=dict)
     """Figures of the actor's own."""
 
@@ -125,7 +127,9 @@ class StreamActor:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
-        self._alerting = threading.Lock()
+        # Reentrant: an alert may be found to be unsendable while it is sent.
+        self._alerting = threading.RLock()
+        self._problems: list[str] = []
         self.inbox: Inbox | None = None
         self.outlets: dict[str, Outlet] = {}
 
@@ -133,8 +137,8 @@ class StreamActor:
         """Open everything; raises the project's errors for what cannot be opened."""
         logging.captureWarnings(capture=True)
         logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
-        self.inbox = Inbox(self.scope, self.name, self._reads)
         self.alerts = self.outlet(alert_stream(self.name))
+        self.inbox = self.reader(self.name, self._reads)
         self._open()
         self._phase = "ready"
         return self.info()
@@ -204,6 +208,7 @@ class StreamActor:
             sent=self.sent(),
             vitals=read_vitals(),
             alerts=tuple(self._newest_alerts),
+            problems=tuple(self._problems),
             values=self._values(),
         )
 
@@ -227,10 +232,29 @@ class StreamActor:
         """Prefix of the stream names of this run on this node."""
         return self.session.scope(ray.get_runtime_context().get_node_id())
 
-    def outlet(self, stream: str) -> Outlet:
-        """Open a stream for writing."""
-        self.outlets[stream] = Outlet(self.scope, stream)
+    def outlet(self, stream: str, what: str = "") -> Outlet:
+        """Open a stream for writing; `what` is what people know its items as."""
+
+        def unsendable(reason: str) -> None:
+            self._problem("unsendable", f"{what or stream}: {reason}")
+
+        self.outlets[stream] = Outlet(self.scope, stream, unsendable)
         return self.outlets[stream]
+
+    def reader(self, name: str, depths: dict[str, int], who: str = "") -> Inbox:
+        """Open streams for reading as `name`; `who` is what people know this reader as."""
+
+        def unreadable(reason: str) -> None:
+            self._problem("unreadable", f"{who or self.name} cannot read {reason}")
+
+        return Inbox(self.scope, name, depths, unreadable)
+
+    def _problem(self, kind: str, text: str) -> None:
+        """Say once what cannot be sent or read; it is told again when the run ends."""
+        with self._alerting:
+            if text not in self._problems and len(self._problems) < _ALERTS_KEPT:
+                self._problems.append(text)
+                self.alert(kind, text)
 
     def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401
         """Tell the people who watch; any thread may."""
@@ -241,8 +265,11 @@ class StreamActor:
         with self._alerting:
             header = Header(self.alerts.sent, stamp, self.name)
             alert = Alert(header, kind, text, values)
+            if self.alerts.measure(alert, header, host_time_ns()).item is None:
+                header = Header(self.alerts.sent, stamp, self.name)
+                alert = Alert(header, kind, text, {})
+                self.alerts.measure(alert, header, host_time_ns())
             self._newest_alerts.append(alert)
-            self.alerts.measure(alert, header, host_time_ns())
 
     def follow(self, stamp: int) -> None:
         """In lockstep mission time is what the newest message says, but for who conducts it."""

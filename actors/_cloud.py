@@ -19,7 +19,7 @@ from ray.exceptions import RayError, RayTaskError
 from aerodaas.actors._costs import Executions
 from aerodaas.actors._parcels import Parcel, Parcels
 from aerodaas.actors.executor import FRAMES_KEPT, Executed, MissingFrameError, UnpreparedError
-from aerodaas.actors.streams import decode_message
+from aerodaas.actors.streams import UnreadableError, decode_message
 from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import Task
 from aerodaas.status import Message
@@ -205,7 +205,10 @@ class Cloud:
             self.gone = True
             return CloudAnswer(sent.task, lost=True, error="its executor in the cloud is gone")
         self._answered_since = max(self._answered_since, sent.at)
-        return self._learned(sent, executed)
+        try:
+            return self._learned(sent, executed)
+        except UnreadableError as error:
+            return CloudAnswer(sent.task, error=f"cannot be read: {error}", way=self.executor.site)
 
     def _learned(self, sent: _Sent, executed: Executed) -> CloudAnswer:
         """Take what an execution tells about the link, the coding and the work."""

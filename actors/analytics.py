@@ -20,7 +20,7 @@ from aerodaas.actors._link import StreamLink
 from aerodaas.actors._names import ACKS
 from aerodaas.actors.replayed import RecordedWork
 from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
-from aerodaas.actors.streams import Inbox, Outlet
+from aerodaas.actors.streams import Outlet
 from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.clock import host_time_ns
@@ -211,8 +211,9 @@ class _Worker:
 
     def open(self) -> None:
         session = self._actor.session
-        self.inbox = Inbox(self._actor.scope, f"analytics/{self.node.stream}", self.depths)
-        self._results = self._actor.outlet(self.node.stream)
+        name = type(self.node.work).__name__
+        self.inbox = self._actor.reader(f"analytics/{self.node.stream}", self.depths, name)
+        self._results = self._actor.outlet(self.node.stream, f"{name}'s result")
         self._commands = {
             trigger.stream: self._actor.outlet(trigger.stream) for trigger in self.node.triggers
         }

@@ -12,6 +12,7 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from aerodaas.actors._coding import CodedFrame, decoded
+from aerodaas.actors.application import Application
 from aerodaas.actors.streams import decode_message, encode_message
 from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.clock import host_time_ns
@@ -48,8 +49,12 @@ class Executed(NamedTuple):
 class CloudExecutor:
     """Holds the analyses of `prepare`; Ray runs as many `execute` at once as it was told."""
 
-    def __init__(self) -> None:
-        """Hold nothing yet: the analyses would be kept for restarts."""
+    def __init__(self, application: Application | None = None) -> None:
+        """Hold nothing yet: the analyses would be kept for restarts.
+
+        What the `application` defines is known from here on, and after a restart.
+        """
+        del application
         self._analyses: dict[str, Analytics[Any]] = {}
         self._turns: dict[str, threading.Lock] = {}
         self._frames: OrderedDict[tuple[str, int], Message[Any]] = OrderedDict()

@@ -388,7 +388,9 @@ class Flight:
         options = {**self._options(name, process.place, restarts=-1), **environments[name]}
         remote: Any = ray.remote(CloudExecutor)
         concurrency = process.slots + _LOOKS
-        handle = remote.options(**options, max_concurrency=concurrency).remote()
+        handle = remote.options(**options, max_concurrency=concurrency).remote(
+            self.plan.session.application
+        )
         self._helpers.append(handle)
         works = ray.put(process.works)
         self._opening.append(handle.prepare.remote(works))

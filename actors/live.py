@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import uuid
+import warnings
 from collections import deque
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -12,7 +13,7 @@ import ray
 from ray.exceptions import RayError
 
 from aerodaas.actors.session import Session
-from aerodaas.actors.streams import Inbox, decode_message, shared_memory_available
+from aerodaas.actors.streams import Inbox, UnreadableError, decode_message, shared_memory_available
 from aerodaas.status import Message
 
 __all__ = ["LiveReader"]
@@ -57,12 +58,20 @@ class _Asking:
             return []
         self._question = None
         try:
-            messages = [decode_message(memoryview(data)) for data in ray.get(answered[0])]
+            messages = [_decoded(data) for data in ray.get(answered[0])]
         except RayError:
             return []  # It has died: either it is restarted, or the flight is over.
         if messages:
             self._next = messages[-1].seq + 1
         return messages
+
+
+def _decoded(data: bytes) -> Message[Any]:
+    try:
+        return decode_message(memoryview(data))
+    except UnreadableError as error:
+        warnings.warn(str(error), stacklevel=2)
+        return error.message
 
 
 class LiveReader:

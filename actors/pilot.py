@@ -150,7 +150,13 @@ class Pilot:
         patience = _PLANS_PATIENCE * self.spec.robot.mission.plan_timeout
         wall = self._session.host_seconds(round(patience * NANOSECONDS))
         return BackgroundPlanner(
-            scheduler, PlannerExecutor(max(_LEAST_PATIENCE, wall), solve, scheduler)
+            scheduler,
+            PlannerExecutor(
+                max(_LEAST_PATIENCE, wall),
+                solve,
+                scheduler,
+                application=self._session.application,
+            ),
         )
 
     @staticmethod

@@ -11,6 +11,8 @@ import ray
 from ray.exceptions import GetTimeoutError, RayActorError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
+from aerodaas.actors.application import Application
+
 __all__ = ["PlannerExecutor"]
 
 T = TypeVar("T")
@@ -18,6 +20,10 @@ T = TypeVar("T")
 
 class _PlannerActor:
     """Calls what it is given; holds no state, so that a restart loses nothing."""
+
+    def __init__(self, application: Application | None) -> None:
+        """Know what the application defines, after a restart, too."""
+        del application
 
     @ray.method(max_task_retries=-1)
     def load(self, *_: object) -> None:
@@ -30,7 +36,9 @@ class _PlannerActor:
 class PlannerExecutor(Executor):
     """Runs one call after another in an actor on this node, started anew where one hangs."""
 
-    def __init__(self, patience: float, *used: object) -> None:
+    def __init__(
+        self, patience: float, *used: object, application: Application | None = None
+    ) -> None:
         """Give each call `patience` wall seconds; returns when the actor is there.
 
         The modules of what is `used` later are loaded at once, for it takes seconds.
@@ -41,7 +49,7 @@ class PlannerExecutor(Executor):
             num_cpus=0,
             max_restarts=-1,
             scheduling_strategy=NodeAffinitySchedulingStrategy(here, soft=False),
-        ).remote()
+        ).remote(application)
         self._patience = patience
         self._caller = ThreadPoolExecutor(1, "planner")
         ray.get(self._actor.load.remote(*used))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import uuid
 from dataclasses import dataclass, field, replace
 
+from aerodaas.actors.application import Application
 from aerodaas.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
 from aerodaas.config import EnvironmentConfig
 from aerodaas.recording.pace import Pace, later
@@ -41,6 +42,8 @@ class Session:
     """Host time at which mission time is zero."""
     pace: Pace = field(default_factory=Pace)
     """In a replay, what the recorded flight did when."""
+    application: Application = field(default_factory=Application)
+    """What the application's own files define."""
 
     def next_due(self, source: str, rate: float, after: int) -> int:
         """The first stamp later than `after` at which `source`, of `rate` Hz, is due."""

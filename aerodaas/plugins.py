@@ -7,12 +7,23 @@ A package adds its own by an entry point in the group `aerodaas.<kind>`, such as
 from __future__ import annotations
 
 import importlib
+import sys
+from collections.abc import Mapping
 from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
 from typing import Any, Literal
 
 from aerodaas.errors import AeroDaaSError, ConfigError, UnknownIdError
 
-__all__ = ["PluginKind", "is_built_in", "load_plugin", "plugin_names", "require_plugin"]
+__all__ = [
+    "PluginKind",
+    "is_built_in",
+    "load_plugin",
+    "main_name",
+    "plugin_names",
+    "require_plugin",
+]
 
 PluginKind = Literal["drivers", "cameras", "waypoint_schedulers", "analytics_schedulers"]
 
@@ -87,11 +98,27 @@ def load_plugin(kind: PluginKind, name: str) -> Any:  # noqa: ANN401 - a class o
     target = _target(kind, name)
     module, _, attribute = target.partition(":")
     try:
-        return getattr(importlib.import_module(module), attribute)
+        return getattr(_imported(module), attribute)
     except AeroDaaSError:
         raise
     except (ImportError, AttributeError) as error:
         raise ConfigError(f"cannot load {name!r} ({target}): {error}") from error
+
+
+def main_name(namespace: Mapping[str, Any]) -> str | None:
+    """The name by which others would import the file that runs as `__main__`; None without one."""
+    spec, file = namespace.get("__spec__"), namespace.get("__file__")
+    if spec is not None:
+        return str(spec.name)
+    return Path(file).stem if file else None
+
+
+def _imported(name: str) -> ModuleType:
+    # Imported once more, the application's own file would start its mission once more.
+    main = sys.modules.get("__main__")
+    if main is not None and name == main_name(vars(main)):
+        return main
+    return importlib.import_module(name)
 
 
 def _target(kind: PluginKind, name: str) -> str:

@@ -49,7 +49,9 @@ def travels(cls: C) -> C:
     values = _values_of(cls)
 
     def reduce(self: Any) -> tuple[Any, tuple[Any, ...]]:  # noqa: ANN401 - an instance of `cls`
-        return type(self), values(self)
+        if type(self) is not cls:
+            return _rebuilt, (type(self), _state(self))
+        return cls, values(self)
 
     cls.__reduce__ = reduce  # type: ignore[assignment]
     return valued(cls)
@@ -111,3 +113,18 @@ def _can_be_hashed(value: object) -> bool:
     except TypeError:
         return False
     return True
+
+
+def _state(record: object) -> dict[str, Any]:
+    """All that an object of a derived class holds: its constructor may be any."""
+    slots = (getattr(one, "__slots__", ()) for one in type(record).__mro__)
+    names = [name for some in slots for name in ((some,) if isinstance(some, str) else some)]
+    held = {name: getattr(record, name) for name in names if hasattr(record, name)}
+    return {**held, **getattr(record, "__dict__", {})}
+
+
+def _rebuilt(cls: type, state: dict[str, Any]) -> object:
+    record: object = object.__new__(cls)
+    for name, value in state.items():
+        object.__setattr__(record, name, value)  # a frozen one refuses its own
+    return record

@@ -202,16 +202,20 @@ class Run:
         self._raise_problems()
 
     def _plan(self) -> FlightPlan:
+        from aerodaas.actors.application import capture, require_sendable  # noqa: PLC0415
         from aerodaas.actors.plan import make_plan  # noqa: PLC0415
         from aerodaas.actors.session import Session  # noqa: PLC0415
 
         self._check_world()
         self._take_tasks()
         speed = None if self.lockstep else (self.options.speed or 1.0)
-        session = Session(self.config, speed, pace=self._pace())
         scheduler = self._environment.trajectory_scheduler()
         dispatch_with = self._environment.analytics_scheduler()
         self._change_models()
+        schedulers = [one for one in (scheduler, dispatch_with) if one is not None]
+        application = capture(self.graph, self.config, *schedulers)
+        require_sendable(self.graph, *schedulers)
+        session = Session(self.config, speed, pace=self._pace(), application=application)
         compute = self._environment.compute()
         joins = self.options.address or os.environ.get("RAY_ADDRESS")
         return make_plan(session, self.graph, compute, scheduler, dispatch_with, here=not joins)
@@ -308,7 +312,7 @@ class Run:
         problems += [
             line
             for report in self._flight.reports().values()
-            for line in report.values.get("last_errors", ())
+            for line in (*report.values.get("last_errors", ()), *report.problems)
         ]
         robots = self.state.robots if self.state else {}
         problems += [

@@ -4,6 +4,7 @@ Between actors of one node a message travels in shared memory (`_shared.py`, ice
 another node as a Ray ObjectRef (`_remote.py`). Placement decides; nobody else sees which.
 """
 
+from aerodaas.actors.streams._codec import UnreadableError
 from aerodaas.actors.streams._codec import decode as decode_message
 from aerodaas.actors.streams._codec import encode as encode_message
 from aerodaas.actors.streams._inbox import Inbox
@@ -17,6 +18,7 @@ __all__ = [
     "Inbox",
     "Outlet",
     "RemoteReader",
+    "UnreadableError",
     "decode_message",
     "encode_message",
     "shared_memory_available",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import threading
+import warnings
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from queue import SimpleQueue
 from typing import Any
 
-from aerodaas.actors.streams._codec import decode
+from aerodaas.actors.streams._codec import UnreadableError, decode
 from aerodaas.actors.streams._shared import (
     MAX_DEPTH,
     SharedSubscriber,
@@ -27,11 +28,19 @@ class Inbox:
     the messages' `seq` and is counted in `dropped`.
     """
 
-    def __init__(self, scope: str, name: str, depths: Mapping[str, int]) -> None:
+    def __init__(
+        self,
+        scope: str,
+        name: str,
+        depths: Mapping[str, int],
+        unreadable: Callable[[str], None] = warnings.warn,
+    ) -> None:
         """Read the streams named in `depths`; `scope` is the prefix of their names on this node.
 
-        `name` is the reader's own, unique within the scope.
+        `name` is the reader's own, unique within the scope. A message whose item cannot be rebuilt
+        here is received empty, and `unreadable` is told what it was, and why, in any thread.
         """
+        self._unreadable = unreadable
         self.received: dict[str, int] = dict.fromkeys(depths, 0)
         self.dropped: dict[str, int] = dict.fromkeys(depths, 0)
         self._next: dict[str, int] = {}
@@ -89,7 +98,10 @@ class Inbox:
 
     def deliver(self, stream: str, data: bytes) -> None:
         """Take a message that came from another node."""
-        message = decode(memoryview(data))
+        try:
+            message = decode(memoryview(data))
+        except UnreadableError as error:
+            message = self._emptied(error)
         with self._called:
             self._delivered[stream].append(message)
         self.wake()
@@ -133,13 +145,23 @@ class Inbox:
             start = len(messages)
             subscriber = self._subscribers.get(stream)
             if subscriber is not None:
-                while (message := subscriber.receive()) is not None:
+                while (message := self._read(subscriber)) is not None:
                     messages.append(message)
             while delivered:
                 messages.append(delivered.popleft())
             for message in messages[start:]:
                 self._count(message)
         return messages
+
+    def _read(self, subscriber: SharedSubscriber) -> Message[Any] | None:
+        try:
+            return subscriber.receive()
+        except UnreadableError as error:
+            return self._emptied(error)
+
+    def _emptied(self, error: UnreadableError) -> Message[Any]:
+        self._unreadable(str(error))
+        return error.message
 
     def _count(self, message: Message[Any]) -> None:
         stream = message.stream

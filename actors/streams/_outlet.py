@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
-from aerodaas.actors.streams._codec import Encoded
+from aerodaas.actors.streams._codec import Encoded, UnsendableError
 from aerodaas.actors.streams._remote import RemoteReader, send_to
 from aerodaas.actors.streams._shared import SharedPublisher, shared_memory_available
 from aerodaas.clock import host_time_ns
@@ -19,10 +22,19 @@ _MESSAGES_KEPT = 4
 
 
 class Outlet:
-    """Publishes one stream: in shared memory on this node, by reference to other nodes."""
+    """Publishes one stream: in shared memory on this node, by reference to other nodes.
 
-    def __init__(self, scope: str, stream: str) -> None:
-        """Open `stream` for writing; `scope` is the prefix of its name on this node."""
+    An item that cannot be sent leaves its message empty, so that everyone who waits for it goes on.
+    """
+
+    def __init__(
+        self, scope: str, stream: str, unsendable: Callable[[str], None] = warnings.warn
+    ) -> None:
+        """Open `stream` for writing; `scope` is the prefix of its name on this node.
+
+        `unsendable` is told of what cannot be sent, and why.
+        """
+        self._unsendable = unsendable
         self.scope = scope
         self.stream = stream
         self.sent = 0
@@ -63,13 +75,21 @@ class Outlet:
         self.latencies.append((hops[-1].published - captured) / 1e6)
         message = Message(self.stream, self.sent, stamp, header, captured, hops, item)
         self.sent += 1
-        encoded = Encoded(message)
+        problem = ""
+        try:
+            encoded = Encoded(message)
+        except UnsendableError as error:
+            problem = str(error)
+            message = replace(message, item=None)
+            encoded = Encoded(message)
         if self._shared is not None:
             self._shared.send(encoded)
         if self.remote:
             send_to(self.remote, self.stream, encoded)
         if self._kept is not None:
             self._kept.append((message.seq, encoded.to_bytes()))
+        if problem:
+            self._unsendable(problem)
         return message
 
     def since(self, seq: int) -> list[bytes]:

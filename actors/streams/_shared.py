@@ -147,7 +147,8 @@ class SharedSubscriber:
         """Return the oldest message kept, or None.
 
         Large arrays in it live in shared memory, unless the reader holds on to so many already
-        that only a copy lets it go on receiving.
+        that only a copy lets it go on receiving. Raises UnreadableError if its item cannot be
+        rebuilt here.
         """
         try:
             sample = self._subscriber.receive()

@@ -6,8 +6,12 @@ import dataclasses
 import json
 import math
 import re
+import sys
 from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
+from contextlib import suppress
+from dataclasses import is_dataclass
+from enum import Enum
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -23,6 +27,8 @@ _LONGEST_ARRAY = 4096
 _TAKEN = frozenset({"fence", "setpoints", "state", "status"})
 """Last parts of the topics of a robot that are the project's own."""
 _OWN = "own."
+_LONGEST_TEXT = 1000
+_DEEPEST_OBJECT = 4
 _FORBIDDEN = re.compile(r"[^A-Za-z0-9_/\-]+")
 
 
@@ -83,10 +89,10 @@ def json_bytes(value: dict[str, Any]) -> bytes:
 
 
 def plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - any JSON value
-    """Reduce any object to JSON's types; never raises for lack of a rule.
+    """Reduce any object to JSON's types; never raises, whatever an object's own methods do.
 
-    Numbers that are not finite become None, large arrays their shape and type, objects that are
-    no dataclass their class's name.
+    Numbers that are not finite become None, large arrays their shape and type, members of an
+    enumeration their name, objects with fields those fields, and others what they print as.
     """
     if value is None or isinstance(value, bool | int | str):
         return value
@@ -94,9 +100,11 @@ def plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - any JSON valu
         return float(value) if math.isfinite(value) else None
     if isinstance(value, np.integer | np.bool_):
         return value.item()
-    if depth >= _DEEPEST:
-        return f"<{type(value).__name__}>"
-    return _plain_container(value, depth + 1)
+    if depth < _DEEPEST:
+        # Whatever an object of the application's raises when it is asked.
+        with suppress(Exception):
+            return _plain_container(value, depth + 1)
+    return f"<{type(value).__name__}>"
 
 
 def _plain_container(value: object, depth: int) -> Any:  # noqa: ANN401 - any JSON value
@@ -104,14 +112,42 @@ def _plain_container(value: object, depth: int) -> Any:  # noqa: ANN401 - any JS
         whole = value.size <= _LONGEST_ARRAY and value.dtype.kind in "biuf"
         shape = {"shape": list(value.shape), "dtype": str(value.dtype)}
         return plain(value.tolist(), depth) if whole else shape
+    if isinstance(value, tuple) and hasattr(value, "_asdict"):
+        value = value._asdict()
     if isinstance(value, Mapping):
         return {str(key): plain(item, depth) for key, item in value.items()}
     if isinstance(value, list | tuple | AbstractSet):
         return [plain(item, depth) for item in value]
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        names = [field.name for field in dataclasses.fields(value)]
-        return {name: plain(getattr(value, name, None), depth) for name in names}
+    fields = {} if isinstance(value, type | Enum) else _fields(value)
+    # Objects that name each other are left to their names sooner than nested lists are.
+    if fields and depth <= _DEEPEST_OBJECT:
+        return {name: plain(item, depth) for name, item in fields.items()}
+    return _words(value)
+
+
+def _fields(value: Any) -> dict[str, Any]:  # noqa: ANN401 - any object
+    """What an object says that it consists of; nothing for one of Python's own."""
     dump = getattr(value, "model_dump", None) or getattr(value, "get_data", None)
-    if callable(dump) and not isinstance(value, type):
-        return plain(dump(), depth)
-    return f"<{type(value).__name__}>"
+    if callable(dump):
+        data = dump()
+        return data if isinstance(data, dict) else {"data": data}
+    names = [field.name for field in dataclasses.fields(value)] if is_dataclass(value) else []
+    if type(value).__module__.partition(".")[0] not in sys.stdlib_module_names:
+        slots = (getattr(one, "__slots__", ()) for one in type(value).__mro__)
+        names += [name for some in slots for name in ((some,) if isinstance(some, str) else some)]
+        names += [name for name in getattr(value, "__dict__", {}) if not name.startswith("__")]
+    return {name: getattr(value, name) for name in names if hasattr(value, name)}
+
+
+def _words(value: object) -> str:
+    if isinstance(value, Enum) and value.name is not None:
+        return value.name
+    if isinstance(value, type) or _wordless(type(value)):
+        return f"<{getattr(value, '__qualname__', type(value).__name__)}>"
+    text = str(value)
+    return text if len(text) <= _LONGEST_TEXT else f"{text[:_LONGEST_TEXT]}…"
+
+
+def _wordless(kind: type) -> bool:
+    """Whether objects of a class print as no more than its name and an address."""
+    return kind.__str__ is object.__str__ and kind.__repr__ is object.__repr__

@@ -14,7 +14,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import cv2
 from foxglove import Schema
 from foxglove.messages import LogLevel
 from mcap.writer import Writer
@@ -183,7 +182,7 @@ class FlightRecorder:
         if message.item is not None:
             try:
                 entries = list(convert(message.item, message, self._session))
-            except (TypeError, ValueError, OverflowError, AttributeError, cv2.error) as error:
+            except Exception as error:  # noqa: BLE001 - an object of the application's may raise anything
                 # An item that contradicts its own type must cost neither the flight nor the rest.
                 self.drops(message.stream)
                 text = f"cannot record a {type(message.item).__name__}: {error}"
