@@ -19,6 +19,7 @@ from typing import Any, Literal
 import ray
 
 from aerodaas.actors._names import alert_stream
+from aerodaas.actors.application import Application
 from aerodaas.actors.session import Session
 from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteReader
 from aerodaas.clock import LockstepClock, host_time_ns
@@ -162,6 +163,10 @@ class StreamActor:
             if not subscribed.wait(_LISTENING) and not self.stopping:
                 raise MissionError(f"{self.name} is busy and listens to nothing new")
         return self.info()
+
+    def learn(self, application: Application) -> None:
+        """Know what the application has defined since the session was made."""
+        del application  # to arrive is enough
 
     def connect(self, readers: dict[str, list[Any]]) -> None:
         """Learn which actors on other nodes read this actor's streams."""

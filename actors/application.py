@@ -89,7 +89,7 @@ def capture(graph: Graph, config: EnvironmentConfig, *plugins: object) -> Applic
             attributes.setdefault(name, {key.partition("/")[2]: key for key in defined})
     local = [one for one in _mentioned(used) if "<locals>" in one.__qualname__]
     definitions |= _define(f"{uuid.uuid4().hex[:12]}-local", local)
-    seeds = [(module, []) for module, _, _ in named]
+    seeds: list[tuple[str, list[str]]] = [(module, []) for module, _, _ in named]
     seeds += [(one.__module__, []) for one in _mentioned(used)]
     seeds += [(one.__module__, []) for one in used if isinstance(one, types.FunctionType)]
     for namespace in files:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -21,6 +22,7 @@ from aerodaas.actors._names import done_stream
 from aerodaas.actors._offload import CloudProcess
 from aerodaas.actors._robot_report import RobotReport
 from aerodaas.actors.analytics import AnalyticsActor
+from aerodaas.actors.application import Application
 from aerodaas.actors.caretaker import Caretaker
 from aerodaas.actors.cluster import Place, nodes_at, options_for, outlives_application
 from aerodaas.actors.dispatcher import DispatcherActor
@@ -211,6 +213,15 @@ class Flight:
     def reachable(self) -> bool:
         """False once this process has left the cluster that the actors live in."""
         return ray.is_initialized() and ray.get_runtime_context().get_job_id() == self._job
+
+    def learn(self, application: Application) -> None:
+        """Have every actor know what the application defines by now."""
+        session = replace(self.plan.session, application=application)
+        self.plan = replace(self.plan, session=session)
+        for reference in [one.handle.learn.remote(application) for one in self._members.values()]:
+            # One that has died learns it when it is set up anew.
+            with contextlib.suppress(AeroDaaSError):
+                self._ask(reference)
 
     def grow(self, plan: FlightPlan) -> None:
         """Fly on by `plan`, the graph as it is now; returns when all that is new runs.
@@ -499,6 +510,7 @@ class Flight:
         while member.lost_at == lost_at and not self._stopped:
             try:
                 if ray.get(actor.report.remote()).phase == "new":
+                    ray.get(actor.learn.remote(self.plan.session.application))
                     member.info = ray.get(actor.prepare.remote(*member.setup))
                     if member.further:
                         member.info = ray.get(actor.listen.remote(member.further))

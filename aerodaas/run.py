@@ -23,6 +23,7 @@ from aerodaas.status import MissionState
 
 if TYPE_CHECKING:
     from aerodaas.actors._base import ActorReport
+    from aerodaas.actors.application import Application
     from aerodaas.actors.flight import Flight, FlightState
     from aerodaas.actors.plan import FlightPlan
     from aerodaas.environment import Environment
@@ -139,6 +140,7 @@ class Run:
 
         flight = self._flying("nothing can be added")
         self._change_models()
+        flight.learn(self._application())
         flight.grow(
             make_plan(
                 flight.plan.session,
@@ -151,7 +153,9 @@ class Run:
 
     def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
         """Have all robots plan by `scheduler` from now on; raises MissionError once it is over."""
-        self._flying("no scheduler can be set").use_scheduler(scheduler)
+        flight = self._flying("no scheduler can be set")
+        flight.learn(self._application(scheduler))
+        flight.use_scheduler(scheduler)
 
     def _flying(self, hence: str) -> Flight:
         if self._flight is None or self._over:
@@ -202,7 +206,6 @@ class Run:
         self._raise_problems()
 
     def _plan(self) -> FlightPlan:
-        from aerodaas.actors.application import capture, require_sendable  # noqa: PLC0415
         from aerodaas.actors.plan import make_plan  # noqa: PLC0415
         from aerodaas.actors.session import Session  # noqa: PLC0415
 
@@ -212,13 +215,25 @@ class Run:
         scheduler = self._environment.trajectory_scheduler()
         dispatch_with = self._environment.analytics_scheduler()
         self._change_models()
-        schedulers = [one for one in (scheduler, dispatch_with) if one is not None]
-        application = capture(self.graph, self.config, *schedulers)
-        require_sendable(self.graph, *schedulers)
+        application = self._application()
         session = Session(self.config, speed, pace=self._pace(), application=application)
         compute = self._environment.compute()
         joins = self.options.address or os.environ.get("RAY_ADDRESS")
         return make_plan(session, self.graph, compute, scheduler, dispatch_with, here=not joins)
+
+    def _application(self, *others: object) -> Application:
+        """What the application defines by now, that of `others` included.
+
+        Raises GraphError, by name, for what cannot be sent.
+        """
+        from aerodaas.actors.application import capture, require_sendable  # noqa: PLC0415
+
+        environment = self._environment
+        used = (environment.trajectory_scheduler(), environment.analytics_scheduler(), *others)
+        plugins = [one for one in used if one is not None]
+        application = capture(self.graph, self.config, *plugins)
+        require_sendable(self.graph, *plugins)
+        return application
 
     def _check_world(self) -> None:
         """Raise ConfigError for a broken scenario here rather than in some actor."""

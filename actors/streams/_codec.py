@@ -10,6 +10,8 @@ from __future__ import annotations
 import dataclasses
 import pickle
 import struct
+from collections.abc import Callable
+from functools import partial
 from operator import attrgetter
 from typing import Any
 
@@ -105,13 +107,15 @@ def decode(source: memoryview) -> Message[Any]:
         cursor = _aligned(cursor)
         buffers.append(source[cursor : cursor + length])
         cursor += length
-    *envelope, kind = pickle.loads(source[start:middle])  # noqa: S301 - our own bytes
+    *fields, kind = pickle.loads(source[start:middle])  # noqa: S301 - our own bytes
+    kept: Any = Message
+    make: Callable[[Any], Message[Any]] = partial(kept, *fields)
     try:
         item = pickle.loads(source[middle:end], buffers=buffers)  # noqa: S301
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
-        raise UnreadableError(Message(*envelope, None), kind, reason) from error
-    return Message(*envelope, item)
+        raise UnreadableError(make(None), kind, reason) from error
+    return make(item)
 
 
 def _pickled(message: Message[Any]) -> tuple[bytes, list[pickle.PickleBuffer]]:

@@ -71,15 +71,17 @@ def pickled_class(definition: object) -> bytes:
 def pickled(item: object, buffers: Callable[[pickle.PickleBuffer], Any]) -> bytes:
     """Pickle an item whose classes may be the application's; raises what pickling raises."""
     file = io.BytesIO()
-    _Pickler(file, protocol=5, buffer_callback=buffers).dump(item)
+    pickler: Any = _Pickler
+    pickler(file, protocol=5, buffer_callback=buffers).dump(item)
     return file.getvalue()
 
 
-class _Pickler(cloudpickle.Pickler):  # type: ignore[misc] - untyped
+class _Pickler(cloudpickle.Pickler):
     def reducer_override(self, obj: Any) -> Any:  # noqa: ANN401 - pickle's
         if isinstance(obj, type) and not _importable(obj):
             return _reference(obj)
-        return super().reducer_override(obj)
+        known: Any = super()
+        return known.reducer_override(obj)
 
 
 def _reference(definition: type) -> tuple[Any, ...]:

@@ -150,4 +150,5 @@ def _words(value: object) -> str:
 
 def _wordless(kind: type) -> bool:
     """Whether objects of a class print as no more than its name and an address."""
-    return kind.__str__ is object.__str__ and kind.__repr__ is object.__repr__
+    words: tuple[object, object] = kind.__str__, kind.__repr__
+    return words == (object.__str__, object.__repr__)
