@@ -7,11 +7,11 @@ everything between has been done; `paths` counts those ends.
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import Counter, defaultdict
 
 from aerodaas.graph import Graph
 
-__all__ = ["Barrier", "paths"]
+__all__ = ["Barrier", "paths", "widest"]
 
 
 def paths(graph: Graph, stream: str, steering: set[str], *, recorded: bool) -> int:
@@ -24,6 +24,17 @@ def paths(graph: Graph, stream: str, steering: set[str], *, recorded: bool) -> i
     for node in graph.downstream(stream):
         ends += max(1, paths(graph, node.id, steering, recorded=recorded))
     return ends
+
+
+def widest(graph: Graph, stream: str) -> int:
+    """How many messages at most one message of `stream` leads to on any one stream."""
+    counts: Counter[str] = Counter()
+    waiting = [stream]
+    while waiting:
+        current = waiting.pop()
+        counts[current] += 1
+        waiting.extend(node.id for node in graph.downstream(current))
+    return max(counts.values())
 
 
 class Barrier:

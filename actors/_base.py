@@ -138,7 +138,7 @@ class StreamActor:
         """Open everything; raises the project's errors for what cannot be opened."""
         logging.captureWarnings(capture=True)
         logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
-        self.alerts = self.outlet(alert_stream(self.name))
+        self.alerts = self.outlet(alert_stream(self.name), f"{self.name}'s alert")
         self.inbox = self.reader(self.name, self._reads)
         self._open()
         self._phase = "ready"

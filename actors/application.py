@@ -208,10 +208,10 @@ def _imports_of(namespace: dict[str, Any]) -> list[tuple[str, list[str]]]:
 def require_sendable(graph: Graph, *plugins: object) -> None:
     """Raise GraphError, by name, for what must reach another process and cannot be sent."""
     for node in graph.nodes.values():
-        if node.kind != "sensor":
-            _require(node.work, f"{type(node.work).__name__} ({node.id})")
         for trigger in node.triggers:
             _require(trigger.when, f"the condition of {node.id}'s trigger")
+        if node.kind != "sensor":
+            _require(node.work, f"{type(node.work).__name__} ({node.id})")
     for plugin in plugins:
         _require(plugin, type(plugin).__name__)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from aerodaas.actors._barrier import paths
+from aerodaas.actors._barrier import paths, widest
 from aerodaas.actors._names import (
     ACKS,
     DECISIONS,
@@ -315,6 +315,10 @@ class _Planner:
             scheduler=self.scheduler,
         )
 
+    def _room(self, source: str) -> int:
+        """Measurements beyond the newest whose results fit into what readers may leave waiting."""
+        return max(0, MESSAGE_DEPTH // widest(self.graph, source) - 1)
+
     def conduct(self, specs: tuple[RobotSpec, ...], cameras: tuple[Cameras, ...]) -> Conduct:
         rates = {camera.stream: camera.sensor.rate for camera in cameras}
         for node in self.analyses():
@@ -329,7 +333,7 @@ class _Planner:
             )
         ]
         windows = {
-            source: 0 if self.reaches_a_drone(source) else size
+            source: 0 if self.reaches_a_drone(source) else min(size, self._room(source))
             for size, sources in ((_CAMERA_WINDOW, list(rates)), (_STATE_WINDOW, own))
             for source in sources
         }

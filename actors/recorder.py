@@ -75,6 +75,14 @@ class RecorderActor(StreamActor):
         )
         self._acks = self.outlet(f"{ACKS}/recorder") if self.session.lockstep else None
 
+    def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
+        """Tell the people who watch, and write it down at once: nobody else reads our alerts."""
+        super().tell(kind, text, stamp, values)
+        with self._alerting:
+            alert = self._newest_alerts[-1]
+            stream, count = self.alerts.stream, self.alerts.sent
+        self._write(Message(stream, count, stamp, alert.header, host_time_ns(), (), alert))
+
     def vitals(self, readings: dict[str, Vitals]) -> None:
         """Record what the run's processes take, by `actor@machine`."""
         stamp = self.clock.now()

@@ -7,7 +7,7 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.actors._barrier import Barrier, paths
+from aerodaas.actors._barrier import Barrier, paths, widest
 from aerodaas.graph import Graph, Node
 
 measurements = st.lists(
@@ -84,3 +84,15 @@ def test_paths_count_the_ends_of_every_way() -> None:
     # The recorder reads five messages: the camera's, the detector's, follow's, and pose's two.
     assert paths(graph, "camera", {"follow"}, recorded=True) == 6
     assert paths(graph, "pose", {"follow"}, recorded=False) == 0
+
+
+def test_an_analysis_of_many_streams_answers_each_of_them() -> None:
+    """What one picture leads to on one stream is what must find room there."""
+    graph = Graph()
+    graph.add(Node("camera", "sensor", object, None))
+    for number in range(5):
+        graph.add(Node(f"a{number}", "analytics", object, None, inputs=["camera"]))
+    graph.add(Node("all", "analytics", object, None, inputs=[f"a{n}" for n in range(5)]))
+    graph.add(Node("last", "analytics", object, None, inputs=["all", "a0"]))
+    assert widest(graph, "last") == widest(graph, "a0") - 1 == 1
+    assert widest(graph, "camera") == 6
