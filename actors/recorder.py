@@ -78,6 +78,8 @@ class RecorderActor(StreamActor):
     def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
         """Tell the people who watch, and write it down at once: nobody else reads our alerts."""
         super().tell(kind, text, stamp, values)
+        if self._phase == "new":
+            return
         with self._alerting:
             alert = self._newest_alerts[-1]
             stream, count = self.alerts.stream, self.alerts.sent
