@@ -135,8 +135,10 @@ class Commander:
                 return
             later = message.result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
             if later and pending.order.insists:
-                pending.answer = _RESULTS[message.result]
-                pending.deadline = now + _LATER
+                if pending.answer != _RESULTS[message.result]:
+                    # PX4 says it twice, and only the first time counts.
+                    pending.answer = _RESULTS[message.result]
+                    pending.deadline = now + _LATER
                 return
             del self._pending[message.command]
         if message.result == mavlink.MAV_RESULT_ACCEPTED:

@@ -11,6 +11,9 @@ __all__ = ["LIFTED", "FlightPhase"]
 
 _MOTORS_STOPPED = 1.5
 """Seconds without a tick of the motors' clock, which counts whole seconds, for them to stand."""
+_CALLED_OFF = 4.0
+"""Seconds that it must stand after a landing that called a take-off off: a `takeoff` that was sent
+may come later than the `land`, and its motors' clock tells of them a second late."""
 LIFTED = 0.3
 """Metres from which it counts as flying."""
 _LOW = 0.3
@@ -35,6 +38,7 @@ class FlightPhase:
         self.refusal = ""
         """Why the latest take-off came to nothing."""
         self._since = -math.inf
+        self._patience = _MOTORS_STOPPED
         self._calm = 0
         self._motor_time: float | None = None
         self._ticked_at = -math.inf
@@ -51,6 +55,8 @@ class FlightPhase:
 
     def to(self, mode: VehicleMode, now: float) -> None:
         """Change to `mode` by request, at `now` seconds."""
+        off = mode is VehicleMode.LANDING and self.mode is VehicleMode.TAKING_OFF and not self.risen
+        self._patience = _CALLED_OFF if off else _MOTORS_STOPPED
         self.mode, self._since = mode, now
         self.risen = False
         self._calm = 0
@@ -81,7 +87,7 @@ class FlightPhase:
                 self.rose()
             return
         standing = not turning and min(state.height, state.ground_distance) < _LOW
-        if not standing or now - self._since < _MOTORS_STOPPED:
+        if not standing or now - self._since < self._patience:
             return
         if self.mode is VehicleMode.LANDING:
             self.mode = VehicleMode.GROUNDED

@@ -6,6 +6,7 @@ import contextlib
 import json
 import math
 import queue
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ from mavlink_flights import flight
 from numpy.typing import NDArray
 
 from aerodaas.config import GeofenceConfig
+from aerodaas.drivers.mavlink import plans
 from aerodaas.drivers.mavlink.ardupilot import ArduPilot
 from aerodaas.drivers.mavlink.commander import Commander, Order, Outcome
 from aerodaas.drivers.mavlink.dialect import mavlink
@@ -222,6 +224,67 @@ def test_no_answer_at_all_is_an_outcome() -> None:
     assert ear.outcomes.get_nowait() == Outcome(accepted=False, text="no answer", tries=6)
 
 
+def test_a_replaced_order_ends() -> None:
+    """Told once that it was replaced; only the newer one is repeated, and has the answer."""
+    ear, newer = Ear(), queue.SimpleQueue[Outcome]()
+    other = Order(TAKE_OFF.number, (1.0,) * 7, "take off higher")
+    ear.commander.give(TAKE_OFF, ear.outcomes.put, now=0.0)
+    ear.commander.give(other, newer.put, now=0.5)
+    outcome = ear.outcomes.get_nowait()
+    assert outcome.replaced
+    assert not outcome.accepted
+    ear.commander.turn(1.6)
+    assert [one.param1 for one in ear.sent] == [0.0, 1.0, 1.0]
+    ear.acknowledge(TAKE_OFF.number, mavlink.MAV_RESULT_ACCEPTED, 2.0)
+    assert newer.get_nowait().accepted
+    assert ear.outcomes.empty()
+
+
+def test_what_is_rejected_for_now_is_asked_again_with_a_bound() -> None:
+    """Once a second, and the sixth rejection is the last word; what does not insist has one."""
+    ear, now = Ear(), 0.0
+    ear.commander.give(TAKE_OFF, ear.outcomes.put, now=now)
+    while ear.outcomes.empty():
+        ear.acknowledge(TAKE_OFF.number, mavlink.MAV_RESULT_TEMPORARILY_REJECTED, now + 0.1)
+        now += 0.2
+        ear.commander.turn(now)
+    assert len(ear.sent) == 6
+    assert 5.0 < now < 8.0
+    assert ear.outcomes.get_nowait().text == "rejected for now"
+    ear.commander.give(PX4.disarm(), ear.outcomes.put, now=now)
+    ear.acknowledge(PX4.disarm().number, mavlink.MAV_RESULT_TEMPORARILY_REJECTED, now + 0.1)
+    assert not ear.outcomes.get_nowait().accepted
+
+
+def test_a_withdrawn_order_is_not_repeated() -> None:
+    """Nor is anything told of it."""
+    ear = Ear()
+    ear.commander.give(TAKE_OFF, ear.outcomes.put, now=0.0)
+    ear.commander.withdraw(TAKE_OFF.number)
+    ear.commander.turn(5.0)
+    ear.acknowledge(TAKE_OFF.number, mavlink.MAV_RESULT_ACCEPTED, 5.0)
+    assert len(ear.sent) == 1
+    assert ear.outcomes.empty()
+
+
+def test_a_mode_counts_only_once_it_was_seen() -> None:
+    """However long a HEARTBEAT takes to show it; after that, the mode before is a pilot's."""
+    phase = FlightPhase()
+    phase.observe(FlightMode.HOLD, 0.0, armed=True, critical=False)
+    phase.ask(FlightMode.GUIDED, 1.0)
+    for second in range(2, 30):
+        phase.observe(FlightMode.HOLD, float(second), armed=True, critical=False)
+        assert not phase.seen
+        assert phase.taken is None
+    phase.observe(FlightMode.GUIDED, 30.0, armed=True, critical=False)
+    assert phase.seen
+    phase.observe(FlightMode.HOLD, 31.0, armed=True, critical=False)
+    assert phase.taken is VehicleMode.MANUAL
+    phase.observe(FlightMode.HOLD, 32.0, armed=False, critical=False)
+    phase.ask(FlightMode.GUIDED, 33.0)
+    assert not phase.seen
+
+
 @given(st.integers(-(2**31), 2**31 - 1))
 def test_px4s_integers_travel_by_their_bytes(value: int) -> None:
     """Except those whose bytes are no number, which no parameter has."""
@@ -269,6 +332,46 @@ def test_an_upload_whose_acknowledgement_is_lost_begins_anew(
         pair.vehicle.upload_mission(items)
         assert pair.vehicle.download_mission() == items
     assert len(lost) == 1
+
+
+class Tired:
+    """A link to an autopilot that answers each word only the fourth time, and the last at once."""
+
+    target = (1, 1)
+
+    def __init__(self, count: int) -> None:
+        self.inbox: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._count = count
+        self._heard = 0
+        self.next = 0
+
+    @contextlib.contextmanager
+    def listen(self, *_: str) -> Iterator[queue.SimpleQueue[Any]]:
+        """Its answers."""
+        yield self.inbox
+
+    def send(self, message: Any) -> None:  # noqa: ANN401 - pymavlink's
+        """Hear one word."""
+        self._heard += 1
+        item = message.get_type() == "MISSION_ITEM_INT"
+        last = item and message.seq == self._count - 1
+        if self._heard % 4 and not last:
+            return
+        self.next += item
+        answer = mavlink.MAVLink_mission_request_int_message(245, 191, self.next, 0)
+        if last:
+            answer = mavlink.MAVLink_mission_ack_message(245, 191, 0, 0)
+        self.inbox.put(answer)
+
+
+def test_tries_of_an_upload_begin_anew_with_each_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Five in vain end it, but in a row: a long plan over a bad link gets through."""
+    monkeypatch.setattr(plans, "_TIMEOUT", 0.01)
+    monkeypatch.setattr(plans, "_ITEM_TIMEOUT", 0.0025)
+    item = Item(mavlink.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 0.0), 1, 1, 10.0)
+    link = Tired(8)
+    plans.upload(link, [item] * 8)  # type: ignore[arg-type]
+    assert link.next == 8
 
 
 def test_a_fence_is_drawn_where_it_belongs() -> None:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
+import logging
+import threading
 from collections.abc import Iterator
 
 import numpy as np
 import pytest
+from mavlink_flights import flight
 from stepped import Stepped
 
 from aerodaas.errors import VehicleError
@@ -154,3 +158,37 @@ def test_a_gps_that_is_lost_is_told_by_its_name(world: Stepped) -> None:
     assert told(state, "GPS: unhealthy")
     world.autopilot.lose_gps(off=True)
     assert fly(world, THERE, 3.0).faults == ()
+
+
+def test_a_log_that_blocks_holds_nobody_up() -> None:
+    """While the link's own thread hangs in a log, the control loop reads, flies and lands."""
+    entered, let_go = threading.Event(), threading.Event()
+
+    class Blocking(logging.Handler):
+        def emit(self, _: logging.LogRecord) -> None:
+            entered.set()
+            let_go.wait(60.0)
+
+    log = logging.getLogger("aerodaas.drivers.mavlink.vehicle")
+    handler = Blocking()
+    done = threading.Event()
+    with flight(AutopilotOptions(family="ardupilot")) as pair:
+        pair.guide()
+
+        def turn() -> None:
+            pair.vehicle.read()
+            with contextlib.suppress(VehicleError):
+                pair.vehicle.send(VelocitySetpoint(np.zeros(3)))
+            with contextlib.suppress(VehicleError):
+                pair.vehicle.land()
+            done.set()
+
+        log.addHandler(handler)
+        try:
+            pair.autopilot.take_over()
+            assert entered.wait(10.0)
+            threading.Thread(target=turn, daemon=True).start()
+            assert done.wait(20.0)
+        finally:
+            let_go.set()
+            log.removeHandler(handler)

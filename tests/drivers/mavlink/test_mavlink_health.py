@@ -1,0 +1,230 @@
+"""What is wrong, by its name; and the arming checks as each autopilot tells them."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerodaas.drivers.mavlink.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.event_words import CHECKS, COMMANDER
+from aerodaas.drivers.mavlink.events import EventReader, event_number
+from aerodaas.drivers.mavlink.health import Health
+from aerodaas.drivers.mavlink.px4 import PX4
+from aerodaas.drivers.mavlink.telemetry import Telemetry
+
+CHECK, GPS = mavlink.MAV_SYS_STATUS_PREARM_CHECK, mavlink.MAV_SYS_STATUS_SENSOR_GPS
+GYRO = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+SEQUENCE = itertools.count()
+WELL = 0x3F
+"""Attitude, velocities and positions of the estimator."""
+
+
+def gps(fix: int) -> Any:  # noqa: ANN401 - pymavlink has no types
+    """A GPS with this kind of fix."""
+    return mavlink.MAVLink_gps_raw_int_message(0, fix, 1, 1, 0, 80, 80, 0, 0, 9)
+
+
+def estimator(flags: int = WELL, unsure: float = 0.5, compass: float = 0.1) -> Any:  # noqa: ANN401
+    """PX4's estimator."""
+    return mavlink.MAVLink_estimator_status_message(
+        0, flags, 0.1, 0.1, 0.1, compass, 0.0, 0.0, unsure, 0.4
+    )
+
+
+def ekf(flags: int = WELL, compass: float = 0.1) -> Any:  # noqa: ANN401
+    """ArduPilot's estimator."""
+    return mavlink.MAVLink_ekf_status_report_message(flags, 0.1, 0.1, 0.1, compass, 0.0)
+
+
+def battery(charge: int, faults: int = 0, number: int = 0) -> Any:  # noqa: ANN401
+    """A battery's word about itself."""
+    return mavlink.MAVLink_battery_status_message(
+        number, 0, 0, 2000, [3700] * 10, 0, 0, 0, 50, 0, charge, [0] * 4, 0, faults
+    )
+
+
+def status(present: int, enabled: int, healthy: int) -> Any:  # noqa: ANN401
+    """The sensors' bits."""
+    return mavlink.MAVLink_sys_status_message(
+        present, enabled, healthy, 100, 12000, 500, 50, 0, 0, 0, 0, 0, 0
+    )
+
+
+def shaking(z: float, clipped: int = 0) -> Any:  # noqa: ANN401
+    """How it shakes."""
+    return mavlink.MAVLink_vibration_message(0, 1.0, 1.0, z, clipped, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("well", "ill", "words"),
+    [
+        (gps(3), gps(1), "GPS: no fix"),
+        (gps(3), gps(0), "GPS: no fix"),
+        (gps(3), gps(2), "GPS: a fix in the plane only"),
+        (estimator(), estimator(unsure=12.0), "estimator: position unsure by more than 10 m"),
+        (estimator(), estimator(WELL & ~0x18), "estimator: no position along the ground"),
+        (estimator(), estimator(WELL | 128), "estimator: no position along the ground"),
+        (
+            estimator(),
+            estimator(WELL | 1024),
+            "estimator: GPS positions jump, and are not believed",
+        ),
+        (estimator(), estimator(WELL & ~1), "estimator: attitude unknown"),
+        (
+            estimator(),
+            estimator(compass=1.2),
+            "estimator: what is measured of its compass does not fit",
+        ),
+        (ekf(), ekf(WELL & ~0x18), "estimator: no position along the ground"),
+        (ekf(), ekf(WELL | 1 << 15), "estimator: GPS positions jump, and are not believed"),
+        (ekf(), ekf(compass=0.9), "estimator: what is measured of its compass does not fit"),
+        (battery(1), battery(2), "battery: low"),
+        (battery(1), battery(3, 16), "battery: critical, too hot"),
+        (battery(1, number=1), battery(0, 4, number=1), "battery 2: a cell has failed"),
+        (shaking(5.0), shaking(45.0), "vibration: more than 30 m/s²"),
+        (status(GYRO, GYRO, GYRO), status(GYRO, GYRO, 0), "gyroscope: unhealthy"),
+        (status(GPS, GPS, GPS), status(GPS, GPS, 0), "GPS: unhealthy"),
+    ],
+)
+def test_what_is_wrong_is_told_by_its_name(well: Any, ill: Any, words: str) -> None:  # noqa: ANN401
+    """Once it has been so for a second, until it is well again; nothing before."""
+    health = Health()
+    for second, message in enumerate((well, well, ill)):
+        health.take(message, float(second))
+        assert health.faults(second) == []
+    health.take(ill, 3.5)
+    assert health.faults(3.5) == [words]
+    health.take(well, 4.0)
+    assert health.faults(4.0) == []
+
+
+def test_clipping_is_told_while_it_grows() -> None:
+    """A count that stands still is of the past."""
+    health = Health()
+    for second, count in enumerate((500, 500, 560, 620, 680)):
+        health.take(shaking(1.0, count), float(second))
+    assert health.faults(4.0) == ["vibration: beyond what the accelerometers measure"]
+    health.take(shaking(1.0, 680), 5.0)
+    assert health.faults(5.0) == []
+
+
+def test_a_gps_that_says_nothing_more() -> None:
+    """Silence is told, too; one that never had a fix is not missed."""
+    health = Health()
+    assert health.faults(100.0) == []
+    health.take(gps(0), 100.0)
+    health.take(gps(0), 102.0)
+    assert health.faults(120.0) == []
+    health.take(gps(3), 121.0)
+    assert health.faults(124.9) == []
+    assert health.faults(125.5) == ["GPS: it has fallen silent"]
+
+
+def test_sensors_that_are_not_there_or_not_used_are_not_ill() -> None:
+    """Only what is present and enabled can be unhealthy."""
+    health = Health()
+    for second in range(4):
+        health.take(status(0, GYRO, 0), float(second))
+        health.take(status(GPS, 0, 0), float(second))
+    assert health.faults(4.0) == []
+
+
+def test_what_grows_slowly_is_told_in_steps() -> None:
+    """A text that changed with every metre would be told with every metre."""
+    health = Health()
+    told = set()
+    for tenth in range(1200):
+        health.take(estimator(unsure=tenth / 10), tenth / 10)
+        told |= set(health.faults(tenth / 10))
+    assert len(told) == 5
+
+
+def test_an_estimator_that_is_lost_leaves_no_position() -> None:
+    """Packets with a position come all the same; they are not believed."""
+    telemetry = Telemetry()
+    for tenth in range(100):
+        now = tenth / 10
+        boot = 1000 + 100 * tenth
+        telemetry.take(mavlink.MAVLink_local_position_ned_message(boot, 1, 2, 3, 0, 0, 0), now)
+        telemetry.take(mavlink.MAVLink_attitude_message(boot, 0, 0, 0, 0, 0, 0), now)
+        telemetry.take(estimator(WELL if tenth < 50 else WELL & ~0x18), now)
+        assert telemetry.knows_place(now) == (tenth < 60)
+
+
+@given(st.integers(0, 0xFFFF), st.floats(), st.floats(), st.integers(0, 2**32 - 1))
+def test_whatever_is_measured_is_survived(flags: int, one: float, other: float, bits: int) -> None:
+    """Any figures, NaN and infinities among them: texts, and no exception."""
+    health = Health()
+    for now in (0.0, 2.0):
+        health.take(estimator(flags, one, other), now)
+        health.take(ekf(flags, one), now)
+        health.take(shaking(other), now)
+        health.take(status(bits, bits, ~bits & 0xFFFFFFFF), now)
+        health.take(battery(flags & 7, bits), now)
+    assert all(isinstance(text, str) and text for text in health.faults(2.0))
+
+
+def test_px4_lists_its_arming_checks_nowhere_but_in_health() -> None:
+    """As 1.16.1 does: not yet known, failing, passing; ArduPilot says that it has them."""
+    telemetry, px4, ardupilot = Telemetry(), PX4(), ArduPilot()
+    assert px4.ready(telemetry) is None
+    telemetry.take(status(0, 0, GYRO), 0.0)
+    assert px4.ready(telemetry) is None
+    telemetry.take(status(GYRO, GYRO, GYRO), 0.0)
+    assert px4.ready(telemetry) is False
+    assert ardupilot.ready(telemetry) is None
+    telemetry.take(status(GYRO, GYRO, GYRO | CHECK), 0.0)
+    assert px4.ready(telemetry) is True
+    telemetry.take(status(GYRO | CHECK, GYRO | CHECK, GYRO), 0.0)
+    assert ardupilot.ready(telemetry) is False
+    telemetry.take(status(GYRO | CHECK, GYRO | CHECK, GYRO | CHECK), 0.0)
+    assert ardupilot.ready(telemetry) is True
+
+
+def report(events: EventReader, *names: str) -> None:
+    """A whole report of the arming checks."""
+    for name in ("commander_arming_check_summary", *names, "commander_health_summary"):
+        events.take(event_number(name), 3, next(SEQUENCE))
+
+
+def test_px4_objects_to_what_hold_would_not_mend() -> None:
+    """A take-off begins with hold: what only the present mode lacks is no objection to it."""
+    telemetry, px4 = Telemetry(), PX4()
+    telemetry.altitude = 488.0
+    assert px4.objections(telemetry, 0.0) == ["PX4 has not told yet whether its arming checks pass"]
+    telemetry.take(status(GYRO, GYRO, GYRO), 0.0)
+    assert px4.objections(telemetry, 0.0) == ["PX4's arming checks fail"]
+    telemetry.custom_mode = 6 << 16
+    report(telemetry.events, "check_modes_offboard_signal")
+    assert px4.objections(telemetry, 0.0) == []
+    report(telemetry.events, "check_modes_offboard_signal", "check_mag_missing")
+    assert px4.objections(telemetry, 0.0) == ["compass: missing"]
+    telemetry.custom_mode = 4 << 16 | 3 << 24
+    report(telemetry.events, "check_modes_offboard_signal")
+    assert px4.objections(telemetry, 0.0) == ["its present mode needs setpoints"]
+
+
+def test_events_are_told_in_words_or_not_at_all() -> None:
+    """No name of PX4's own reaches people, and nothing of an event without words."""
+    assert all("_" not in words and words for words in (*CHECKS.values(), *COMMANDER.values()))
+    telemetry = Telemetry()
+    for number, name in enumerate(("commander_failsafe_enter_generic", "no_such_thing")):
+        event = mavlink.mavlink_map[410](0, 0, event_number(name), 0, number, 2, [0] * 40)
+        telemetry.take(event, 1.0)
+    assert telemetry.texts.recent(1.0, 5.0) == ["its own protection is at work"]
+
+
+def test_a_place_of_zeros_is_none() -> None:
+    """An autopilot without GPS sends zeros."""
+    telemetry = Telemetry()
+    telemetry.take(mavlink.MAVLink_global_position_int_message(1, 10, 10, 5, 0, 0, 0, 0, 0), 0.0)
+    assert telemetry.place is not None
+    telemetry.take(mavlink.MAVLink_global_position_int_message(2, 0, 0, 5, 0, 0, 0, 0, 0), 0.0)
+    assert telemetry.place is None
+    assert math.isnan(telemetry.battery.fraction)
