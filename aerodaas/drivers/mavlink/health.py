@@ -129,7 +129,9 @@ class Health:
         self._note("fix", f"GPS: {kind}" if lost else "", now)
 
     def _estimator(self, message: Any, now: float) -> None:  # noqa: ANN401
-        self._flags(message.flags, now, glitch=mavlink.ESTIMATOR_GPS_GLITCH)
+        # PX4 sets the bit of a constant position when all is well, and clears it when it is lost.
+        flags = message.flags & ~mavlink.ESTIMATOR_CONST_POS_MODE
+        self._flags(flags, now, glitch=mavlink.ESTIMATOR_GPS_GLITCH)
         unsure = _step(message.pos_horiz_accuracy, _UNSURE)
         self._note("unsure", unsure and f"estimator: position unsure by more than {unsure} m", now)
         unsure = _step(message.pos_vert_accuracy, _UNSURE)

@@ -69,7 +69,8 @@ def shaking(z: float, clipped: int = 0) -> Any:  # noqa: ANN401
         (gps(3), gps(2), "GPS: a fix in the plane only"),
         (estimator(), estimator(unsure=12.0), "estimator: position unsure by more than 10 m"),
         (estimator(), estimator(WELL & ~0x18), "estimator: no position along the ground"),
-        (estimator(), estimator(WELL | 128), "estimator: no position along the ground"),
+        (estimator(0x3FF), estimator(0x365), "estimator: no position along the ground"),
+        (ekf(), ekf(WELL | 128), "estimator: no position along the ground"),
         (
             estimator(),
             estimator(WELL | 1024),
@@ -172,19 +173,19 @@ def test_whatever_is_measured_is_survived(flags: int, one: float, other: float, 
 
 def test_px4_lists_its_arming_checks_nowhere_but_in_health() -> None:
     """As 1.16.1 does: not yet known, failing, passing; ArduPilot says that it has them."""
-    telemetry, px4, ardupilot = Telemetry(), PX4(), ArduPilot()
-    assert px4.ready(telemetry) is None
-    telemetry.take(status(0, 0, GYRO), 0.0)
-    assert px4.ready(telemetry) is None
-    telemetry.take(status(GYRO, GYRO, GYRO), 0.0)
-    assert px4.ready(telemetry) is False
-    assert ardupilot.ready(telemetry) is None
-    telemetry.take(status(GYRO, GYRO, GYRO | CHECK), 0.0)
-    assert px4.ready(telemetry) is True
-    telemetry.take(status(GYRO | CHECK, GYRO | CHECK, GYRO), 0.0)
-    assert ardupilot.ready(telemetry) is False
-    telemetry.take(status(GYRO | CHECK, GYRO | CHECK, GYRO | CHECK), 0.0)
-    assert ardupilot.ready(telemetry) is True
+    said = [
+        status(0, 0, GYRO),
+        status(GYRO, GYRO, GYRO),
+        status(GYRO, GYRO, GYRO | CHECK),
+        status(GYRO | CHECK, GYRO | CHECK, GYRO),
+        status(GYRO | CHECK, GYRO | CHECK, GYRO | CHECK),
+    ]
+    telemetry, heard = Telemetry(), [(PX4().ready(Telemetry()), ArduPilot().ready(Telemetry()))]
+    for message in said:
+        telemetry.take(message, 0.0)
+        heard.append((PX4().ready(telemetry), ArduPilot().ready(telemetry)))
+    assert [px4 for px4, _ in heard] == [None, None, False, True, False, True]
+    assert [ardupilot for _, ardupilot in heard] == [None, None, None, None, False, True]
 
 
 def report(events: EventReader, *names: str) -> None:
