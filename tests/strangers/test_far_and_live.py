@@ -71,6 +71,22 @@ class Hoverbot:
 LIVE = """
 import threading
 
+import numpy as np
+
+from aerodaas.cameras.base import Picture
+
+
+class Grey:
+    model, finished, skipped = None, False, 0
+
+    def __init__(self, sensor, environment): ...
+    def open(self): ...
+    def close(self): ...
+
+    def capture(self, stamp, pose):
+        return Picture(np.full((32, 48, 3), 77, np.uint8), stamp)
+
+
 class Seen:
     def __init__(self, value):
         self.value = value
@@ -109,13 +125,14 @@ def test_real_time_with_a_driver_of_ones_own(tmp_path: Path) -> None:
     """`python app.py`: a driver in a module, results read by the application as its own class."""
     environment = json.loads(json.dumps(ENVIRONMENT))
     environment["robots"][0]["driver"] = "bot:Hoverbot"
+    environment["robots"][0]["sensors"] = [{**CAMERA, "driver": "app:Grey", "settings": {}}]
     files = {"app.py": HEAD + LIVE, "bot.py": HOVERBOT, "bot_settings.py": "SPEED = 1.0\n"}
     write(tmp_path, files, environment)
     flown = fly(tmp_path, "app.py", python=True)
     assert "read Seen" in flown.said, flown.said
     assert flown.landed_as_planned(), flown.said
     assert "Lock's result: a lock cannot be sent" in " ".join(flown.said.split())
-    assert {kind for kind, _ in flown.values("drone/see")} == {"Seen"}
+    assert set(map(str, flown.values("drone/see"))) == {"('Seen', {'value': 77.0})"}
     assert {value for _, value in flown.values("drone/check")} == {True}
 
 
@@ -133,11 +150,10 @@ class Mine:
 
 class Near(Analytics[Mine]):
     def __getstate__(self):
-        # Sent: from here on none of the files is where it was.
+        # Sent: from here on the package is no longer where it was.
         here = Path(__file__).parent
-        for name in ("helpers", "app.py"):
-            if (here / name).exists():
-                (here / name).rename(here / f"{name}.gone")
+        if (here / "helpers").exists():
+            (here / "helpers").rename(here / "gone")
         return super().__getstate__()
 
     def process(self, item, context):
