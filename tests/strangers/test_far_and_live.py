@@ -131,7 +131,7 @@ def test_real_time_with_a_driver_of_ones_own(tmp_path: Path) -> None:
     flown = fly(tmp_path, "app.py", python=True)
     assert "read Seen" in flown.said, flown.said
     assert flown.landed_as_planned(), flown.said
-    assert "Lock's result: a lock cannot be sent" in " ".join(flown.said.split())
+    assert "Lock's result: lock cannot be sent" in " ".join(flown.said.split())
     assert set(map(str, flown.values("drone/see"))) == {"('Seen', {'value': 77.0})"}
     assert {value for _, value in flown.values("drone/check")} == {True}
 
