@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import math
 from typing import Any
 
 import pytest
@@ -223,9 +222,11 @@ def test_events_are_told_in_words_or_not_at_all() -> None:
 
 def test_a_place_of_zeros_is_none() -> None:
     """An autopilot without GPS sends zeros."""
-    telemetry = Telemetry()
-    telemetry.take(mavlink.MAVLink_global_position_int_message(1, 10, 10, 5, 0, 0, 0, 0, 0), 0.0)
-    assert telemetry.place is not None
-    telemetry.take(mavlink.MAVLink_global_position_int_message(2, 0, 0, 5, 0, 0, 0, 0, 0), 0.0)
-    assert telemetry.place is None
-    assert math.isnan(telemetry.battery.fraction)
+    telemetry, places = Telemetry(), []
+    for boot, degrees in ((1, 10), (2, 0)):
+        telemetry.take(
+            mavlink.MAVLink_global_position_int_message(boot, degrees, degrees, 5, 0, 0, 0, 0, 0),
+            0.0,
+        )
+        places.append(telemetry.place)
+    assert places == [(1e-6, 1e-6), None]
