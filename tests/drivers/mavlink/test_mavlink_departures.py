@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 from stepped import Stepped
 
-from aerodaas.testing.mavlink import AutopilotOptions, Impairment
+from aerodaas.drivers.mavlink.commander import Commander
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.px4 import PX4
+from aerodaas.drivers.mavlink.withdrawal import Withdrawal
+from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot, Impairment
 from aerodaas.vehicle import VehicleMode
 
 FAMILIES = ("px4", "ardupilot")
@@ -84,3 +90,51 @@ def test_before_anything_is_armed_the_ground_is_told_at_once(
         world.autopilot.cut(off=False)
         world.watch(5.0)
         assert world.autopilot.firmware.motions == []
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_what_shows_to_be_done_needs_no_acknowledgement(
+    monkeypatch: pytest.MonkeyPatch, family: str
+) -> None:
+    """Not one acknowledgement comes through: HEARTBEATs and landed states tell enough."""
+    options = AutopilotOptions(family=family)  # type: ignore[arg-type]
+    with Stepped(monkeypatch, options) as world:
+        monkeypatch.setattr(EmulatedAutopilot, "_acknowledge", lambda *_: None)
+        world.vehicle.take_off(2.0)
+        world.until(VehicleMode.HOLDING, VehicleMode.GUIDED)
+        motions = world.autopilot.firmware.motions
+    assert motions.count("arm") == 1
+    assert motions.count("take off") == 1
+
+
+def test_a_withdrawal_is_over_only_when_motors_have_stood_for_a_while() -> None:
+    """Two HEARTBEATs, 1.5 s after the last word; motors that start begin it anew."""
+    sent: list[Any] = []
+    landed: list[float] = []
+    commander = Commander(sent.append, (1, 1), 245)
+
+    def answer(result: int, now: float) -> None:
+        number = PX4.disarm().number
+        ack = mavlink.MAVLink_command_ack_message(number, result, 0, 0, 245, 191)
+        commander.take(ack, now)
+
+    def land() -> None:
+        landed.append(1.0)
+
+    withdrawal = Withdrawal(commander, PX4.disarm(), land, 0.0, flies=False)
+    withdrawal.observe(0.1, armed=False)
+    answer(mavlink.MAV_RESULT_ACCEPTED, 0.2)
+    over = []
+    for now, armed in ((0.5, False), (1.4, False), (1.5, True), (2.5, False)):
+        withdrawal.observe(now, armed=armed)
+        over.append(withdrawal.over)
+    assert len(sent) == 2
+    answer(mavlink.MAV_RESULT_ACCEPTED, 2.6)
+    for now in (2.7, 2.9, 3.1):
+        withdrawal.observe(now, armed=False)
+        over.append(withdrawal.over)
+    assert over == [False] * 6 + [True]
+    assert landed == []
+    withdrawal = Withdrawal(commander, PX4.disarm(), land, 10.0, flies=False)
+    answer(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, 10.1)
+    assert landed == [1.0]
