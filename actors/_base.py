@@ -25,6 +25,7 @@ from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteR
 from aerodaas.clock import LockstepClock, host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.priority import be_nice
 from aerodaas.vitals import Vitals, read_vitals
 
 __all__ = [
@@ -116,6 +117,9 @@ class _AlertHandler(logging.Handler):
 class StreamActor:
     """Base of the actors; subclasses implement `_open`, `_run` and `_close`."""
 
+    niceness = 10
+    """Of its process; the drone's actor alone is not nice."""
+
     def __init__(self, session: Session, name: str, reads: dict[str, int]) -> None:
         """Belong to `session` as `name`, reading the streams `reads` with these depths."""
         self.session = session
@@ -136,6 +140,7 @@ class StreamActor:
 
     def prepare(self) -> ActorInfo:
         """Open everything; raises the project's errors for what cannot be opened."""
+        be_nice(self.niceness)
         logging.captureWarnings(capture=True)
         logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
         self.alerts = self.outlet(alert_stream(self.name), f"{self.name}'s alert")

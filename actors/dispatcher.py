@@ -76,6 +76,8 @@ class Managed:
 class DispatcherActor(StreamActor):
     """Drives `scheduler` over the executors of the `managed` analyses."""
 
+    niceness = 5
+
     def __init__(
         self,
         session: Session,

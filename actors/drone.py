@@ -17,6 +17,7 @@ from aerodaas.actors._base import ActorInfo, StreamActor
 from aerodaas.actors._growth_gate import GrowthGate
 from aerodaas.actors._loop_calls import LoopCalls, LoopOverError
 from aerodaas.actors._names import ACKS, end_stream, reply_stream, request_stream, state_stream
+from aerodaas.actors._publisher import Publisher
 from aerodaas.actors._robot_report import RobotReport
 from aerodaas.actors.pilot import Pilot, RobotSpec
 from aerodaas.actors.session import (
@@ -30,6 +31,7 @@ from aerodaas.clock import LockstepClock
 from aerodaas.errors import AeroDaaSError
 from aerodaas.navigation.commands import Answer, Command, ReturnHome
 from aerodaas.navigation.safety import Neighbour
+from aerodaas.priority import Slack, punctual, raise_niceness
 from aerodaas.recording.pace import NEVER
 from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
 from aerodaas.status import Message
@@ -64,6 +66,8 @@ class Conduct:
 class DroneActor(StreamActor):
     """Flies `robots`."""
 
+    niceness = 0
+
     def __init__(
         self,
         session: Session,
@@ -88,15 +92,25 @@ class DroneActor(StreamActor):
         self._reports: dict[str, RobotReport] = {}
         """How each robot fares: replaced by the loop, never changed."""
         self._calls = LoopCalls(self._wake)
+        self._publisher = Publisher()
         self._gate = GrowthGate(self._serve)
         self._due: dict[str, int] = {}
         self._late = 0
+        self._refused: tuple[str, ...] = ()
+        """What this machine does not grant the loop."""
         self._heard = time.monotonic()
         self._orphaned = False
 
     def _open(self) -> None:
+        nice = raise_niceness()
+        if nice > 0 and not self.session.lockstep:
+            self.alert(
+                "niceness",
+                f"the process that flies runs at nice {nice} and must not raise itself: start "
+                "this node's Ray with RAY_worker_niceness=0",
+            )
         for spec in self._specs:
-            pilot = Pilot(spec, self.session)
+            pilot = Pilot(spec, self.session, self._publisher)
             streams = (*Pilot.streams(spec), *map(reply_stream, spec.requesters))
             pilot.open({stream: self.outlet(stream) for stream in streams})
             self._pilots[pilot.id] = pilot
@@ -198,14 +212,18 @@ class DroneActor(StreamActor):
             if self.session.lockstep:
                 self._run_lockstep()
             else:
-                self._run_real_time()
+                self._publisher.start()
+                with punctual() as refused:
+                    self._refused = refused
+                    self._run_real_time()
         finally:
+            self._publisher.close()
             self._calls.close("the mission is over")
             self._publish_reports()
 
     def _run_real_time(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first
-        due = self.clock.now()
+        due, slack = self.clock.now(), Slack()
         while not self._over():
             wait = self.session.host_seconds(max(0, due - self.clock.now()))
             for message in self.inbox.receive(wait):
@@ -223,6 +241,8 @@ class DroneActor(StreamActor):
             self._watch_application()
             self._publish_reports()
             due = next_due(CONTROL_RATE, now)
+            if due > self.clock.now():
+                slack.use()
 
     def _run_lockstep(self) -> None:
         assert isinstance(self.clock, LockstepClock)  # noqa: S101 - the session says so
@@ -300,7 +320,7 @@ class DroneActor(StreamActor):
         if state is not None:
             self._whereabouts[pilot.id] = _neighbour(state)
         for alert in pilot.new_alerts():
-            self.alert(alert.kind, alert.text, **alert.values)
+            self._publisher.do(partial(self.tell, alert.kind, alert.text, now, dict(alert.values)))
 
     def _take(self, message: Message[Any], now: int) -> None:
         if message.stream in self._neighbours and isinstance(message.item, VehicleState):
@@ -325,6 +345,9 @@ class DroneActor(StreamActor):
         for pilot in self._pilots.values():
             pilot.abandon()
         super()._fail(error)
+
+    def _values(self) -> dict[str, Any]:
+        return {"loop_late": self._late, "not_granted": self._refused}
 
     def _close(self) -> None:
         self._calls.close("the drone's actor has been stopped")

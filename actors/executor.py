@@ -11,6 +11,8 @@ from collections import OrderedDict
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import ray
+
 from aerodaas.actors._coding import CodedFrame, decoded
 from aerodaas.actors.application import Application
 from aerodaas.actors.streams import decode_message, encode_message
@@ -18,11 +20,14 @@ from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert
 from aerodaas.errors import AeroDaaSError
+from aerodaas.priority import be_nice
 from aerodaas.status import Hop, Message
 from aerodaas.vehicle import VehicleState
 
 __all__ = ["FRAMES_KEPT", "CloudExecutor", "Executed", "MissingFrameError", "UnpreparedError"]
 
+_NICENESS = 10
+"""Of its process: on one machine, what flies goes before."""
 FRAMES_KEPT = 8
 """Frames that can be named; the oldest gives way to the next."""
 _UNPACKING = 2.0
@@ -62,6 +67,8 @@ class CloudExecutor:
 
     def prepare(self, analyses: dict[str, Analytics[Any]]) -> None:
         """Open the analyses, by stream."""
+        if ray.is_initialized() and ray.get_runtime_context().get_actor_id():
+            be_nice(_NICENESS)
         for analysis in analyses.values():
             analysis.open()
         self._turns = {name: threading.Lock() for name, a in analyses.items() if not a.concurrent}

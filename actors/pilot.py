@@ -17,6 +17,7 @@ from aerodaas.actors._names import (
     state_stream,
     status_stream,
 )
+from aerodaas.actors._publisher import Publisher
 from aerodaas.actors._robot_report import Latencies
 from aerodaas.actors.planner import PlannerExecutor
 from aerodaas.actors.replayed import Arrivals, WatchedPlanner, as_planned
@@ -94,8 +95,9 @@ class RobotSpec:
 class Pilot:
     """Flies one robot; driven by the drone's actor."""
 
-    def __init__(self, spec: RobotSpec, session: Session) -> None:
+    def __init__(self, spec: RobotSpec, session: Session, publisher: Publisher) -> None:
         """Build the vehicle and the mission; nothing is connected yet."""
+        self._publisher = publisher
         self.spec = spec
         self.id = spec.robot.id
         self.latencies = Latencies()
@@ -331,6 +333,6 @@ class Pilot:
             self.vehicle.land()
 
     def _publish(self, stream: str, item: object, now: int) -> tuple[str, int]:
-        outlet = self._outlets[stream]
-        outlet.measure(item, Header(outlet.sent, now, stream), host_time_ns())
+        outlet, measured = self._outlets[stream], host_time_ns()
+        self._publisher.do(lambda: outlet.measure(item, Header(outlet.sent, now, stream), measured))
         return stream, now

@@ -12,10 +12,14 @@ from ray.exceptions import GetTimeoutError, RayActorError
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from aerodaas.actors.application import Application
+from aerodaas.priority import be_nice
 
 __all__ = ["PlannerExecutor"]
 
 T = TypeVar("T")
+
+_NICENESS = 10
+"""Of its process: a plan may take longer, the setpoint loop beside it must not."""
 
 
 class _PlannerActor:
@@ -28,6 +32,7 @@ class _PlannerActor:
     @ray.method(max_task_retries=-1)
     def load(self, *_: object) -> None:
         """Arrive with one's arguments, however often the process dies on the way."""
+        be_nice(_NICENESS)
 
     def call(self, function: Callable[..., T], *args: Any, **kwargs: Any) -> T:  # noqa: ANN401
         return function(*args, **kwargs)

@@ -12,4 +12,6 @@ VARIABLES = {
     "RAY_max_direct_call_object_size": "4194304",
     # That an actor died is told at once; why it did, for which Ray would wait a second, may follow.
     "RAY_timeout_ms_task_wait_for_death_info": "100",
+    # Ray would run its workers at nice 15, the drone's actor, too; the others lower themselves.
+    "RAY_worker_niceness": "0",
 }

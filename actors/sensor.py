@@ -22,6 +22,8 @@ __all__ = ["SensorActor"]
 class SensorActor(StreamActor):
     """Asks a camera for its newest picture at the sensor's rate and publishes it as a Frame."""
 
+    niceness = 5
+
     def __init__(
         self, session: Session, stream: str, sensor: SensorConfig, state: str, *, ends: bool
     ) -> None:

@@ -9,6 +9,7 @@ import shutil
 import socket
 import sys
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -17,6 +18,7 @@ import psutil
 from rich.console import Console
 from rich.table import Table
 
+from aerodaas import priority
 from aerodaas.errors import AeroDaaSError
 
 __all__ = ["Finding", "examine", "show_findings"]
@@ -62,6 +64,7 @@ def examine(address: str | None = None) -> bool:
     checks: list[Callable[[], Iterator[Finding]]] = [
         _python,
         _machine,
+        _punctuality,
         _packages,
         _providers,
         _streams,
@@ -107,6 +110,20 @@ def _machine() -> Iterator[Finding]:
         fits = size >= _SHARED_MEMORY_NEEDED
         remedy = "" if fits else "give the container more: docker run --shm-size=1g"
         yield Finding("shared memory", f"{size:.0f} MiB", fits, remedy)
+
+
+def _punctuality() -> Iterator[Finding]:
+    """What a drone's actor is granted here, found by a thread that asks for it and ends."""
+    nice = priority.niceness()
+    remedy = "" if nice <= 0 else "start Ray and aerodaas without `nice`, RAY_worker_niceness=0"
+    yield Finding("niceness", str(nice), nice <= 0, remedy)
+    with ThreadPoolExecutor(1) as thread:
+        refused = thread.submit(priority.real_time).result()
+    hint = "setcap cap_sys_nice+ep, or `ulimit -r 1`, lets the setpoint loop go before all else"
+    yield Finding("real-time priority", f"{refused}; {hint}" if refused else "granted")
+    refused = priority.lockable_memory()
+    hint = "`ulimit -l unlimited` keeps the setpoint loop's memory from being swapped out"
+    yield Finding("locked memory", f"{refused}; {hint}" if refused else "granted")
 
 
 def _packages() -> Iterator[Finding]:
