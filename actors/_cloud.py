@@ -27,6 +27,10 @@ from aerodaas.status import Message
 __all__ = ["Cloud", "CloudAnswer", "Executor"]
 
 _PROBE_EVERY = NANOSECONDS
+_PATIENCE = 4
+"""An execution that takes so many times what was expected is lost, ..."""
+_LEAST_PATIENCE = NANOSECONDS
+"""... but not before this."""
 
 
 @dataclass(frozen=True)
@@ -68,10 +72,14 @@ class _Sent:
     task: Task
     at: int
     """Mission time."""
+    until: int
+    """Mission time after which it is lost."""
     future: Future[Executed] | None = None
     parcel: Parcel | None = None
     carries: bool = True
     """The frame travels in this call; else it is named."""
+    way: tuple[str, int] = ("", 0)
+    """Its frame's name on the uplink, where it carries it."""
     began: float = 0.0
     ended: float = 0.0
     problem: str = ""
@@ -81,13 +89,19 @@ class Cloud:
     """Executions on one executor."""
 
     def __init__(
-        self, executor: Executor, parcels: Parcels, timeout_ns: int, wake: Callable[[], None]
+        self,
+        executor: Executor,
+        parcels: Parcels,
+        timeout_ns: int,
+        wake: Callable[[], None],
+        speed: float = 1.0,
     ) -> None:
         """Send frames as `parcels`, which all executors of a node share.
 
         An executor that was restarted is given its analyses anew. `wake` is called, from another
-        thread, when an answer is there.
+        thread, when an answer is there. Mission time runs at `speed`.
         """
+        self._second = speed * NANOSECONDS
         self.gone = False
         self.executor = executor
         self.parcels = parcels
@@ -116,7 +130,9 @@ class Cloud:
 
     def send(self, task: Task, message: Message[Any], now: int, budget: float) -> None:
         """Start an execution whose result is of use for `budget` seconds of the host."""
-        sent = self._started[task.id] = _Sent(task, now)
+        patience = self._patience(task)
+        sent = self._started[task.id] = _Sent(task, now, now + patience)
+        self.parcels.announce(message)
         until = time.monotonic() + budget
         self.parcels.later(partial(self._carry, sent, message, until))
 
@@ -125,12 +141,33 @@ class Cloud:
         while self._answered:
             sent = self._answered.popleft()
             if self._started.pop(sent.task.id, None) is not None:
-                yield self._answer(sent)
+                answer = self._answer(sent)
+                self.parcels.uplink.lose(sent.way)
+                yield answer
         for sent in list(self._started.values()):
-            if now - sent.at > self._timeout:
+            if now > sent.until:
                 del self._started[sent.task.id]
+                self.parcels.uplink.lose(sent.way)
                 self.gone |= self._answered_since < sent.at
-                yield CloudAnswer(sent.task, timed_out=True, way=self.executor.site)
+                yield CloudAnswer(
+                    sent.task,
+                    timed_out=now >= sent.task.deadline,
+                    lost=now < sent.task.deadline,
+                    error="its executor in the cloud did not answer",
+                    way=self.executor.site,
+                )
+
+    def _patience(self, task: Task) -> int:
+        """How long an execution may take, nanoseconds of mission time.
+
+        A few times of what is expected once anything is known, for a process that is frozen says
+        nothing; while nothing is known, as long as the resources allow.
+        """
+        expected = self.expected(task.profile.model)
+        if expected is None:
+            return self._timeout
+        usual = max(task.profile.cloud_time, round(expected * self._second))
+        return min(self._timeout, max(_LEAST_PATIENCE, _PATIENCE * usual))
 
     def probe(self, now: int) -> None:
         """Look at the link; and whether an executor that was gone is back, for a few bytes."""
@@ -174,6 +211,9 @@ class Cloud:
                 self._carried.append(parcel.name)
                 self.parcels.bytes += len(parcel.data)
             sent.began = time.perf_counter()
+            if sent.carries:
+                sent.way = (self.executor.site, sent.task.id)
+                self.parcels.uplink.depart(sent.way, len(parcel.data), sent.began)
             execute, left = self.executor.handle.execute, until - time.monotonic()
             data = parcel.data if sent.carries else b""
             reference = execute.remote(sent.task.profile.model, parcel.name, data, left)
@@ -218,7 +258,7 @@ class Cloud:
         there = (hop.published - hop.received) / NANOSECONDS
         link = max(0.0, sent.ended - sent.began - there)
         if sent.carries:
-            self.parcels.arrived(parcel, link, executed.decoding)
+            self.parcels.arrived(parcel, sent.way, sent.began + link, executed.decoding)
         self.executions.observe(sent.task.profile.model, there - executed.decoding)
         figures = {
             "link_ms": link * 1e3,

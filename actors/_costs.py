@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 
-__all__ = ["Executions", "Link", "quantile"]
+__all__ = ["Executions", "Link", "Uplink", "quantile"]
 
 _KEPT = 11
 _LINK_KEPT = 5
@@ -57,6 +57,44 @@ class Link:
     def seconds(self, size: float) -> float:
         """Expected seconds from sending `size` bytes until a small answer, without any work."""
         return self.latency + size / self.bandwidth
+
+
+class Uplink:
+    """What is under way on a link that carries one thing after another. Threads may share it."""
+
+    def __init__(self, link: Link) -> None:
+        """Learn about `link` from what it carries."""
+        self._link = link
+        self._under_way: dict[object, tuple[float, float]] = {}
+        self._arrived = float("-inf")
+
+    @property
+    def waiting(self) -> float:
+        """Bytes that must arrive before what is sent now."""
+        return sum(size for size, _ in tuple(self._under_way.values()))
+
+    def seconds(self, size: float) -> float:
+        """Expected seconds from sending `size` bytes now until a small answer, without any work."""
+        return self._link.seconds(size + self.waiting)
+
+    def depart(self, name: object, size: float, at: float) -> None:
+        """Something of so many bytes is handed to the link at `at`, seconds."""
+        self._under_way[name] = size, at
+
+    def arrive(self, name: object, at: float) -> None:
+        """It was there, and answered but for the work, at `at`; learn what the link took for it.
+
+        What it waited for others is theirs: counted twice, a queue would look like a slow link.
+        """
+        size, departed = self._under_way.pop(name, (0.0, at))
+        queued = self._arrived > departed
+        taken = at - max(departed, self._arrived) + (self._link.latency if queued else 0.0)
+        self._arrived = max(self._arrived, at)
+        self._link.observe(round(size), taken)
+
+    def lose(self, name: object) -> None:
+        """It will not arrive any more."""
+        self._under_way.pop(name, None)
 
 
 class Executions:

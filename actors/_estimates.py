@@ -27,16 +27,25 @@ class Estimates:
         self._learnt = learnt
         self._told: dict[str, Profile] = {}
 
-    def profile(self, told: Profile, open_times: frozenset[str], cloud: float | None) -> Profile:
+    def profile(
+        self,
+        told: Profile,
+        open_times: frozenset[str],
+        cloud: float | None,
+        link: float = 0.0,
+    ) -> Profile:
         """The profile for a new task of an analysis.
 
         `told` is what the environment file says, `open_times` which of its times are to be
-        measured, `cloud` the host seconds that the cloud is expected to take, if known.
+        measured, `cloud` the host seconds that the cloud is expected to take, if known, `link`
+        those that a frame sent now spends on its way alone: no time told can be less than that.
         """
         profile = self._told.setdefault(told.model, told)
         wanted = open_times - self._learnt
         edge = self._time(self.edge.seconds(told.model) if "edge_time" in wanted else None)
         there = self._time(cloud if "cloud_time" in wanted else None)
+        if there is None and "cloud_time" not in self._learnt and "cloud_time" not in open_times:
+            there = max(told.cloud_time, round(link * self._second))
         news = replace(
             profile,
             edge_time=edge or profile.edge_time,

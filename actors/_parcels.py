@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors._coding import CODINGS, Coder, Coding, fastest
-from aerodaas.actors._costs import Link
+from aerodaas.actors._costs import Link, Uplink
 from aerodaas.actors.streams import encode_message
 from aerodaas.data import Frame
 from aerodaas.status import Message
@@ -50,6 +50,7 @@ class Parcels:
     def __init__(self, compression: str) -> None:
         """`compression` is that of `ComputeConfig`."""
         self.link = Link()
+        self.uplink = Uplink(self.link)
         self.chosen: dict[str, int] = {}
         """Frames coded, by coding."""
         self.bytes = 0
@@ -58,7 +59,10 @@ class Parcels:
         self._coder = Coder()
         self._parcels: OrderedDict[tuple[str, int], Parcel] = OrderedDict()
         self._packer = ThreadPoolExecutor(1, "packer")
-        self._expected = 0.0
+        self._coding_seconds = self._size = 0.0
+        """Of the newest parcel."""
+        self._announced: dict[tuple[str, int], None] = {}
+        """Messages that are to be packed."""
         self._pinged = self._transferred = float("-inf")
         self._pinging: Future[Any] | None = None
 
@@ -66,9 +70,16 @@ class Parcels:
         """Do `work` in the packing thread, after what was asked for before."""
         self._packer.submit(work)
 
+    def announce(self, message: Message[Any]) -> None:
+        """A message will be packed: it counts among what must cross the link first."""
+        name = (message.stream, message.seq)
+        if name not in self._parcels:
+            self._announced[name] = None
+
     def pack(self, message: Message[Any]) -> Parcel:
         """The parcel for a message; made at the first call. In the packing thread only."""
         key = (message.stream, message.seq)
+        self._announced.pop(key, None)
         parcel = self._parcels.get(key)
         if parcel is None:
             parcel = self._parcels[key] = self._pack(message)
@@ -76,18 +87,25 @@ class Parcels:
                 self._parcels.popitem(last=False)
         return parcel
 
-    def arrived(self, parcel: Parcel, seconds: float, decoding: float) -> None:
-        """Learn from the call that carried a frame: `seconds` of way, and of decompressing."""
+    def arrived(self, parcel: Parcel, way: tuple[str, int], at: float, decoding: float) -> None:
+        """Learn from the call that carried a frame and that was answered, but for work, at `at`.
+
+        `way` is its name on the uplink; `decoding` the seconds of decompressing.
+        """
         self._transferred = time.monotonic()
-        self.link.observe(len(parcel.data), seconds)
+        self.uplink.arrive(way, at)
         if parcel.frame is not None and decoding > 0:
             self._coder.took_to_decode(parcel.frame, parcel.coding, decoding)
         parcel.frame = None
 
     @property
     def expected(self) -> float:
-        """Seconds of coding and way that a frame like the last one may be expected to take."""
-        return max(self._expected, self.link.latency)
+        """Seconds of coding and way that a frame like the last one may be expected to take.
+
+        What is under way, or waits to be packed, goes before it.
+        """
+        size = self._size * (1 + len(self._announced))
+        return max(self._coding_seconds + self.uplink.seconds(size), self.link.latency)
 
     def ping(self, executor: Any) -> None:  # noqa: ANN401 - a Ray handle
         """Look at the link, if it is time to."""
@@ -124,13 +142,16 @@ class Parcels:
         if frame is not None:
             original = frame.nbytes
             costs = self._coder.costs(frame, self._allowed)
-            coding, self._expected = fastest(costs, self.link.seconds)
+            coding, _ = fastest(costs, self.link.seconds)
+            self._coding_seconds = costs[coding].seconds
             if coding != "raw":
                 message = _with_item(message, self._coder.encode(frame, coding))
         data = encode_message(message)
+        self._size = len(data)
         self.chosen[coding] = self.chosen.get(coding, 0) + 1
         name = (message.stream, message.seq)
-        return Parcel(name, data, frame, coding, original or len(data), self._expected)
+        expected = self._coding_seconds + self.uplink.seconds(self._size)
+        return Parcel(name, data, frame, coding, original or len(data), expected)
 
 
 def _with_item(message: Message[Any], item: Any) -> Message[Any]:  # noqa: ANN401

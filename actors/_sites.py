@@ -21,12 +21,16 @@ class Sites:
     """The executors in the cloud. A task goes to the one that is expected to answer first."""
 
     def __init__(
-        self, executors: Sequence[Executor], timeout_ns: int, wake: Callable[[], None]
+        self,
+        executors: Sequence[Executor],
+        timeout_ns: int,
+        wake: Callable[[], None],
+        speed: float = 1.0,
     ) -> None:
-        """Use `executors`; `timeout_ns` and `wake` as of `Cloud`."""
+        """Use `executors`; `timeout_ns`, `wake` and `speed` as of `Cloud`."""
         # Processes of one node share its link, and frames are coded once for all of them.
         parcels = {one.site: Parcels(one.compression) for one in executors}
-        self._clouds = [Cloud(one, parcels[one.site], timeout_ns, wake) for one in executors]
+        self._clouds = [Cloud(one, parcels[one.site], timeout_ns, wake, speed) for one in executors]
         self._parcels = parcels
         self._slots = {one.site: one.slots for one in executors}
         self._homeless: deque[CloudAnswer] = deque()
@@ -41,6 +45,10 @@ class Sites:
         """Seconds from sending a task to its result; None while nobody knows."""
         known = [cloud.expected(model) for cloud in self._able(model)]
         return min((seconds for seconds in known if seconds is not None), default=None)
+
+    def on_the_way(self, model: str) -> float:
+        """Seconds that the link alone takes for a frame sent now, what is queued on it included."""
+        return min((cloud.parcels.expected for cloud in self._able(model)), default=0.0)
 
     def send(self, task: Task, message: Message[Any], now: int, budget: float) -> None:
         """Start an execution whose result is of use for `budget` seconds of the host."""

@@ -51,7 +51,7 @@ __all__ = ["DispatcherActor", "Managed"]
 _LAST_ANSWERS = 2.0
 """Seconds given to the cloud at the end of a run."""
 _COMPLAINTS_KEPT = 16
-_EDGE_PATIENCE = 10
+_EDGE_PATIENCE = 4
 """An execution on the edge that takes so many times its expected time has failed."""
 _LEAST_PATIENCE = NANOSECONDS
 """... but not before this: a first inference may take some."""
@@ -139,7 +139,7 @@ class DispatcherActor(StreamActor):
         assert self.inbox is not None  # noqa: S101 - prepared
         timeout = self._resources.cloud_timeout
         wake = self.inbox.wake
-        self._cloud = Sites(cloud, timeout, wake) if cloud else None
+        self._cloud = Sites(cloud, timeout, wake, self.session.speed or 1.0) if cloud else None
 
         def tell(model: str, life: Life) -> None:
             self._lives.append((model, life))
@@ -190,7 +190,8 @@ class DispatcherActor(StreamActor):
             self._publish(managed.stream, message, None)
             return
         cloud = self._cloud.expected(managed.stream) if self._cloud is not None else None
-        profile = self._estimates.profile(managed.profile, managed.open_times, cloud)
+        link = self._cloud.on_the_way(managed.stream) if self._cloud is not None else 0.0
+        profile = self._estimates.profile(managed.profile, managed.open_times, cloud, link)
         reserve = 0 if self.session.lockstep else self._way.reserve(profile.deadline)
         task = Task(
             id=next(self._numbers),
@@ -252,8 +253,7 @@ class DispatcherActor(StreamActor):
             model = running.profile.model
             self.alert("executor_lost", f"{model} does not answer on the edge")
             self._dispatch.down.add(model)
-            self._why[running.id] = "it did not answer"
-            self._guarded("finished", running, now, Outcome.FAILED)
+            self._lose(running, "it did not answer", now)
         elif running is None:
             self._require_decisions(now)
 

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.actors._costs import Executions, Link, quantile
+from aerodaas.actors._costs import Executions, Link, Uplink, quantile
 from aerodaas.actors._estimates import Estimates
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
 
@@ -100,3 +100,50 @@ def test_noise_makes_no_new_profile() -> None:
     first = estimates.profile(told(), TIMES, 0.300)
     estimates.edge.observe("model", 0.102)
     assert estimates.profile(told(), TIMES, 0.305) is first
+
+
+@given(
+    st.floats(1e-3, 0.5), st.floats(1e4, 1e7), st.lists(st.integers(20_000, 500_000), min_size=2)
+)
+def test_a_queue_on_a_link_is_waited_for_and_not_taken_for_slowness(
+    latency: float, bandwidth: float, sizes: list[int]
+) -> None:
+    """All sent at once: each waits for those before it, and the bandwidth is still recovered."""
+    link = Link()
+    link.observe(0, latency)
+    uplink = Uplink(link)
+    for number, size in enumerate(sizes):
+        uplink.depart(number, size, 0.0)
+    assert uplink.waiting == sum(sizes)
+    sent = 0
+    for number, size in enumerate(sizes):
+        sent += size
+        uplink.arrive(number, latency + sent / bandwidth)
+        assert link.bandwidth == pytest.approx(bandwidth, rel=0.01)
+        left = sum(sizes[number + 1 :])
+        assert uplink.waiting == left
+        assert uplink.seconds(50_000) == pytest.approx(
+            latency + (left + 50_000) / bandwidth, rel=0.01
+        )
+
+
+def test_what_is_lost_on_a_link_is_waited_for_no_longer() -> None:
+    """And what arrives twice, or never left, tells nothing."""
+    link = Link()
+    uplink = Uplink(link)
+    uplink.depart("a", 100_000, 0.0)
+    uplink.lose("a")
+    uplink.lose("a")
+    assert uplink.waiting == 0
+
+
+def test_no_time_told_for_the_cloud_is_less_than_its_link_takes() -> None:
+    """Over 200 kbit/s a picture of 50 kB takes two seconds, whatever the user's file says."""
+    told = Profile("m", 10.0, 1000 * MILLISECOND, 100 * MILLISECOND, 300 * MILLISECOND)
+    plain = Estimates(1.0, frozenset())
+    assert plain.profile(told, frozenset(), None, 0.0) is told
+    assert plain.profile(told, frozenset(), 0.1, 0.2).cloud_time == 300 * MILLISECOND
+    assert plain.profile(told, frozenset(), 0.1, 2.0).cloud_time == 2000 * MILLISECOND
+    assert plain.profile(told, frozenset(), 0.1, 0.1).cloud_time == 300 * MILLISECOND
+    adapts = Estimates(1.0, frozenset({"cloud_time"}))
+    assert adapts.profile(told, frozenset(), None, 2.0).cloud_time == 300 * MILLISECOND
