@@ -22,7 +22,7 @@ from aerodaas.actors._names import alert_stream
 from aerodaas.actors.application import Application
 from aerodaas.actors.session import Session
 from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Inbox, Outlet, RemoteReader
-from aerodaas.clock import LockstepClock, host_time_ns
+from aerodaas.clock import NANOSECONDS, LockstepClock, host_time_ns
 from aerodaas.data import Alert, Header
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.priority import be_nice
@@ -38,6 +38,8 @@ __all__ = [
 ]
 
 _ALERTS_KEPT = 50
+_REPEATED = 5 * NANOSECONDS
+"""Mission time within which an alert in the same words is the same alert."""
 _LISTENING = 5.0
 """Wall seconds that an actor's own thread may take to turn to further streams."""
 Phase = Literal["new", "ready", "running", "done", "failed"]
@@ -131,6 +133,8 @@ class StreamActor:
         self._started = threading.Event()
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
+        self._told: dict[tuple[str, str], int] = {}
+        """When each of the newest alerts was last told, by kind and words."""
         self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
         # Reentrant: an alert may be found to be unsendable while it is sent.
         self._alerting = threading.RLock()
@@ -271,8 +275,17 @@ class StreamActor:
         self.tell(kind, text, self.clock.now(), values)
 
     def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
-        """Tell the people who watch about mission time `stamp`; any thread may."""
+        """Tell the people who watch about mission time `stamp`; any thread may.
+
+        What was told in the same words within the last seconds is not told again.
+        """
         with self._alerting:
+            before = self._told.get((kind, text))
+            if before is not None and 0 <= stamp - before < _REPEATED:
+                return
+            self._told[kind, text] = stamp
+            while len(self._told) > _ALERTS_KEPT:
+                self._told.pop(next(iter(self._told)))
             header = Header(self.alerts.sent, stamp, self.name)
             alert = Alert(header, kind, text, values)
             if self.alerts.measure(alert, header, host_time_ns()).item is None:

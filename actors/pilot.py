@@ -210,10 +210,10 @@ class Pilot:
 
     def _refuse(self, source: str, error: Exception, now: int) -> Answer:
         """Take note of what `source` brought upon itself; people are told once of each kind."""
-        text = f"{source} was refused, for it raised {failure_line(error)}"
+        text = f"{source} failed: {failure_line(error)}"
         if (source, type(error)) not in self._blamed:
             self._blamed.add((source, type(error)))
-            self._tell(now, "refused", text)
+            self._tell(now, "command_failed", text)
         return Answer(accepted=False, text=text)
 
     def _tell(self, now: int, kind: str, text: str) -> None:

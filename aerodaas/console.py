@@ -58,6 +58,9 @@ class Watching:
     def __init__(self, options: RunOptions, config: EnvironmentConfig) -> None:
         self._title = options.application.stem if options.application else config.name
         self._view = MissionView() if options.view else None
+        self._errors = Console(stderr=True, highlight=False, soft_wrap=True)
+        self._printed: set[tuple[str, int, int]] = set()
+        """Alerts, by source, number and stamp."""
         self._began = time.monotonic()
         self._before: tuple[float, dict[str, int]] = (0.0, {})
         self._rates: dict[str, float] = {}
@@ -79,6 +82,7 @@ class Watching:
     def update(self, state: FlightState) -> None:
         """Show the flight as it is now."""
         if self._view is None:
+            self._print_alerts(state)
             return
         stamps = [robot.status.stamp for robot in state.robots.values()]
         now = seconds(max(stamps, default=0))
@@ -97,6 +101,15 @@ class Watching:
                 scheduler=_scheduler_text(state),
             )
         )
+
+    def _print_alerts(self, state: FlightState) -> None:
+        """Without a view, a line for each alert as it comes."""
+        for alert in state.alerts:
+            key = alert.header.source, alert.header.id, alert.header.stamp
+            if key not in self._printed:
+                self._printed.add(key)
+                time_text = f"{seconds(alert.header.stamp):.1f} s"
+                self._errors.print(f"{time_text} {alert.header.source}: {alert.text}", markup=False)
 
     def _measure_rates(self, state: FlightState, now: float) -> None:
         counts = {

@@ -166,7 +166,9 @@ class Mission:
         try:
             return self._obey(command)
         except Exception as error:  # noqa: BLE001 - what others send may raise anything
-            text = f"{type(command).__name__} failed: {type(error).__name__}: {error}"
+            source = f"an item of {command.name}" if isinstance(command, StreamItem) else ""
+            what = source or type(command).__name__
+            text = f"{what} failed: {type(error).__name__}: {error}"
             self._log.alert(self._now, "command_failed", text)
             return Answer(accepted=False, text=text)
 

@@ -17,6 +17,7 @@ from aerodaas.navigation.commands import AddNavigation, End, OpenStream, Request
 from aerodaas.status import MissionState
 
 _STREAM = "drone/evil"
+_FLYING = {MissionState.HOLDING, MissionState.ENROUTE, MissionState.LOITERING}
 
 
 class Malicious:
@@ -91,6 +92,7 @@ def _eventually(holds: Any) -> None:  # noqa: ANN401
 
 
 def _land(actor: DroneByHand) -> None:
+    _eventually(lambda: actor.robots()["drone"].status.state in _FLYING)
     assert actor.command("drone", End()).accepted
     _eventually(lambda: actor.report().phase == "done")
     assert actor.robots()["drone"].status.state is MissionState.LANDED
@@ -105,11 +107,11 @@ def test_an_item_that_raises_is_told_with_its_streams_name(kind: type) -> None:
     actor.start(host_time_ns())
     for _ in range(5):
         _send(actor, _STREAM, kind())
-    _eventually(lambda: any(one.kind == "refused" for one in actor.report().alerts))
+    _eventually(lambda: any(one.kind == "command_failed" for one in actor.report().alerts))
     time.sleep(0.2)
-    told = [one.text for one in actor.report().alerts if one.kind == "refused"]
+    told = [one.text for one in actor.report().alerts if one.kind == "command_failed"]
     assert len(told) == 1
-    assert told[0].startswith(f"an item of {_STREAM} was refused, for it raised")
+    assert told[0].startswith(f"an item of {_STREAM} failed: ")
     _land(actor)
 
 

@@ -20,6 +20,7 @@ from aerodaas.navigation.commands import AddNavigation, ClearNavigation, End
 from aerodaas.status import MissionState
 
 _READS = 100_000
+_ON_GROUND = {MissionState.IDLE, MissionState.PREFLIGHT, MissionState.TAKING_OFF}
 _HOLD = {"on_complete": "hold"}
 
 
@@ -141,6 +142,19 @@ def test_the_newest_latencies_are_given_in_their_order() -> None:
     assert known.newest(0) == ()
 
 
+def test_an_alert_in_the_same_words_is_told_again_only_after_a_while() -> None:
+    """Others are told at once; what is told goes by mission time."""
+    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=None)
+    second = 1_000_000_000
+    for stamp in range(12):
+        actor.tell("kind", "the same", stamp * second, {})
+        actor.tell("kind", f"another {stamp}", stamp * second, {})
+    told = [one for one in actor.report().alerts if one.text == "the same"]
+    assert [one.header.stamp // second for one in told] == [0, 5, 10]
+    assert len(actor.report().alerts) == 15
+    actor.stop()
+
+
 def _serve_until(calls: LoopCalls, count: int) -> None:
     while count > 0:
         count -= calls.serve()
@@ -154,6 +168,10 @@ def _until_over(actor: DroneByHand) -> None:
 
 
 def _land(actor: DroneByHand) -> None:
+    end = time.monotonic() + 60.0
+    while actor.robots()["drone"].status.state in _ON_GROUND:
+        assert time.monotonic() < end
+        time.sleep(0.01)
     assert actor.command("drone", End()).accepted
     _until_over(actor)
     assert actor.robots()["drone"].status.state is MissionState.LANDED
