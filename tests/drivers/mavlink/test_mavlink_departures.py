@@ -103,8 +103,11 @@ def test_what_shows_to_be_done_needs_no_acknowledgement(
         world.vehicle.take_off(2.0)
         world.until(VehicleMode.HOLDING, VehicleMode.GUIDED)
         motions = world.autopilot.firmware.motions
+        numbers = [getattr(one, "command", None) for _, one in world.autopilot.heard]
     assert motions.count("arm") == 1
     assert motions.count("take off") == 1
+    assert numbers.count(mavlink.MAV_CMD_COMPONENT_ARM_DISARM) <= 2
+    assert numbers.count(mavlink.MAV_CMD_NAV_TAKEOFF) <= 3
 
 
 def test_a_withdrawal_is_over_only_when_motors_have_stood_for_a_while() -> None:
