@@ -7,14 +7,25 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 import ray
-from ray.exceptions import RayError
+from ray.exceptions import GetTimeoutError, RayActorError, RayError
 
 from aerodaas.actors._base import ActorReport
 from aerodaas.errors import AeroDaaSError
 
-__all__ = ["end_actors"]
+__all__ = ["end_actors", "may_fly"]
 
 _STOP_TIMEOUT = 20.0
+_ANSWER_TIMEOUT = 5.0
+
+
+def may_fly(drone: Any) -> bool:  # noqa: ANN401 - an actor's handle
+    """Whether the mission of a drone's actor goes on, or may do so as far as anyone can tell."""
+    try:
+        return bool(ray.get(drone.report.remote(), timeout=_ANSWER_TIMEOUT).phase == "running")
+    except RayActorError:
+        return False
+    except GetTimeoutError:
+        return True
 
 
 def end_actors(groups: Iterable[Sequence[Any]], helpers: Sequence[Any]) -> dict[Any, ActorReport]:

@@ -1,20 +1,21 @@
 """The caretaker: ends the actors of a run whose application has died, once the drones are down.
 
-In a cluster that outlives the application, the actors of a run are detached from it, so that a
-killed application does not take the drone's actor with it. The drone's actor brings the drone
-home by itself; the caretaker sees to it that nothing is left running afterwards.
+The actors of a run are detached from the application, so that one that is killed does not take
+the drone's actor with it. The drone's actor brings the drone home by itself; the caretaker sees to
+it that nothing is left running afterwards.
 """
 
 from __future__ import annotations
 
+import os
+import threading
 import time
 from collections.abc import Sequence
 from typing import Any
 
-import ray
-from ray.exceptions import GetTimeoutError, RayActorError
-
-from aerodaas.actors._ending import end_actors
+from aerodaas.actors._application import Application
+from aerodaas.actors._ending import end_actors, may_fly
+from aerodaas.actors.run_lock import RunLock
 
 __all__ = ["Caretaker"]
 
@@ -22,38 +23,51 @@ _LAUNCH = 200.0
 """Wall seconds that an application has to start its run, before its first word."""
 _SILENCE = 5.0
 """Wall seconds without a word from the application after which it is taken for dead."""
-_ANSWER_TIMEOUT = 5.0
 _LOOK_INTERVAL = 1.0
 
 
 class Caretaker:
-    """Watches one run; needs two calls at a time, `watch` and `heard`."""
+    """Watches one run, from its making on: a call might be lost with the application."""
 
-    def __init__(self) -> None:
-        """Begin to listen."""
+    def __init__(
+        self,
+        application: Application,
+        drones: Sequence[Any],
+        groups: Sequence[Sequence[Any]],
+        helpers: Sequence[Any],
+    ) -> None:
+        """Wait until `application` is gone and none of the `drones` flies; then end everything.
+
+        `groups` are stopped in turn, the `helpers` killed. In lockstep, where nothing falls down,
+        the drones are not waited for.
+        """
         self._silent_from = time.monotonic() + _LAUNCH
+        self._application = application
+        self._drones = drones
+        self._ended = groups, helpers
+        self._lock = RunLock()
+        threading.Thread(target=self._watch, name="caretaker", daemon=True).start()
 
     def heard(self) -> None:
         """Note that the application is alive."""
         self._silent_from = time.monotonic() + _SILENCE
 
-    def watch(
-        self, drones: Sequence[Any], groups: Sequence[Sequence[Any]], helpers: Sequence[Any]
-    ) -> None:
-        """Wait until the application is gone and none of the `drones` flies; then end everything.
+    def look_after(self, groups: Sequence[Sequence[Any]], helpers: Sequence[Any]) -> None:
+        """End these, instead, once it is time to: actors have come in flight."""
+        self._ended = groups, helpers
 
-        `groups` are stopped in turn, the `helpers` killed.
-        """
-        while time.monotonic() < self._silent_from or any(map(self._may_fly, drones)):
+    def _watch(self) -> None:
+        lockstep = self._application.lockstep
+        while not self._gone() or (not lockstep and any(map(may_fly, self._drones))):
             time.sleep(_LOOK_INTERVAL)
-        end_actors(groups, helpers)
-        ray.actor.exit_actor()
+        end_actors(*self._ended)
+        self._lock.release()
+        os._exit(0)
 
-    @staticmethod
-    def _may_fly(drone: Any) -> bool:  # noqa: ANN401 - an actor's handle
-        try:
-            return bool(ray.get(drone.report.remote(), timeout=_ANSWER_TIMEOUT).phase == "running")
-        except RayActorError:
-            return False
-        except GetTimeoutError:
+    def _gone(self) -> bool:
+        if not self._application.near:
+            return time.monotonic() > self._silent_from
+        if self._application.ended():
             return True
+        # Suspended in real time, it has lost its drones all the same; in lockstep they wait.
+        return not self._application.lockstep and time.monotonic() > self._silent_from

@@ -1,31 +1,35 @@
-"""Ray itself: start it here, or join a cluster, and find places for actors."""
+"""Ray itself: start one of our own here, or join a cluster, and find places for actors."""
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import logging
 import os
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import ray
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from aerodaas.actors.greeting import greet
+from aerodaas.actors.greeting import greet, hushed, take_up_token
+from aerodaas.actors.local_ray import LocalRay
 from aerodaas.actors.ray_variables import VARIABLES
 from aerodaas.config import ComputeConfig
 from aerodaas.errors import AeroDaaSError, ConfigError
 
 __all__ = [
     "Place",
+    "begin",
     "connect",
     "disconnect",
     "discover",
     "home_edge",
+    "is_local",
     "join",
     "nodes_at",
     "options_for",
-    "outlives_application",
     "pinned",
 ]
 
@@ -34,12 +38,9 @@ _SHARE = 0.001
 """Share of a node's `edge` or `cloud` resource that an actor takes: it says where, not how much."""
 _NAMESPACE = "aerodaas"
 """Ray's, for the names of actors that outlive their application."""
-_STORE_BYTES = 128 * 2**20
-"""Object store of a one-machine run; its streams travel in shared memory of their own."""
 
-
-_ours = False
-"""Whether this process started the Ray that it is connected to."""
+_local: LocalRay | None = None
+"""The Ray that this process has had started."""
 
 
 @dataclass(frozen=True)
@@ -51,54 +52,69 @@ class Place:
     """IP address of one node, where the kind alone does not say."""
 
 
-def connect(address: str | None) -> None:
-    """Start Ray on this machine, or join the cluster at `address` (or `RAY_ADDRESS`).
+def begin(address: str | None) -> None:
+    """Have a Ray of our own begin to start, where `connect` will need one; returns at once."""
+    global _local  # noqa: PLW0603 - one Ray for each process
+    if ray.is_initialized() or address or os.environ.get("RAY_ADDRESS") or _local is not None:
+        return
+    _local = LocalRay(VARIABLES)
+    atexit.register(disconnect)
 
-    Raises AeroDaaSError if the cluster cannot be reached, ConfigError if it offers no edge node.
+
+def connect(address: str | None) -> None:
+    """Start a Ray of our own on this machine, or join the cluster at `address` (or `RAY_ADDRESS`).
+
+    Raises AeroDaaSError if the cluster cannot be reached or Ray does not start, ConfigError if the
+    cluster offers no edge node.
     """
-    global _ours  # noqa: PLW0603 - one Ray for each process
     if ray.is_initialized():
         return
-    _ours = False
     address = address or os.environ.get("RAY_ADDRESS")
     if address:
         join(address)
         _require_edge(address)
         return
-    common = _settings()
-    # "local": else Ray joins whatever cluster someone has started on this machine.
-    ray.init(
-        address="local",
-        num_cpus=os.cpu_count(),
-        include_dashboard=False,
-        object_store_memory=_STORE_BYTES,
-        resources={"edge": 1, "cloud": 1},
-        **common,
-    )
-    _ours = True
-    _trim()
+    begin(None)
+    assert _local is not None  # noqa: S101 - begun
+    address = _local.address
+    take_up_token()
+    _init(address, _node_ip_address=_local.node_address)
 
 
 def join(address: str) -> None:
     """Join the cluster at `address`, whatever its nodes offer; AeroDaaSError if that fails."""
     if ray.is_initialized():
         return
-    common = _settings()
     greet(address)
+    _init(address)
+
+
+def _init(address: str, **more: Any) -> None:  # noqa: ANN401 - as Ray takes them
+    for name, value in VARIABLES.items():
+        os.environ.setdefault(name, value)
+    # The first error is told; Ray would print the tracebacks of those that followed.
+    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
+    quiet: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
     try:
-        ray.init(address=address, **common)
+        with hushed(), _fatal_only():
+            ray.init(address=address, namespace=_NAMESPACE, **quiet, **more)
     except (ConnectionError, RuntimeError, ValueError) as error:
         reason = str(error).strip().splitlines()[0]
         raise _unreachable(address, reason) from None
 
 
-def _settings() -> dict[str, Any]:
-    """How quiet Ray is to be."""
-    for name, value in VARIABLES.items():
-        os.environ.setdefault(name, value)
-    # The first error is told; Ray would print the tracebacks of those that followed.
-    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
-    return {"logging_level": logging.ERROR, "log_to_driver": False, "namespace": _NAMESPACE}
+@contextlib.contextmanager
+def _fatal_only() -> Iterator[None]:
+    """Ray's C++ part, which reads this once, writes its errors to the terminal; we tell them."""
+    name = "RAY_BACKEND_LOG_LEVEL"
+    if name in os.environ:
+        yield
+        return
+    os.environ[name] = "fatal"
+    try:
+        yield
+    finally:
+        del os.environ[name]
 
 
 def _unreachable(address: str, reason: str) -> AeroDaaSError:
@@ -106,17 +122,6 @@ def _unreachable(address: str, reason: str) -> AeroDaaSError:
         f"cannot join the Ray cluster at {address}: {reason}; "
         "check the address and that the head runs the same Ray and Python versions"
     )
-
-
-def _trim() -> None:
-    """Stop what a one-machine run of ours has no use for: 150 MB of autoscaler, log and web.
-
-    Ray offers no switch for it, so a Ray that hides these processes elsewhere keeps them.
-    """
-    node = getattr(ray._private.worker, "_global_node", None)  # noqa: SLF001
-    for name in ("kill_monitor", "kill_log_monitor", "kill_dashboard"):
-        with contextlib.suppress(Exception):
-            getattr(node, name)(check_alive=False)
 
 
 def _require_edge(address: str) -> None:
@@ -128,14 +133,19 @@ def _require_edge(address: str) -> None:
         )
 
 
-def outlives_application() -> bool:
-    """Tell whether the connected Ray goes on when this process dies: nobody here started it."""
-    return not _ours
+def is_local() -> bool:
+    """Tell whether the connected Ray was started for this process alone."""
+    return _local is not None
 
 
 def disconnect() -> None:
-    """Leave the cluster; a Ray that `connect` started ends with all its processes."""
+    """Leave Ray; one of our own ends, at once or once the last drone has landed."""
+    global _local  # noqa: PLW0603 - one Ray for each process
     ray.shutdown()
+    if _local is not None:
+        atexit.unregister(disconnect)
+        _local.end()
+        _local = None
 
 
 def discover() -> list[ComputeConfig]:

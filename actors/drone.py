@@ -20,6 +20,7 @@ from aerodaas.actors._names import ACKS, end_stream, reply_stream, request_strea
 from aerodaas.actors._publisher import Publisher
 from aerodaas.actors._robot_report import RobotReport
 from aerodaas.actors.pilot import Pilot, RobotSpec
+from aerodaas.actors.run_lock import RunLock
 from aerodaas.actors.session import (
     CONTROL_PERIOD_NS,
     CONTROL_RATE,
@@ -206,6 +207,7 @@ class DroneActor(StreamActor):
 
     def _run(self) -> None:
         self._heard = time.monotonic()
+        lock = RunLock()
         for pilot in self._pilots.values():
             pilot.start(self.clock)
         try:
@@ -220,6 +222,7 @@ class DroneActor(StreamActor):
             self._publisher.close()
             self._calls.close("the mission is over")
             self._publish_reports()
+            lock.release()
 
     def _run_real_time(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first

@@ -14,9 +14,10 @@ import ray
 from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
 from typing_extensions import Self
 
+from aerodaas.actors._application import Application
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors._cloud import Executor
-from aerodaas.actors._ending import end_actors
+from aerodaas.actors._ending import end_actors, may_fly
 from aerodaas.actors._lifeline import ASKED_AGAIN, LIFE, LIFELINES, Life, Lifelines
 from aerodaas.actors._names import done_stream
 from aerodaas.actors._offload import CloudProcess
@@ -24,7 +25,7 @@ from aerodaas.actors._robot_report import RobotReport
 from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.application import Application
 from aerodaas.actors.caretaker import Caretaker
-from aerodaas.actors.cluster import Place, nodes_at, options_for, outlives_application
+from aerodaas.actors.cluster import Place, is_local, nodes_at, options_for
 from aerodaas.actors.dispatcher import DispatcherActor
 from aerodaas.actors.drone import COMMANDS, DroneActor
 from aerodaas.actors.executor import CloudExecutor
@@ -118,7 +119,6 @@ class Flight:
         self._members: dict[str, _Member] = {}
         self._helpers: list[Any] = []
         """Actors without streams, to be killed at the end."""
-        self._detached = outlives_application()
         self._job = ray.get_runtime_context().get_job_id()
         self._caretaker: Any = None
         self._opening: list[Any] = []
@@ -143,7 +143,7 @@ class Flight:
         if self.recording is not None and provenance is not None:
             recorder = (session, self.recording, plan.recorded, provenance, live, page)
             self._create("recorder", RecorderActor, edge, recorder, restarts=_RESTARTS)
-        if self._detached:
+        if not is_local():
             self._appoint_caretaker()
         self._origin = 0
         self._answers: dict[str, tuple[float, dict[str, RobotReport]]] = {}
@@ -167,6 +167,9 @@ class Flight:
         self._prepare(list(self._members.values()), progress)
         for reference in self._opening:
             self._ask(reference, _PREPARE_TIMEOUT)
+        if self._caretaker is None:
+            # Until here the local Ray would have ended with us.
+            self._appoint_caretaker()
         self._origin = host_time_ns()
         self._start(list(self._members.values()))
 
@@ -274,6 +277,14 @@ class Flight:
             drone.info = self._ask(grown, 2 * _GROWING)
         self._connect_all()
         self._start(fresh)
+        if self._caretaker is not None:
+            self._caretaker.look_after.remote(self._in_ending_order(), list(self._helpers))
+
+    @property
+    def flying(self) -> bool:
+        """Whether a drone may be in the air that would not be safe if its actor ended."""
+        drones = [self._members[name].handle for name in self._ids()]
+        return not self.plan.session.lockstep and any(map(may_fly, drones))
 
     def command(self, robot: str, command: Command) -> Answer:
         """Tell a robot's mission something."""
@@ -309,6 +320,12 @@ class Flight:
             member.report = last.get(member.handle, member.report)
         return self.reports()
 
+    def leave(self) -> None:
+        """Leave the drones, and all that they need, to the caretaker."""
+        self._stopped = True
+        for lifelines in self._lifelines:
+            lifelines.end()
+
     def _in_ending_order(self) -> list[list[Any]]:
         """All actors with streams; the recorder last, for it records the end of the others."""
         recorder = [m.handle for m in self._members.values() if m.name == "recorder"]
@@ -318,9 +335,10 @@ class Flight:
     def _appoint_caretaker(self) -> None:
         options = self._options("caretaker", Place(), restarts=0)
         remote: Any = ray.remote(Caretaker)
-        self._caretaker = remote.options(**options, max_concurrency=2).remote()
         drones = [self._members[name].handle for name in self._ids()]
-        self._caretaker.watch.remote(drones, self._in_ending_order(), list(self._helpers))
+        watched = (drones, self._in_ending_order(), list(self._helpers))
+        application = Application(self.plan.session.lockstep)
+        self._caretaker = remote.options(**options).remote(application, *watched)
         self._helpers.append(self._caretaker)
 
     def _ids(self) -> set[str]:
@@ -349,11 +367,9 @@ class Flight:
         self._members[name] = _Member(name, made.remote(*args, **kwargs), setup, restarts)
 
     def _options(self, name: str, place: Place, *, restarts: int) -> dict[str, Any]:
-        """Ray's options; in a cluster that outlives us, actors do too, and have a name."""
-        options = options_for(place, restarts=restarts)
-        if self._detached:
-            options |= {"lifetime": "detached", "name": f"{self.plan.session.id}/{name}"}
-        return options
+        """Ray's options; actors outlive the application, and therefore have a name."""
+        outliving = {"lifetime": "detached", "name": f"{self.plan.session.id}/{name}"}
+        return {**options_for(place, restarts=restarts), **outliving}
 
     def _create_cameras(self, cameras: Iterable[Cameras]) -> None:
         for camera in cameras:

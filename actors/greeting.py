@@ -22,7 +22,7 @@ from ray.exceptions import RayError, RpcError
 from aerodaas.actors._encryption import require_same_encryption
 from aerodaas.errors import AeroDaaSError
 
-__all__ = ["greet", "listener_of"]
+__all__ = ["greet", "hushed", "listener_of", "take_up_token"]
 
 _PROBE_SECONDS = 5.0
 _TOKEN_ADVICE = (
@@ -51,7 +51,7 @@ def greet(address: str) -> None:
     if address.startswith("ray://"):
         return
     require_same_encryption(address, listener)
-    _take_up_token()
+    take_up_token()
     _compare(address, _metadata(address))
 
 
@@ -61,7 +61,7 @@ def listener_of(address: str) -> tuple[str, int] | None:
     return (host.strip("[]"), int(port)) if host and port.isdigit() else None
 
 
-def _take_up_token() -> None:
+def take_up_token() -> None:
     """Ray uses the user's token for a cluster that it starts, but not for one that it joins."""
     try:
         from ray._private.authentication import (  # noqa: PLC0415 - since Ray 2.59
@@ -78,7 +78,7 @@ def _take_up_token() -> None:
 def _metadata(address: str) -> dict[str, Any]:
     """What the head says of itself."""
     try:
-        with _hushed():
+        with hushed():
             client = GcsClient(address=address)
             told = client.internal_kv_get(b"CLUSTER_METADATA", b"cluster", timeout=_PROBE_SECONDS)
     except (RayError, RpcError) as error:
@@ -125,7 +125,7 @@ def _level(logger: logging.Logger, level: int) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _hushed() -> Iterator[None]:
+def hushed() -> Iterator[None]:
     """Ray's C++ part writes to standard error what is raised a moment later."""
     kept = os.dup(2)
     nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -24,7 +24,7 @@ from aerodaas.view.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
 if TYPE_CHECKING:
     from aerodaas.actors.flight import FlightState
 
-__all__ = ["Starting", "Watching", "show_results", "show_speed"]
+__all__ = ["Starting", "Watching", "show_left", "show_results", "show_speed"]
 
 _ALERTS_SHOWN = 4
 
@@ -182,6 +182,13 @@ def show_speed(options: RunOptions, mission: float, wall: float, start: float) -
         factor = f"{mission / wall:.1f} times as fast as the clock"
         line = f"flew {mission:.1f} s in {wall:.1f} s, {factor}; ready after {start:.1f} s"
         Console(highlight=False, soft_wrap=True).print(line)
+
+
+def show_left(recording: Path | None) -> None:
+    """Say what becomes of drones that still fly when the application ends."""
+    where = f"; its recording: {_shown(recording)}" if recording else ""
+    line = f"a drone is still flying: it comes down by itself, and its processes end then{where}"
+    Console(highlight=False, soft_wrap=True, stderr=True).print(line, markup=False)
 
 
 def show_results(options: RunOptions, recording: Path | None) -> None:

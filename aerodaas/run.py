@@ -72,7 +72,6 @@ class Run:
     def start(self) -> None:
         """Start all actors; raises the project's errors, with nothing left running."""
         from aerodaas.actors import cluster  # noqa: PLC0415 - ray only where it is needed
-        from aerodaas.actors.flight import Flight  # noqa: PLC0415
         from aerodaas.actors.live import LiveReader  # noqa: PLC0415
         from aerodaas.console import Starting  # noqa: PLC0415
         from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
@@ -90,6 +89,9 @@ class Run:
             raise ConfigError(
                 '--live and --view serve what is recorded; set "recording.enabled" to true'
             )
+        cluster.begin(self.options.address)
+        from aerodaas.actors.flight import Flight  # noqa: PLC0415 - loads while Ray starts
+
         with Starting(self.options) as starting:
             starting.step("starting Ray")
             cluster.connect(self.options.address)
@@ -185,7 +187,7 @@ class Run:
     def wait(self) -> None:
         """Watch until every mission has ended; raises what they ended with.
 
-        Ctrl-C lands the drones first; a second one stops at once.
+        Ctrl-C lands the drones first; after a second one they land without us.
         """
         if self._finished.is_set():
             return
@@ -297,7 +299,7 @@ class Run:
             return
 
     def _finish(self) -> None:
-        from aerodaas.console import show_results, show_speed  # noqa: PLC0415
+        from aerodaas.console import show_left, show_results, show_speed  # noqa: PLC0415
 
         assert self._flight is not None  # noqa: S101 - launched
         self._finished.set()
@@ -306,6 +308,10 @@ class Run:
         atexit.unregister(self.abandon)
         flown = time.monotonic() - self._launched
         with self._polling:
+            if self._flight.flying:
+                self._flight.leave()
+                show_left(self._flight.recording)
+                return
             self._flight.stop()
         for hook in self.on_end:
             hook()

@@ -89,7 +89,7 @@ class RemoteUser:
 
     def __exit__(self, *_: object) -> None:
         """Wait for the script's end; raises what it raised."""
-        self._thread.join(30)
+        self._thread.join(120)
         assert not self._thread.is_alive(), "the remote user still waits"
         if self.failure is not None:
             raise self.failure
@@ -99,7 +99,7 @@ class RemoteUser:
         return next(status for status in self._statuses() if happened(status))
 
     def _statuses(self) -> Iterator[dict[str, Any]]:
-        given_up = time.monotonic() + 60
+        given_up = time.monotonic() + 120
         while time.monotonic() < given_up:
             try:
                 yield self.client.status()

@@ -23,9 +23,9 @@ from ray.cluster_utils import Cluster
 from scripted import RemoteUser, free_port
 
 from aerodaas import AeroNavigation, Environment, NavigationType, TrajectoryScheduler
+from aerodaas.actors.supervisor import VARIABLE
 from aerodaas.analytics import RemoteAnalytics
-from aerodaas.analytics.remote.client import RemoteClient
-from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.errors import MissionError
 from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
 
@@ -239,24 +239,24 @@ def test_application_killed_in_a_cluster(flyer: Flyer, cluster: Cluster) -> None
 
 
 @pytest.mark.slow
-def test_application_killed_with_its_own_ray(flyer: Flyer) -> None:
-    """All actors end with it, the vehicle has its own failsafe, the recording can be read."""
+def test_application_killed_on_one_machine(flyer: Flyer) -> None:
+    """The drone comes home and lands, the recording is closed, and then nothing is left."""
     port = free_port()
     application = start_application(flyer, port)
-    actors: set[psutil.Process] = set()
-
-    def kill(user: RemoteUser) -> None:
-        user.until(lambda status: status["distance"] > 20.0)
-        actors.update(actors_below(application.pid))
-        application.kill()
-        application.wait()
-
-    with RemoteUser(port, kill):
-        pass
-    assert len(actors) == 3
-    assert wait_for(lambda: gone(actors), 30.0)
-    with pytest.raises(AeroDaaSError):
-        RemoteClient(f"http://127.0.0.1:{port}").status()
+    user = RemoteUser(port, lambda _: None)
+    user.until(lambda status: status["distance"] > 20.0)
+    left = set(psutil.Process(application.pid).children(recursive=True))
+    folders = {Path(one.environ()[VARIABLE]) for one in left if VARIABLE in one.environ()}
+    application.kill()
+    application.wait()
+    status = user.until(lambda status: status["state"] == "returning")
+    assert status["reason"] == "the application's process is gone"
+    assert len(left) > 4
+    assert len(folders) == 1
+    assert wait_for(lambda: gone(left), 60.0)
+    assert not any(folder.exists() for folder in folders)
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
+        assert recording.complete
         flight = Flight.read(recording)
-    assert flight.robots["drone"].position[:, 0].max() > 10.0
+    assert landed_at_home(flight)
+    assert "the application's process is gone" in alerts(flight)["application_lost"]

@@ -1,0 +1,37 @@
+"""The application as its caretaker sees it: a process here, or one of another machine."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+
+import psutil
+import ray
+
+__all__ = ["Application"]
+
+
+@dataclass(frozen=True)
+class Application:
+    """Made by the application itself, and looked after by another process."""
+
+    lockstep: bool
+    """Its drones are simulated, and fly no faster than it can follow."""
+    node: str = field(default_factory=lambda: ray.get_runtime_context().get_node_id())
+    pid: int = field(default_factory=os.getpid)
+    began: float = field(default_factory=lambda: psutil.Process().create_time())
+
+    @property
+    def near(self) -> bool:
+        """Whether this process runs beside it, and so can see whether it lives."""
+        return bool(ray.get_runtime_context().get_node_id() == self.node)
+
+    def ended(self) -> bool:
+        """Whether it has ended, for who is near."""
+        try:
+            process = psutil.Process(self.pid)
+            # A number may be used again.
+            dead = process.create_time() != self.began or process.status() == psutil.STATUS_ZOMBIE
+        except psutil.NoSuchProcess:
+            return True
+        return dead

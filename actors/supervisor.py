@@ -1,0 +1,254 @@
+"""The process that keeps a local Ray: starts it, ends it when nobody needs it, and tidies up.
+
+It is run as a script, needs the standard library only (10 MB), and is in a session of its own, so
+that neither Ctrl-C nor a `kill -9` of the application ends it or its Ray. The Ray is ended once
+the application has gone and no run is under way: each run holds a lock (`run_lock.py`) for as long
+as its drones may fly and its actors have work. On standard output it tells the application, one
+line of JSON each, `{"address": ...}` or `{"error": ...}`, and `{"flying": true}` where it has to
+stay after the application has said goodbye by closing its standard input.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import fcntl
+import json
+import os
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+__all__ = ["LOCKS", "PREFIX", "VARIABLE", "main"]
+
+VARIABLE = "AERODAAS_LOCAL_RAY"
+"""Environment variable of all processes of a local Ray: its folder."""
+PREFIX = "aerodaas-ray-"
+LOCKS = "runs"
+"""Folder of the locks of runs that are under way."""
+_RAYS_OWN = "ray"
+"""Below our own folder, for Ray opens its own to all users of the machine."""
+_OWN_LOCK = "supervisor.lock"
+_TRIES = 2
+_TOO_SLOW = "timed out during startup"
+"""Ray gives its node half a minute to start, which a busy machine may not have to give."""
+_START_SECONDS = 180.0
+_GRACE_SECONDS = 3.0
+"""For actors that were told to end and hold their locks a moment longer."""
+_DYING_SECONDS = 10.0
+_LOOK_SECONDS = 0.2
+_LONGEST = 40
+"""Characters of a temporary folder; a socket's path below it may have 107 in all."""
+_UNWANTED = ("_private/monitor.py", "v2/monitor.py", "dashboard/dashboard.py", "util.client.server")
+"""Autoscaler, web pages and proxy for remote drivers, 200 MB that one machine has no use for."""
+_SUBREAPER = 36
+_RAY = (
+    # What comes with its command line, but not with starting: a second of imports.
+    "import sys; sys.modules['ray.serve.scripts'] = None; "
+    "from ray.scripts.scripts import main; main()"
+)
+
+
+def main(application: int, words: list[str]) -> None:
+    """Keep a Ray started by `ray start` with `words` for the process `application`."""
+    for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    # Whatever a process of this Ray leaves behind becomes a child of this one.
+    ctypes.CDLL(None).prctl(_SUBREAPER, 1, 0, 0, 0)
+    client = _Client(application)
+    base = Path(tempfile.gettempdir())
+    base = base if len(str(base)) <= _LONGEST else Path("/tmp")  # noqa: S108 - mkdtemp follows
+    _prune(base)
+    folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=base))
+    try:
+        (folder / LOCKS).mkdir()
+        with (folder / LOCKS / _OWN_LOCK).open("w") as own:
+            fcntl.lockf(own, fcntl.LOCK_EX)
+            # It gets its name only now, so that nobody finds it without an owner.
+            Path(own.name).rename(folder / _OWN_LOCK)
+            _keep(client, folder, words)
+    finally:
+        _end_all()
+        _free_streams()
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def _keep(client: _Client, folder: Path, words: list[str]) -> None:
+    """Start Ray, and return when it is to be ended."""
+    address, reason = _start(client, folder, words)
+    if not address:
+        client.tell(error=reason)
+        return
+    _end_all(lambda line: any(part in line for part in _UNWANTED))
+    client.tell(address=address, folder=str(folder))
+    while not client.gone(1.0):
+        _reap()
+    until = time.monotonic() + _GRACE_SECONDS
+    while _under_way(folder) and time.monotonic() < until:
+        time.sleep(_LOOK_SECONDS)
+    if _under_way(folder):
+        client.tell(flying=True)
+    while _under_way(folder):
+        _reap()
+        time.sleep(_LOOK_SECONDS)
+
+
+class _Client:
+    """The application: its process, and the pipe to it."""
+
+    def __init__(self, pid: int) -> None:
+        try:
+            self._process = os.pidfd_open(pid)
+        except ProcessLookupError:
+            sys.exit()  # it died before we came
+        self._poll = select.poll()
+        self._poll.register(self._process, select.POLLIN)
+        self._poll.register(sys.stdin.fileno(), select.POLLIN | select.POLLHUP)
+
+    def gone(self, timeout: float) -> bool:
+        """Whether it has died or said goodbye, waiting for that up to `timeout` seconds."""
+        return bool(self._poll.poll(timeout * 1000.0))
+
+    def tell(self, **words: object) -> None:
+        """Say something, if it is still there."""
+        with contextlib.suppress(OSError):
+            print(json.dumps(words), flush=True)  # noqa: T201 - this is the pipe
+
+
+def _start(client: _Client, folder: Path, words: list[str]) -> tuple[str, str]:
+    """Start Ray; returns its address, or "" and why it did not start."""
+    environment = {**os.environ, VARIABLE: str(folder)}
+    own = folder / _RAYS_OWN
+    command = [sys.executable, "-c", _RAY, "start", "--temp-dir", str(own), *words]
+    reason = ""
+    for _ in range(_TRIES):
+        with (folder / "start.log").open("w+") as log:
+            starting = subprocess.Popen(  # noqa: S603 - our own words
+                command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log
+            )
+            until = time.monotonic() + _START_SECONDS
+            while starting.poll() is None and time.monotonic() < until:
+                if client.gone(0.02):
+                    return "", "the application has gone"
+            code = starting.poll()
+            log.seek(0)
+            said = log.read().strip()
+        if code == 0:
+            return (own / "ray_current_cluster").read_text().strip(), ""
+        _end_all()
+        slow = code is None or _TOO_SLOW in said
+        reason = _TOO_SLOW if slow else said.rpartition("\n")[2]
+        if not slow:
+            break
+    return "", reason
+
+
+def _under_way(folder: Path) -> bool:
+    """Whether a run still holds its lock."""
+    return any(_held(path) for path in (folder / LOCKS).iterdir())
+
+
+def _held(path: Path) -> bool:
+    """Whether a living process holds the lock of this file."""
+    try:
+        with path.open("r+") as file:
+            fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    except FileNotFoundError:
+        return False
+    return False
+
+
+def _end_all(matches: Callable[[str], bool] = lambda _: True) -> None:
+    """Kill all descendants whose command line `matches`, and wait for their end."""
+    until = time.monotonic() + _DYING_SECONDS
+    while left := [pid for pid in _descendants() if matches(_command(pid))]:
+        for pid in left:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        _reap()
+        if time.monotonic() > until:
+            return
+        time.sleep(0.02)
+
+
+def _reap() -> None:
+    with contextlib.suppress(ChildProcessError):
+        while os.waitpid(-1, os.WNOHANG)[0]:
+            pass
+
+
+def _descendants() -> list[int]:
+    """All processes below this one, but for those that have ended."""
+    parents = dict(_processes())
+    ours = {os.getpid()}
+    while more := {pid for pid, parent in parents.items() if parent in ours} - ours:
+        ours |= more
+    return sorted(ours - {os.getpid()})
+
+
+def _processes() -> Iterator[tuple[int, int]]:
+    """Number and parent of each process of this machine that has not ended."""
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit():
+            with contextlib.suppress(OSError):
+                state, parent = (entry / "stat").read_text().rpartition(")")[2].split()[:2]
+                if state != "Z":
+                    yield int(entry.name), int(parent)
+
+
+def _command(pid: int) -> str:
+    with contextlib.suppress(OSError):
+        return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode()
+    return ""
+
+
+def _prune(base: Path) -> None:
+    """Remove what a supervisor that was killed has left, but where a drone still flies."""
+    for folder in base.glob(f"{PREFIX}*"):
+        if _orphaned(folder):
+            for pid, _ in list(_processes()):
+                if _belongs(pid, folder):
+                    with contextlib.suppress(OSError):
+                        os.kill(pid, signal.SIGKILL)
+            shutil.rmtree(folder, ignore_errors=True)
+
+
+def _orphaned(folder: Path) -> bool:
+    with contextlib.suppress(OSError):
+        own = folder / _OWN_LOCK
+        return own.exists() and not _held(own) and not _under_way(folder)
+    return False  # somebody else's
+
+
+def _belongs(pid: int, folder: Path) -> bool:
+    with contextlib.suppress(OSError):
+        return f"{VARIABLE}={folder}".encode() in Path(f"/proc/{pid}/environ").read_bytes().split(
+            b"\0"
+        )
+    return False
+
+
+def _free_streams() -> None:
+    """Have iceoryx2 remove the shared memory of the dead, as it does for each new node."""
+    code = "import iceoryx2 as i; i.NodeBuilder.new().create(i.ServiceType.Ipc)"
+    with contextlib.suppress(OSError, subprocess.TimeoutExpired):
+        subprocess.run(  # noqa: S603 - our own words
+            [sys.executable, "-c", code],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            timeout=_DYING_SECONDS,
+            check=False,
+        )
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), sys.argv[2:])
