@@ -21,6 +21,11 @@ _NEED_PLACE = {_GUIDED, _LOITER, _RETURN, _BRAKE}
 _TIMEOUT = 3.0
 """GUID_TIMEOUT: seconds without setpoints after which it stops."""
 _STATION_LOST = 5.0
+_CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+_GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
+_POSITION = mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+_PRESENT, _ENABLED = 0x5371FC0F, 0x5361BC0F
+"""SYS_STATUS' bits of what is always there, and of what is switched on without a position."""
 _LEAST = 0.5
 """Metres of a take-off."""
 
@@ -30,6 +35,9 @@ class EmulatedArduPilot(Firmware):
 
     number: ClassVar[int] = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     default_rates: ClassVar[dict[int, float]] = {}
+    dead_reckoning: ClassVar[float] = 7.4
+    version: ClassVar[int] = 0x04070000
+    capabilities: ClassVar[int] = 0xFBEF
 
     def __init__(
         self, options: AutopilotOptions, flight: MavFlight, say: Callable[[Any], None]
@@ -67,10 +75,30 @@ class EmulatedArduPilot(Firmware):
         if message.get_srcSystem() == int(self.parameters.values["SYSID_MYGCS"]):
             self._station_at = self.now
 
+    @property
+    def sensors(self) -> tuple[int, int, int]:
+        """GPS counts as healthy without a fix, too; the arming checks are listed as present."""
+        seen = _GPS if self.ready else 0
+        placed = _POSITION if self.knows_place else 0
+        enabled = _ENABLED | seen | placed
+        healthy = enabled & ~_CHECK | (_CHECK if self.ready else 0)
+        return _PRESENT | seen, enabled, healthy
+
+    def go_blind(self) -> None:
+        """Land, by FS_EKF_ACTION."""
+        self.text("EKF variance")
+        self.text("EKF Failsafe: changed to LAND Mode")
+        self._mode = _LAND
+        self.failsafe = True
+        self.motions.append("land")
+        self.flight.land()
+
     def command(self, number: int, values: tuple[float, ...], frame: int | None) -> Result:
         """Modes and take-off."""
         if number == mavlink.MAV_CMD_DO_SET_MODE:
             return self._set_mode(int(values[1]))
+        if number == mavlink.MAV_CMD_DO_REPOSITION and frame is not None:
+            return self.go_to(*values[3:]) if self.guided else _FAILED
         if number == mavlink.MAV_CMD_NAV_TAKEOFF:
             relative = {None, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT}
             fits = self.armed and self.guided and frame in relative

@@ -26,7 +26,14 @@ _TURN = 0.01
 _LARGEST = 65535
 _HEARTBEAT = 1.0
 _ROUNDING = 1e-6
-_PLANS = {"MISSION_REQUEST_LIST", "MISSION_REQUEST_INT", "MISSION_COUNT", "MISSION_ITEM_INT"}
+_PARAMETERS = {"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"}
+_PLANS = {
+    "MISSION_CLEAR_ALL",
+    "MISSION_COUNT",
+    "MISSION_ITEM_INT",
+    "MISSION_REQUEST_INT",
+    "MISSION_REQUEST_LIST",
+}
 
 
 class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
@@ -99,7 +106,7 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
     def lose_gps(self, *, off: bool = False) -> None:
         """Let its GPS have no fix, or have one again."""
         with self._lock:
-            self.firmware.gps_fix = off
+            self.firmware.lose_gps(off=off)
 
     def shift_frame(self, by: Vector) -> None:
         """Let its local position jump by `by` (NED metres), while it flies on."""
@@ -177,9 +184,8 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
             self._acknowledge(message, firmware.obey(message.command, values, message.frame))
         elif kind == "SET_POSITION_TARGET_LOCAL_NED":
             firmware.setpoint(message)
-        elif kind in {"PARAM_REQUEST_READ", "PARAM_SET"}:
-            answer = firmware.parameters.handle(message)
-            if answer is not None:
+        elif kind in _PARAMETERS:
+            for answer in firmware.parameters.handle(message):
                 self._say(answer)
         elif kind in _PLANS:
             for answer in firmware.plans.handle(message):

@@ -12,6 +12,7 @@ import shapely
 
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.geometry import enu_to_ned, ned_to_enu, yaw_enu_to_ned, yaw_ned_to_enu
+from aerodaas.testing.mavlink.extras import Extras
 from aerodaas.testing.mavlink.flight import GuidedTarget, MavFlight
 from aerodaas.testing.mavlink.options import AutopilotOptions
 from aerodaas.testing.mavlink.store import ParameterStore, PlanStore
@@ -24,7 +25,10 @@ Result: TypeAlias = Any
 
 _OK = mavlink.MAV_RESULT_ACCEPTED
 _IGNORE_PLACE, _IGNORE_VELOCITY, _IGNORE_YAW, _IGNORE_RATE = 0b111, 0b111000, 1 << 10, 1 << 11
-_CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+_FORCED = 21196
+"""By which a disarming stops the motors in the air, too."""
+_DRIFT = np.array([0.3, 1.0, 0.0])
+"""NED m/s by which a position without GPS goes astray."""
 
 
 class Firmware(ABC):
@@ -35,8 +39,18 @@ class Firmware(ABC):
     idle_disarm: ClassVar[float] = 10.0
     """Seconds armed on the ground after which it disarms."""
     default_rates: ClassVar[dict[int, float]]
-    lists_check: ClassVar[bool] = True
-    """Whether SYS_STATUS lists the arming checks as present, beside telling whether they pass."""
+    version: ClassVar[int]
+    """As AUTOPILOT_VERSION has it: major, minor, patch, kind of release, from the highest byte."""
+    capabilities: ClassVar[int]
+    """MAV_PROTOCOL_CAPABILITY of AUTOPILOT_VERSION."""
+    stands_still: ClassVar[bool] = False
+    """Whether its estimator reports on the ground that it holds its place for fixed."""
+    starting: ClassVar[int] = mavlink.MAV_STATE_STANDBY
+    """MAV_STATE of its HEARTBEAT until it is ready."""
+    no_fix: ClassVar[int] = mavlink.GPS_FIX_TYPE_NO_FIX
+    """The fix type of its GPS_RAW_INT when it has none."""
+    dead_reckoning: ClassVar[float]
+    """Seconds without GPS for which it trusts its own position."""
 
     def __init__(
         self,
@@ -60,8 +74,13 @@ class Firmware(ABC):
         """Every deed that moved it, in order: the tests' witness."""
         self.frozen_at: int | None = None
         """Milliseconds at which the stamps of its telemetry stand still; None: they do not."""
-        self.gps_fix = True
+        self.gps_lost_at: float | None = None
+        """Second since which its GPS has no fix; None: it has one."""
+        self.terminated = False
+        """Its motors were stopped for good, and it goes on to call itself armed."""
+        self._drifted = np.zeros(3)
         self._say = say
+        self._extras = Extras(self)
         self._armed_at = 0.0
         self._setpoint_at = -math.inf
         self._lifted = False
@@ -73,9 +92,48 @@ class Firmware(ABC):
         return self.now >= self.options.ready_after
 
     @property
+    def gps_fix(self) -> bool:
+        """Whether its GPS has a position."""
+        return self.gps_lost_at is None
+
+    @property
+    def knows_place(self) -> bool:
+        """Whether its estimator trusts its own position over ground; for a while without GPS."""
+        lost_at = self.gps_lost_at
+        return self.ready and (lost_at is None or self.now - lost_at < self.dead_reckoning)
+
+    @property
+    def unsure(self) -> float:
+        """Metres by which its estimator believes to err over ground."""
+        return 0.3 if self.gps_lost_at is None else 1.8 + self.now - self.gps_lost_at
+
+    def lose_gps(self, *, off: bool = False) -> None:
+        """Let its GPS have no fix, or have one again: the place that it drifted to is put right."""
+        if not off:
+            self.gps_lost_at = self.now
+            return
+        self.gps_lost_at = None
+        self.flight.shift_frame(-self._drifted)
+        self._drifted = np.zeros(3)
+
+    @property
+    @abstractmethod
+    def sensors(self) -> tuple[int, int, int]:
+        """SYS_STATUS' bits: present, enabled, healthy."""
+
+    @abstractmethod
+    def go_blind(self) -> None:
+        """Act on the loss of its position, by its own protection."""
+
+    @property
     @abstractmethod
     def custom_mode(self) -> int:
         """As its HEARTBEAT has it."""
+
+    @property
+    def sinks_blind(self) -> bool:
+        """Whether it sinks without a position, in a mode that is none of landing."""
+        return False
 
     @property
     @abstractmethod
@@ -102,7 +160,9 @@ class Firmware(ABC):
     def breach(self) -> None:
         """The fence was crossed."""
 
-    def obey(self, number: int, values: tuple[float, ...], frame: int | None) -> Result:
+    def obey(  # noqa: PLR0911 - one for each command
+        self, number: int, values: tuple[float, ...], frame: int | None
+    ) -> Result:
         """Obey a command; the result that is acknowledged."""
         if number == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             message, interval = int(values[0]), values[1]
@@ -111,7 +171,12 @@ class Firmware(ABC):
         if number == mavlink.MAV_CMD_REQUEST_MESSAGE:
             return self._request(int(values[0]))
         if number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
-            return self._arm() if values[0] > 0.5 else self._disarm()  # noqa: PLR2004 - 0 or 1
+            if values[0] > 0.5:  # noqa: PLR2004 - 0 or 1
+                return self._arm()
+            return self._disarm(forced=values[1] == _FORCED)
+        if number == mavlink.MAV_CMD_DO_CHANGE_SPEED and values[1] > 0.0:
+            self.flight.fastest = values[1]
+            return _OK
         if number == mavlink.MAV_CMD_RUN_PREARM_CHECKS:
             self.refuse_arming()
             return _OK
@@ -119,10 +184,11 @@ class Firmware(ABC):
 
     def _request(self, message: int) -> Result:
         if message == mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
-            version = 1 << 24 | 16 << 16 | 1 << 8 | 255
             self._say(
                 mavlink.MAVLink_autopilot_version_message(
-                    _CAPABILITIES, version, 0, 0, 0, *([0] * 8,) * 3, 0, 0, self.options.system
+                    *(self.capabilities, self.version, self.version, 0, 0),
+                    *([0] * 8,) * 3,
+                    *(0, 0, self.options.system),
                 )
             )
             return _OK
@@ -150,21 +216,34 @@ class Firmware(ABC):
         """Whether it arms in its present mode."""
         return self.ready
 
-    def _disarm(self) -> Result:
+    disarming_refused: ClassVar[int] = mavlink.MAV_RESULT_FAILED
+
+    def _disarm(self, *, forced: bool) -> Result:
+        if forced:
+            self.stop_motors()
+            return _OK
         if self.flight.flying:
-            return mavlink.MAV_RESULT_DENIED
+            return self.disarming_refused
         self.armed = self.failsafe = False
         return _OK
 
     def stop_motors(self) -> None:
         """Stop its motors wherever it is: a kill switch, a forced disarm."""
-        self.armed = self.failsafe = self._lifted = False
+        self.armed = self.failsafe = self._lifted = self.terminated = False
         self.flight.drop()
+
+    def terminate(self) -> Result:
+        """Stop its motors, as a parachute wants it."""
+        if not self.armed:
+            return mavlink.MAV_RESULT_DENIED
+        self.stop_motors()
+        self.armed = self.terminated = True
+        return _OK
 
     def restart(self) -> None:
         """Start anew, as after a loss of power: motors, clock, rates and local frame."""
         self.stop_motors()
-        self.now, self._setpoint_at = 0.0, -math.inf
+        self.now, self._setpoint_at, self.gps_lost_at = 0.0, -math.inf, None
         self.rates = dict(self.default_rates)
         self.flight.begin_frame_here()
         self.home = self.flight.ned
@@ -179,6 +258,18 @@ class Firmware(ABC):
         self._lifted = True
         self.motions.append("take off")
         self.flight.take_off(height)
+
+    def go_to(self, yaw: float, latitude: float, longitude: float, altitude: float) -> Result:
+        """Fly to a place on the earth: radians east of north or NaN, 1e-7 degrees, metres."""
+        if not self.flight.flying:
+            return mavlink.MAV_RESULT_DENIED
+        flight = self.flight
+        place = flight.origin.to_local(latitude / 1e7, longitude / 1e7, 0.0)
+        place[2] = flight.believed.position[2] + flight.rise_to(altitude)
+        facing = None if math.isnan(yaw) else yaw_ned_to_enu(yaw)
+        self.motions.append("go to")
+        flight.target = GuidedTarget(place, None, facing, None)
+        return _OK
 
     def setpoint(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
         """Take a SET_POSITION_TARGET_LOCAL_NED."""
@@ -207,9 +298,15 @@ class Firmware(ABC):
         self.flight.advance(duration)
         if self._lifted and not self.flight.flying:
             self._lifted = self.armed = self.failsafe = False
-        if self.armed and not self._lifted and self.now - self._armed_at > self.idle_disarm:
+        idles = self.armed and not self._lifted and not self.terminated
+        if idles and self.now - self._armed_at > self.idle_disarm:
             self.armed = False
-        if self.armed:
+        if self.gps_lost_at is not None and not self.knows_place:
+            self._drifted = self._drifted + _DRIFT * duration
+            self.flight.shift_frame(_DRIFT * duration)
+            if self.flight.flying and not self.failsafe:
+                self.go_blind()
+        if self.armed and not self.terminated:
             self.protect()
             self._watch_fence()
 
@@ -235,9 +332,12 @@ class Firmware(ABC):
         """Its HEARTBEAT."""
         flags = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
         flags |= mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
-        state = mavlink.MAV_STATE_ACTIVE if self.armed else mavlink.MAV_STATE_STANDBY
+        idle = mavlink.MAV_STATE_STANDBY if self.ready else self.starting
+        state = mavlink.MAV_STATE_ACTIVE if self.armed else idle
         if self.failsafe:
             state = mavlink.MAV_STATE_CRITICAL
+        if self.terminated:
+            state = mavlink.MAV_STATE_FLIGHT_TERMINATION
         return mavlink.MAVLink_heartbeat_message(
             self.options.vehicle_type, self.number, flags, self.custom_mode, state, 3
         )
@@ -259,9 +359,9 @@ class Firmware(ABC):
             mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION,
         }
-        if number not in makers or (number in needs_place and not self.ready):
+        if number in needs_place and not self.ready:
             return None
-        return makers[number]()
+        return makers[number]() if number in makers else self._extras.message(number)
 
     @property
     def _boot(self) -> int:
@@ -293,32 +393,32 @@ class Firmware(ABC):
     def _gps(self) -> Any:  # noqa: ANN401
         latitude, longitude, _ = self.flight.origin.to_geodetic(self.flight.believed.position)
         place = (round(latitude * 1e7), round(longitude * 1e7), round(self.flight.altitude * 1e3))
-        fix = (
-            mavlink.GPS_FIX_TYPE_3D_FIX
-            if self.ready and self.gps_fix
-            else mavlink.GPS_FIX_TYPE_NO_FIX
-        )
+        known = self.ready and self.gps_fix
+        fix = mavlink.GPS_FIX_TYPE_3D_FIX if known else self.no_fix
+        sharpness = (80, 80) if known else (9999, 9999)
         return mavlink.MAVLink_gps_raw_int_message(
-            int(self.now * 1e6), fix, *place, 80, 80, 0, 0, 12, place[2] + 47_000, 800, 1200
+            *(int(self.now * 1e6), fix, *place, *sharpness, 0, 0, 12 if known else 0),
+            *(place[2] + 47_000, *((800, 1200) if known else (100_000, 100_000))),
         )
 
     def _status(self) -> Any:  # noqa: ANN401
-        gps = mavlink.MAV_SYS_STATUS_SENSOR_GPS
-        there = gps | (_CHECK if self.lists_check else 0)
-        healthy = (gps if self.ready and self.gps_fix else 0) | (_CHECK if self.may_arm() else 0)
         left = round(100 * self.flight.charge)
         volts = round(1e3 * self.flight.voltage)
         return mavlink.MAVLink_sys_status_message(
-            there, there, healthy, 100, volts, 500, left, 0, 0, 0, 0, 0, 0
+            *self.sensors, 100, volts, -1, left, 0, 0, 0, 0, 0, 0
         )
 
     def _landed(self) -> Any:  # noqa: ANN401
         state = mavlink.MAV_LANDED_STATE_ON_GROUND
+        if self.terminated:
+            state = mavlink.MAV_LANDED_STATE_IN_AIR
         if self.flight.flying:
             state = {
                 VehicleMode.TAKING_OFF: mavlink.MAV_LANDED_STATE_TAKEOFF,
                 VehicleMode.LANDING: mavlink.MAV_LANDED_STATE_LANDING,
             }.get(self.flight.mode, mavlink.MAV_LANDED_STATE_IN_AIR)
+            if self.sinks_blind:
+                state = mavlink.MAV_LANDED_STATE_IN_AIR
         return mavlink.MAVLink_extended_sys_state_message(0, state)
 
     def _home(self) -> Any:  # noqa: ANN401
@@ -332,11 +432,3 @@ class Firmware(ABC):
 
     def _time(self) -> Any:  # noqa: ANN401
         return mavlink.MAVLink_system_time_message(int(1.8e15 + self.now * 1e6), self._boot)
-
-
-_CAPABILITIES = (
-    mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-    | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
-)

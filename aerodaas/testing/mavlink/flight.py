@@ -63,6 +63,8 @@ class MavFlight(EmulatedFlight):
         latitude, longitude, self._sea_level = options.origin
         self.origin = GeodeticOrigin(latitude, longitude)
         self.target: GuidedTarget | None = None
+        self.fastest = _SPEED
+        """Metres a second over ground towards a target."""
 
     @property
     def believed(self) -> Odometry:
@@ -143,8 +145,9 @@ class MavFlight(EmulatedFlight):
         if target.position is not None:
             velocity = velocity + _POSITION_GAIN * (target.position - believed.position)
         across = float(np.linalg.norm(velocity[:2]))
-        if across > _SPEED:
-            velocity = velocity * np.array([_SPEED / across, _SPEED / across, 1.0])
+        if across > self.fastest:
+            share = self.fastest / across
+            velocity = velocity * np.array([share, share, 1.0])
         rate = target.yaw_rate or 0.0
         if target.yaw is not None:
             rate = _YAW_GAIN * wrap_angle(target.yaw - believed.yaw)

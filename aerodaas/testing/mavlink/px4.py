@@ -16,12 +16,37 @@ from aerodaas.testing.mavlink.store import ParameterStore
 __all__ = ["EmulatedPX4"]
 
 _OK, _LATER = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED
-_AUTO, _POSITION, _OFFBOARD = 4, 3, 6
+_ALTITUDE, _POSITION, _AUTO, _OFFBOARD, _TERMINATION = 2, 3, 4, 6, 10
 _TAKE_OFF, _HOLD, _RETURN, _LAND = 2, 3, 5, 6
 _LOSS = 1.0
 """COM_OF_LOSS_T: seconds without setpoints after which it leaves offboard."""
 _NEAR = 0.7
 """Metres below its altitude at which a take-off counts as done, about NAV_MC_ALT_RAD."""
+_CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+_GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
+_POSITION_CONTROL = mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+_PRESENT = (
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL
+    | mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG
+    | mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    | mavlink.MAV_SYS_STATUS_LOGGING
+    | _POSITION_CONTROL
+)
+_HEALTHY = (
+    (_PRESENT & ~_POSITION_CONTROL)
+    | mavlink.MAV_SYS_STATUS_SENSOR_DIFFERENTIAL_PRESSURE
+    | mavlink.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
+    | mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
+    | mavlink.MAV_SYS_STATUS_AHRS
+    | _GPS
+)
+"""What complains is unhealthy; what there is not does not complain."""
+_SPOOL_UP = 1.0
+"""COM_SPOOLUP_TIME: seconds from arming until it lifts."""
+_LOW = 0.15
+"""BAT_LOW_THR."""
 _RETURN_ACTION, _HOLD_ACTION = 3.0, 5.0
 
 
@@ -30,7 +55,13 @@ class EmulatedPX4(Firmware):
 
     number: ClassVar[int] = mavlink.MAV_AUTOPILOT_PX4
     arming_refused: ClassVar[int] = _LATER
-    lists_check: ClassVar[bool] = False
+    disarming_refused: ClassVar[int] = _LATER
+    starting: ClassVar[int] = mavlink.MAV_STATE_UNINIT
+    stands_still: ClassVar[bool] = True
+    no_fix: ClassVar[int] = mavlink.GPS_FIX_TYPE_NO_GPS
+    dead_reckoning: ClassVar[float] = 5.0
+    version: ClassVar[int] = 0x011001FF
+    capabilities: ClassVar[int] = 0xE8FF
     default_rates: ClassVar[dict[int, float]] = {
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 30.0,
         mavlink.MAVLINK_MSG_ID_ATTITUDE: 50.0,
@@ -38,6 +69,13 @@ class EmulatedPX4(Firmware):
         mavlink.MAVLINK_MSG_ID_SYS_STATUS: 1.0,
         mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: 2.0,
         mavlink.MAVLINK_MSG_ID_HOME_POSITION: 0.5,
+        mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: 1.0,
+        mavlink.MAVLINK_MSG_ID_ALTITUDE: 1.0,
+        mavlink.MAVLINK_MSG_ID_VFR_HUD: 1.0,
+        mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
+        mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 1.0,
+        mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 0.5,
+        mavlink.MAVLINK_MSG_ID_VIBRATION: 0.5,
     }
 
     def __init__(
@@ -50,6 +88,7 @@ class EmulatedPX4(Firmware):
             "GF_ACTION": 2.0,
             "GF_MAX_VER_DIST": 0.0,
             "MIS_TAKEOFF_ALT": 2.5,
+            "RTL_RETURN_ALT": 30.0,
         }
         integers = {"COM_LOW_BAT_ACT", "COM_OBL_RC_ACT", "NAV_DLL_ACT", "GF_ACTION"}
         super().__init__(options, flight, say, ParameterStore(values, integers, bytewise=True))
@@ -71,15 +110,44 @@ class EmulatedPX4(Firmware):
         """Hold."""
         self._main, self._sub = _AUTO, _HOLD
 
+    @property
+    def sensors(self) -> tuple[int, int, int]:
+        """The arming checks are never listed as present: only whether they pass is told."""
+        present = _PRESENT | (_GPS if self.knows_place else 0)
+        healthy = _HEALTHY | (_POSITION_CONTROL if self.knows_place else 0)
+        healthy |= _CHECK if self.may_arm() else 0
+        if self.flight.charge <= _LOW:
+            healthy &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+        return present, present | mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER, healthy
+
+    @property
+    def sinks_blind(self) -> bool:
+        """Shown as altitude mode."""
+        return self._main == _ALTITUDE
+
+    def go_blind(self) -> None:
+        """Shown as altitude mode; it sinks where it drifts."""
+        self._main, self._sub = _ALTITUDE, 0
+        self.failsafe = True
+        self.flight.land()
+
     def may_arm(self) -> bool:
         """Not in offboard without setpoints, though that mode itself was accepted."""
         fed = self.now - self._setpoint_at < _LOSS
-        return self.ready and (not self.guided or fed)
+        return self.knows_place and not self.terminated and (not self.guided or fed)
 
-    def command(self, number: int, values: tuple[float, ...], frame: int | None) -> Result:
+    def command(  # noqa: PLR0911 - one for each command
+        self, number: int, values: tuple[float, ...], frame: int | None
+    ) -> Result:
         """Modes and take-off."""
         if number == mavlink.MAV_CMD_DO_SET_MODE:
             return self._set_mode(int(values[1]), int(values[2]))
+        if number == mavlink.MAV_CMD_DO_FLIGHTTERMINATION and values[0] == 1.0:
+            self._main, self._sub = _TERMINATION, 0
+            return self.terminate()
+        if number == mavlink.MAV_CMD_DO_REPOSITION and frame is not None:
+            result = self._set_mode(_AUTO, _HOLD)
+            return self.go_to(*values[3:]) if result == _OK else result
         if number == mavlink.MAV_CMD_NAV_TAKEOFF:
             if frame not in {None, mavlink.MAV_FRAME_GLOBAL}:
                 return mavlink.MAV_RESULT_DENIED
@@ -92,7 +160,7 @@ class EmulatedPX4(Firmware):
         return mavlink.MAV_RESULT_UNSUPPORTED
 
     def _set_mode(self, main: int, sub: int) -> Result:
-        if main == _AUTO and not self.ready:
+        if main == _AUTO and not self.knows_place:
             self._event("commander_modeswitch_not_avail", mavlink.MAV_SEVERITY_CRITICAL)
             return _LATER
         if (main, sub) == (self._main, self._sub):
@@ -129,7 +197,8 @@ class EmulatedPX4(Firmware):
         """Lift once armed for take-off; leave offboard when setpoints stop."""
         taking_off = (self._main, self._sub) == (_AUTO, _TAKE_OFF)
         if taking_off and not self._lifted:
-            self.lift(max(0.5, self.flight.rise_to(self._altitude)))
+            if self.now - self._armed_at > _SPOOL_UP:
+                self.lift(max(0.5, self.flight.rise_to(self._altitude)))
         elif taking_off and self.flight.rise_to(self._altitude) < _NEAR:
             self._sub = _HOLD
             self.flight.hold()

@@ -20,20 +20,37 @@ class ParameterStore:
         self._integers = integers
         self._bytewise = bytewise
 
-    def handle(self, message: Any) -> Any | None:  # noqa: ANN401 - pymavlink has no types
-        """The answer to PARAM_REQUEST_READ or PARAM_SET; None if there is no such parameter."""
-        raw = message.param_id
-        name = raw.decode("ascii", "replace") if isinstance(raw, bytes) else raw
+    def handle(self, message: Any) -> list[Any]:  # noqa: ANN401 - pymavlink has no types
+        """The answers to PARAM_REQUEST_LIST, PARAM_REQUEST_READ or PARAM_SET.
+
+        None at all if there is no such parameter.
+        """
+        if message.get_type() == "PARAM_REQUEST_LIST":
+            return [self._say(name) for name in self.values]
+        name = self._meant(message)
         if name not in self.values:
-            return None
-        whole = name in self._integers and self._bytewise
+            return []
         if message.get_type() == "PARAM_SET":
             value = message.param_value
-            if whole:
+            if self._whole(name):
                 (value,) = struct.unpack("<i", struct.pack("<f", value))
             self.values[name] = float(value)
+        return [self._say(name)]
+
+    def _meant(self, message: Any) -> str:  # noqa: ANN401
+        """By its name, or by its place in the list."""
+        index = getattr(message, "param_index", -1)
+        if 0 <= index < len(self.values):
+            return list(self.values)[index]
+        raw = message.param_id
+        return raw.decode("ascii", "replace") if isinstance(raw, bytes) else str(raw)
+
+    def _whole(self, name: str) -> bool:
+        return name in self._integers and self._bytewise
+
+    def _say(self, name: str) -> Any:  # noqa: ANN401
         value = self.values[name]
-        if whole:
+        if self._whole(name):
             (value,) = struct.unpack("<f", struct.pack("<i", round(value)))
         kind = _INT if name in self._integers else _REAL
         index = list(self.values).index(name)
@@ -51,11 +68,14 @@ class PlanStore:
         self._expected = 0
         self._kind = 0
 
-    def handle(self, message: Any) -> list[Any]:  # noqa: ANN401 - pymavlink has no types
+    def handle(self, message: Any) -> list[Any]:  # noqa: ANN401, PLR0911 - one for each kind
         """The answers to one message of the mission protocol."""
         peer = (message.get_srcSystem(), message.get_srcComponent())
         kind, name = message.mission_type, message.get_type()
         held = self.plans.get(kind, [])
+        if name == "MISSION_CLEAR_ALL":
+            self._clear(kind)
+            return [_ack(peer, mavlink.MAV_MISSION_ACCEPTED, kind)]
         if name == "MISSION_REQUEST_LIST":
             return [mavlink.MAVLink_mission_count_message(*peer, len(held), kind)]
         if name == "MISSION_REQUEST_INT":
@@ -70,6 +90,10 @@ class PlanStore:
                 self._coming.append(message)
             return self._next(peer)
         return []
+
+    def _clear(self, kind: int) -> None:
+        for one in [kind] if kind != mavlink.MAV_MISSION_TYPE_ALL else list(self.plans):
+            self.plans.pop(one, None)
 
     def _next(self, peer: tuple[int, int]) -> list[Any]:
         assert self._coming is not None  # noqa: S101 - a transfer is under way
