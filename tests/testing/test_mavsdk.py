@@ -1,4 +1,4 @@
-"""An independent client flies the emulated PX4: what we test against is not only our own idea.
+"""An independent client flies the emulated autopilots: not only our own idea of them.
 
 MAVSDK lives in an environment of its own, named by its Python::
 
@@ -13,8 +13,10 @@ import os
 import socket
 import subprocess
 from pathlib import Path
+from typing import Literal
 
 import pytest
+from autopilot_facts import VERSIONS
 
 from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot
 
@@ -27,23 +29,34 @@ pytestmark = [
 ]
 
 
-def test_mavsdk_flies_the_emulated_px4() -> None:
-    """Parameters, arming, take-off, offboard velocity and landing, by its own code."""
+@pytest.mark.parametrize("family", ["px4", "ardupilot"])
+def test_mavsdk_flies_it(family: Literal["px4", "ardupilot"]) -> None:
+    """Version, parameters, health, arming, take-off, go-to, offboard and landing, by its code."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
         port = int(probe.getsockname()[1])
-    options = AutopilotOptions(family="px4", peer=("127.0.0.1", port))
+    options = AutopilotOptions(family=family, peer=("127.0.0.1", port))
     with EmulatedAutopilot(options) as autopilot:
         client = str(Path(__file__).with_name("mavsdk_client.py"))
         command = [PYTHON, client, str(port)]
         done = subprocess.run(command, capture_output=True, text=True, timeout=150, check=False)
         assert done.returncode == 0, done.stderr[-2000:] + done.stdout[-2000:]
         seen = json.loads(done.stdout.splitlines()[-1])
-        motions = autopilot.firmware.motions
-    assert seen["autopilot"] == "PX4"
-    assert seen["parameter"] == 0
+        firmware = autopilot.firmware
+    assert seen["version"] == list(VERSIONS[family])
+    assert seen["parameters"] == len(firmware.parameters.values)
+    assert seen["satellites"] >= 6
+    assert seen["battery"] == pytest.approx(90.0, abs=2.0)
+    # MAVSDK does not ask ArduPilot for SYS_STATUS, and does not know without it.
+    assert seen["global position"] is (family == "px4")
     assert 2.0 <= seen["height"] < 4.0
     assert seen["armed"]
-    assert seen["north"] == pytest.approx(1.0, abs=0.3)
+    assert seen["metres from there"] < 0.6
     assert not seen["armed at last"]
-    assert motions == ["arm", "take off", "follow", "land"]
+    assert firmware.motions[:2] == ["arm", "take off"]
+    assert "go to" in firmware.motions
+    assert firmware.motions[-1] == "land"
+    if family == "px4":
+        assert seen["parameter"] == 0
+        assert seen["all well"]
+        assert seen["north"] == pytest.approx(1.0, abs=0.3)

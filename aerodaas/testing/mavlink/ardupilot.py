@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any, ClassVar
 
@@ -35,6 +36,14 @@ class EmulatedArduPilot(Firmware):
 
     number: ClassVar[int] = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     default_rates: ClassVar[dict[int, float]] = {}
+    unheard_of: ClassVar[frozenset[int]] = frozenset(
+        {
+            mavlink.MAVLINK_MSG_ID_ALTITUDE,
+            mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+            mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION,
+        }
+    )
+    interval_refused: ClassVar[int] = mavlink.MAV_RESULT_DENIED
     dead_reckoning: ClassVar[float] = 7.4
     version: ClassVar[int] = 0x04070000
     capabilities: ClassVar[int] = 0xFBEF
@@ -98,7 +107,8 @@ class EmulatedArduPilot(Firmware):
         if number == mavlink.MAV_CMD_DO_SET_MODE:
             return self._set_mode(int(values[1]))
         if number == mavlink.MAV_CMD_DO_REPOSITION and frame is not None:
-            return self.go_to(*values[3:]) if self.guided else _FAILED
+            # Whatever way it is told to face, it faces as it did.
+            return self.go_to(math.nan, *values[4:]) if self.guided else _FAILED
         if number == mavlink.MAV_CMD_NAV_TAKEOFF:
             relative = {None, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT}
             fits = self.armed and self.guided and frame in relative

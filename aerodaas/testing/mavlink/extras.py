@@ -100,22 +100,24 @@ class Extras:
     @staticmethod
     def _charge(left: int) -> int:
         """The charge state at that many per cent: PX4's thresholds as delivered."""
-        states = {
+        states: dict[int, int] = {
             5: mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY,
             7: mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL,
             15: mavlink.MAV_BATTERY_CHARGE_STATE_LOW,
         }
-        found = [state for most, state in states.items() if left <= most]
-        return int(found[0] if found else mavlink.MAV_BATTERY_CHARGE_STATE_OK)
+        found: list[int] = [state for most, state in states.items() if left <= most]
+        ok: int = mavlink.MAV_BATTERY_CHARGE_STATE_OK
+        return found[0] if found else ok
 
     def _vibration(self) -> Any:  # noqa: ANN401
         return mavlink.MAVLink_vibration_message(self._stamp * 1000, 0.01, 0.01, 0.1, 0, 0, 0)
 
     def _flags(self) -> int:
         firmware = self._firmware
-        flags = _ATTITUDE | _HEIGHT | (_HORIZONTAL if firmware.knows_place else 0)
+        flags: int = _ATTITUDE | _HEIGHT | (_HORIZONTAL if firmware.knows_place else 0)
         still = firmware.stands_still and not firmware.flight.flying
-        return flags | (mavlink.ESTIMATOR_CONST_POS_MODE if still else 0)
+        held: int = mavlink.ESTIMATOR_CONST_POS_MODE if still else 0
+        return flags | held
 
     def _estimator(self) -> Any:  # noqa: ANN401
         unsure = self._firmware.unsure

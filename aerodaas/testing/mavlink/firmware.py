@@ -45,6 +45,9 @@ class Firmware(ABC):
     """MAV_PROTOCOL_CAPABILITY of AUTOPILOT_VERSION."""
     stands_still: ClassVar[bool] = False
     """Whether its estimator reports on the ground that it holds its place for fixed."""
+    unheard_of: ClassVar[frozenset[int]]
+    """Messages that it knows nothing of when it is asked to send them regularly."""
+    interval_refused: ClassVar[int] = mavlink.MAV_RESULT_FAILED
     starting: ClassVar[int] = mavlink.MAV_STATE_STANDBY
     """MAV_STATE of its HEARTBEAT until it is ready."""
     no_fix: ClassVar[int] = mavlink.GPS_FIX_TYPE_NO_FIX
@@ -166,6 +169,8 @@ class Firmware(ABC):
         """Obey a command; the result that is acknowledged."""
         if number == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL:
             message, interval = int(values[0]), values[1]
+            if message in self.unheard_of:
+                return self.interval_refused
             self.rates[message] = 1e6 / interval if interval > 0 else 0.0
             return _OK
         if number == mavlink.MAV_CMD_REQUEST_MESSAGE:

@@ -56,6 +56,9 @@ class EmulatedPX4(Firmware):
     number: ClassVar[int] = mavlink.MAV_AUTOPILOT_PX4
     arming_refused: ClassVar[int] = _LATER
     disarming_refused: ClassVar[int] = _LATER
+    unheard_of: ClassVar[frozenset[int]] = frozenset(
+        {mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, mavlink.MAVLINK_MSG_ID_SIM_STATE}
+    )
     starting: ClassVar[int] = mavlink.MAV_STATE_UNINIT
     stands_still: ClassVar[bool] = True
     no_fix: ClassVar[int] = mavlink.GPS_FIX_TYPE_NO_GPS
