@@ -13,7 +13,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
-from aerodaas.actors._application import Application
+from aerodaas.actors._application_process import ApplicationProcess
 from aerodaas.actors._ending import end_actors, may_fly
 from aerodaas.actors.run_lock import RunLock
 
@@ -31,7 +31,7 @@ class Caretaker:
 
     def __init__(
         self,
-        application: Application,
+        application: ApplicationProcess,
         drones: Sequence[Any],
         groups: Sequence[Sequence[Any]],
         helpers: Sequence[Any],

@@ -14,7 +14,7 @@ import ray
 from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
 from typing_extensions import Self
 
-from aerodaas.actors._application import Application
+from aerodaas.actors._application_process import ApplicationProcess
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors._cloud import Executor
 from aerodaas.actors._ending import end_actors, may_fly
@@ -337,7 +337,7 @@ class Flight:
         remote: Any = ray.remote(Caretaker)
         drones = [self._members[name].handle for name in self._ids()]
         watched = (drones, self._in_ending_order(), list(self._helpers))
-        application = Application(self.plan.session.lockstep)
+        application = ApplicationProcess(self.plan.session.lockstep)
         self._caretaker = remote.options(**options).remote(application, *watched)
         self._helpers.append(self._caretaker)
 

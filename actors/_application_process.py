@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import psutil
 import ray
 
-__all__ = ["Application"]
+__all__ = ["ApplicationProcess"]
 
 
 @dataclass(frozen=True)
-class Application:
+class ApplicationProcess:
     """Made by the application itself, and looked after by another process."""
 
     lockstep: bool
