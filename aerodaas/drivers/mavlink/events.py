@@ -79,5 +79,7 @@ class EventReader:
             return None
         text = _TEXTS.get(number)
         if self._report is not None:
+            # What a check objects to is for who wants to take off; in flight it is told by health.
             self._report.append(text or f"a check that is not known here (event {number:#010x})")
+            return None
         return None if text is None else Said(text, severity)

@@ -74,7 +74,7 @@ class Telemetry:
         self.clock = math.nan
         """The same clock in seconds since the Unix epoch."""
         self.reboots = 0
-        self._booting = False
+        self._booting: bool | None = None
         self.software = ""
         self._stamps: dict[str, int] = {}
         self.seen: dict[str, float] = {}
@@ -130,7 +130,8 @@ class Telemetry:
             mavlink.MAV_STATE_EMERGENCY,
         }
         booting = message.system_status == mavlink.MAV_STATE_BOOT
-        if booting and not self._booting:
+        # The very first one may find it just starting, which is no new start.
+        if booting and self._booting is False:
             self._restarted()
         self._booting = booting
 

@@ -220,6 +220,30 @@ def test_events_are_told_in_words_or_not_at_all() -> None:
     assert telemetry.texts.recent(1.0, 5.0) == ["its own protection is at work"]
 
 
+def test_what_the_arming_checks_object_to_is_no_text_of_its_own() -> None:
+    """It is asked for before a take-off; as alerts of a flight it would be noise."""
+    telemetry = Telemetry()
+    names = (
+        "commander_arming_check_summary",
+        "check_modes_offboard_signal",
+        "commander_health_summary",
+    )
+    for number, name in enumerate(names):
+        event = mavlink.mavlink_map[410](0, 0, event_number(name), 0, number, 2, [0] * 40)
+        telemetry.take(event, 1.0)
+    assert telemetry.texts.recent(1.0, 5.0) == []
+    assert telemetry.events.objections == ("its present mode needs setpoints",)
+
+
+def test_an_autopilot_that_is_found_starting_has_not_started_anew() -> None:
+    """Only a start after it was heard to be up is one."""
+    telemetry, reboots = Telemetry(), []
+    for state in (mavlink.MAV_STATE_BOOT, mavlink.MAV_STATE_STANDBY, mavlink.MAV_STATE_BOOT):
+        telemetry.take(mavlink.MAVLink_heartbeat_message(2, 3, 0, 0, state, 3), 0.0)
+        reboots.append(telemetry.reboots)
+    assert reboots == [0, 0, 1]
+
+
 def test_a_place_of_zeros_is_none() -> None:
     """An autopilot without GPS sends zeros."""
     telemetry, places = Telemetry(), []
