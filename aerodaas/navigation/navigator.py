@@ -51,7 +51,7 @@ class Navigator:
         self._home = home
         self._max_range = max_range
         self._origin = origin
-        self._command_timeout = round(command_timeout * NANOSECONDS)
+        self._command_timeout = command_timeout
         self._resume_after = round(resume_after * NANOSECONDS)
         self._unplanned: set[int] = set()
         self._unanswered: PlanRequest | None = None
@@ -110,7 +110,7 @@ class Navigator:
         present = self.command
         if present and now < present.expires and present.command.priority < command.priority:
             return
-        valid_for = min(round(command.valid_for * NANOSECONDS), self._command_timeout)
+        valid_for = round(min(command.valid_for, self._command_timeout) * NANOSECONDS)
         self.command = LiveCommand(command, now + valid_for, cause)
 
     def replan(self) -> None:
