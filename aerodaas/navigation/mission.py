@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -47,6 +48,7 @@ from aerodaas.navigation.supervisor import CALM, Demand, Finding, Supervisor, ha
 from aerodaas.schedulers.waypoint.base import Situation
 from aerodaas.status import MissionState, MissionStatus
 from aerodaas.vehicle import VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.waypoints import Waypoint
 
 __all__ = ["Mission"]
 
@@ -57,6 +59,9 @@ _DRIFT = 0.5
 _FORECAST_PERIOD = NANOSECONDS
 _FORECAST_PATIENCE = 10 * NANOSECONDS
 """Nanoseconds for which the battery must be found too small before people are told."""
+_FORECAST_MARGIN = 1.1
+"""Times what is there to spend that the plan must take to be called too long: gauge and model are
+no better than that."""
 _SETTLED = frozenset({VehicleMode.HOLDING, VehicleMode.GUIDED})
 
 
@@ -522,17 +527,17 @@ class Mission:
         if self._now < self._forecast_due or not has_position(state):
             return
         self._forecast_due = self._now + _FORECAST_PERIOD
-        route = [stop.waypoint for stop in self._navigator.queue]
+        route = [self._as_flown(stop) for stop in self._navigator.queue]
         needed = self._meter.route(
             state.odometry.position, route, self.home, self.limits.cruise_speed
         )
         available = state.battery.fraction - self.limits.battery_land
-        if not (route and needed > available):
+        if not (route and needed > max(0.0, available) * _FORECAST_MARGIN):
             self._plan_fault, self._short_since = "", None
             return
         self._plan_fault = (
-            f"at this rate the plan and the way home need {needed:.0%} of a battery, and "
-            f"{max(0.0, available):.0%} is there to spend: the drone returns when only the way "
+            f"at this rate the plan and the way home need {_share(needed)} of a battery, and "
+            f"{_share(max(0.0, available))} is there to spend: the drone returns when only the way "
             "home is left"
         )
         if self._short_since is None:
@@ -545,8 +550,18 @@ class Mission:
             self._forecast_told = True
             self._log.alert(self._now, "unreachable_plan", self._plan_fault)
 
+    def _as_flown(self, stop: Stop) -> Waypoint:
+        """What is left of a stop, at no more than the speed that the drone may fly."""
+        speed = min(stop.waypoint.speed or self.limits.cruise_speed, self.limits.max_speed)
+        return replace(stop.waypoint, speed=speed, hover_duration=max(0.0, stop.remaining_hover))
+
     def _to(self, state: MissionState, reason: str = "") -> None:
         self._machine.to(state, self._now, reason)
+
+
+def _share(charge: float) -> str:
+    most = 9.99
+    return f"{charge:.0%}" if charge <= most else f"more than {most:.0%}"
 
 
 def _subject(finding: Finding) -> tuple[str, str]:

@@ -364,6 +364,38 @@ def test_a_forecast_that_is_short_for_a_moment_only_is_not_told() -> None:
     assert any("at this rate" in fault for fault in one.status.faults)
 
 
+def forecast_of(waypoint: Waypoint, charge: float) -> list[str]:
+    """What is told before take-off of a plan of this one waypoint."""
+    limits = LimitsConfig(endurance=600.0, battery_return=0.15, battery_land=0.1)
+    one = flight(add(waypoint), limits=limits, vehicle=KinematicVehicle(charge=charge))
+    one.turn()
+    return alerts(one, "unreachable_plan")
+
+
+def test_the_forecast_counts_what_will_be_flown() -> None:
+    """No faster than the drone may fly, and with room for what gauge and model do not know."""
+    slow = Waypoint("far", 20, 0, 1.5, speed=LimitsConfig().max_speed)
+    fast = Waypoint("far", 20, 0, 1.5, speed=200.0)
+    for charge in (0.16, 0.2, 0.3, 1.0):
+        assert forecast_of(fast, charge) == forecast_of(slow, charge)
+    hover = Waypoint("here", 0, 0, 0.5, hover_duration=0.5 * 600)
+    assert not forecast_of(hover, 0.58)
+    assert forecast_of(hover, 0.5)
+    absurd = forecast_of(Waypoint("here", 0, 0, 0.5, hover_duration=1e300), 1.0)
+    assert "more than 999%" in absurd[0]
+
+
+def test_a_hover_that_is_nearly_over_is_not_forecast_anew() -> None:
+    """Half way through it the battery lasts, for half of it is left."""
+    limits = LimitsConfig(endurance=300.0, battery_return=0.15, battery_land=0.1)
+    here = Waypoint("here", 0, 0, 1.5, hover_duration=150.0)
+    vehicle = KinematicVehicle(drain=1 / 300.0, charge=0.7)
+    one = flight(add(here), limits=limits, vehicle=vehicle)
+    one.run()
+    assert one.status.visited == ("here",)
+    assert not alerts(one, "unreachable_plan")
+
+
 class Nasty:
     """An item of a stream that raises whatever is asked of it."""
 

@@ -146,8 +146,8 @@ def test_a_vehicle_without_position_stands_still_and_lands() -> None:
 
 def test_take_off_is_refused_with_all_reasons() -> None:
     """Battery, fence and height are named at once; nothing leaves the ground."""
-    limits = FENCE.model_copy(update={"takeoff_height": 20.0})
-    vehicle = KinematicVehicle((50.0, 0.0, 0.0), charge=0.2)
+    limits = FENCE.model_copy(update={"takeoff_height": 9.0})
+    vehicle = KinematicVehicle((50.0, 0.0, 11.0), charge=0.2)
     refused = flight(
         add(Waypoint("a", 0, 0, 5, waypoint_type="local")), limits=limits, vehicle=vehicle
     )
