@@ -69,11 +69,19 @@ class MotorWatch:
         """Judge `state`, read at `now` (mission clock, nanoseconds)."""
         if state.mode is VehicleMode.LOST:
             self._unheard = True
+        elif self._falls(state):
+            self._state = Motors.STOPPED_IN_FLIGHT
         elif state.armed or state.mode is not VehicleMode.GROUNDED:
             self._run(state, now)
         elif self._state is not Motors.IDLE:
             self._state = self._stop(state, now)
         return self._state
+
+    def _falls(self, state: VehicleState) -> bool:
+        """Whether it was up when its motors stopped, and does not call itself grounded yet."""
+        running = self._state is Motors.RUNNING and self._lifted
+        stopped = state.mode is VehicleMode.FAILSAFE and not state.armed
+        return running and stopped and float(self.place[2] - self._home[2]) > _LIFTED
 
     def _run(self, state: VehicleState, now: int) -> None:
         self._state, self._mode, self._unheard = Motors.RUNNING, state.mode, False

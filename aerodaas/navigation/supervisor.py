@@ -122,7 +122,8 @@ class Supervisor:
         if state.mode is VehicleMode.MANUAL:
             return Finding(Demand.RELEASE, "pilot", "a pilot has taken over")
         if state.mode is VehicleMode.FAILSAFE:
-            text = "the vehicle's own protection has taken over"
+            why = f": {'; '.join(state.faults)}" if state.faults else ""
+            text = f"the vehicle's own protection has taken over{why}"
             return Finding(Demand.RELEASE, "failsafe", text)
         return None
 

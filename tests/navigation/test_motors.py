@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from flights import Flight, KinematicVehicle, add, flight, live, square
@@ -70,6 +72,37 @@ def test_motors_that_stop_in_flight_end_the_mission(state: S) -> None:
     aborted_in_flight(one)
     assert one.status.visited == visited
     assert one.vehicle.calls == asked
+
+
+@pytest.mark.parametrize("lost", [False, True])
+def test_a_fall_that_the_vehicle_knows_of_is_no_takeover(lost: bool) -> None:  # noqa: FBT001
+    """A driver may say that it falls, disarmed and not grounded; before, it may not be heard."""
+    one = flight(add(*square()))
+    one.run(12.0)
+    one.vehicle.lost = lost
+    one.run(0.5)
+    falling = replace(one.vehicle.read(), mode=VehicleMode.FAILSAFE, armed=False)
+    one.vehicle.read = lambda: falling  # type: ignore[method-assign]
+    one.turn()
+    aborted_in_flight(one)
+    assert [alert.kind for alert in one.mission.alerts][-1] == "motors_stopped"
+
+
+def test_a_failsafe_says_what_it_is_for() -> None:
+    """The vehicle's complaints are in the reason; a low one that landed itself did not fall."""
+    one = flight(add(*square()))
+    one.run(12.0)
+    one.vehicle.faults = ("battery: critical", "GPS: no fix")
+    one.vehicle.mode = VehicleMode.FAILSAFE
+    one.turn()
+    one.expect(S.ABORTED)
+    said = "the vehicle's own protection has taken over: battery: critical; GPS: no fix"
+    assert one.status.reason == said
+    watch = MotorWatch(np.zeros(3))
+    for height in (1.0, 0.5, 0.1):
+        watch.observe(seen(height, -0.3, VehicleMode.HOLDING, armed=True), 0)
+    stood = watch.observe(seen(0.0, 0.0, VehicleMode.FAILSAFE, armed=False), NANOSECONDS)
+    assert stood is not Motors.STOPPED_IN_FLIGHT
 
 
 def test_the_place_is_where_the_motors_last_ran() -> None:
