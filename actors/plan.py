@@ -38,6 +38,7 @@ from aerodaas.data import Frame
 from aerodaas.errors import GraphError
 from aerodaas.graph import Graph, NavigationEdge, Node
 from aerodaas.handles import SENSOR_ITEMS
+from aerodaas.identifiers import told
 from aerodaas.navigation.commands import TRIGGERED, initial_commands
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
@@ -205,7 +206,7 @@ class _Planner:
 
     def managed_one(self, node: Node) -> Managed:
         tasks = self.session.environment.schedulers.tasks
-        told = tasks.get(short_name(node), TaskConfig())
+        own = told(node.id, tasks) or TaskConfig()
         times = ("edge_time", "cloud_time")
         profile = told_profile(node.id, tasks)
         return Managed(
@@ -213,7 +214,7 @@ class _Planner:
             inputs=tuple(node.inputs),
             profile=priced(profile, allowed(node, self.compute)),
             acknowledges=self.acknowledgements(node.id) == 0,
-            open_times=frozenset(time for time in times if getattr(told, time) is None),
+            open_times=frozenset(time for time in times if getattr(own, time) is None),
         )
 
     def node_spec(self, node: Node) -> NodeSpec:
@@ -274,7 +275,7 @@ class _Planner:
 
     def runtime_env_of(self, node: Node) -> RuntimeEnvConfig | None:
         """What an analysis has for itself: the environment file's word comes last."""
-        return self.session.environment.runtime_env.get(short_name(node), node.runtime_env)
+        return told(node.id, self.session.environment.runtime_env) or node.runtime_env
 
     def analyses_by_actor(self) -> tuple[Analyses, ...]:
         shared: dict[Place, list[NodeSpec]] = {}

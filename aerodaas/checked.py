@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import types
 import typing
 from collections.abc import Iterable, Sequence
@@ -17,7 +18,7 @@ __all__ = ["checked", "explained", "near"]
 
 M = TypeVar("M", bound=BaseModel)
 _SECRET = "token"  # noqa: S105 - a setting's name
-_LONGEST = 60
+_WORD = re.compile(r"[\w .\-]{0,40}")
 
 
 def checked(model: type[M], content: object, place: str, hint: str = "") -> M:
@@ -49,8 +50,10 @@ def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> 
         known = _settings_at(model, place[:-1])
         return f"{text}: there is no such setting{whose}{near(str(place[-1]), known)}"
     value = problem["input"]
-    plain = value is None or isinstance(value, bool | int | float | str)
-    shown = repr(value)[:_LONGEST] if plain and _SECRET not in text else ""
+    number = value is None or isinstance(value, bool | int | float)
+    # A word may be shown, but no address, which may hold a password, and no secret.
+    word = isinstance(value, str) and _WORD.fullmatch(value) and _SECRET not in text
+    shown = repr(value) if number or word else ""
     if problem["type"] == "missing" or not shown:
         return f"{text}: {problem['msg']}{whose}"
     return f"{text}: {problem['msg']}, not {shown}{whose}"

@@ -7,20 +7,21 @@ takes seconds to start, and a fleet on its way to the field does not come back f
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel
 
 from aerodaas.checked import checked, near
-from aerodaas.errors import ConfigError, GraphError, UnknownIdError
+from aerodaas.errors import ConfigError, GraphError
+from aerodaas.identifiers import find_scoped
 from aerodaas.names import snake_case
 from aerodaas.plugins import PluginKind, is_built_in, load_plugin, require_plugin
 
 if TYPE_CHECKING:
     from aerodaas.config import EnvironmentConfig, RobotConfig, SensorConfig
-    from aerodaas.graph import Graph, Node
+    from aerodaas.graph import Graph
 
 __all__ = ["check_environment", "check_graph", "check_plugins", "check_served", "check_tasks"]
 
@@ -42,11 +43,11 @@ def check_environment(config: EnvironmentConfig, place: str) -> None:
         require_plugin("drivers", robot.driver)
         if is_built_in("drivers", robot.driver):
             _check_settings("drivers", robot.driver, robot.settings, f"{place}: robot {robot.id}")
-    for name, sensor in _cameras(config):
+    for sensor in (one for one in config.all_sensors() if one.type == "camera"):
         driver = config.camera_driver(sensor)
         require_plugin("cameras", driver)
         if is_built_in("cameras", driver):
-            _check_settings("cameras", driver, sensor.settings, f"{place}: sensor {name}")
+            _check_settings("cameras", driver, sensor.settings, f"{place}: sensor {sensor.full_id}")
 
 
 def check_plugins(
@@ -68,7 +69,7 @@ def check_plugins(
             load_plugin("drivers", robot.driver)(robot, config)
     for sensor in cameras:
         driver = config.camera_driver(sensor)
-        _check_settings("cameras", driver, sensor.settings, f"sensor {sensor.id}")
+        _check_settings("cameras", driver, sensor.settings, f"sensor {sensor.full_id}")
         if is_built_in("cameras", driver):
             load_plugin("cameras", driver)(sensor, config)
         if here and driver in _PLAYED:
@@ -111,10 +112,9 @@ def check_tasks(graph: Graph, config: EnvironmentConfig) -> None:
 
 
 def _check_names(section: str, told: Iterable[str], graph: Graph) -> None:
-    known = {name for node in _analyses(graph) for name in (node.id, _short(node))}
+    known = [node.id for node in graph.nodes.values() if node.kind != "sensor"]
     for name in told:
-        if name not in known:
-            raise UnknownIdError(f"analysis (under {section})", name, sorted(known))
+        find_scoped(f"analysis (under {section})", name, known)
 
 
 def _check_settings(kind: PluginKind, name: str, settings: dict[str, Any], place: str) -> None:
@@ -130,7 +130,7 @@ def _check_path(sensor: SensorConfig) -> None:
     beside = Path(path).parent
     names = [one.name for one in beside.iterdir()] if beside.is_dir() else []
     raise ConfigError(
-        f"sensor {sensor.id}: settings.path: there is no {path}"
+        f"sensor {sensor.full_id}: settings.path: there is no {path}"
         f"{near(Path(path).name, names[:_NAMED])}"
     )
 
@@ -142,24 +142,6 @@ def check_served(option: str, address: str | None) -> None:
     host, _, port = address.rpartition(":")
     if not host or not port.isdigit() or int(port) > _LAST_PORT:
         raise ConfigError(f"{option} takes host:port, such as 127.0.0.1:8765, not {address!r}")
-
-
-def _cameras(config: EnvironmentConfig) -> Iterator[tuple[str, SensorConfig]]:
-    for robot in config.robots:
-        for sensor in robot.sensors:
-            if sensor.type == "camera":
-                yield f"{robot.id}/{sensor.id}", sensor
-    for sensor in config.sensors:
-        if sensor.type == "camera":
-            yield sensor.id, sensor
-
-
-def _analyses(graph: Graph) -> list[Node]:
-    return [node for node in graph.nodes.values() if node.kind != "sensor"]
-
-
-def _short(node: Node) -> str:
-    return node.id.rpartition("/")[2]
 
 
 def _is_rate(rate: object) -> bool:

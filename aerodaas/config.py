@@ -12,12 +12,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from packaging.requirements import InvalidRequirement, Requirement
-from pydantic import BaseModel, ConfigDict, Field, SecretStr, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, SecretStr, model_validator
 from typing_extensions import Self
 
 from aerodaas.checked import checked
 from aerodaas.errors import ConfigError
-from aerodaas.identifiers import Identifier
+from aerodaas.identifiers import Identifier, ScopedName
 
 __all__ = [
     "CameraConfig",
@@ -167,6 +167,23 @@ class SensorConfig(_Strict):
     rate: Positive = 15.0
     """Items per second."""
     settings: dict[str, Any] = Field(default_factory=dict)
+    _robot: str | None = PrivateAttr(default=None)
+
+    @property
+    def robot(self) -> str | None:
+        """The robot that carries it; None for one of the environment's own."""
+        return self._robot
+
+    @property
+    def full_id(self) -> str:
+        """`robot/sensor`, which no other sensor of the file is called; also its stream."""
+        return self.id if self._robot is None else f"{self._robot}/{self.id}"
+
+    def carried_by(self, robot: str) -> SensorConfig:
+        """The same sensor on board of `robot`."""
+        sensor = self.model_copy()
+        sensor._robot = robot  # noqa: SLF001 - of this class
+        return sensor
 
 
 class CameraConfig(_Strict):
@@ -207,6 +224,11 @@ class RobotConfig(_Strict):
     """Where it stands before take-off, ENU metres."""
     start_yaw: Finite = 0.0
     """Degrees counter-clockwise from east."""
+
+    @model_validator(mode="after")
+    def _carry(self) -> Self:
+        self.sensors[:] = [sensor.carried_by(self.id) for sensor in self.sensors]
+        return self
 
 
 class EndpointConfig(_Strict):
@@ -320,8 +342,8 @@ class SchedulersConfig(_Strict):
     """Default plug-ins: a registered name or `module:Class`."""
 
     trajectory: str = "ordered"
-    tasks: dict[str, TaskConfig] = Field(default_factory=dict)
-    """What the analytics scheduler is told of each analysis, by the analysis' name."""
+    tasks: dict[ScopedName, TaskConfig] = Field(default_factory=dict)
+    """What the analytics scheduler is told of each analysis, by its name or `robot/analysis`."""
     analytics: str | None = None
     """None: each analysis runs where it is deployed, on the newest item, without a dispatcher."""
 
@@ -377,8 +399,8 @@ class EnvironmentConfig(_Strict):
     sensors: list[SensorConfig] = Field(default_factory=list)
     """Sensors of the environment that no robot carries."""
     compute: list[ComputeConfig] | Literal["auto"] = "auto"
-    runtime_env: dict[Identifier, RuntimeEnvConfig] = Field(default_factory=dict)
-    """By the name of an analysis; replaces what the application gave to `deploy`."""
+    runtime_env: dict[ScopedName, RuntimeEnvConfig] = Field(default_factory=dict)
+    """By the name of an analysis, or `robot/analysis`; replaces what the application gave to `deploy`."""
     schedulers: SchedulersConfig = SchedulersConfig()
     recording: RecordingConfig = RecordingConfig()
     remote: RemoteConfig = RemoteConfig()
@@ -388,7 +410,8 @@ class EnvironmentConfig(_Strict):
     def _unique_ids(self) -> Self:
         groups = {
             "robot": [robot.id for robot in self.robots],
-            "sensor": [s.id for s in self.sensors] + [s.id for r in self.robots for s in r.sensors],
+            "environment sensor": [sensor.id for sensor in self.sensors],
+            **{f"sensor of {one.id}": [s.id for s in one.sensors] for one in self.robots},
             "compute resource": [] if self.compute == "auto" else [c.id for c in self.compute],
         }
         for kind, ids in groups.items():
@@ -418,8 +441,12 @@ class EnvironmentConfig(_Strict):
         """
         if sensor.driver is not None:
             return sensor.driver
-        carriers = [robot.driver for robot in self.robots if sensor in robot.sensors]
-        return carriers[0] if carriers else "simulated"
+        carriers = (robot.driver for robot in self.robots if robot.id == sensor.robot)
+        return next(carriers, "simulated")
+
+    def all_sensors(self) -> list[SensorConfig]:
+        """The sensors of all robots and the environment's own."""
+        return [*(sensor for robot in self.robots for sensor in robot.sensors), *self.sensors]
 
     def has_pictures(self, sensor: SensorConfig) -> bool:
         """Tell whether a camera has a source at all.

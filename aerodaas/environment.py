@@ -13,6 +13,7 @@ from aerodaas.config import ComputeConfig, EnvironmentConfig, RobotConfig
 from aerodaas.errors import ConfigError, GraphError, MissionError, UnknownIdError
 from aerodaas.graph import Graph, NavigationEdge
 from aerodaas.handles import Compute, Sensor
+from aerodaas.identifiers import find_scoped
 from aerodaas.interfaces import IAeroData, IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.names import PaperNames
 from aerodaas.navigation.commands import (
@@ -63,7 +64,7 @@ class Environment(PaperNames, IEnvironment):
         check_environment(self.config, str(options.replay or self.path))
         self.env_data = self.config.model_dump(by_alias=True)
         """The environment file's content, for analyses that want it."""
-        self.graph = Graph()
+        self.graph = Graph(sensor.full_id for sensor in self.config.all_sensors())
         self.run: Run | None = None
         self._flights = 0
         self._flown = 0
@@ -82,12 +83,14 @@ class Environment(PaperNames, IEnvironment):
         return [Sensor(self.graph, sensor, None) for sensor in self.config.sensors]
 
     def get_env_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
-        """Return the requested sensor; raises UnknownIdError."""
-        for sensor in self.config.sensors:
-            if sensor.id == sensor_id:
-                return Sensor(self.graph, sensor, None)
-        known = [sensor.id for sensor in self.config.sensors]
-        raise UnknownIdError("environment sensor", sensor_id, known)
+        """Return a sensor of the environment, or a robot's by `robot/sensor`.
+
+        A robot's sensor may go by its short name where no other sensor has it. Raises
+        UnknownIdError for one that there is not, AmbiguousIdError where several robots have it.
+        """
+        sensors = {sensor.full_id: sensor for sensor in self.config.all_sensors()}
+        sensor = sensors[find_scoped("sensor", sensor_id, sensors)]
+        return Sensor(self.graph, sensor, sensor.robot)
 
     def get_env_robots(self) -> list[IRobot]:
         """Return all the robots available in the environment."""
@@ -100,8 +103,9 @@ class Environment(PaperNames, IEnvironment):
         return self._robots[robot_id]
 
     def is_robot_sensor_available(self, sensor_id: str) -> bool:
-        """Return True if a robot has the required onboard sensor."""
-        return any(s.id == sensor_id for robot in self.config.robots for s in robot.sensors)
+        """Return True if a robot has the required onboard sensor, by `robot/sensor` or its id."""
+        sensors = [sensor for robot in self.config.robots for sensor in robot.sensors]
+        return any(sensor_id in {sensor.id, sensor.full_id} for sensor in sensors)
 
     def get_robot_sensors(self) -> list[ISensor[Any]]:
         """Return the sensors of all robots in the environment."""
@@ -168,22 +172,25 @@ class Environment(PaperNames, IEnvironment):
 
     def navigation_added(self, entry: NavigationEntry) -> bool:
         """Take navigation that a scheduler was given; False before the mission starts."""
+        if entry.robot is not None:
+            self.get_robot_by_id(entry.robot)
+        flying = list(dict.fromkeys(edge.robot for edge in self.graph.navigation))
         if not self.graph.flying:
+            # One that is called for no robot may yet be meant for the only one that will fly.
+            if len(flying) > 1:
+                _addressee(entry, flying)
             return False
-        stream = entry.navigation.stream
-        clear_on = stream.name if entry.clear_first and stream is not None else None
-        for robot in sorted({edge.robot for edge in self.graph.navigation}):
-            if stream is None:
-                self.command(
-                    robot,
-                    AddNavigation(
-                        entry.navigation, entry.index, entry.deadline, clear_first=entry.clear_first
-                    ),
-                )
-            else:
-                self.fly_by(
-                    NavigationEdge(robot, entry.navigation, entry.index, entry.deadline, clear_on)
-                )
+        robot = _addressee(entry, flying)
+        self._require_flying(robot)
+        if entry.navigation.stream is None:
+            self.command(
+                robot,
+                AddNavigation(
+                    entry.navigation, entry.index, entry.deadline, clear_first=entry.clear_first
+                ),
+            )
+        else:
+            self.fly_by(_edge(robot, entry))
         return True
 
     def fly_by(self, edge: NavigationEdge) -> None:
@@ -193,12 +200,7 @@ class Environment(PaperNames, IEnvironment):
         refuses.
         """
         graph = self.graph
-        flying = {one.robot for one in graph.navigation}
-        if graph.flying and edge.robot not in flying:
-            raise GraphError(
-                f"{edge.robot} cannot join a mission in flight: call navigate() for every robot "
-                "that is to fly before start_mission(), or fly it when this mission has ended"
-            )
+        self._require_flying(edge.robot)
         graph.navigation.append(edge)
         if graph.on_growth is None:
             return
@@ -210,9 +212,17 @@ class Environment(PaperNames, IEnvironment):
             graph.navigation.remove(edge)
             raise
 
+    def _require_flying(self, robot: str) -> None:
+        graph = self.graph
+        if graph.flying and robot not in {one.robot for one in graph.navigation}:
+            raise GraphError(
+                f"{robot} cannot join a mission in flight: call navigate() for every robot "
+                "that is to fly before start_mission(), or fly it when this mission has ended"
+            )
+
     def command(self, robot: str, command: Command) -> None:
         """Tell a flying robot something; raises MissionError if it does not fly or refuses."""
-        if self.run is None:
+        if self.run is None or robot not in {one.robot for one in self.graph.navigation}:
             raise MissionError(f"{robot} is not flying: call start_mission(wait=False) first")
         answer = self.run.command(robot, command)
         if not answer.accepted:
@@ -258,17 +268,17 @@ class Environment(PaperNames, IEnvironment):
         self._flown = len(self.graph.navigation)
 
     def _place_entries(self) -> None:
-        """Hand what was added to the scheduler to the robot that navigates."""
-        robots = list(dict.fromkeys(edge.robot for edge in self.graph.navigation))
+        """Hand what was added to the scheduler to the robot that it is meant for.
+
+        Raises GraphError where several fly and nothing says for which.
+        """
         entries = self.trajectory_scheduler().entries
-        for entry in entries:
-            stream = entry.navigation.stream
-            clear_on = stream.name if entry.clear_first and stream is not None else None
-            self.graph.navigation.extend(
-                NavigationEdge(robot, entry.navigation, entry.index, entry.deadline, clear_on)
-                for robot in robots
-            )
-        entries.clear()
+        named = [edge.robot for edge in self.graph.navigation]
+        named += [entry.robot for entry in entries if entry.robot is not None]
+        robots = list(dict.fromkeys(named))
+        if robots:
+            self.graph.navigation += [_edge(_addressee(one, robots), one) for one in entries]
+            entries.clear()
 
 
 class Robot(PaperNames, IRobot):
@@ -293,7 +303,7 @@ class Robot(PaperNames, IRobot):
     def get_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
         """Return the requested sensor; raises UnknownIdError."""
         for sensor in self.config.sensors:
-            if sensor.id == sensor_id:
+            if sensor_id in {sensor.id, sensor.full_id}:
                 return Sensor(self._environment.graph, sensor, self.robot_id)
         known = [sensor.id for sensor in self.config.sensors]
         raise UnknownIdError(f"sensor of {self.robot_id}", sensor_id, known)
@@ -366,6 +376,26 @@ class Robot(PaperNames, IRobot):
         """Register a hook to run after the mission has ended; usable as a decorator."""
         self._end_hooks.append(hook)
         return hook
+
+
+def _addressee(entry: NavigationEntry, flying: list[str]) -> str:
+    """The robot that navigation is meant for; raises GraphError where several could be."""
+    if entry.robot is not None:
+        return entry.robot
+    if len(flying) != 1:
+        place = f"\n  at {entry.line}" if entry.line else ""
+        raise GraphError(
+            f"{' and '.join(flying)} fly, and nothing says which of them this is for: write "
+            f"add_navigation(…, robot=drone), clear_navigation(robot=drone) or "
+            f"drone.navigate(…){place}"
+        )
+    return flying[0]
+
+
+def _edge(robot: str, entry: NavigationEntry) -> NavigationEdge:
+    stream = entry.navigation.stream
+    clear_on = stream.name if entry.clear_first and stream is not None else None
+    return NavigationEdge(robot, entry.navigation, entry.index, entry.deadline, clear_on)
 
 
 def _find(path: Path, application: Path | None) -> Path:

@@ -10,6 +10,7 @@ import difflib
 
 __all__ = [
     "AeroDaaSError",
+    "AmbiguousIdError",
     "ClockError",
     "ConfigError",
     "EndpointError",
@@ -45,12 +46,30 @@ class UnknownIdError(AeroDaaSError):
     def __init__(self, kind: str, wanted: str, known: list[str]) -> None:
         """Say which `kind` of thing was `wanted` and which ones are `known`."""
         choices = ", ".join(sorted(known)) or "none"
-        close = difflib.get_close_matches(wanted, known, n=1)
+        # Scoped names are known by their last part, too.
+        names = {name: None for one in known for name in (one, one.rpartition("/")[2])}
+        close = difflib.get_close_matches(wanted, names, n=1)
         meant = f" (did you mean {close[0]}?)" if close else ""
         super().__init__(f"no {kind} is called {wanted!r}; known: {choices}{meant}")
         self._args = (kind, wanted, known)
 
     def __reduce__(self) -> tuple[type[UnknownIdError], tuple[str, str, list[str]]]:
+        """Pickle by the constructor's own arguments: errors cross process boundaries."""
+        return (type(self), self._args)
+
+
+class AmbiguousIdError(AeroDaaSError):
+    """A short name was given that several things bear."""
+
+    exit_code = 2
+
+    def __init__(self, kind: str, wanted: str, fitting: list[str]) -> None:
+        """Say which `kind` of thing was `wanted` and by which names the `fitting` ones go."""
+        choices = " or ".join(sorted(fitting))
+        super().__init__(f"more than one {kind} is called {wanted!r}; say {choices}")
+        self._args = (kind, wanted, fitting)
+
+    def __reduce__(self) -> tuple[type[AmbiguousIdError], tuple[str, str, list[str]]]:
         """Pickle by the constructor's own arguments: errors cross process boundaries."""
         return (type(self), self._args)
 

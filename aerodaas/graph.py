@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 import linecache
 import typing
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
@@ -120,8 +120,9 @@ class NavigationEdge:
 class Graph:
     """The dataflow of one application."""
 
-    def __init__(self) -> None:
-        """Start empty."""
+    def __init__(self, sensors: Iterable[str] = ()) -> None:
+        """Start empty; the ids of `sensors` are theirs, whether they are used or not."""
+        self._sensors = frozenset(sensors)
         self.nodes: dict[str, Node] = {}
         self.navigation: list[NavigationEdge] = []
         self.reader: Callable[[str], StreamReader[Any]] | None = None
@@ -134,7 +135,7 @@ class Graph:
     def add(self, node: Node) -> Node:
         """Add a node, giving it a fresh id where its own is taken by another."""
         base, count = node.id, 2
-        while node.id in self.nodes:
+        while node.id in self.nodes or (node.kind != "sensor" and node.id in self._sensors):
             node.id = f"{base}_{count}"
             count += 1
         self.nodes[node.id] = node

@@ -61,7 +61,7 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
 
     def get_data_stream(self) -> AeroStreamData[E]:
         """Return the stream of the sensor's data; in flight, a camera that is off is started."""
-        name = f"{self._robot}/{self._config.id}" if self._robot else self._config.id
+        name = self._config.full_id
         item = SENSOR_ITEMS[self._config.type]
         if name not in self._graph.nodes:
             node = self._graph.add(Node(name, "sensor", item, self._config, self._robot))

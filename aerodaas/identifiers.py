@@ -8,18 +8,36 @@ no id may, so that neither can be taken for the other.
 from __future__ import annotations
 
 import re
-from typing import Annotated
+from collections.abc import Iterable, Mapping
+from typing import Annotated, TypeVar
 
 from pydantic import Field
 
-from aerodaas.errors import GraphError
+from aerodaas.errors import AmbiguousIdError, GraphError, UnknownIdError
 
-__all__ = ["INTERNAL", "Identifier", "internal", "is_internal", "require_name", "safe_name"]
+__all__ = [
+    "INTERNAL",
+    "Identifier",
+    "ScopedName",
+    "find_scoped",
+    "internal",
+    "is_internal",
+    "require_name",
+    "safe_name",
+    "short",
+    "told",
+]
 
+
+V = TypeVar("V")
 INTERNAL = "@"
 """Begins the part of a stream's name that is the project's own."""
 Identifier = Annotated[str, Field(pattern=r"^[A-Za-z][A-Za-z0-9_\-]*$", max_length=64)]
 """An id of an environment file."""
+ScopedName = Annotated[
+    str, Field(pattern=r"^[A-Za-z_][A-Za-z0-9_\-]*(/[A-Za-z_][A-Za-z0-9_\-]*)?$", max_length=129)
+]
+"""`robot/name`, or the name alone where only one robot has it."""
 _NAME = re.compile(r"[^\W\d][\w\-]{0,63}")
 
 
@@ -35,6 +53,32 @@ def internal(owner: str, name: str) -> str:
 def is_internal(stream: str) -> bool:
     """Tell whether a stream is the project's own rather than a sensor's or an analysis'."""
     return INTERNAL in stream
+
+
+def short(name: str) -> str:
+    """A scoped name without its robot's."""
+    return name.rpartition("/")[2]
+
+
+def told(of: str, table: Mapping[str, V]) -> V | None:
+    """What `table` holds under the scoped name `of`, or else under its short one."""
+    return table[of] if of in table else table.get(short(of))
+
+
+def find_scoped(kind: str, wanted: str, known: Iterable[str]) -> str:
+    """The one of the scoped names `known` that is `wanted`, in full or by its short name.
+
+    Raises UnknownIdError where there is none, AmbiguousIdError where the short name fits several.
+    """
+    names = list(known)
+    if wanted in names:
+        return wanted
+    fitting = [name for name in names if short(name) == wanted]
+    if len(fitting) > 1:
+        raise AmbiguousIdError(kind, wanted, fitting)
+    if not fitting:
+        raise UnknownIdError(kind, wanted, names)
+    return fitting[0]
 
 
 def require_name(name: str, owner: str) -> str:

@@ -129,12 +129,15 @@ class INavigate(ABC):
         *,
         priority: int | None = None,
         deadline: float | None = None,
+        robot: IRobot | str | None = None,
     ) -> None:
-        """Add navigation to the queue: at an index, with a priority, with a deadline."""
+        """Add navigation to a robot's queue: at an index, with a priority, with a deadline."""
 
     @abstractmethod
-    def clear_navigation(self, *, on: AeroStreamData[Any] | None = None) -> None:
-        """Empty the queue: now, or when `on` first yields something."""
+    def clear_navigation(
+        self, *, on: AeroStreamData[Any] | None = None, robot: IRobot | str | None = None
+    ) -> None:
+        """Empty a robot's queue: now, or when `on` first yields something."""
 
 
 class INavigableAnalyse(IAnalyse["AeroNavigation"]):

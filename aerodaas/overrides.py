@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.config import EnvironmentConfig, SensorConfig, validated
-from aerodaas.errors import ConfigError
+from aerodaas.errors import AmbiguousIdError, ConfigError, UnknownIdError
 
 __all__ = ["located", "overridden", "parse_setting"]
 
@@ -28,8 +28,10 @@ def parse_setting(text: str) -> tuple[str, Any]:
 def overridden(config: EnvironmentConfig, settings: Mapping[str, Any]) -> EnvironmentConfig:
     """Return `config` with `settings` laid over it.
 
-    The part before the first dot is the id of a robot, a sensor or a compute resource, or a
-    section of the file such as `simulation`. Raises ConfigError for an unknown id or setting.
+    The part before the first dot is the id of a robot, a sensor (or `robot/sensor`) or a compute
+    resource, or a section of the file such as `simulation`. What bears an id that others bear, too,
+    goes by `robots/…`, `sensors/…` or `compute/…`. Raises ConfigError for an unknown setting,
+    UnknownIdError for an unknown id and AmbiguousIdError for one that fits several.
     """
     if not settings:
         return config
@@ -68,17 +70,35 @@ def _absolute(path: str, folder: Path) -> str:
 
 
 def _find(content: dict[str, Any], owner: str) -> dict[str, Any]:
-    places: list[dict[str, Any]] = [*content["robots"], *content["sensors"]]
-    places += [sensor for robot in content["robots"] for sensor in robot["sensors"]]
-    places += [] if content["compute"] == "auto" else content["compute"]
-    for place in places:
-        if place["id"] == owner:
-            return place
+    places = _places(content)
     section = content.get(owner)
     if isinstance(section, dict):
-        return section
-    known = ", ".join(sorted(place["id"] for place in places))
-    raise ConfigError(f"no robot, sensor, compute resource or section is called {owner!r}: {known}")
+        places[owner] = section
+    fitting = [name for name in places if owner in {name, *_shorter(name, places[name])}]
+    if len(fitting) > 1:
+        raise AmbiguousIdError("part of the environment", owner, fitting)
+    if fitting:
+        return places[fitting[0]]
+    known = sorted(places[name].get("id", name) for name in places)
+    raise UnknownIdError("robot, sensor, compute resource or section", owner, known)
+
+
+def _places(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """What has an id, by names that no two share."""
+    compute = [] if content["compute"] == "auto" else content["compute"]
+    sections = {"robots": content["robots"], "sensors": content["sensors"], "compute": compute}
+    places = {
+        f"{section}/{place['id']}": place for section, many in sections.items() for place in many
+    }
+    for robot in content["robots"]:
+        for sensor in robot["sensors"]:
+            places[f"robots/{robot['id']}/{sensor['id']}"] = sensor
+    return places
+
+
+def _shorter(name: str, place: dict[str, Any]) -> list[str]:
+    """Other names of a part: its id, and that with its robot's."""
+    return [name.partition("/")[2], str(place["id"])] if "id" in place else []
 
 
 def _assign(place: dict[str, Any], path: list[str], value: Any) -> None:  # noqa: ANN401

@@ -16,6 +16,7 @@ from aerodaas.checks import check_served
 from aerodaas.clock import seconds
 from aerodaas.config import EnvironmentConfig, TaskConfig
 from aerodaas.errors import AeroDaaSError, ConfigError, GraphError, MissionError, RecordingError
+from aerodaas.identifiers import told
 from aerodaas.navigation.commands import Answer, Command, End
 from aerodaas.options import RunOptions, current_options
 from aerodaas.signals import Terminated, raise_on_termination
@@ -264,13 +265,14 @@ class Run:
 
     def _take_tasks(self) -> None:
         """Add what the application says of its analyses to what the environment file does."""
+        schedulers = self.config.schedulers
         own = {
-            node.id.rpartition("/")[2]: task
+            node.id: task
             for node in self.graph.nodes.values()
             if isinstance(task := getattr(node.work, "task", None), TaskConfig)
+            and told(node.id, schedulers.tasks) is None
         }
-        told = self.config.schedulers
-        schedulers = told.model_copy(update={"tasks": {**own, **told.tasks}})
+        schedulers = schedulers.model_copy(update={"tasks": {**own, **schedulers.tasks}})
         self.config = self.config.model_copy(update={"schedulers": schedulers})
 
     def _speed_text(self) -> str:

@@ -121,5 +121,8 @@ def _sensor(node: Node, host: Environment) -> str:
     """The owner's sensor of the same ids; raises UnknownIdError."""
     _, _, sensor = node.id.rpartition("/")
     if node.robot is None:
+        known = [one.id for one in host.config.sensors]
+        if sensor not in known:
+            raise UnknownIdError("environment sensor", sensor, known)
         return host.get_env_sensor_by_id(sensor).get_data_stream().name
     return host.get_robot_by_id(node.robot).get_sensor_by_id(sensor).get_data_stream().name

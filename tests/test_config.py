@@ -107,13 +107,16 @@ def test_fences_that_are_none(fence: dict[str, Any], message: str) -> None:
         validated({"robots": [{"id": "d", "limits": {"geofence": fence}}]}, "here")
 
 
-def test_ids_are_unique_among_sensors_of_all_robots() -> None:
-    """Streams are named by them."""
+def test_ids_are_unique_among_the_sensors_of_a_robot() -> None:
+    """Streams are named by both; what two robots carry may be called the same."""
     one = {"id": "a", "sensors": [{"id": "cam"}]}
-    with pytest.raises(ConfigError, match="more than one sensor is called cam"):
-        validated({"robots": [one, {**one, "id": "b"}]}, "here")
-    with pytest.raises(ConfigError, match="more than one sensor is called cam"):
-        validated({"robots": [one], "sensors": [{"id": "cam"}]}, "here")
+    content = {"robots": [one, {**one, "id": "b"}], "sensors": [{"id": "cam"}]}
+    names = [sensor.full_id for sensor in validated(content, "here").all_sensors()]
+    assert names == ["a/cam", "b/cam", "cam"]
+    with pytest.raises(ConfigError, match="more than one sensor of a is called cam"):
+        validated({"robots": [{"id": "a", "sensors": [{"id": "cam"}] * 2}]}, "here")
+    with pytest.raises(ConfigError, match="more than one environment sensor is called cam"):
+        validated({"robots": [one], "sensors": [{"id": "cam"}] * 2}, "here")
 
 
 def test_relative_paths_lead_where_the_file_lies(

@@ -14,13 +14,13 @@ __all__ = ["camera_model", "camera_settings", "required_path"]
 
 def camera_settings(sensor: SensorConfig) -> CameraConfig:
     """Check the settings of `sensor`; raises ConfigError that names the sensor and the setting."""
-    return checked(CameraConfig, sensor.settings, f"sensor {sensor.id}: settings")
+    return checked(CameraConfig, sensor.settings, f"sensor {sensor.full_id}: settings")
 
 
 def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> str:
     """Return the path among the settings; raises ConfigError where it is missing."""
     if not settings.path:
-        message = f'sensor {sensor.id}: settings: give the {what} as "path"'
+        message = f'sensor {sensor.full_id}: settings: give the {what} as "path"'
         raise ConfigError(message)
     return settings.path
 

@@ -190,10 +190,10 @@ class TelloCamera:
 
 def _carrier(sensor: SensorConfig, environment: EnvironmentConfig) -> RobotConfig:
     for robot in environment.robots:
-        if robot.driver == "tello" and any(own.id == sensor.id for own in robot.sensors):
+        if robot.driver == "tello" and robot.id == sensor.robot:
             return robot
     raise ConfigError(
-        f'sensor {sensor.id}: the driver "tello" is for a sensor of a robot whose driver is '
+        f'sensor {sensor.full_id}: the driver "tello" is for a sensor of a robot whose driver is '
         '"tello", which switches its video on'
     )
 

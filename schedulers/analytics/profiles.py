@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config import TaskConfig
+from aerodaas.identifiers import told
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal
 
 __all__ = ["ACTIVE", "CLOUD_TIME", "EDGE_TIME", "PASSIVE", "PUBLISHED", "told_profile"]
@@ -55,18 +56,18 @@ ACTIVE: tuple[str, ...] = tuple(PUBLISHED)
 def told_profile(model: str, tasks: Mapping[str, TaskConfig]) -> Profile:
     """What the environment file's `schedulers.tasks` tell of an analysis.
 
-    `model` is the analysis' stream; the file knows it by its name without the robot. Raises
+    `model` is the analysis' stream; the file may leave the robot's name out. Raises
     SchedulerError for figures that no scheduler could work with.
     """
-    told = tasks.get(model.rpartition("/")[2], TaskConfig())
-    window = round(told.qoe_window * NANOSECONDS)
+    task = told(model, tasks) or TaskConfig()
+    window = round(task.qoe_window * NANOSECONDS)
     return Profile(
         model,
-        told.benefit,
-        int(told.deadline * MILLISECOND),
-        int((told.edge_time or EDGE_TIME) * MILLISECOND),
-        int((told.cloud_time or CLOUD_TIME) * MILLISECOND),
-        told.edge_cost,
-        told.cloud_cost,
-        QoeGoal(told.qoe_bonus, told.qoe_share, window) if told.qoe_bonus else None,
+        task.benefit,
+        int(task.deadline * MILLISECOND),
+        int((task.edge_time or EDGE_TIME) * MILLISECOND),
+        int((task.cloud_time or CLOUD_TIME) * MILLISECOND),
+        task.edge_cost,
+        task.cloud_cost,
+        QoeGoal(task.qoe_bonus, task.qoe_share, window) if task.qoe_bonus else None,
     )

@@ -16,8 +16,8 @@ from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
 from aerodaas.geometry import Vector
-from aerodaas.graph import AeroStreamData
-from aerodaas.interfaces import IAeroData, IEnvironment, INavigate
+from aerodaas.graph import AeroStreamData, application_line
+from aerodaas.interfaces import IAeroData, IEnvironment, INavigate, IRobot
 from aerodaas.names import PaperNames
 from aerodaas.navigation.energy import EnergyModel
 from aerodaas.records import travels
@@ -58,6 +58,10 @@ class NavigationEntry:
     deadline: float | None = None
     clear_first: bool = False
     """The queue is emptied when this navigation's stream first yields."""
+    robot: str | None = None
+    """Id of the robot that it is meant for; None for the only one that flies."""
+    line: str = ""
+    """Where the application wrote it."""
 
 
 @runtime_checkable
@@ -87,7 +91,8 @@ class TrajectoryScheduler(PaperNames, INavigate):
         """Belong to `environment`, whose graph records the navigation."""
         self._environment = environment
         self.entries: list[NavigationEntry] = []
-        self._cleared = False
+        self._cleared: set[str | None] = set()
+        """Robots, None for the only one, whose next stream empties the queue."""
 
     @abstractmethod
     def plan(self, pending: Sequence[Waypoint], situation: Situation) -> Sequence[Waypoint]:
@@ -113,8 +118,12 @@ class TrajectoryScheduler(PaperNames, INavigate):
         *,
         priority: int | None = None,
         deadline: float | None = None,
+        robot: IRobot | str | None = None,
     ) -> None:
-        """Add waypoints or a stream of navigation to the queue, before or during the mission."""
+        """Add waypoints or a stream of navigation to a robot's queue, before or in the mission.
+
+        `robot` may be left out where only one flies; GraphError is raised where several do.
+        """
         navigation = self.generate_navigation(data)
         if priority is not None:
             navigation = AeroNavigation(
@@ -123,23 +132,33 @@ class TrajectoryScheduler(PaperNames, INavigate):
                 navigation.scheduling_type,
                 priority=priority,
             )
-        clear_first = self._cleared and navigation.stream is not None
-        self._cleared = self._cleared and not clear_first
-        self._enter(NavigationEntry(navigation, index, deadline, clear_first))
+        named = _id_of(robot)
+        cleared = {named, None} & self._cleared if navigation.stream is not None else set()
+        line = application_line()
+        self._enter(NavigationEntry(navigation, index, deadline, bool(cleared), named, line))
+        self._cleared -= cleared
 
-    def clear_navigation(self, *, on: AeroStreamData[Any] | None = None) -> None:
-        """Empty the queue: now, or when the stream `on` first yields something.
+    def clear_navigation(
+        self, *, on: AeroStreamData[Any] | None = None, robot: IRobot | str | None = None
+    ) -> None:
+        """Empty the queue of a robot: now, or when the stream `on` first yields something.
+
+        `robot` may be left out where only one flies; GraphError is raised where several do.
 
         Before the mission, this is the paper's "on detection, reset the queue": what was added so
         far is forgotten, and the first item of the stream that is added next empties the queue
         of what `navigate()` was given, which is flown until then.
         """
+        named, line = _id_of(robot), application_line()
         if on is not None:
             navigation = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, on)
-            self._enter(NavigationEntry(navigation, clear_first=True))
-        elif not self._tell(NavigationEntry(AeroNavigation(), clear_first=True)):
-            self.entries.clear()
-            self._cleared = True
+            self._enter(NavigationEntry(navigation, clear_first=True, robot=named, line=line))
+        elif not self._tell(
+            NavigationEntry(AeroNavigation(), clear_first=True, robot=named, line=line)
+        ):
+            kept = [entry for entry in self.entries if named not in {None, entry.robot}]
+            self.entries[:] = kept
+            self._cleared.add(named)
 
     def _enter(self, entry: NavigationEntry) -> None:
         if not self._tell(entry):
@@ -152,3 +171,7 @@ class TrajectoryScheduler(PaperNames, INavigate):
     def __getstate__(self) -> dict[str, Any]:
         """Leave the application's side behind when sent to the drone's actor."""
         return {**self.__dict__, "_environment": None, "entries": []}
+
+
+def _id_of(robot: IRobot | str | None) -> str | None:
+    return robot if robot is None or isinstance(robot, str) else str(getattr(robot, "robot_id", ""))

@@ -138,7 +138,7 @@ def _camera(port: int, **robot: object) -> TelloCamera:
         {"id": "t", "driver": "tello", "settings": {"address": ADDRESS}, "sensors": [sensor]}
         | robot
     )
-    return TelloCamera(sensor, EnvironmentConfig(robots=[config]))
+    return TelloCamera(config.sensors[0], EnvironmentConfig(robots=[config]))
 
 
 def _free_port() -> int:

@@ -83,7 +83,7 @@ def tello_settings(robot: RobotConfig) -> TelloSettings:
 
 def tello_camera_settings(sensor: SensorConfig) -> TelloCameraSettings:
     """Check the settings of `sensor`; raises ConfigError that names the sensor and the setting."""
-    return checked(TelloCameraSettings, sensor.settings, f"sensor {sensor.id}: settings")
+    return checked(TelloCameraSettings, sensor.settings, f"sensor {sensor.full_id}: settings")
 
 
 def video_port(robot: RobotConfig) -> int | None:
