@@ -400,7 +400,7 @@ class EnvironmentConfig(_Strict):
     """Sensors of the environment that no robot carries."""
     compute: list[ComputeConfig] | Literal["auto"] = "auto"
     runtime_env: dict[ScopedName, RuntimeEnvConfig] = Field(default_factory=dict)
-    """By the name of an analysis, or `robot/analysis`; replaces what the application gave to `deploy`."""
+    """By the name of an analysis, or `robot/analysis`; in the place of what `deploy` was given."""
     schedulers: SchedulersConfig = SchedulersConfig()
     recording: RecordingConfig = RecordingConfig()
     remote: RemoteConfig = RemoteConfig()
