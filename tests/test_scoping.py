@@ -126,13 +126,16 @@ def test_a_camera_is_of_its_own_robots_kind() -> None:
     assert drivers == ["simulated", "tello"]
 
 
-def test_an_analysis_never_takes_a_sensors_stream(env: Environment) -> None:
-    """Whichever is asked for first."""
-    drone = env.get_robot_by_id("left")
-    other = env.get_robot_by_id("right").get_sensor_by_id("cam").get_data_stream()
+def test_an_analysis_never_takes_a_sensors_stream(tmp_path: Path) -> None:
+    """Though the sensor is not used before the analysis is there."""
+    sensors = [CAMERA, {**CAMERA, "id": "eye"}]
+    env = Environment(Flyer(tmp_path).write({**FLAT, "robots": [robot(sensors=sensors)]}))
+    drone = env.get_robot_by_id("drone")
     model = SyntheticAnalytics("cam", 1, 1).deploy(env.get_compute_resource_by_id("edge"))
-    assert model.analyse(other).name != "right/cam"
-    assert drone.get_sensor_by_id("cam").get_data_stream().name == "left/cam"
+    results = model.analyse(drone.get_sensor_by_id("eye").get_data_stream())
+    assert results.name != "drone/cam"
+    assert drone.get_sensor_by_id("cam").get_data_stream().name == "drone/cam"
+    assert env.graph.nodes["drone/cam"].kind == "sensor"
 
 
 def two_models(env: Environment) -> None:
