@@ -130,7 +130,7 @@ def test_wind(autopilot: Autopilot) -> None:
         assert flight.relay.witness.away < 2.0
 
 
-@pytest.mark.parametrize(("low", "critical"), [(0.8, 0.05), (0.9, 0.8)])
+@pytest.mark.parametrize(("low", "critical"), [(0.8, 0.05), (0.7, 0.65)])
 def test_battery(autopilot: Autopilot, low: float, critical: float) -> None:
     """Low, it comes home; critical while it does, it lands where it is."""
     if autopilot.family == "px4":

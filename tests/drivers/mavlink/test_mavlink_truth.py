@@ -12,6 +12,8 @@ import pytest
 from mavlink_flights import flight
 from stepped import Stepped
 
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.telemetry import Telemetry
 from aerodaas.errors import VehicleError
 from aerodaas.testing.mavlink import AutopilotOptions
 from aerodaas.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
@@ -191,3 +193,19 @@ def test_a_log_that_blocks_holds_nobody_up() -> None:
         finally:
             let_go.set()
             log.removeHandler(handler)
+
+
+def test_only_an_autopilot_that_was_met_before_has_started_anew() -> None:
+    """One that boots while we meet it has not; ArduPilot says so in its first HEARTBEATs."""
+    telemetry = Telemetry()
+
+    def beat(state: int, now: float) -> None:
+        telemetry.take(mavlink.MAVLink_heartbeat_message(2, 3, 81, 0, state, 3), now)
+
+    beat(mavlink.MAV_STATE_BOOT, 1.0)
+    beat(mavlink.MAV_STATE_BOOT, 2.0)
+    beat(mavlink.MAV_STATE_STANDBY, 3.0)
+    assert telemetry.reboots == 0
+    beat(mavlink.MAV_STATE_BOOT, 9.0)
+    beat(mavlink.MAV_STATE_BOOT, 10.0)
+    assert telemetry.reboots == 1
