@@ -170,6 +170,10 @@ class Environment(PaperNames, IEnvironment):
             self._dispatch_with = load_scheduler(self.config.schedulers.analytics)
         return self._dispatch_with
 
+    def navigation_waiting(self) -> list[NavigationEntry]:
+        """What a scheduler was given before the mission."""
+        return [] if self._trajectory is None else list(self._trajectory.entries)
+
     def navigation_added(self, entry: NavigationEntry) -> bool:
         """Take navigation that a scheduler was given; False before the mission starts."""
         if entry.robot is not None:

@@ -80,6 +80,7 @@ def _building(application: Path) -> Iterator[list[Environment]]:
 def _refuse_navigation(guest: Environment, name: str) -> None:
     graph = guest.graph
     culprits = [edge.robot for edge in graph.navigation]
+    culprits += [f"add_navigation(…) at {entry.line}" for entry in guest.navigation_waiting()]
     for node in graph.nodes.values():
         if isinstance(node.work, CommandingAnalytics):
             culprits.append(node.id)
