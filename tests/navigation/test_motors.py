@@ -258,3 +258,12 @@ def test_an_abort_in_the_first_second_is_told_truly(turns: int, command: End | R
     assert one.now > ended
     assert one.vehicle.mode is VehicleMode.GROUNDED
     assert one.vehicle.position[2] == pytest.approx(0.0, abs=0.01)
+
+
+def test_lifting_is_counted_from_the_place_of_take_off() -> None:
+    """Motors that stop again on a roof or in a pit have flown nowhere."""
+    for home in (5.0, -5.0):
+        watch = MotorWatch(np.array([0.0, 0.0, home]))
+        watch.observe(seen(home, 0.0, VehicleMode.TAKING_OFF, armed=True), 0)
+        stopped = seen(home, 0.0, VehicleMode.GROUNDED, armed=False)
+        assert watch.observe(stopped, NANOSECONDS) is Motors.NEVER_LIFTED
