@@ -7,11 +7,14 @@ it that nothing is left running afterwards.
 
 from __future__ import annotations
 
-import os
+import contextlib
 import threading
 import time
 from collections.abc import Sequence
 from typing import Any
+
+import ray
+from ray.exceptions import RayError
 
 from aerodaas.actors._application_process import ApplicationProcess
 from aerodaas.actors._ending import end_actors, may_fly
@@ -46,6 +49,7 @@ class Caretaker:
         self._drones = drones
         self._ended = groups, helpers
         self._lock = RunLock()
+        self._itself = ray.get_runtime_context().current_actor
         threading.Thread(target=self._watch, name="caretaker", daemon=True).start()
 
     def heard(self) -> None:
@@ -62,7 +66,9 @@ class Caretaker:
             time.sleep(_LOOK_INTERVAL)
         end_actors(*self._ended)
         self._lock.release()
-        os._exit(0)
+        with contextlib.suppress(RayError):
+            # In Ray's own way, or it would tell the terminal of a worker that died.
+            ray.kill(self._itself)
 
     def _gone(self) -> bool:
         if not self._application.near:

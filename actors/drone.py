@@ -16,6 +16,7 @@ from aerodaas.actors._barrier import Barrier
 from aerodaas.actors._base import ActorInfo, StreamActor
 from aerodaas.actors._growth_gate import GrowthGate
 from aerodaas.actors._loop_calls import LoopCalls, LoopOverError
+from aerodaas.actors._losses import ALONE
 from aerodaas.actors._names import ACKS, end_stream, reply_stream, request_stream, state_stream
 from aerodaas.actors._publisher import Publisher
 from aerodaas.actors._robot_report import RobotReport
@@ -350,7 +351,8 @@ class DroneActor(StreamActor):
         super()._fail(error)
 
     def _values(self) -> dict[str, Any]:
-        return {"loop_late": self._late, "not_granted": self._refused}
+        alone = {name: pilot.vehicle.capabilities.alone for name, pilot in self._pilots.items()}
+        return {"loop_late": self._late, "not_granted": self._refused, ALONE: alone}
 
     def _close(self) -> None:
         self._calls.close("the drone's actor has been stopped")

@@ -19,6 +19,7 @@ from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors._cloud import Executor
 from aerodaas.actors._ending import end_actors, may_fly
 from aerodaas.actors._lifeline import ASKED_AGAIN, LIFE, LIFELINES, Life, Lifelines
+from aerodaas.actors._losses import DeadError, Pulse, SilentError, drone_lost
 from aerodaas.actors._names import done_stream
 from aerodaas.actors._offload import CloudProcess
 from aerodaas.actors._robot_report import RobotReport
@@ -73,10 +74,6 @@ class FlightState:
         return sorted(alerts, key=lambda alert: alert.header.stamp)
 
 
-class _SilentError(MissionError):
-    """An actor did not answer in time; it may be busy."""
-
-
 @dataclass
 class _Member:
     """One actor of the run."""
@@ -121,6 +118,7 @@ class Flight:
         """Actors without streams, to be killed at the end."""
         self._job = ray.get_runtime_context().get_job_id()
         self._caretaker: Any = None
+        self._pulse = Pulse()
         self._opening: list[Any] = []
         self._lifelines: list[Lifelines] = []
         session, edge = plan.session, Place()
@@ -186,6 +184,7 @@ class Flight:
 
         Also tells the drones that the application is alive.
         """
+        self._pulse.beat()
         if time.monotonic() >= self._next_reports:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
@@ -205,7 +204,10 @@ class Flight:
             robots: dict[str, RobotReport] = self._ask(
                 self._members[name].handle.robots.remote(newest)
             )
-        except _SilentError:
+        except DeadError:
+            member = self._members[name]
+            raise drone_lost(name, member.report, self._pulse.frozen) from None
+        except SilentError:
             if before is None or time.monotonic() - before[0] > _SILENT_FOR:
                 raise
             return before[1]
@@ -375,7 +377,8 @@ class Flight:
         for camera in cameras:
             args = (self.plan.session, camera.stream, camera.sensor, camera.state)
             name = f"sensor/{camera.stream}"
-            self._create(name, SensorActor, camera.place, args, ends=camera.ends)
+            ends = camera.ends
+            self._create(name, SensorActor, camera.place, args, restarts=_RESTARTS, ends=ends)
 
     def _create_analyses(
         self, actors: Iterable[Analyses], environments: Mapping[str, Mapping[str, Any]]
@@ -471,7 +474,7 @@ class Flight:
                 member.report = ray.get(reference)
             except RayActorError:
                 if member.name in self._ids():
-                    raise MissionError(f"the actor {member.name} died") from None
+                    raise drone_lost(member.name, member.report, self._pulse.frozen) from None
                 # Of those with a lifeline, that tells, and sooner.
                 if not member.restarts:
                     self._lost(member)
@@ -553,9 +556,9 @@ class Flight:
         except RayActorError as error:
             # Ray puts the remote traceback first and what went wrong last.
             reason = str(error).strip().splitlines()[-1]
-            raise MissionError(f"an actor died: {reason}") from None
+            raise DeadError(f"an actor died: {reason}") from None
         except ray.exceptions.GetTimeoutError:
-            raise _SilentError(f"an actor did not answer within {timeout:.0f} s") from None
+            raise SilentError(f"an actor did not answer within {timeout:.0f} s") from None
 
 
 def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:

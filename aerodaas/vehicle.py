@@ -83,6 +83,8 @@ class Capabilities:
     """m/s that the vehicle itself can do horizontally."""
     max_climb: float = 3.0
     """m/s that the vehicle itself can do vertically."""
+    alone: str = "its own failsafe is what remains"
+    """What the vehicle does once the driver's process is gone, for people."""
 
 
 @travels

@@ -79,6 +79,7 @@ class SimulatedVehicle:
             global_position=self._origin is not None,
             max_speed=self._airframe.max_speed,
             max_climb=self._airframe.max_climb,
+            alone="a simulated drone ends with its process",
         )
 
     def connect(self, timeout: float = 10.0) -> None:  # noqa: ARG002 - it is always there

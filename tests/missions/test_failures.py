@@ -151,16 +151,44 @@ def test_remote_service_dies(flyer: Flyer) -> None:
     assert "return-home: accepted" in alerts(flight)["remote_command"]
 
 
+def test_killed_sensor_is_restarted(flyer: Flyer) -> None:
+    """The drone flies on, frames come again, and the recording says who died and for how long."""
+    camera = {"id": "cam", "type": "camera", "rate": 5}
+    content = environment()
+    content["robots"][0]["sensors"].append(camera)
+    with flyer.options(speed=1.0, lockstep=False):
+        env = Environment(flyer.write(content))
+        drone = env.get_robot_by_id("drone")
+        frames = drone.get_sensor_by_id("cam")
+        frames.get_data_stream()
+        drone.navigate(hop((300, 0)))
+        run = env.launch()
+        flight = run._flight
+        assert flight is not None
+        frames.poll(20.0)
+        before = flight.infos()["sensor/drone/cam"].pid
+        os.kill(before, signal.SIGKILL)
+        assert wait_for(lambda: flight.infos()["sensor/drone/cam"].pid != before, 60.0)
+        assert run.look().robots["drone"].status.state.value != "aborted"
+        drone.end_mission()
+        run.wait()
+    told = alerts(recorded(run))
+    assert "the actor sensor/drone/cam died" in told["actor_lost"]
+    assert "sensor/drone/cam is back after" in told["actor_back"]
+
+
 def test_drone_actor_dies(flyer: Flyer) -> None:
     """Nobody can fly any more: the application ends with the reason, and nothing is left over."""
     with flyer.options(speed=5.0):
         env = Environment(flyer.write(environment()))
         env.get_robot_by_id("drone").navigate(hop((300, 0)))
         run = env.launch()
-        run.look()
         assert run._flight is not None
+        assert wait_for(lambda: bool(run.look().reports["drone/drone"].values), 20.0)
         os.kill(run._flight.infos()["drone/drone"].pid, signal.SIGKILL)
-        with pytest.raises(MissionError, match="died"):
+        with pytest.raises(
+            MissionError, match="the actor of drone died: a simulated drone ends with its process"
+        ):
             run.wait()
 
 
@@ -178,13 +206,15 @@ def cluster(runtime: None) -> Iterator[Cluster]:  # noqa: ARG001 - its PYTHONPAT
     cluster.shutdown()
 
 
-def start_application(flyer: Flyer, port: int, *arguments: str) -> subprocess.Popen[bytes]:
+def start_application(
+    flyer: Flyer, port: int, *arguments: str, stderr: int | None = None
+) -> subprocess.Popen[bytes]:
     """Start the long mission in a process of its own."""
     path = flyer.write(environment(remote={"port": port}))
     command = [sys.executable, "-m", "aerodaas", "run", str(HERE / "remote_app.py")]
     command += ["--env", str(path), "--speed", "5", "--no-view"]
     command += ["--record", str(flyer.folder / "flight"), *arguments]
-    return subprocess.Popen(command, cwd=ROOT)
+    return subprocess.Popen(command, cwd=ROOT, stderr=stderr)
 
 
 def actors_below(pid: int) -> set[psutil.Process]:
@@ -260,3 +290,25 @@ def test_application_killed_on_one_machine(flyer: Flyer) -> None:
         flight = Flight.read(recording)
     assert landed_at_home(flight)
     assert "the application's process is gone" in alerts(flight)["application_lost"]
+
+
+@pytest.mark.slow
+def test_application_suspended_on_one_machine(flyer: Flyer) -> None:
+    """The drone comes home meanwhile; resumed, the application says what happened, in its words."""
+    port = free_port()
+    application = start_application(flyer, port, stderr=subprocess.PIPE)
+    user = RemoteUser(port, lambda _: None)
+    user.until(lambda status: status["distance"] > 20.0)
+    actors = actors_below(application.pid)
+    application.send_signal(signal.SIGSTOP)
+    status = user.until(lambda status: status["state"] == "returning")
+    assert status["reason"] == "the application's process is gone"
+    assert wait_for(lambda: gone(actors), 90.0)
+    application.send_signal(signal.SIGCONT)
+    said = application.communicate(timeout=60)[1].decode()
+    assert application.returncode not in {0, None}
+    assert "this application did not run for" in said
+    assert "so the drone came home by itself" in said
+    assert "ray.kill" not in said
+    assert "Traceback" not in said
+    assert landed_at_home(Flight.read(Recording.open(flyer.folder / "flight" / "flight.mcap")))

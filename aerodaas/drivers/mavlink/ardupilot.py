@@ -60,6 +60,10 @@ class ArduPilot(Autopilot):
     family: ClassVar[int] = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     stream_before: ClassVar[float] = 0.0
     stops_short: ClassVar[bool] = False
+    alone: ClassVar[str] = (
+        "ArduPilot stops within 3 s and hovers until somebody lands it; it comes home only with "
+        'FS_GCS_ENABLE at 1 and "role": "ground_station"'
+    )
     orphaned: ClassVar[str] = (
         "if this process dies it hovers where it is; with FS_GCS_ENABLE at 1 and "
         '"role": "ground_station" it comes home'

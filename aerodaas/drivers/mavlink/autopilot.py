@@ -44,6 +44,8 @@ class Autopilot(ABC):
     stops_short: ClassVar[bool]
     """Whether it holds before it has reached the height of a take-off."""
     failsafes: ClassVar[tuple[Failsafe, ...]]
+    alone: ClassVar[str]
+    """What it does once our process is gone."""
     orphaned: ClassVar[str] = ""
     """What it does if a companion's process dies, where no parameter makes that safe."""
     rates: ClassVar[dict[int, float]] = {

@@ -67,6 +67,10 @@ class PX4(Autopilot):
         **Autopilot.rates,
         mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,
     }
+    alone: ClassVar[str] = (
+        "PX4 leaves offboard mode within 1.3 s and does what COM_OBL_RC_ACT says: without a radio "
+        "it returns or lands"
+    )
     failsafes: ClassVar[tuple[Failsafe, ...]] = (
         Failsafe(
             "COM_LOW_BAT_ACT",

@@ -8,6 +8,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -102,7 +103,10 @@ class MavlinkVehicle:
     def capabilities(self) -> Capabilities:
         """What this driver offers."""
         settings = self._settings
-        return Capabilities("mavlink", max_speed=settings.max_speed, max_climb=settings.max_climb)
+        known = Capabilities("mavlink", max_speed=settings.max_speed, max_climb=settings.max_climb)
+        if self._connection is None:
+            return known
+        return replace(known, alone=self._connection.autopilot.alone)
 
     def use_clock(self, clock: Clock) -> None:
         """Stamp states by `clock` from now on; the calling thread is the control loop."""

@@ -124,6 +124,7 @@ class TelloVehicle:
             returns_home=False,
             max_speed=self._settings.full_speed,
             max_climb=self._settings.full_climb,
+            alone="its guard centres the sticks, and the Tello lands by itself 15 s later",
         )
 
     def use_clock(self, clock: Clock) -> None:
