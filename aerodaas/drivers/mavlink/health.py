@@ -151,8 +151,7 @@ class Health:
 
     def _flags(self, flags: int, now: float, *, glitch: int) -> None:
         """The bits that both kinds of status have in common."""
-        # That it holds its place for fixed (CONST_POS_MODE) PX4 says whenever it stands.
-        lost = not flags & _HORIZONTAL
+        lost = not flags & _HORIZONTAL or flags & mavlink.ESTIMATOR_CONST_POS_MODE
         self._note("lost", "estimator: no position along the ground" if lost else "", now)
         jumps = "estimator: GPS positions jump, and are not believed"
         self._note("glitch", jumps if flags & glitch else "", now)

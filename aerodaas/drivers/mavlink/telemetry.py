@@ -213,6 +213,8 @@ class Telemetry:
     def _restarted(self) -> None:
         """The autopilot has started anew: what it said before is of another life."""
         self.reboots += 1
+        # Its first HEARTBEAT comes a second after its first other words, and no motor turns.
+        self.armed = False
         self.boot_time = math.nan
         self._stamps.clear()
         self.position_at = self.attitude_at = -math.inf

@@ -95,6 +95,8 @@ def test_an_autopilot_that_starts_anew_in_flight(world: Stepped) -> None:
     states = world.watch(12.0)
     assert not states[-1].armed
     assert all(state.armed or state.mode is not VehicleMode.RETURNING for state in states)
+    # Before its first HEARTBEAT, too: a mission must not take this for a failsafe that flies.
+    assert not any(state.armed for state in states if state.mode is VehicleMode.FAILSAFE)
     assert told(states[-1], "autopilot: it started anew in flight")
     lying = world.autopilot.truth.position
     for state in states[20:]:
