@@ -31,7 +31,7 @@ class ApplicationProcess:
         try:
             process = psutil.Process(self.pid)
             # A number may be used again.
-            dead = process.create_time() != self.began or process.status() == psutil.STATUS_ZOMBIE
+            again = process.create_time() != self.began
+            return bool(again or process.status() == psutil.STATUS_ZOMBIE)
         except psutil.NoSuchProcess:
             return True
-        return dead

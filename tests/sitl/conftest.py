@@ -6,8 +6,9 @@ import os
 from collections.abc import Iterator
 
 import pytest
-from sitl_autopilot import Autopilot
-from sitl_autopilot import autopilot as started
+
+from sitl.autopilot import Autopilot
+from sitl.autopilot import autopilot as started
 
 VARIABLES = {"px4": "AERODAAS_SITL_PX4", "ardupilot": "AERODAAS_SITL_ARDUPILOT"}
 

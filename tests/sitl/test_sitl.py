@@ -14,8 +14,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from sitl_autopilot import Autopilot
-from sitl_flights import FAR, FARM, SitlFlight, robot_at, survey
 
 from aerodaas.config import EnvironmentConfig, GeofenceConfig
 from aerodaas.drivers.mavlink.dialect import mavlink
@@ -30,6 +28,8 @@ from aerodaas.waypoints import (
     NavigationType,
     VelocityCommand,
 )
+from sitl.autopilot import Autopilot
+from sitl.flights import FAR, FARM, SitlFlight, robot_at, survey
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock]
 
@@ -137,8 +137,8 @@ def test_link_cut(autopilot: Autopilot, duration: float) -> None:
 
 def kill_in_flight(url: str, *settings: str) -> None:
     """Kill a program that flies, four seconds on its way, and wait eight seconds more."""
-    command = [sys.executable, str(HERE / "sitl_victim.py"), url, *settings]
-    victim = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+    command = [sys.executable, "-m", "sitl.victim", url, *settings]
+    victim = subprocess.Popen(command, cwd=HERE.parent, stdout=subprocess.PIPE, text=True)
     assert victim.stdout is not None
     assert victim.stdout.readline().strip() == "enroute"
     time.sleep(4.0)

@@ -9,13 +9,13 @@ import math
 import time
 
 import pytest
-from sitl_autopilot import Autopilot
-from sitl_flights import FAR, FARM, SitlFlight
 
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.navigation.commands import End
 from aerodaas.status import MissionState as S
 from aerodaas.testing.channel import Impairment
+from sitl.autopilot import Autopilot
+from sitl.flights import FAR, FARM, SitlFlight
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420)]
 

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import psutil
 import pytest
-from sitl_autopilot import Autopilot
-from sitl_flights import robot_at
-from sitl_relay import Relay
 
 from aerodaas.recording.reader import Recording
+from sitl.autopilot import Autopilot
+from sitl.flights import robot_at
+from sitl.relay import Relay
 
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420)]
 
@@ -37,7 +37,7 @@ def test_application_killed(autopilot: Autopilot, tmp_path: Path) -> None:
     robot = robot_at(relay.url).model_dump(mode="json", exclude_unset=True)
     environment = tmp_path / "environment.json"
     environment.write_text(json.dumps({"robots": [robot]}))
-    command = [sys.executable, "-m", "aerodaas", "run", str(HERE / "sitl_far_app.py")]
+    command = [sys.executable, "-m", "aerodaas", "run", str(HERE / "far_app.py")]
     command += ["--env", str(environment), "--no-view", "--record", str(tmp_path / "flight")]
     application = subprocess.Popen(command)
     try:

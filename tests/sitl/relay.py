@@ -8,9 +8,8 @@ import socket
 import threading
 import time
 
-from sitl_witness import Witness
-
 from aerodaas.testing.channel import Channel, Impairment
+from sitl.witness import Witness
 
 __all__ = ["Relay"]
 

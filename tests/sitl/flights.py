@@ -8,7 +8,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from sitl_relay import Relay
 from typing_extensions import Self
 
 from aerodaas.clock import ScaledClock
@@ -24,6 +23,7 @@ from aerodaas.status import MissionState, MissionStatus
 from aerodaas.testing.channel import Impairment
 from aerodaas.vehicle import VehicleMode, VehicleState
 from aerodaas.waypoints import AeroNavigation, NavigationType, SchedulingType, Waypoint
+from sitl.relay import Relay
 
 __all__ = ["FAR", "FARM", "PERFECT", "SitlFlight", "robot_at", "survey"]
 

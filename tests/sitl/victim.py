@@ -1,17 +1,16 @@
 """A program that flies until it is killed, and says when it is on its way.
 
-sitl_victim.py URL [SETTING=VALUE ...]
+python -m sitl.victim URL [SETTING=VALUE ...]
 """
 
 from __future__ import annotations
 
 import sys
 
-from sitl_flights import SitlFlight
-
 from aerodaas.navigation.commands import AddNavigation
 from aerodaas.status import MissionState
 from aerodaas.waypoints import AeroNavigation, NavigationType, Waypoint
+from sitl.flights import SitlFlight
 
 if __name__ == "__main__":
     far = AeroNavigation(NavigationType.DISTANCE_DRIVEN, [Waypoint("far", 0, 80, 3.0)])

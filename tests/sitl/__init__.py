@@ -1,0 +1,1 @@
+"""Flights on real autopilots in simulation."""
