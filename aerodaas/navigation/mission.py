@@ -289,12 +289,14 @@ class Mission:
             if leaving and grounded:
                 self._to(MissionState.ABORTED, f"{reason} before take-off")
             return leaving and grounded
-        if leaving and motors is not Motors.STOPPED_IN_FLIGHT:
-            if motors is Motors.LANDED:
-                self._to(MissionState.LANDED, reason)
+        if motors is Motors.SETTLING:
+            return True
+        if leaving and motors is Motors.LANDED:
+            self._to(MissionState.LANDED, reason)
             return True
         east, north, up = self._motors.place
-        text = f"motors stopped in flight at E {east:.1f}, N {north:.1f}, up {up:.1f} m"
+        what = "landed of its own accord" if motors is Motors.LANDED else "motors stopped in flight"
+        text = f"{what} at E {east:.1f}, N {north:.1f}, up {up:.1f} m"
         self._to(MissionState.ABORTED, text)
         self._log.alert(self._now, "motors_stopped", text)
         return True

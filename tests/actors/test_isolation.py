@@ -131,7 +131,7 @@ def test_what_cannot_be_provided_is_refused_before_take_off(
         ({"packages": ["--pre x"]}, "neither a requirement"),
         ({"packages": ["x==1"], "image_uri": "y"}, "brings its own packages"),
         ({"env_vars": {"RAY_ADDRESS": "x"}}, "cannot be set"),
-        ({"pip": ["x"]}, "pip: Extra inputs"),
+        ({"pip": ["x"]}, "pip: there is no such setting"),
         ({"env_vars": {"A": 1}}, "valid string"),
     ],
 )
@@ -145,5 +145,5 @@ def test_nonsense_is_refused_where_it_is_said(
 
 def test_a_runtime_env_for_nobody_is_refused(flyer: Flyer) -> None:
     """A name in the file that the application does not know is a mistake."""
-    with pytest.raises(UnknownIdError, match=r"'oldd'; known: old"):
+    with pytest.raises(UnknownIdError, match=r"'oldd'; known: drone/old"):
         refused(flyer, {}, {"oldd": {"env_vars": {"A": "1"}}})

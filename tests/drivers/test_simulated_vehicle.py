@@ -163,7 +163,7 @@ def test_a_low_battery_refuses_take_off_and_lands_by_itself() -> None:
     flight = Flight({"battery": 0.1})
     with pytest.raises(VehicleError, match="10%"):
         flight.vehicle.take_off(1.5)
-    flight = Flight({"battery": 0.06, "battery_minimum": 0.0}).hovering(5.0)
+    flight = Flight({"battery": 0.06, "battery_minimum": 0.05}).hovering(5.0)
     flight.until(VehicleMode.FAILSAFE)
     with pytest.raises(VehicleError, match="last charge"):
         flight.vehicle.send(VelocitySetpoint(np.zeros(3)))

@@ -105,6 +105,19 @@ def test_a_failsafe_says_what_it_is_for() -> None:
     assert stood is not Motors.STOPPED_IN_FLIGHT
 
 
+@pytest.mark.parametrize("state", [S.ENROUTE, S.PAUSED])
+def test_a_landing_that_was_not_asked_for_is_no_fall(state: S) -> None:
+    """The mission ends unfinished, and says that the drone came down by itself."""
+    one = in_state(state)
+    one.vehicle.land()
+    one.vehicle.send = lambda setpoint: setpoint  # type: ignore[method-assign] # whatever is asked
+    one.vehicle.hold = lambda: None  # type: ignore[method-assign]
+    one.run(until=lambda: one.mission.finished)
+    one.expect(S.ABORTED)
+    assert one.status.reason.startswith("landed of its own accord at E ")
+    assert [alert.text for alert in one.mission.alerts] == [one.status.reason]
+
+
 def test_the_place_is_where_the_motors_last_ran() -> None:
     """Not where the drone fell to."""
     one = flight(add(Waypoint("far", 20, 0, 4.0)))
