@@ -132,6 +132,7 @@ class Pilot:
             takeoff=takeoff,
             origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
             wind=np.array(environment.simulation.wind, dtype=np.float64),
+            obeyed=self.vehicle.capabilities.obeys,
         )
         self.loop = SetpointLoop(self.vehicle, self.mission)
         self.state: VehicleState = self.vehicle.read()

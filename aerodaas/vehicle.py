@@ -85,6 +85,8 @@ class Capabilities:
     """m/s that the vehicle itself can do vertically."""
     alone: str = "its own failsafe is what remains"
     """What the vehicle does once the driver's process is gone, for people."""
+    obeys: bool = True
+    """False for a recorded vehicle, which flies as it flew whatever it is told."""
 
 
 @travels

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from aerodaas.config import EnvironmentConfig, RobotConfig
 from aerodaas.errors import ConfigError, VehicleError
@@ -119,9 +120,9 @@ class ReplayedVehicle:
 def _capabilities(robot: RobotConfig, environment: EnvironmentConfig) -> Capabilities:
     driver = robot.settings.get("driver")
     if driver is None:
-        return Capabilities("replayed")
+        return Capabilities("replayed", obeys=False)
     recorded = robot.model_copy(
         update={"driver": driver, "settings": robot.settings.get("settings", {})}
     )
     capabilities: Capabilities = load_plugin("drivers", driver)(recorded, environment).capabilities
-    return capabilities
+    return replace(capabilities, obeys=False)

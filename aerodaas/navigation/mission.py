@@ -84,16 +84,19 @@ class Mission:
         takeoff: Vector,
         origin: GeodeticOrigin | None = None,
         wind: Vector | None = None,
+        obeyed: bool = True,
     ) -> None:
         """Plan with `planner` for a drone that stands at `takeoff`, ENU metres.
 
-        `origin` pins global waypoints; `wind` (ENU m/s) is for the energy model. Raises ConfigError
-        for a geofence that is none.
+        `origin` pins global waypoints; `wind` (ENU m/s) is for the energy model. Without `obeyed`
+        the vehicle is a recorded one, and lands when it landed. Raises ConfigError for a geofence
+        that is none.
         """
         self.limits = limits = robot.limits
         self.fence = Geofence(limits.geofence)
         self.home = takeoff.astype(np.float64)
         self._options = robot.mission
+        self._obeyed = obeyed
         self._machine = MissionStateMachine()
         self._log = MissionLog(f"{robot.id}/mission")
         self._meter = EnergyMeter(
@@ -291,8 +294,9 @@ class Mission:
             return leaving and grounded
         if motors is Motors.SETTLING:
             return True
-        if leaving and motors is Motors.LANDED:
-            self._to(MissionState.LANDED, reason)
+        if motors is Motors.LANDED and (leaving or not self._obeyed):
+            if leaving:
+                self._to(MissionState.LANDED, reason)
             return True
         east, north, up = self._motors.place
         what = "landed of its own accord" if motors is Motors.LANDED else "motors stopped in flight"
