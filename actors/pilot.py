@@ -176,6 +176,9 @@ class Pilot:
         """Start the mission, whose time is that of `clock`."""
         if isinstance(self.vehicle, ClockedVehicle):
             self.vehicle.use_clock(clock)
+        if not self._session.lockstep:
+            # A replay takes off where the mission was built for, which lockstep tells at 0 s.
+            self._publish(state_stream(self.id), self.state, clock.now())
         self.handle(Start(), clock.now())
 
     def grow(self, spec: RobotSpec, outlets: dict[str, Outlet]) -> None:

@@ -185,7 +185,9 @@ def test_a_flight_by_the_clock_repeats_every_decision(flyer: Flyer) -> None:
     found = difference(first.recording, again(flyer, first, build))
     assert found.agrees, str(found)
     counted = {stream.what: stream.same for stream in found.streams}
-    assert counted["drone/chase navigation"] == counted["drone/tardy detections"] > 10
+    # The mission may end between a result and the command made of it.
+    assert 0 <= counted["drone/tardy detections"] - counted["drone/chase navigation"] <= 1
+    assert counted["drone/chase navigation"] > 10
     pace = read_pace(first.recording)
     assert len(pace.work["drone/tardy"]["drone/cam"]) < len(pace.readings["drone/cam"])
     assert pace.plans["drone"]
