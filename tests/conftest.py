@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import required
 from flying import Flyer
 
 from aerodaas.options import RunOptions, current_options
@@ -16,10 +16,11 @@ from aerodaas.options import RunOptions, current_options
 _ROOT = Path(__file__).resolve().parents[1]
 
 _CI = bool(os.environ.get("CI"))
-# The training itself needs PyTorch, which flying does not: without it, its tests do not exist,
-# but in continuous integration, where they must run.
-_TRAINING = [f"training/test_{name}.py" for name in ("company", "training_run", "pose_training")]
-collect_ignore = [] if _CI or importlib.util.find_spec("torch") else _TRAINING
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """What is missing fails in continuous integration."""
+    config.pluginmanager.register(required)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

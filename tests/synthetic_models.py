@@ -65,6 +65,49 @@ def patchwork_model(
     return _save(path, graph, None)
 
 
+def mosaic_model(path: Path, side: int, *, classes: int = 5) -> Path:
+    """Write a YOLOX-shaped model, whose boxes and scores are functions of each cell's mean colour.
+
+    Different enough from cell to cell that boxes overlap, tie with none, and are of all classes.
+    """
+    rng = np.random.default_rng(8)
+    weights = rng.normal(0, 1, (5 + classes, 3, 1, 1))
+    # Classes go by hue; dark cells hold things, about three cells wide.
+    weights[5:] = 60 * (weights[5:] - weights[5:].mean(axis=1, keepdims=True))
+    bias = np.zeros(5 + classes)
+    bias[2:4], weights[4], bias[4] = 1.0, -4.0, 3.0
+    constants: dict[str, NDArray[np.generic]] = {
+        "full": np.array(255, np.float32),
+        "weights": weights.astype(np.float32),
+        "bias": bias.astype(np.float32),
+        "flat": np.array([0, 5 + classes, -1], np.int64),
+        "parts": np.array([4, 1 + classes], np.int64),
+    }
+    nodes, flat = [helper.make_node("Div", ["images", "full"], ["light"])], []
+    for stride in (8, 16, 32):
+        pool, cells, row = (f"{name}{stride}" for name in ("pool", "cells", "row"))
+        window = [stride, stride]
+        nodes += [
+            helper.make_node("AveragePool", ["light"], [pool], kernel_shape=window, strides=window),
+            helper.make_node("Conv", [pool, "weights", "bias"], [cells]),
+            helper.make_node("Reshape", [cells, "flat"], [row]),
+        ]
+        flat.append(row)
+    nodes += [
+        helper.make_node("Concat", flat, ["raw"], axis=2),
+        helper.make_node("Transpose", ["raw"], ["rows"], perm=[0, 2, 1]),
+        helper.make_node("Split", ["rows", "parts"], ["boxes", "logits"], axis=2),
+        helper.make_node("Sigmoid", ["logits"], ["scores"]),
+        helper.make_node("Concat", ["boxes", "scores"], ["output"], axis=2),
+    ]
+    count = sum((side // stride) ** 2 for stride in (8, 16, 32))
+    info = helper.make_tensor_value_info("output", TensorProto.FLOAT, [1, count, 5 + classes])
+    picture = helper.make_tensor_value_info("images", TensorProto.FLOAT, [1, 3, side, side])
+    initializers = [numpy_helper.from_array(value, name) for name, value in constants.items()]
+    graph = helper.make_graph(nodes, "mosaic", [picture], [info], initializers)
+    return _save(path, graph, {"names": str({number: f"c{number}" for number in range(classes)})})
+
+
 def _save(path: Path, graph: onnx.GraphProto, metadata: Mapping[str, str] | None) -> Path:
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
     helper.set_model_props(model, dict(metadata or {}))

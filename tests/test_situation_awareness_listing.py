@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from flying import Flyer
 
-from aerodaas.analytics.models import DETECTOR, POSE
 from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
 from aerodaas.simulation.scenario import Scenario
@@ -60,9 +59,6 @@ ENVIRONMENT: dict[str, Any] = {
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(
-    not (DETECTOR.exists() and POSE.exists()), reason="the trained networks are not in this tree"
-)
 def test_situation_awareness_flies_as_printed(flyer: Flyer) -> None:
     """The drone keeps two metres from the person, and lands once a hand is raised."""
     scenario = flyer.folder / "walk.json"

@@ -13,8 +13,6 @@ from aerodaas import Analytics, Environment, Odometry
 from aerodaas.analytics.base import Context
 from aerodaas.errors import ConfigError, UnknownIdError
 
-uv = pytest.importorskip("uv", reason='needs uv: pip install "aerodaas[isolation]"')
-
 DISTRIBUTION = "aerodaas_conflicting"
 
 

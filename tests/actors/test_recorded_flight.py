@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import foxglove.messages
+import jsonschema
 import numpy as np
 import pytest
 from flying import FLAT, Flyer, hop, robot
@@ -67,7 +68,6 @@ def flown(runtime: None, tmp_path_factory: pytest.TempPathFactory) -> Path:  # n
 
 def messages(path: Path) -> list[tuple[str, str, Any, Any]]:
     """Topic, schema's name, message and value of everything, each validated by its own schema."""
-    jsonschema = pytest.importorskip("jsonschema")
     decoders = DecoderFactory()
     checks: dict[str, Any] = {}
     found = []

@@ -6,15 +6,14 @@ import uuid
 
 import numpy as np
 import pytest
+from required import needs
 
 from aerodaas.actors.streams import Inbox, Outlet
 from aerodaas.actors.streams._shared import MAX_DEPTH, shared_memory_available
 from aerodaas.data import Header
 
 pytestmark = [
-    pytest.mark.skipif(
-        not shared_memory_available(), reason="this host has no shared memory for iceoryx2"
-    ),
+    needs(shared_memory_available(), "needs iceoryx2 and shared memory: `aerodaas doctor`"),
     pytest.mark.wall_clock,
 ]
 

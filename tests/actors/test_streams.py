@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 import ray
+from required import needs
 from stream_reader import Reader, Seen, digest
 
 from aerodaas.actors.streams import (
@@ -30,9 +31,7 @@ from aerodaas.data import Frame, Header
 from aerodaas.status import Message
 
 pytestmark = [
-    pytest.mark.skipif(
-        not shared_memory_available(), reason="this host has no shared memory for streams"
-    ),
+    needs(shared_memory_available(), "needs iceoryx2 and shared memory: `aerodaas doctor`"),
     pytest.mark.wall_clock,
 ]
 

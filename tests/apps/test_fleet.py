@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from flying import Flyer
+from required import needs_python
 
 sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
@@ -21,7 +22,7 @@ DRONES = ("left", "middle", "right")
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.skipif(sys.version_info < (3, 11), reason="PyVRP exists for Python 3.11 and newer")
+@needs_python(3, 11, because="PyVRP has no older")
 def test_three_drones_share_an_area(flyer: Flyer) -> None:
     """Every waypoint is visited by one of them; all come home, and never near each other."""
     with flyer.options(application=APPLICATION, seed=0):

@@ -13,6 +13,7 @@ import pytest
 import ray
 from cluster_flights import ENVIRONMENT, Told, Watched, eventually
 from flying import Flyer
+from required import needs_root
 
 from aerodaas.actors import cluster
 from aerodaas.cluster import EdgeCloud, Shape
@@ -21,7 +22,7 @@ from aerodaas.status import MissionState
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.timeout(240),
-    pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
+    needs_root,
     pytest.mark.wall_clock,
     pytest.mark.xdist_group("namespaces"),
 ]

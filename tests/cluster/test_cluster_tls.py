@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 from certificates import make_certificates, tls_variables
 from flying import FLAT, robot
+from required import needs, needs_root
 
 from aerodaas.cluster.machine import run
 from aerodaas.cluster.network import LocalNetwork
@@ -27,8 +28,8 @@ from aerodaas.recording.reader import Recording
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.timeout(400),
-    pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
-    pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl"),
+    needs_root,
+    needs(shutil.which("openssl"), "install openssl"),
     pytest.mark.wall_clock,
     pytest.mark.xdist_group("namespaces"),
 ]

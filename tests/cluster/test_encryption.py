@@ -12,11 +12,12 @@ from pathlib import Path
 
 import pytest
 from certificates import make_certificates, tls_variables
+from required import needs
 
 from aerodaas.actors._encryption import require_same_encryption
 from aerodaas.errors import AeroDaaSError, ConfigError
 
-pytestmark = pytest.mark.skipif(shutil.which("openssl") is None, reason="needs openssl")
+pytestmark = needs(shutil.which("openssl"), "install openssl")
 HERE, ELSEWHERE = "127.0.0.1", "127.0.0.2"
 
 

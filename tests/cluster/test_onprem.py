@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import os
-import shutil
 import subprocess
 import sys
 import time
@@ -13,6 +12,7 @@ from pathlib import Path
 
 import pytest
 import yaml  # type: ignore[import-untyped]
+from required import needs_peer, needs_root, peer
 
 from aerodaas.cluster.machine import run
 from aerodaas.cluster.network import Far, LocalNetwork
@@ -20,11 +20,8 @@ from aerodaas.cluster.network import Far, LocalNetwork
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.timeout(900),
-    pytest.mark.skipif(os.geteuid() != 0, reason="network namespaces need root"),
-    pytest.mark.skipif(
-        not all(map(shutil.which, ("ssh", "ssh-keygen", "rsync", "/usr/sbin/sshd"))),
-        reason="needs an SSH client and server, and rsync",
-    ),
+    needs_root,
+    needs_peer("AERODAAS_SSHD"),
     pytest.mark.wall_clock,
     pytest.mark.xdist_group("namespaces"),
 ]
@@ -58,7 +55,7 @@ def start_sshd(far: Far, folder: Path) -> subprocess.Popen[bytes]:
     far.machine.run("mount", "--bind", str(home / "passwd"), "/etc/passwd")
     config = home / "sshd_config"
     config.write_text(SSHD.format(folder=folder))
-    words = far.machine.words("/usr/sbin/sshd", "-D", "-e", "-f", str(config))
+    words = far.machine.words(peer("AERODAAS_SSHD"), "-D", "-e", "-f", str(config))
     with (home / "sshd.log").open("wb") as log:
         return subprocess.Popen(words, stderr=log)
 

@@ -7,6 +7,7 @@ import logging
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 from mcap.reader import NonSeekingReader, make_reader
@@ -50,7 +51,6 @@ def recorded(path: Path, *items: object, **settings: str) -> dict[str, list[Reco
 
 def test_whole_flight_reads_strictly(tmp_path: Path) -> None:
     """Every checksum holds, every message decodes by the schema that the file itself carries."""
-    jsonschema = pytest.importorskip("jsonschema")
     path = tmp_path / "flight.mcap"
     summary = record(path, SyntheticFlight(rate=4, frames=1), drops=3)
     with path.open("rb") as file:

@@ -5,19 +5,18 @@ from __future__ import annotations
 import html
 import json
 import re
-import shutil
 import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
+from required import needs_peer, peer
 from synthetic_flight import SyntheticFlight, record
 
 from aerodaas.recording.comparison import write_comparison
 from aerodaas.recording.report import write_report
 
-NAMES = ("chromium", "chromium-browser", "google-chrome")
-BROWSER = next((found for found in map(shutil.which, NAMES) if found), None)
+BROWSER = peer("AERODAAS_BROWSER")
 PROBE = """
 <script>
 window.addEventListener("load", () => {
@@ -44,7 +43,6 @@ window.addEventListener("error", event => window.complaints.push(String(event.me
 
 def look(page: Path, width: int) -> tuple[dict[str, Any], str]:
     """Load a page in a window of this width; returns what was found, and the browser's log."""
-    assert BROWSER is not None
     probe = page.with_name("probe.html")
     text = page.read_text().replace("<head>", f"<head>{EARS}").replace("</body>", f"{PROBE}</body>")
     probe.write_text(text)
@@ -69,7 +67,7 @@ def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(BROWSER is None, reason="no Chromium or Chrome is installed")
+@needs_peer("AERODAAS_BROWSER")
 @pytest.mark.parametrize("width", [1280, 500])
 def test_pages_load_without_complaint(recorded: Path, tmp_path: Path, width: int) -> None:
     """Both pages, on a desktop and in the narrowest window that a headless browser opens."""

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import importlib.util
-import sys
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from required import needs_python
 from waypoint_fields import HOME, in_a_hurry, places, scatter, waypoints
 
 from aerodaas.errors import SchedulerError
@@ -20,9 +20,7 @@ from aerodaas.schedulers.waypoint.optimal import OptimalScheduler
 from aerodaas.schedulers.waypoint.travel import Travel, tour_length
 from aerodaas.waypoints import Waypoint
 
-needs_solver = pytest.mark.skipif(
-    sys.version_info < (3, 11), reason="PyVRP exists for Python 3.11 and newer"
-)
+needs_solver = needs_python(3, 11, because="PyVRP has no older")
 
 
 def test_without_the_solver_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 
 import pytest
+from required import needs_peer, peer
 
 from sitl.autopilot import Autopilot
 from sitl.autopilot import autopilot as started
 
-VARIABLES = {"px4": "AERODAAS_SITL_PX4", "ardupilot": "AERODAAS_SITL_ARDUPILOT"}
+VARIABLES = {"ardupilot": "AERODAAS_SITL_ARDUPILOT", "px4": "AERODAAS_SITL_PX4"}
 
 
 @pytest.fixture
@@ -19,15 +19,10 @@ def boot() -> float:
     return 5.0
 
 
-@pytest.fixture(params=sorted(VARIABLES))
+@pytest.fixture(
+    params=[pytest.param(family, marks=needs_peer(name)) for family, name in VARIABLES.items()]
+)
 def autopilot(request: pytest.FixtureRequest, boot: float) -> Iterator[Autopilot]:
     """Each autopilot that is named."""
-    variable = VARIABLES[request.param]
-    named = os.environ.get(variable, "")
-    if not named:
-        pytest.skip(
-            f"{variable} names no autopilot in simulation; set it to a URL such "
-            "as udpin:0.0.0.0:14540, or to `start command => URL`"
-        )
-    with started(request.param, named, boot) as vehicle:
+    with started(request.param, peer(VARIABLES[request.param]), boot) as vehicle:
         yield vehicle

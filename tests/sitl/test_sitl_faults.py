@@ -9,6 +9,7 @@ import math
 import time
 
 import pytest
+from required import needs_peer
 
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.navigation.commands import End
@@ -116,10 +117,16 @@ def test_gps_lost(autopilot: Autopilot) -> None:
         assert len(alerts(flight)) <= 2 * FEW, alerts(flight)
 
 
+@pytest.mark.parametrize(
+    "autopilot",
+    [pytest.param("ardupilot", marks=needs_peer("AERODAAS_SITL_ARDUPILOT"))],
+    indirect=True,
+)
 def test_wind(autopilot: Autopilot) -> None:
-    """8 m/s from the north-west: the survey is flown, and it comes home."""
-    if autopilot.family == "px4":
-        pytest.skip("the simulator of PX4 that is flown here knows no wind")
+    """8 m/s from the north-west: the survey is flown, and it comes home.
+
+    The simulator of PX4 that is flown here knows no wind.
+    """
     with SitlFlight(autopilot.url, FARM) as flight:
         flight.set_parameter("SIM_WIND_DIR", 315.0)
         flight.set_parameter("SIM_WIND_SPD", 8.0)

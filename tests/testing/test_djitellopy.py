@@ -9,21 +9,21 @@ djitellopy brings another OpenCV, so that it needs an environment of its own, na
 from __future__ import annotations
 
 import json
-import os
 import socket
 import subprocess
 from pathlib import Path
 
 import pytest
+from required import needs_peer, peer
 
 from aerodaas.testing.tello import EmulatedTello, TelloOptions, VideoOptions
 from aerodaas.vehicle import VehicleMode
 
-PYTHON = os.environ.get("AERODAAS_DJITELLOPY", "")
+PYTHON = peer("AERODAAS_DJITELLOPY")
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(not PYTHON, reason="AERODAAS_DJITELLOPY names no Python with djitellopy"),
+    needs_peer("AERODAAS_DJITELLOPY"),
     pytest.mark.wall_clock,
 ]
 

@@ -9,7 +9,6 @@ MAVSDK lives in an environment of its own, named by its Python::
 from __future__ import annotations
 
 import json
-import os
 import socket
 import subprocess
 from pathlib import Path
@@ -17,14 +16,15 @@ from typing import Literal
 
 import pytest
 from autopilot_facts import VERSIONS
+from required import needs_peer, peer
 
 from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot
 
-PYTHON = os.environ.get("AERODAAS_MAVSDK", "")
+PYTHON = peer("AERODAAS_MAVSDK")
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(not PYTHON, reason="AERODAAS_MAVSDK names no Python with MAVSDK"),
+    needs_peer("AERODAAS_MAVSDK"),
     pytest.mark.wall_clock,
 ]
 
