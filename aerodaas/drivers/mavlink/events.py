@@ -22,8 +22,9 @@ def event_number(name: str) -> int:
     return 1 << 24 | digest & 0xFFFFFF
 
 
+_CHECKS = {event_number(f"check_{name}"): words for name, words in CHECKS.items()}
 _TEXTS = {
-    **{event_number(f"check_{name}"): words for name, words in CHECKS.items()},
+    **_CHECKS,
     **{event_number(f"commander_{name}"): words for name, words in COMMANDER.items()},
 }
 _OF_THE_MODE = frozenset(
@@ -71,7 +72,8 @@ class EventReader:
             self._report = []
             return None
         if number == _END:
-            self.objections = tuple(dict.fromkeys(self._report or ()))
+            if self._report is not None:
+                self.objections = tuple(dict.fromkeys(self._report))
             self._report = None
             return None
         severity = log_levels & 0x0F
@@ -82,4 +84,5 @@ class EventReader:
             # What a check objects to is for who wants to take off; in flight it is told by health.
             self._report.append(text or f"a check that is not known here (event {number:#010x})")
             return None
-        return None if text is None else Said(text, severity)
+        # A check outside a report is of one whose beginning got lost.
+        return None if text is None or number in _CHECKS else Said(text, severity)

@@ -12,7 +12,9 @@ __all__ = ["Health"]
 _STANDS = 1.0
 """Seconds for which something must be wrong before it is told: estimators change their minds."""
 _SILENT = 4.0
-"""Seconds without a word of the GPS, which speaks twice a second, after which it is silent."""
+"""Seconds in which others spoke and the GPS, which speaks twice a second, did not."""
+_GAP = 1.0
+"""Seconds between two messages that count at most: the rest is the link's silence, nobody's own."""
 _FIX = 3
 """GPS fix types from this one on are positions in space."""
 _UNSURE = (100, 50, 20, 10, 5)
@@ -77,7 +79,8 @@ class Health:
     def __init__(self) -> None:
         self._complaints: dict[str, _Complaint] = {}
         self._fixed_at = -math.inf
-        self._gps_at = -math.inf
+        self._heard_at: float | None = None
+        self._gps_silence = 0.0
         self._clipped: int | None = None
         self._takers = {
             "GPS_RAW_INT": self._gps,
@@ -89,7 +92,10 @@ class Health:
         }
 
     def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Take note of a message."""
+        """Take note of a message, of whatever kind."""
+        if self._heard_at is not None:
+            self._gps_silence += min(now - self._heard_at, _GAP)
+        self._heard_at = now
         taker = self._takers.get(message.get_type())
         if taker is not None:
             taker(message, now)
@@ -97,7 +103,7 @@ class Health:
     def faults(self, now: float) -> list[str]:
         """What is wrong at `now`, one sentence each, its name first."""
         told = [one.text for one in self._complaints.values() if now - one.since >= _STANDS]
-        if math.isfinite(self._fixed_at) and now - self._gps_at > _SILENT:
+        if math.isfinite(self._fixed_at) and self._gps_silence > _SILENT:
             told.insert(0, "GPS: it has fallen silent")
         return list(dict.fromkeys(told))
 
@@ -120,7 +126,7 @@ class Health:
         self._complaints[name] = _Complaint(now if before is None else before.since, text)
 
     def _gps(self, message: Any, now: float) -> None:  # noqa: ANN401
-        self._gps_at = now
+        self._gps_silence = 0.0
         if message.fix_type >= _FIX:
             self._fixed_at = now
         # A vehicle that never had a fix flies by something else, or says itself why it does not.

@@ -119,11 +119,30 @@ def test_a_gps_that_says_nothing_more() -> None:
     health = Health()
     assert health.faults(100.0) == []
     health.take(gps(0), 100.0)
-    health.take(gps(0), 102.0)
+    others_speak(health, 100.0, 120.0)
     assert health.faults(120.0) == []
     health.take(gps(3), 121.0)
+    others_speak(health, 121.0, 124.9)
     assert health.faults(124.9) == []
+    others_speak(health, 124.9, 125.5)
     assert health.faults(125.5) == ["GPS: it has fallen silent"]
+
+
+def others_speak(health: Health, since: float, until: float) -> None:
+    """Ten messages a second that say nothing of the GPS."""
+    for tenth in range(int(since * 10) + 1, int(until * 10) + 1):
+        health.take(shaking(1.0), tenth / 10)
+
+
+def test_a_link_that_is_cut_is_no_silent_gps() -> None:
+    """While nothing is heard, and in the first moments after, the GPS is not blamed."""
+    health = Health()
+    health.take(gps(3), 10.0)
+    assert health.faults(40.0) == []
+    health.take(shaking(1.0), 40.0)
+    assert health.faults(40.5) == []
+    others_speak(health, 40.0, 44.0)
+    assert health.faults(44.0) == ["GPS: it has fallen silent"]
 
 
 def test_sensors_that_are_not_there_or_not_used_are_not_ill() -> None:
@@ -208,6 +227,15 @@ def test_px4_objects_to_what_hold_would_not_mend() -> None:
     telemetry.custom_mode = 4 << 16 | 3 << 24
     report(telemetry.events, "check_modes_offboard_signal")
     assert px4.objections(telemetry, 0.0) == ["its present mode needs setpoints"]
+
+
+def test_a_report_of_checks_whose_beginning_got_lost_is_none() -> None:
+    """What the checks object to is for take-offs; alone, it is no news of a flight."""
+    events = EventReader()
+    report(events, "check_mag_missing")
+    assert events.take(event_number("check_modes_offboard_signal"), 3, next(SEQUENCE)) is None
+    events.take(event_number("commander_health_summary"), 3, next(SEQUENCE))
+    assert events.objections == ("compass: missing",)
 
 
 def test_events_are_told_in_words_or_not_at_all() -> None:
