@@ -18,6 +18,7 @@ from aerodaas.records import travels
 __all__ = [
     "Capabilities",
     "ClockedVehicle",
+    "FlightEnd",
     "PlayedVehicle",
     "PositionSetpoint",
     "Setpoint",
@@ -45,6 +46,17 @@ class VehicleMode(str, enum.Enum):
     """The vehicle's own protection has taken over; we must not send."""
     LOST = "lost"
     """No word from the vehicle within its link time-out."""
+
+
+class FlightEnd(str, enum.Enum):
+    """How a flight ended, by the word of a driver that can tell."""
+
+    LANDED = "landed"
+    """It came down gently and stands, asked to or by itself, at whatever height."""
+    FELL = "fell"
+    """Its motors stopped in the air, or it hit the ground."""
+    UNHEARD = "unheard"
+    """It came down while nothing was heard of it, and stands."""
 
 
 @travels
@@ -107,6 +119,8 @@ class VehicleState:
     """What the vehicle complains about at present, one sentence each."""
     extra: dict[str, float] = field(default_factory=dict)
     """Further figures by name in SI units, such as temperature or link quality."""
+    ended: FlightEnd | None = None
+    """How the latest flight ended; None before and during one, and if the driver cannot tell."""
 
 
 @runtime_checkable

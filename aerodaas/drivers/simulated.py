@@ -119,6 +119,7 @@ class SimulatedVehicle:
             self._noise.gps(motion, self._origin) if self._origin else None,
             exact,
             tuple(self._faults()),
+            ended=self._autopilot.ended,
         )
 
     def _faults(self) -> list[str]:

@@ -299,10 +299,14 @@ class Mission:
                 self._to(MissionState.LANDED, reason)
             return True
         east, north, up = self._motors.place
-        what = "landed of its own accord" if motors is Motors.LANDED else "motors stopped in flight"
-        text = f"{what} at E {east:.1f}, N {north:.1f}, up {up:.1f} m"
+        where = f"at E {east:.1f}, N {north:.1f}, up {up:.1f} m"
+        if motors is Motors.LANDED:
+            why = f": {'; '.join(state.faults)}" if state.faults else ""
+            kind, text = "landed", f"landed of its own accord {where}{why}"
+        else:
+            kind, text = "motors_stopped", f"motors stopped in flight {where}"
         self._to(MissionState.ABORTED, text)
-        self._log.alert(self._now, "motors_stopped", text)
+        self._log.alert(self._now, kind, text)
         return True
 
     def _preflight(self, state: VehicleState, objections: Sequence[str]) -> Action:
@@ -329,10 +333,13 @@ class Mission:
     def _protect(self, state: VehicleState) -> None:
         before = {_subject(finding) for finding in self._assessment.findings}
         self._assessment = self._supervisor.assess(state, self._now)
-        for finding in self._assessment.findings:
-            if _subject(finding) not in before:
-                self._log.alert(self._now, finding.kind, finding.text)
         demand, reason = self._assessment.demand, self._assessment.gravest.text
+        for finding in self._assessment.findings:
+            # A takeover, or the loss of the position, names the faults that it comes from.
+            named = demand is not Demand.NOTHING and finding.text in reason
+            told = named and finding.kind == "vehicle"
+            if _subject(finding) not in before and not told:
+                self._log.alert(self._now, finding.kind, finding.text)
         if demand is Demand.RELEASE:
             self._to(MissionState.ABORTED, reason)
         elif demand is Demand.LAND and self.state is not MissionState.LANDING:

@@ -10,7 +10,7 @@ import numpy as np
 from aerodaas.clock import NANOSECONDS
 from aerodaas.geometry import Vector
 from aerodaas.navigation.supervisor import has_position
-from aerodaas.vehicle import VehicleMode, VehicleState
+from aerodaas.vehicle import FlightEnd, VehicleMode, VehicleState
 
 __all__ = ["MotorWatch", "Motors"]
 
@@ -45,11 +45,19 @@ class Motors(enum.Enum):
     STOPPED_IN_FLIGHT = enum.auto()
 
 
+_ENDS = {
+    FlightEnd.LANDED: Motors.LANDED,
+    FlightEnd.UNHEARD: Motors.LANDED,
+    FlightEnd.FELL: Motors.STOPPED_IN_FLIGHT,
+}
+
+
 class MotorWatch:
     """Follows one vehicle's motors from the ground to the ground.
 
-    A landing is what the vehicle itself calls a descent (or what it did while nothing was heard of
-    it), with no sinking faster than `_GENTLE` shortly before the motors stop and shortly after.
+    A driver that can tell how the flight ended is believed. For one that cannot, a landing is what
+    the vehicle itself calls a descent (or what it did while nothing was heard of it), with no
+    sinking faster than `_GENTLE` shortly before the motors stop and shortly after.
     """
 
     def __init__(self, home: Vector) -> None:
@@ -69,19 +77,13 @@ class MotorWatch:
         """Judge `state`, read at `now` (mission clock, nanoseconds)."""
         if state.mode is VehicleMode.LOST:
             self._unheard = True
-        elif self._falls(state):
-            self._state = Motors.STOPPED_IN_FLIGHT
+        elif self._state is not Motors.IDLE and _stands(state) and state.ended is not None:
+            self._state = _ENDS[state.ended]
         elif state.armed or state.mode is not VehicleMode.GROUNDED:
             self._run(state, now)
         elif self._state is not Motors.IDLE:
             self._state = self._stop(state, now)
         return self._state
-
-    def _falls(self, state: VehicleState) -> bool:
-        """Whether it was up when its motors stopped, and does not call itself grounded yet."""
-        running = self._state is Motors.RUNNING and self._lifted
-        stopped = state.mode is VehicleMode.FAILSAFE and not state.armed
-        return running and stopped and float(self.place[2] - self._home[2]) > _LIFTED
 
     def _run(self, state: VehicleState, now: int) -> None:
         self._state, self._mode, self._unheard = Motors.RUNNING, state.mode, False
@@ -112,3 +114,8 @@ class MotorWatch:
             return Motors.LANDED if stood_for >= _SETTLING else Motors.SETTLING
         waits = self._unheard and stood_for < _PLACING
         return Motors.SETTLING if waits else Motors.STOPPED_IN_FLIGHT
+
+
+def _stands(state: VehicleState) -> bool:
+    """Whether its motors stand, by its own word: an older flight's end says nothing before."""
+    return not state.armed and state.mode in {VehicleMode.GROUNDED, VehicleMode.FAILSAFE}

@@ -10,7 +10,7 @@ import numpy as np
 
 from aerodaas.data import Battery, GpsFix, Odometry
 from aerodaas.recording.reader import Recording
-from aerodaas.vehicle import VehicleMode, VehicleState
+from aerodaas.vehicle import FlightEnd, VehicleMode, VehicleState
 
 __all__ = ["odometry_of", "vehicle_states"]
 
@@ -37,7 +37,7 @@ def odometry_of(value: dict[str, Any] | None) -> Odometry | None:
 def _state(value: dict[str, Any]) -> VehicleState:
     odometry = odometry_of(value["odometry"])
     assert odometry is not None  # noqa: S101 - never null
-    battery, gps = value["battery"], value.get("gps")
+    battery, gps, ended = value["battery"], value.get("gps"), value.get("ended")
     return VehicleState(
         value["stamp"],
         odometry,
@@ -48,6 +48,7 @@ def _state(value: dict[str, Any]) -> VehicleState:
         odometry_of(value.get("truth")),
         tuple(value["faults"]),
         dict(value["extra"]),
+        FlightEnd(ended) if ended else None,
     )
 
 

@@ -10,7 +10,7 @@ from aerodaas.simulation.battery import FlightBattery, flight_power
 from aerodaas.simulation.dynamics import STEP, Multirotor, Triple
 from aerodaas.simulation.guidance import velocity_towards, yaw_rate_towards
 from aerodaas.simulation.noise import SensorNoise
-from aerodaas.vehicle import VehicleMode
+from aerodaas.vehicle import FlightEnd, VehicleMode
 
 __all__ = ["Autopilot", "FlightLimits", "Goto", "Steer"]
 
@@ -84,6 +84,8 @@ class Autopilot:
         self.mode = VehicleMode.GROUNDED
         self.armed = False
         self.crashed = False
+        self.ended: FlightEnd | None = None
+        """How the latest flight ended; None before and during one."""
         self.battery = FlightBattery(airframe)
         self._airframe = airframe
         self._rotor = rotor
@@ -94,6 +96,7 @@ class Autopilot:
         self._steps = 0
         self._spooling = 0.0
         self._grounded_for = 0.0
+        self._lifted = False
 
     @property
     def flying(self) -> bool:
@@ -105,6 +108,7 @@ class Autopilot:
         x, y, z = self._home = self._believed()
         self.armed = True
         self.mode = VehicleMode.TAKING_OFF
+        self.ended, self._lifted = None, False
         self._spooling = _SPOOL_UP
         self._grounded_for = 0.0
         self._target = Goto((x, y, z + height), self._believed_yaw(), self._limits.cruise)
@@ -190,7 +194,7 @@ class Autopilot:
             self._change_mode_on_ground()
             mode = self.mode
         else:
-            self._grounded_for = 0.0
+            self._grounded_for, self._lifted = 0.0, True
         if mode is VehicleMode.TAKING_OFF and self._arrived():
             self.hold()
         elif mode is VehicleMode.RETURNING and self._arrived():
@@ -227,3 +231,5 @@ class Autopilot:
             self.armed = False
             self.mode = VehicleMode.GROUNDED
             self._target = None
+            if self._lifted:
+                self.ended = FlightEnd.FELL if self.crashed else FlightEnd.LANDED

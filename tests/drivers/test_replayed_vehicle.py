@@ -15,7 +15,7 @@ from aerodaas.plugins import load_plugin
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.status import Message, MissionState, MissionStatus
-from aerodaas.vehicle import PlayedVehicle, VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.vehicle import FlightEnd, PlayedVehicle, VehicleMode, VehicleState, VelocitySetpoint
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 STEP = 50_000_000
@@ -36,6 +36,7 @@ def state(number: int) -> VehicleState:
         truth=odometry,
         faults=("cold",),
         extra={"link": third},
+        ended=FlightEnd.LANDED if number < 3 else None,
     )
 
 

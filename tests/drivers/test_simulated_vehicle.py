@@ -14,6 +14,7 @@ from aerodaas.config import EnvironmentConfig, HomeConfig, RobotConfig, Simulati
 from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.errors import ClockError, ConfigError, InvalidWaypointError, VehicleError
 from aerodaas.vehicle import (
+    FlightEnd,
     PositionSetpoint,
     SteppedVehicle,
     VehicleMode,
@@ -84,6 +85,7 @@ def test_a_flight_from_the_ground_and_back() -> None:
     flight.until(VehicleMode.LANDING)
     state = flight.until(VehicleMode.GROUNDED)
     assert not state.armed
+    assert state.ended is FlightEnd.LANDED
     assert state.faults == ()
     assert state.odometry.height == 0.0
     assert state.odometry.position[:2] == pytest.approx(np.zeros(2), abs=0.3)
@@ -170,6 +172,21 @@ def test_a_low_battery_refuses_take_off_and_lands_by_itself() -> None:
     assert not flight.until(VehicleMode.GROUNDED).armed
 
 
+def test_how_a_flight_ended_is_said_when_it_has() -> None:
+    """Not before, not in the next one, and not of one that never lifted."""
+    flight = Flight()
+    assert flight.fly(0.1).ended is None
+    flight.vehicle.take_off(2.0)
+    flight.vehicle.land()
+    assert flight.until(VehicleMode.GROUNDED).ended is None
+    flight.vehicle.take_off(2.0)
+    assert flight.until(VehicleMode.HOLDING).ended is None
+    flight.vehicle.land()
+    assert flight.until(VehicleMode.GROUNDED).ended is FlightEnd.LANDED
+    flight.vehicle.take_off(2.0)
+    assert flight.fly(0.1).ended is None
+
+
 def test_an_empty_battery_falls_down() -> None:
     """Without charge there is no thrust, and the crash is told."""
     settings_ = {"battery": 0.004, "battery_minimum": 0.0, "battery_failsafe": 0.0}
@@ -177,6 +194,7 @@ def test_an_empty_battery_falls_down() -> None:
     flight.vehicle.take_off(20.0)
     state = flight.until(VehicleMode.GROUNDED)
     assert any("hit the ground" in fault for fault in state.faults)
+    assert state.ended is FlightEnd.FELL
     assert "crashed" in flight.vehicle.preflight()
 
 

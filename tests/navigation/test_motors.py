@@ -15,7 +15,7 @@ from aerodaas.data import Battery, Odometry
 from aerodaas.navigation.commands import End, Pause, ReturnHome, StreamItem
 from aerodaas.navigation.motors import Motors, MotorWatch
 from aerodaas.status import MissionState as S
-from aerodaas.vehicle import VehicleMode, VehicleState
+from aerodaas.vehicle import FlightEnd, VehicleMode, VehicleState
 from aerodaas.waypoints import AeroNavigation, NavigationType, VelocityCommand, Waypoint
 
 
@@ -81,15 +81,55 @@ def test_a_fall_that_the_vehicle_knows_of_is_no_takeover(lost: bool) -> None:  #
     one.run(12.0)
     one.vehicle.lost = lost
     one.run(0.5)
-    falling = replace(one.vehicle.read(), mode=VehicleMode.FAILSAFE, armed=False)
+    falling = replace(
+        one.vehicle.read(), mode=VehicleMode.FAILSAFE, armed=False, ended=FlightEnd.FELL
+    )
     one.vehicle.read = lambda: falling  # type: ignore[method-assign]
     one.turn()
     aborted_in_flight(one)
     assert [alert.kind for alert in one.mission.alerts][-1] == "motors_stopped"
 
 
+def test_a_vehicle_that_lands_by_itself_on_higher_ground_did_not_fall() -> None:
+    """The driver's word decides, not the height; why it landed is told, and that once."""
+    one = flight(add(Waypoint("far", 60, 0, 4.0)))
+    one.run(12.0)
+    hot = "it is hot inside: 90 °C"
+    stands = replace(
+        one.vehicle.read(),
+        mode=VehicleMode.FAILSAFE,
+        armed=False,
+        ended=FlightEnd.LANDED,
+        faults=(hot,),
+    )
+    assert stands.odometry.height > 1.0
+    one.vehicle.read = lambda: stands  # type: ignore[method-assign]
+    one.run(3.0)
+    one.expect(S.ABORTED)
+    assert one.status.reason.startswith("landed of its own accord at E ")
+    assert one.status.reason.endswith(f"m: {hot}")
+    assert [alert.text for alert in one.mission.alerts] == [one.status.reason]
+
+
+def test_the_word_of_the_driver_decides() -> None:
+    """A landing however fast, a fall however gentle; how an older flight ended says nothing."""
+    for ended, verdict in (
+        (FlightEnd.LANDED, Motors.LANDED),
+        (FlightEnd.FELL, Motors.STOPPED_IN_FLIGHT),
+    ):
+        watch = MotorWatch(np.zeros(3))
+        older = replace(seen(0.0, 0.0, VehicleMode.GROUNDED, armed=False), ended=ended)
+        assert watch.observe(older, 0) is Motors.IDLE
+        for mode in (VehicleMode.TAKING_OFF, VehicleMode.HOLDING):
+            climbing = replace(seen(2.0, 0.0, mode, armed=False), ended=ended)
+            assert watch.observe(climbing, 1) is Motors.RUNNING
+        speed = -0.5 if ended is FlightEnd.FELL else -4.0
+        watch.observe(seen(1.0, speed, VehicleMode.LANDING, armed=True), 2)
+        assert watch.observe(older, 3) is verdict
+
+
 def test_a_failsafe_says_what_it_is_for() -> None:
-    """The vehicle's complaints are in the reason; a low one that landed itself did not fall."""
+    """The vehicle's complaints are in the reason."""
     one = flight(add(*square()))
     one.run(12.0)
     one.vehicle.faults = ("battery: critical", "GPS: no fix")
@@ -98,11 +138,7 @@ def test_a_failsafe_says_what_it_is_for() -> None:
     one.expect(S.ABORTED)
     said = "the vehicle's own protection has taken over: battery: critical; GPS: no fix"
     assert one.status.reason == said
-    watch = MotorWatch(np.zeros(3))
-    for height in (1.0, 0.5, 0.1):
-        watch.observe(seen(height, -0.3, VehicleMode.HOLDING, armed=True), 0)
-    stood = watch.observe(seen(0.0, 0.0, VehicleMode.FAILSAFE, armed=False), NANOSECONDS)
-    assert stood is not Motors.STOPPED_IN_FLIGHT
+    assert [alert.text for alert in one.mission.alerts] == [said]
 
 
 @pytest.mark.parametrize("state", [S.ENROUTE, S.PAUSED])

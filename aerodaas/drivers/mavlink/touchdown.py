@@ -1,7 +1,8 @@
 """Whether motors that stopped did so on the ground, or in the air.
 
 An autopilot calls a disarmed vehicle landed, wherever it is. So a landing is one only if the
-vehicle was seen to stand; what was moving, or had not begun to land, falls.
+vehicle was seen to stand; what was moving, or had not begun to land, falls. What came down while
+nothing was heard is not thought to have fallen.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 
 from aerodaas.drivers.mavlink.phase import FlightMode
+from aerodaas.vehicle import FlightEnd
 
 __all__ = ["Touchdown"]
 
@@ -24,6 +26,8 @@ _NEAR = 1.0
 """Metres above the place of arming at which a return may have ended."""
 _FRESH = 1.0
 """Seconds for which a position says something of the present."""
+_LATE = 2.5
+"""Seconds by which the HEARTBEAT that tells of motors may come late: one of them may be lost."""
 _SAID = 1.8
 """Seconds of its own word for it to stand though its estimate moves: who is stopped in the air says
 so too, but is heard to be disarmed within a second."""
@@ -31,7 +35,6 @@ _FALLS = 2.0
 """m/s downwards at which it does not stand, whatever it says."""
 _FALLEN = 10.0
 """Seconds after which whatever fell lies."""
-_LANDINGS = frozenset({FlightMode.LAND, FlightMode.RETURN})
 
 
 class Touchdown:
@@ -42,6 +45,8 @@ class Touchdown:
         """What to tell of the latest flight's end, until motors start again."""
         self.falling = False
         """Motors stopped in the air, and it does not lie yet."""
+        self.ended: FlightEnd | None = None
+        """How the latest flight ended; None before and during one."""
         self.flew = False
         """Whether it has left the ground since motors started."""
         self._armed: bool | None = None
@@ -51,7 +56,9 @@ class Touchdown:
         self._up = math.nan
         self._ground = math.nan
         self._still_since = math.inf
-        self._moved_at = -math.inf
+        self._moved_at = self._back_at = self._fell_at = -math.inf
+        self._unheard_at = -math.inf
+        """When it was found disarmed, after a time in which nobody heard it."""
         self._rise = 0.0
         self._stopped_at = -math.inf
         self._blind = False
@@ -59,6 +66,12 @@ class Touchdown:
 
     def move(self, up: float, rise: float, speed: float, now: float) -> None:
         """Take note of a position: `up` metres, rising at `rise`, moving at `speed` in all."""
+        if now - self._moved_at > _FRESH:
+            self._back_at = now
+        if rise < -_FALLS:
+            self._fell_at = now
+            if now - self._unheard_at < _LATE:
+                self._fall()
         stands = abs(rise) < _SINKING and speed < _MOVING
         self._still_since = min(self._still_since, now) if stands else math.inf
         self._up, self._rise, self._moved_at = up, rise, now
@@ -78,9 +91,10 @@ class Touchdown:
                 self.flew = self._armed is None and self._on_ground is not True
                 self._ground = self._up
                 self.fault, self.falling, self._blind = "", False, False
+                self.ended, self._unheard_at = None, -math.inf
             self._mode, self._stopped_at = mode, now
-        elif self._armed and self.flew and not self._stands(now):
-            self._fall()
+        elif self._armed and self.flew:
+            self._end(now)
         self._armed = armed
 
     def restart(self, now: float) -> None:
@@ -90,8 +104,17 @@ class Touchdown:
             self._stopped_at = now
         self._armed, self._blind = False, True
 
+    def _end(self, now: float) -> None:
+        unheard = now - self._moved_at > _FRESH or now - self._back_at < _LATE
+        if unheard and now - self._fell_at > _LATE:
+            self.ended, self._unheard_at = FlightEnd.UNHEARD, now
+        elif self._stands(now):
+            self.ended = FlightEnd.LANDED
+        else:
+            self._fall()
+
     def _fall(self) -> None:
-        self.falling = True
+        self.falling, self.ended, self._unheard_at = True, FlightEnd.FELL, -math.inf
         self._still_since = math.inf
         height = self._up - self._ground
         where = f", {height:.0f} m above where they started" if math.isfinite(height) else ""
@@ -105,8 +128,8 @@ class Touchdown:
 
     def _stands(self, now: float) -> bool:
         """Whether it stood on the ground in the mode that it had when its motors stopped."""
-        if now - self._moved_at > _FRESH:
-            return self._mode in _LANDINGS and self._on_ground is not False
+        if now - self._fell_at < _LATE:
+            return False
         said = now - self._on_ground_since
         if now - self._still_since < _STILL:
             return said >= _SAID and self._rise > -_FALLS

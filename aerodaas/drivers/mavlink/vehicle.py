@@ -12,20 +12,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerodaas.clock import NANOSECONDS, Clock, ScaledClock
+from aerodaas.clock import Clock, ScaledClock
 from aerodaas.config import EnvironmentConfig, RobotConfig
-from aerodaas.data import Odometry
 from aerodaas.drivers.mavlink.commander import Commander, Outcome
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish
 from aerodaas.drivers.mavlink.departure import Departure
 from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.finder import Finder, Found
-from aerodaas.drivers.mavlink.frames import LocalFrame
 from aerodaas.drivers.mavlink.link import MavlinkLink, Message
 from aerodaas.drivers.mavlink.parameters import Parameters
 from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.plans import Item, Progress, download, upload
 from aerodaas.drivers.mavlink.rates import RateKeeper
+from aerodaas.drivers.mavlink.reporting import REASONS, Report
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
 from aerodaas.drivers.mavlink.steering import Steering
 from aerodaas.drivers.mavlink.telemetry import Telemetry
@@ -46,12 +45,6 @@ __all__ = ["MavlinkVehicle"]
 
 _log = logging.getLogger(__name__)
 
-_LOST_AFTER = 1.5
-"""Seconds without any word, of a vehicle that speaks 40 times a second."""
-_REASONS = 12.0
-"""Seconds that the autopilot's words may be old to count as the reason of a refusal."""
-_GRAVE = 3
-"""Severity of an error; smaller is graver."""
 _PARTING = 4.0
 """Seconds that `close` waits for a vehicle in the air to begin its landing, and for motors that may
 be starting to stand."""
@@ -86,6 +79,7 @@ class MavlinkVehicle:
         self._phase = FlightPhase()
         self._watchdog = Watchdog()
         self._touchdown = Touchdown()
+        self._report = Report(self._telemetry, self._phase, self._touchdown)
         self._steering = Steering(self._robot, self._settings)
         self._words: deque[str] = deque()
         self._finder = Finder(self._settings)
@@ -94,7 +88,6 @@ class MavlinkVehicle:
         self._rates: RateKeeper | None = None
         self._departure: Departure | None = None
         self._climb_place: Vector | None = None
-        self._restarted_text = ""
         self._left_alone: FlightMode | None = None
         self._checked_at = -math.inf
         self._told: VehicleMode | None = None
@@ -147,6 +140,7 @@ class MavlinkVehicle:
                     words=self._reasons,
                     land=lambda: self._change(FlightMode.LAND),
                 )
+                self._report.departure = self._departure
                 self._commander = commander
             self._connection = establish(
                 link,
@@ -159,6 +153,7 @@ class MavlinkVehicle:
                 home=self._home,
                 pause=self._pause,
             )
+            self._report.alignment = self._connection.alignment
         except BaseException:
             self.close()
             raise
@@ -209,73 +204,8 @@ class MavlinkVehicle:
         """Return the newest state; raise VehicleError if not connected."""
         self._watchdog.feed()
         with self._lock:
-            connection = self._connected()
-            now = time.monotonic()
-            telemetry, lost = self._telemetry, self._lost(now)
-            knows = telemetry.knows_place(now)
-            age = now - telemetry.position_at if knows or lost else 0.0
-            return VehicleState(
-                max(0, self._clock.now() - int(age * NANOSECONDS)),
-                self._odometry(connection.alignment.frame, known=knows or lost),
-                telemetry.battery,
-                VehicleMode.LOST if lost else self._mode(),
-                telemetry.armed,
-                telemetry.gps,
-                faults=tuple(self._faults(now)),
-                extra={
-                    "autopilot_time": telemetry.boot_time,
-                    "autopilot_clock": telemetry.clock,
-                    "damaged_packets": connection.link.counts.damaged,
-                    "foreign_packets": connection.link.counts.strangers,
-                    "silence": telemetry.silence(now),
-                },
-            )
-
-    def _odometry(self, frame: LocalFrame | None, *, known: bool) -> Odometry:
-        telemetry, attitude = self._telemetry, self._telemetry.attitude
-        position: Vector = np.full(3, np.nan)
-        if known and frame is not None and telemetry.position is not None:
-            position = frame.position(telemetry.position)
-        return Odometry(
-            position,
-            LocalFrame.velocity(telemetry.velocity),
-            attitude.yaw,
-            attitude.roll,
-            attitude.pitch,
-            attitude.yaw_rate,
-        )
-
-    def _mode(self) -> VehicleMode:
-        if self._touchdown.falling:
-            return VehicleMode.FAILSAFE
-        if self._phase.taken is None and self._departure is not None:
-            if self._departure.withdrawing:
-                return VehicleMode.LANDING
-            if self._departure.climbs:
-                return VehicleMode.TAKING_OFF
-        return self._phase.mode
-
-    def _lost(self, now: float) -> bool:
-        # Standing motors need no fresh telemetry to be believed: HEARTBEATs tell of them.
-        telemetry = self._telemetry
-        silence = telemetry.silence(now) if telemetry.armed else now - telemetry.heard_at
-        return silence > _LOST_AFTER
-
-    def _frozen(self, now: float) -> bool:
-        return self._lost(now) and now - self._telemetry.heard_at <= _LOST_AFTER
-
-    def _faults(self, now: float) -> list[str]:
-        telemetry = self._telemetry
-        faults = [self._restarted_text, self._touchdown.fault]
-        if self._frozen(now):
-            faults.append("telemetry: packets come, and say nothing new")
-        elif self._lost(now):
-            faults.append("no word from the vehicle")
-        if self._connection is not None:
-            faults.append(self._connection.alignment.fault)
-        faults += telemetry.health.faults(now)
-        faults += telemetry.texts.recent(now, _REASONS, _GRAVE)
-        return list(dict.fromkeys(fault for fault in faults if fault))
+            counts = self._connected().link.counts
+            return self._report.state(self._clock.now(), time.monotonic(), counts)
 
     def preflight(self) -> list[str]:
         """Reasons for which a take-off would be refused now; empty when ready."""
@@ -283,11 +213,11 @@ class MavlinkVehicle:
             if self._link is None or self._connection is None:
                 return ["not connected"]
             now = time.monotonic()
-            if self._lost(now):
+            if self._report.lost(now):
                 return [f"no word from the vehicle for {self._telemetry.silence(now):.0f} s"]
             reasons = []
             if self._phase.armed:
-                reasons.append(f"already {self._mode().value.replace('_', ' ')}")
+                reasons.append(f"already {self._report.mode.value.replace('_', ' ')}")
             elif self._connection.departure.withdrawing:
                 reasons.append("a take-off that was called off is not over yet")
             if not self._knows_place(now):
@@ -325,7 +255,7 @@ class MavlinkVehicle:
     def _reasons(self) -> list[str]:
         """The autopilot's own words about what it has just refused; in the link's thread."""
         now = time.monotonic()
-        said = self._telemetry.texts.recent(now, _REASONS)
+        said = self._telemetry.texts.recent(now, REASONS)
         if self._connection is not None and not said:
             said = self._connection.autopilot.objections(self._telemetry, now)
         return said
@@ -349,7 +279,7 @@ class MavlinkVehicle:
         frame = connection.alignment.frame if knows else None
         message, sent = self._steering.message(
             setpoint,
-            self._odometry(frame, known=True),
+            self._report.odometry(frame, known=True),
             frame,
             connection.target,
             now,
@@ -411,7 +341,7 @@ class MavlinkVehicle:
 
         def done(outcome: Outcome) -> None:
             if not (outcome.accepted or outcome.replaced) and phase.wish is wish:
-                said = "; ".join(self._telemetry.texts.recent(time.monotonic(), _REASONS))
+                said = "; ".join(self._telemetry.texts.recent(time.monotonic(), REASONS))
                 self._words.append(f"{order.what}: {outcome.text} {said}".rstrip())
 
         connection.commander.give(
@@ -472,7 +402,7 @@ class MavlinkVehicle:
         """The autopilot has started anew; its first words may already be known."""
         self._touchdown.restart(self._telemetry.heard_at)
         flew = self._touchdown.falling or bool(self._touchdown.fault)
-        self._restarted_text = f"autopilot: it started anew{' in flight' if flew else ''}"
+        self._report.restarted = f"autopilot: it started anew{' in flight' if flew else ''}"
         if self._connection is not None:
             self._connection.alignment.restart(stands=not flew)
             self._connection.departure.restart()
@@ -498,12 +428,12 @@ class MavlinkVehicle:
         phase.observe(shown, now, armed=telemetry.armed, critical=telemetry.critical)
         self._touchdown.observe(shown, now, armed=telemetry.armed)
         if telemetry.armed and not was_armed:
-            self._restarted_text = ""
+            self._report.restarted = ""
         if self._departure is not None:
             self._departure.observe(now, was_armed=was_armed)
         if phase.taken is not None and self._told is None:
             name = found.autopilot.mode_name(telemetry.custom_mode)
-            said = "; ".join(telemetry.texts.recent(now, _REASONS))
+            said = "; ".join(telemetry.texts.recent(now, REASONS))
             self._words.append(f"the mode is {name!r} now, not by us; {said}")
         self._told = phase.taken
 
@@ -534,7 +464,7 @@ class MavlinkVehicle:
         if goal is None or frame is None or not done or not self._watchdog.healthy(now):
             return
         if self._climb_place is None:
-            self._climb_place = self._odometry(frame, known=True).position
+            self._climb_place = self._report.odometry(frame, known=True).position
         rest = frame.position(np.array([0.0, 0.0, -goal]))[2]
         place = np.array([*self._climb_place[:2], rest])
         self._steer(PositionSetpoint(place, None, self._steering.climb_rate), connection, now)
@@ -562,7 +492,7 @@ class MavlinkVehicle:
     def _require_flight(
         self, deed: str, *, climbing: bool = False, landing: bool = False
     ) -> Connection:
-        connection, mode = self._connected(), self._mode()
+        connection, mode = self._connected(), self._report.mode
         if mode is VehicleMode.MANUAL:
             raise VehicleError(f"{self._name} cannot {deed}: a pilot flies it")
         if mode is VehicleMode.FAILSAFE:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from aerodaas.drivers.tello.state import TelloState
-from aerodaas.vehicle import VehicleMode
+from aerodaas.vehicle import FlightEnd, VehicleMode
 
 __all__ = ["LIFTED", "FlightPhase"]
 
@@ -23,6 +23,10 @@ _HOVERS = 10
 its reply was lost."""
 _CALM = 0.1
 """m/s."""
+_FALLING = 2.0
+"""m/s downwards that no Tello descends at by itself."""
+_LOOKED_AT = 4.0
+"""Seconds before it counts as standing in which a fall would show: its motors' clock tells late."""
 _NO_LIFT = 12.0
 """Seconds after a take-off's request within which it must have lifted."""
 
@@ -37,6 +41,10 @@ class FlightPhase:
         """In a take-off: the Tello has done its own part of it and hovers."""
         self.refusal = ""
         """Why the latest take-off came to nothing."""
+        self.ended: FlightEnd | None = None
+        """How the latest flight ended; None before and during one."""
+        self._lifted = False
+        self._fell_at = -math.inf
         self._since = -math.inf
         self._patience = _MOTORS_STOPPED
         self._calm = 0
@@ -53,6 +61,12 @@ class FlightPhase:
         """True if it can be flown by setpoints."""
         return self.mode in {VehicleMode.HOLDING, VehicleMode.GUIDED}
 
+    @property
+    def outcome(self) -> str:
+        """What became of a flight that nobody ended, in words."""
+        fell = self.ended is FlightEnd.FELL
+        return "its motors have stopped in flight" if fell else "it has landed by itself"
+
     def to(self, mode: VehicleMode, now: float) -> None:
         """Change to `mode` by request, at `now` seconds."""
         off = mode is VehicleMode.LANDING and self.mode is VehicleMode.TAKING_OFF and not self.risen
@@ -62,6 +76,10 @@ class FlightPhase:
         self._calm = 0
         if mode is VehicleMode.TAKING_OFF:
             self.refusal = ""
+            self._depart()
+
+    def _depart(self) -> None:
+        self.ended, self._lifted, self._fell_at = None, False, -math.inf
 
     def rose(self, refusal: str = "") -> None:
         """The Tello has answered to `takeoff`: it hovers, or it gives a reason."""
@@ -78,10 +96,14 @@ class FlightPhase:
         if self._motor_time is not None and state.motor_time != self._motor_time:
             self._ticked_at = now
         self._motor_time = state.motor_time
+        if state.velocity[2] > _FALLING:
+            self._fell_at = now
         turning = now - self._ticked_at < _MOTORS_STOPPED
         if turning and state.height >= LIFTED:
             if self.mode is VehicleMode.GROUNDED:
                 self.mode = VehicleMode.HOLDING
+                self._depart()
+            self._lifted = True
             self._calm = self._calm + 1 if abs(state.velocity[2]) <= _CALM else 0
             if self._calm >= _HOVERS:
                 self.rose()
@@ -90,9 +112,15 @@ class FlightPhase:
         if not standing or now - self._since < self._patience:
             return
         if self.mode is VehicleMode.LANDING:
-            self.mode = VehicleMode.GROUNDED
+            self._end(VehicleMode.GROUNDED, now)
         elif self.mode is VehicleMode.TAKING_OFF and now - self._since > _NO_LIFT:
             self.rose(refusal="it did not lift; is there room and light below it?")
         elif self.steered:
             # Low battery, too hot, or held for too long without a command: nobody asked for it.
-            self.mode = VehicleMode.FAILSAFE
+            self._end(VehicleMode.FAILSAFE, now)
+
+    def _end(self, mode: VehicleMode, now: float) -> None:
+        self.mode = mode
+        if self._lifted:
+            fell = now - self._fell_at < _LOOKED_AT
+            self.ended = FlightEnd.FELL if fell else FlightEnd.LANDED

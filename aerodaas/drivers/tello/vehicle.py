@@ -191,6 +191,7 @@ class TelloVehicle:
                     "stray_replies": counts.stray_replies,
                     "unanswered_commands": counts.timeouts,
                 },
+                ended=self._phase.ended,
             )
 
     def preflight(self) -> list[str]:
@@ -202,7 +203,7 @@ class TelloVehicle:
             if time.monotonic() - self._heard_at > _LOST_AFTER:
                 reasons.append("no word from the Tello")
             if self._phase.mode is VehicleMode.FAILSAFE:
-                reasons.append("it has landed by itself; connect again")
+                reasons.append(f"{self._phase.outcome}; connect again")
             elif self._phase.airborne:
                 reasons.append(f"already {self._phase.mode.value.replace('_', ' ')}")
             charge, needed = self._gauge.battery.fraction, self._settings.battery_minimum
@@ -385,8 +386,6 @@ class TelloVehicle:
         faults = []
         if silence > _LOST_AFTER:
             faults.append(f"no state packet for {silence:.0f} s")
-        if self._phase.mode is VehicleMode.FAILSAFE:
-            faults.append("the Tello has landed by itself")
         if latest.temperature >= _HOT:
             faults.append(f"it is hot inside: {latest.temperature:.0f} °C")
         charge = self._gauge.battery.fraction
@@ -402,7 +401,7 @@ class TelloVehicle:
     def _require_flight(self, deed: str) -> TelloLink:
         link, mode = self._connected(), self._phase.mode
         if mode is VehicleMode.FAILSAFE:
-            raise VehicleError(f"{self._name} cannot {deed}: it has landed by itself")
+            raise VehicleError(f"{self._name} cannot {deed}: {self._phase.outcome}")
         if mode is VehicleMode.GROUNDED:
             raise VehicleError(f"{self._name} cannot {deed} on the ground; take off first")
         if not self._phase.steered:

@@ -26,7 +26,7 @@ from aerodaas.recording.converters.base import (
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.rotation import from_rpy
 from aerodaas.status import Message, SetpointRecord
-from aerodaas.vehicle import PositionSetpoint, Setpoint, VehicleState
+from aerodaas.vehicle import FlightEnd, PositionSetpoint, Setpoint, VehicleState
 
 __all__ = ["body_frame", "odometry_json"]
 
@@ -43,6 +43,7 @@ STATE = json_schema(
     odometry="object",
     faults="array",
     extra="object",
+    ended={"enum": [*FlightEnd, None]},
 )
 BATTERY = json_schema(
     "Battery",
@@ -101,6 +102,7 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
         "odometry": odometry_json(item.odometry),
         "faults": item.faults,
         "extra": item.extra,
+        "ended": item.ended,
     }
     if item.gps is not None:
         state["gps"] = item.gps

@@ -16,7 +16,13 @@ from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.telemetry import Telemetry
 from aerodaas.errors import VehicleError
 from aerodaas.testing.mavlink import AutopilotOptions
-from aerodaas.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.vehicle import (
+    FlightEnd,
+    PositionSetpoint,
+    VehicleMode,
+    VehicleState,
+    VelocitySetpoint,
+)
 
 THERE = np.array([6.0, 3.0, 12.0])
 
@@ -51,6 +57,7 @@ def test_motors_stopped_in_the_air_are_no_landing(world: Stepped) -> None:
     while state.armed:
         state = world.turn()
     assert state.mode is VehicleMode.FAILSAFE
+    assert state.ended is FlightEnd.FELL
     assert told(state, "motors: stopped in flight")
     with pytest.raises(VehicleError, match="own protection"):
         world.vehicle.send(VelocitySetpoint(np.zeros(3)))
@@ -86,6 +93,7 @@ def test_a_landing_is_one(world: Stepped) -> None:
     while state.armed:
         state = world.turn()
     assert state.mode is VehicleMode.GROUNDED
+    assert state.ended is FlightEnd.LANDED
     assert state.faults == ()
 
 
@@ -99,7 +107,8 @@ def test_an_autopilot_that_starts_anew_in_flight(world: Stepped) -> None:
     assert not any(state.armed for state in states if state.mode is VehicleMode.FAILSAFE)
     assert told(states[-1], "autopilot: it started anew in flight")
     lying = world.autopilot.truth.position
-    for state in states[20:]:
+    # A moment ago it was up there; that is told with its age until it speaks again.
+    for state in states[32:]:
         position = state.odometry.position
         assert not np.isfinite(position).all() or np.allclose(position, lying, atol=1.0)
     assert states[-1].odometry.position == pytest.approx(lying, abs=1.0)

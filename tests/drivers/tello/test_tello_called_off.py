@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import pytest
 from tello_flights import flight
@@ -10,7 +11,7 @@ from tello_flights import flight
 from aerodaas.drivers.tello.phase import FlightPhase
 from aerodaas.drivers.tello.state import TelloState
 from aerodaas.testing.tello import Impairment, TelloOptions
-from aerodaas.vehicle import VehicleMode
+from aerodaas.vehicle import FlightEnd, VehicleMode
 
 
 def standing(motor_time: float = 0.0) -> TelloState:
@@ -40,6 +41,39 @@ def test_a_landing_after_a_flight_is_told_as_soon_as_it_stands() -> None:
     phase.to(VehicleMode.LANDING, 110.0)
     phase.observe(standing(9.0), 111.6)
     assert phase.mode is VehicleMode.GROUNDED
+
+
+@pytest.mark.parametrize(
+    ("sinking", "ended", "words"),
+    [(0.4, FlightEnd.LANDED, "landed by itself"), (3.5, FlightEnd.FELL, "stopped in flight")],
+)
+def test_how_a_flight_ended(sinking: float, ended: FlightEnd, words: str) -> None:
+    """By itself on a table it has landed; with motors cut it has fallen."""
+    phase = FlightPhase()
+    phase.to(VehicleMode.TAKING_OFF, 100.0)
+    phase.observe(replace(standing(0.0), height=1.5, ground_distance=1.6), 100.0)
+    phase.observe(replace(standing(1.0), height=1.5, ground_distance=1.6), 101.0)
+    phase.to(VehicleMode.HOLDING, 102.0)
+    down = replace(standing(2.0), velocity=(0.0, 0.0, sinking), height=1.0)
+    phase.observe(down, 102.1)
+    for tenth in range(40):
+        on_a_table = replace(standing(2.0), height=0.8)
+        phase.observe(on_a_table, 102.2 + tenth / 10)
+    assert (phase.mode, phase.ended) == (VehicleMode.FAILSAFE, ended)
+    assert words in phase.outcome
+    phase.to(VehicleMode.TAKING_OFF, 110.0)
+    assert (phase.mode, phase.ended) == (VehicleMode.TAKING_OFF, None)
+
+
+def test_what_never_lifted_has_not_landed() -> None:
+    """A take-off that was called off is no flight."""
+    never_lifted = FlightPhase()
+    never_lifted.to(VehicleMode.TAKING_OFF, 200.0)
+    never_lifted.to(VehicleMode.LANDING, 200.3)
+    for tenth in range(60):
+        never_lifted.observe(standing(2.0), 200.4 + tenth / 10)
+    assert never_lifted.mode is VehicleMode.GROUNDED
+    assert never_lifted.ended is None
 
 
 @pytest.mark.slow
