@@ -136,11 +136,8 @@ arm_denied_resolve_failures: it does not arm before its checks pass
 arm_denied_throttle_center: it does not arm: the throttle is not in the middle
 arm_denied_throttle_high: it does not arm: the throttle is up
 disarm_denied_not_landed: it does not stop its motors in the air
-failsafe_enter: its own protection is at work
-failsafe_enter_autopilot_disengaged: its own protection is at work
 failsafe_enter_crit_bat_warn: battery: critical
 failsafe_enter_crit_low_bat_warn: battery: critical
-failsafe_enter_generic: its own protection is at work
 failsafe_enter_generic_hold: its own protection holds it
 failsafe_enter_generic_warn: its own protection warns
 failsafe_enter_hold: its own protection holds it
@@ -168,4 +165,4 @@ def _table(lines: str) -> dict[str, str]:
 CHECKS = _table(_CHECKS)
 """Of the arming and health checks, `check_…`."""
 COMMANDER = _table(_COMMANDER)
-"""Of the commander itself, `commander_…`."""
+"""Of the commander itself, `commander_…`; that its protection takes over is known by its mode."""

@@ -82,6 +82,8 @@ class Health:
         self._heard_at: float | None = None
         self._gps_silence = 0.0
         self._clipped: int | None = None
+        self._charges_told = False
+        """The batteries speak for themselves."""
         self._takers = {
             "GPS_RAW_INT": self._gps,
             "ESTIMATOR_STATUS": self._estimator,
@@ -171,6 +173,7 @@ class Health:
 
     def _battery(self, message: Any, now: float) -> None:  # noqa: ANN401
         name = f"battery {message.id + 1}" if message.id else "battery"
+        self._charges_told |= message.charge_state != mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED
         said = [_CHARGES[message.charge_state]] if message.charge_state in _CHARGES else []
         said += [text for bit, text in _BATTERY_FAULTS.items() if message.fault_bitmask & bit]
         self._note(name, f"{name}: {', '.join(said)}" if said else "", now)
@@ -191,6 +194,8 @@ class Health:
             & message.onboard_control_sensors_enabled
             & ~message.onboard_control_sensors_health
         )
+        if self._charges_told:
+            bad &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
         for bit, name in _SENSORS.items():
             self._note(f"sensor {name}", f"{name}: unhealthy" if bad & bit else "", now)
 

@@ -229,6 +229,17 @@ def test_px4_objects_to_what_hold_would_not_mend() -> None:
     assert px4.objections(telemetry, 0.0) == ["its present mode needs setpoints"]
 
 
+@pytest.mark.parametrize(("charge", "told"), [(2, "battery: low"), (0, "battery: unhealthy")])
+def test_a_battery_that_speaks_for_itself_is_told_once(charge: int, told: str) -> None:
+    """A low one is unhealthy to its autopilot, too; that is news only where nobody says why."""
+    health = Health()
+    bit = mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+    for second in range(4):
+        health.take(battery(charge), float(second))
+        health.take(status(bit, bit, 0), float(second))
+    assert health.faults(4.0) == [told]
+
+
 def test_a_report_of_checks_whose_beginning_got_lost_is_none() -> None:
     """What the checks object to is for take-offs; alone, it is no news of a flight."""
     events = EventReader()
@@ -242,10 +253,11 @@ def test_events_are_told_in_words_or_not_at_all() -> None:
     """No name of PX4's own reaches people, and nothing of an event without words."""
     assert all("_" not in words and words for words in (*CHECKS.values(), *COMMANDER.values()))
     telemetry = Telemetry()
-    for number, name in enumerate(("commander_failsafe_enter_generic", "no_such_thing")):
+    names = ("commander_kill_sw_engaged", "commander_failsafe_enter_generic", "no_such_thing")
+    for number, name in enumerate(names):
         event = mavlink.mavlink_map[410](0, 0, event_number(name), 0, number, 2, [0] * 40)
         telemetry.take(event, 1.0)
-    assert telemetry.texts.recent(1.0, 5.0) == ["its own protection is at work"]
+    assert telemetry.texts.recent(1.0, 5.0) == ["the kill switch was used"]
 
 
 def test_what_the_arming_checks_object_to_is_no_text_of_its_own() -> None:
