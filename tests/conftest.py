@@ -6,6 +6,7 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import required
@@ -23,18 +24,34 @@ def pytest_configure(config: pytest.Config) -> None:
     config.pluginmanager.register(required)
 
 
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:  # noqa: ANN401
+    """A file is one worker's, so that its fixtures are made once; so are all of tests/cluster.
+
+    Those make network namespaces with the same addresses.
+    """
+    from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415 - not every run has workers
+
+    scheduler = LoadScopeScheduling(config, log)
+    scheduler._split_scope = _worker_share  # as its own subclasses do
+    return scheduler
+
+
+def _worker_share(test: str) -> str:
+    """What goes to one worker together with `test`."""
+    file = test.partition("::")[0]
+    return "tests/cluster" if file.startswith("tests/cluster/") else file
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Order the files for parallel workers; run what met a busy machine once more, in CI only.
 
-    A file is one worker's, so that its fixtures are made once. Those without Ray come first: one
-    mistake in a function is told within seconds. Then come files with slow tests, so that no
-    worker is left with a long one at the end.
+    Those without Ray come first: one mistake in a function is told within seconds. Then come files
+    with slow tests, so that no worker is left with a long one at the end.
     """
     files: dict[str, list[pytest.Item]] = {}
     for item in items:
         files.setdefault(item.nodeid.partition("::")[0], []).append(item)
-        if item.get_closest_marker("xdist_group") is None:
-            item.add_marker(pytest.mark.xdist_group(item.nodeid.partition("::")[0]))
         if _CI and item.get_closest_marker("wall_clock"):
             item.add_marker(pytest.mark.flaky(reruns=1))
 

@@ -22,7 +22,7 @@ from aerodaas.cluster.trace import TracePlayer
 from aerodaas.errors import ConfigError
 from aerodaas.schedulers.lab.network import Network
 
-pytestmark = [pytest.mark.wall_clock, pytest.mark.xdist_group("namespaces")]
+pytestmark = pytest.mark.wall_clock
 
 ROOT = Path(__file__).resolve().parents[2]
 SLOW = [

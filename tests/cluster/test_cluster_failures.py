@@ -24,7 +24,6 @@ pytestmark = [
     pytest.mark.timeout(240),
     needs_root,
     pytest.mark.wall_clock,
-    pytest.mark.xdist_group("namespaces"),
 ]
 _HERE = Path(__file__).resolve().parent
 _ROOT = _HERE.parents[1]

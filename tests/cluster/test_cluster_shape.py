@@ -15,7 +15,7 @@ from aerodaas.cluster.relay import Wire
 from aerodaas.cluster.shape import Shape, parse_bandwidth, parse_time
 from aerodaas.errors import ConfigError
 
-pytestmark = [pytest.mark.wall_clock, pytest.mark.xdist_group("namespaces")]
+pytestmark = pytest.mark.wall_clock
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,6 @@ pytestmark = [
     needs_root,
     needs(shutil.which("openssl"), "install openssl"),
     pytest.mark.wall_clock,
-    pytest.mark.xdist_group("namespaces"),
 ]
 _ROOT = Path(__file__).resolve().parents[2]
 _CAMERA = {"id": "camera", "type": "camera", "driver": "glances:NoiseCamera", "rate": 5.0}

@@ -23,7 +23,6 @@ pytestmark = [
     needs_root,
     needs_peer("AERODAAS_SSHD"),
     pytest.mark.wall_clock,
-    pytest.mark.xdist_group("namespaces"),
 ]
 ROOT = Path(__file__).resolve().parents[2]
 CLUSTERS = ROOT / "clusters"

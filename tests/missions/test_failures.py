@@ -177,6 +177,7 @@ def test_killed_sensor_is_restarted(flyer: Flyer) -> None:
     assert "sensor/drone/cam is back after" in told["actor_back"]
 
 
+@pytest.mark.wall_clock
 def test_drone_actor_dies(flyer: Flyer) -> None:
     """Nobody can fly any more: the application ends with the reason, and nothing is left over."""
     with flyer.options(speed=5.0):

@@ -104,7 +104,9 @@ def test_order_of_boxes_does_not_matter(items: list[tuple[Any, ...]], random: An
     random.shuffle(shuffled)
     shift = box_shift([(found, shuffled)])
     assert shift.paired == len(found)
-    assert (shift.lost, shift.new, shift.most_pixels) == (0, 0, 0.0)
+    assert (shift.lost, shift.new) == (0, 0)
+    # Of boxes that differ by less than a number can tell, either may be taken for the other.
+    assert shift.most_pixels == pytest.approx(0.0, abs=1e-6)
 
 
 @given(boxes, boxes)
