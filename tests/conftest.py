@@ -37,9 +37,9 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:  # n
     return scheduler
 
 
-def _worker_share(test: str) -> str:
-    """What goes to one worker together with `test`."""
-    file = test.partition("::")[0]
+def _worker_share(nodeid: str) -> str:
+    """What goes to one worker together with this test."""
+    file = nodeid.partition("::")[0]
     return "tests/cluster" if file.startswith("tests/cluster/") else file
 
 
