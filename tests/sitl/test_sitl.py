@@ -131,8 +131,8 @@ def test_link_cut(autopilot: Autopilot, duration: float) -> None:
         flight.run(180.0, lambda: flight.mission.finished)
         ended = {S.LANDED, S.ABORTED}
         assert flight.mission.state in ended, flight.story
-        print(f"\nlink cut for {duration:g} s: {flight.story}")  # noqa: T201 - the result itself
         flight.wait_for_ground(240.0)
+        flight.tell_outcome(f"link cut for {duration:g} s")
 
 
 def kill_in_flight(url: str, *settings: str) -> None:

@@ -68,8 +68,8 @@ class PX4(Autopilot):
         mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,
     }
     alone: ClassVar[str] = (
-        "PX4 leaves offboard mode within 1.3 s and does what COM_OBL_RC_ACT says: without a radio "
-        "it returns or lands"
+        "PX4 leaves offboard mode within 1.3 s and does what COM_OBL_RC_ACT says: by default, and "
+        "without a radio, it sinks where it is"
     )
     failsafes: ClassVar[tuple[Failsafe, ...]] = (
         Failsafe(
@@ -83,6 +83,13 @@ class PX4(Autopilot):
             frozenset({1.0, 2.0, 6.0, 7.0}),
             5.0,
             "when our setpoints stop it expects a pilot's sticks, or cuts the motors",
+        ),
+        Failsafe(
+            "COM_OBL_RC_ACT",
+            frozenset({0.0}),
+            5.0,
+            "when our setpoints stop it sinks where it is, unless a pilot has a radio",
+            role="ground_station",
         ),
         Failsafe(
             "NAV_DLL_ACT",

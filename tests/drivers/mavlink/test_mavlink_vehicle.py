@@ -306,6 +306,14 @@ def test_unsafe_failsafes_are_reported_or_set(
             pair.vehicle.parameters.set("NO_SUCH_THING", 1.0)
 
 
+@pytest.mark.parametrize("role", ["companion", "ground_station"])
+def test_a_ground_station_has_px4_come_home_when_setpoints_stop(role: str) -> None:
+    """Else it would have sunk where it was before its ground station counts as lost."""
+    with flight(AutopilotOptions(family="px4"), failsafes="set", role=role) as pair:
+        set_to = pair.autopilot.firmware.parameters.values["COM_OBL_RC_ACT"]
+        assert set_to == (5.0 if role == "ground_station" else 0.0)
+
+
 @pytest.mark.parametrize(
     ("settings", "complaint"),
     [
