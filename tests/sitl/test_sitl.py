@@ -163,7 +163,10 @@ def test_killed_as_its_ground_station(autopilot: Autopilot) -> None:
             time.sleep(0.1)
         place = state.odometry.position.round(1)
         print(f"\nkilled as ground station: {[mode.value for mode in seen]}, down at {place}")  # noqa: T201
-        assert set(seen) <= {VehicleMode.RETURNING, VehicleMode.LANDING, VehicleMode.FAILSAFE}
+        home = {VehicleMode.RETURNING, VehicleMode.LANDING, VehicleMode.FAILSAFE}
+        assert set(seen) <= {VehicleMode.HOLDING, *home}
+        assert seen[-1] in home
+        assert float(np.linalg.norm(place[:2])) < 2.0
     finally:
         vehicle.close()
 

@@ -41,6 +41,8 @@ class Fact:
     """Flags of the estimator's report that are set, and flags that are not."""
     fix: int | None = None
     """GPS_RAW_INT's fix type."""
+    mode: int | None = None
+    """HEARTBEAT's custom mode."""
 
 
 _GROUND, _AIR = mav.MAV_LANDED_STATE_ON_GROUND, mav.MAV_LANDED_STATE_IN_AIR
@@ -95,6 +97,13 @@ FACTS: dict[tuple[str, str], Fact] = {
         sick=_CHECK | _PLACE,
         lost=_HORIZONTAL | _STILL,
         fix=0,
+    ),
+    ("px4", "setpoints stopped for 3 s"): Fact(
+        armed=True,
+        state=mav.MAV_STATE_CRITICAL,
+        landed=_AIR,
+        fix=3,
+        mode=3 << 16,
     ),
     ("px4", "motors killed in the air"): Fact(
         armed=False,

@@ -98,6 +98,12 @@ class Bench:
             self.pass_time(4.0)
         elif situation == "restarted in the air":
             self.firmware.restart()
+        elif situation == "setpoints stopped for 3 s":
+            still = mav.MAV_FRAME_LOCAL_NED, 0b110111000111, *(0.0,) * 11
+            message = mav.MAVLink_set_position_target_local_ned_message(0, 1, 1, *still)
+            self.firmware.setpoint(message)
+            self.give(self.dialect.ask_mode(FlightMode.GUIDED))
+            self.pass_time(3.0)
         elif situation.startswith("GPS lost for "):
             self.firmware.lose_gps()
             self.pass_time(float(situation.split()[3]))
@@ -112,6 +118,7 @@ def test_what_it_says_in_a_situation(family: str, situation: str) -> None:
     beat = firmware.heartbeat()
     assert bool(beat.base_mode & mav.MAV_MODE_FLAG_SAFETY_ARMED) is fact.armed
     assert fact.state in {None, beat.system_status}
+    assert fact.mode in {None, beat.custom_mode}
     landed = firmware.message(mav.MAVLINK_MSG_ID_EXTENDED_SYS_STATE)
     status = firmware.message(mav.MAVLINK_MSG_ID_SYS_STATUS)
     gps = firmware.message(mav.MAVLINK_MSG_ID_GPS_RAW_INT)

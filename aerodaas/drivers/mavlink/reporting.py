@@ -24,6 +24,8 @@ REASONS = 12.0
 """Seconds that the autopilot's words may be old to count as the reason of what it does."""
 _LOST_AFTER = 1.5
 """Seconds without any word, of a vehicle that speaks 40 times a second."""
+_FINDING = 1.0
+"""Seconds that a vehicle which is heard again has to say where it is."""
 _GRAVE = 3
 """Severity of an error; smaller is graver."""
 
@@ -98,8 +100,10 @@ class Report:
         return self._phase.mode
 
     def lost(self, now: float) -> bool:
-        """Whether it has said nothing new for too long."""
-        return self._silence(now) > _LOST_AFTER
+        """Whether it has said nothing new for too long, or not yet where it is since then."""
+        telemetry = self._telemetry
+        back = telemetry.armed and now - telemetry.back_at < _FINDING
+        return self._silence(now) > _LOST_AFTER or (back and not telemetry.knows_place(now))
 
     def _silence(self, now: float) -> float:
         # Standing motors need no fresh telemetry to be believed: HEARTBEATs tell of them.
@@ -109,7 +113,7 @@ class Report:
     def _faults(self, now: float) -> list[str]:
         telemetry = self._telemetry
         faults = [self.restarted, self._touchdown.fault]
-        if self.lost(now) and now - telemetry.heard_at <= _LOST_AFTER:
+        if self._silence(now) > _LOST_AFTER >= now - telemetry.heard_at:
             faults.append("telemetry: packets come, and say nothing new")
         if self.alignment is not None:
             faults.append(self.alignment.fault)

@@ -42,6 +42,8 @@ class Telemetry:
     def __init__(self) -> None:
         self.heard_at = -math.inf
         """Any message at all."""
+        self.back_at = -math.inf
+        """The first message after the latest silence."""
         self.ticked_at = -math.inf
         """The latest message whose stamp was newer than all before."""
         self.beat_at = -math.inf
@@ -98,6 +100,8 @@ class Telemetry:
 
     def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
         """Take note of a message of the vehicle."""
+        if now - self.heard_at > _FRESH:
+            self.back_at = now
         self.heard_at = now
         kind = message.get_type()
         self.seen[kind] = now

@@ -125,8 +125,8 @@ class EmulatedPX4(Firmware):
 
     @property
     def sinks_blind(self) -> bool:
-        """Shown as altitude mode."""
-        return self._main == _ALTITUDE
+        """Shown as altitude mode, or as position mode with nobody at the sticks."""
+        return self._main == _ALTITUDE or (self._main == _POSITION and self.failsafe)
 
     def go_blind(self) -> None:
         """Shown as altitude mode; it sinks where it drifts."""
@@ -207,9 +207,14 @@ class EmulatedPX4(Firmware):
             self.flight.hold()
         if self.guided and self.flight.flying and self.now - self._setpoint_at > _LOSS:
             action = self.parameters.values["COM_OBL_RC_ACT"]
-            sub = {_RETURN_ACTION: _RETURN, _HOLD_ACTION: _HOLD}.get(action, _LAND)
+            sub = {_RETURN_ACTION: _RETURN, _HOLD_ACTION: _HOLD}.get(action)
             self._event("commander_failsafe_enter_generic", mavlink.MAV_SEVERITY_CRITICAL)
-            self._set_mode(_AUTO, sub)
+            if sub is None:
+                # Position mode, by sticks that nobody holds: it sinks where it is.
+                self._main, self._sub = _POSITION, 0
+                self.flight.land()
+            else:
+                self._set_mode(_AUTO, sub)
             self.failsafe = True
 
     def refuse_arming(self) -> None:

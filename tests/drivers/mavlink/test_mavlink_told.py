@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -10,6 +11,13 @@ import pytest
 from stepped import Stepped
 
 from aerodaas.clock import NANOSECONDS, Clock
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.frames import LocalFrame
+from aerodaas.drivers.mavlink.link import LinkCounts
+from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.reporting import Report
+from aerodaas.drivers.mavlink.telemetry import Telemetry
+from aerodaas.drivers.mavlink.touchdown import Touchdown
 from aerodaas.navigation.commands import AddNavigation, Start
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
@@ -17,7 +25,7 @@ from aerodaas.navigation.planner import InlinePlanner
 from aerodaas.schedulers.waypoint.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.status import MissionState
 from aerodaas.testing.mavlink import AutopilotOptions
-from aerodaas.vehicle import VehicleMode
+from aerodaas.vehicle import VehicleMode, VehicleState
 from aerodaas.waypoints import AeroNavigation, NavigationType, Waypoint
 
 
@@ -111,3 +119,31 @@ def test_a_landing_that_nobody_heard_did_not_fall(flown: Flown, duration: float)
     assert flown.mission.state is MissionState.LANDED, (flown.mission.status.reason, flown.told)
     assert flown.mission.status.reason.startswith("no word from the vehicle for")
     assert not any("motors" in text for text in flown.told)
+
+
+def test_a_vehicle_that_is_heard_again_is_given_time_to_say_where_it_is() -> None:
+    """Its first words need not be a position; a second of words without one is a loss of it."""
+    telemetry, phase = Telemetry(), FlightPhase()
+    report = Report(telemetry, phase, Touchdown())
+    report.alignment = SimpleNamespace(frame=LocalFrame(np.zeros(3)), fault="")  # type: ignore[assignment]
+
+    def hear(now: float, *, place: bool) -> VehicleState:
+        said: list[object] = [mavlink.MAVLink_heartbeat_message(2, 12, 0x80, 0, 4, 3)]
+        boot = int(now * 1e3)
+        said += [mavlink.MAVLink_attitude_message(boot, 0, 0, 0, 0, 0, 0)]
+        if place:
+            said += [mavlink.MAVLink_local_position_ned_message(boot, 1, 2, 3, 0, 0, 0)]
+        for message in said:
+            telemetry.take(message, now)
+        phase.observe(FlightMode.GUIDED, now, armed=True, critical=False)
+        return report.state(int(now * NANOSECONDS), now, LinkCounts())
+
+    assert hear(10.0, place=True).mode is VehicleMode.GUIDED
+    again = hear(13.0, place=False)
+    assert again.mode is VehicleMode.LOST
+    assert again.stamp == 10 * NANOSECONDS
+    assert hear(13.2, place=True).mode is VehicleMode.GUIDED
+    for tenth in range(1, 12):
+        blind = hear(16.0 + tenth / 10, place=False)
+    assert blind.mode is VehicleMode.GUIDED
+    assert not np.isfinite(blind.odometry.position).any()
