@@ -113,7 +113,8 @@ class Report:
     def _faults(self, now: float) -> list[str]:
         telemetry = self._telemetry
         faults = [self.restarted, self._touchdown.fault]
-        if self._silence(now) > _LOST_AFTER >= now - telemetry.heard_at:
+        speaks = now - telemetry.heard_at <= _LOST_AFTER < now - telemetry.back_at
+        if speaks and self._silence(now) > _LOST_AFTER:
             faults.append("telemetry: packets come, and say nothing new")
         if self.alignment is not None:
             faults.append(self.alignment.fault)

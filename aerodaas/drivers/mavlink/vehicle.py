@@ -48,6 +48,8 @@ _log = logging.getLogger(__name__)
 _PARTING = 4.0
 """Seconds that `close` waits for a vehicle in the air to begin its landing, and for motors that may
 be starting to stand."""
+_SHORT = 1.5
+"""Metres below the height asked for within which an autopilot may call its take-off done."""
 _STEERED = {VehicleMode.HOLDING, VehicleMode.GUIDED, VehicleMode.RETURNING}
 
 
@@ -457,17 +459,29 @@ class MavlinkVehicle:
             _log.warning("%s: %s", self._name, self._words.popleft())
 
     def _climb_on(self, connection: Connection, now: float) -> None:
-        """Fly the rest ourselves: PX4 calls its take-off done up to 0.8 m below its height."""
-        goal, frame = connection.departure.goal, connection.alignment.frame
-        done = self._phase.seen and self._phase.shown in {FlightMode.HOLD, FlightMode.GUIDED}
-        done &= connection.autopilot.stops_short
-        if goal is None or frame is None or not done or not self._watchdog.healthy(now):
+        """Fly the rest ourselves: PX4 calls its take-off done up to 0.8 m below its height.
+
+        It shows hold before it takes off, too. Once it was asked to follow setpoints it gets them,
+        whatever it shows: without, it would leave that mode by its own protection.
+        """
+        goal, frame, phase = connection.departure.goal, connection.alignment.frame, self._phase
+        if goal is None or frame is None or not self._watchdog.healthy(now):
+            return
+        done = phase.seen and phase.shown in {FlightMode.HOLD, FlightMode.GUIDED}
+        near = self._touchdown.flew and goal - self._up() < _SHORT
+        rest = connection.autopilot.stops_short and done and near
+        if not (rest or phase.wish is FlightMode.GUIDED):
             return
         if self._climb_place is None:
             self._climb_place = self._report.odometry(frame, known=True).position
-        rest = frame.position(np.array([0.0, 0.0, -goal]))[2]
-        place = np.array([*self._climb_place[:2], rest])
+        top = frame.position(np.array([0.0, 0.0, -goal]))[2]
+        place = np.array([*self._climb_place[:2], top])
         self._steer(PositionSetpoint(place, None, self._steering.climb_rate), connection, now)
+
+    def _up(self) -> float:
+        """Metres above the autopilot's own origin."""
+        position = self._telemetry.position
+        return -math.inf if position is None else -float(position[2])
 
     def _mind_the_loop(self, now: float) -> None:
         """If the loop above hangs, hold; if it does not come back, return.

@@ -141,3 +141,23 @@ def test_a_withdrawal_is_over_only_when_motors_have_stood_for_a_while() -> None:
     withdrawal = Withdrawal(commander, PX4.disarm(), land, 10.0, flies=False)
     answer(mavlink.MAV_RESULT_TEMPORARILY_REJECTED, 10.1)
     assert landed == [1.0]
+
+
+def test_the_rest_of_a_climb_is_not_flown_from_the_ground(monkeypatch: pytest.MonkeyPatch) -> None:
+    """PX4 shows hold while the order to take off is lost on the way: no setpoint, no offboard."""
+    with Stepped(monkeypatch, AutopilotOptions(family="px4")) as world:
+        commander = world.vehicle.connection.commander
+        send, late = commander._send, world.now + 4.0
+
+        def lossy(message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
+            if getattr(message, "command", 0) != mavlink.MAV_CMD_NAV_TAKEOFF or world.now > late:
+                send(message)
+
+        monkeypatch.setattr(commander, "_send", lossy)
+        world.vehicle.take_off(3.0)
+        while not world.vehicle.telemetry.armed or world.now < late:
+            assert world.turn().mode in {VehicleMode.GROUNDED, VehicleMode.TAKING_OFF}
+        heard = [message.get_type() for _, message in world.autopilot.heard]
+        assert "SET_POSITION_TARGET_LOCAL_NED" not in heard
+        state = world.until(VehicleMode.HOLDING, VehicleMode.GUIDED)
+        assert state.odometry.height == pytest.approx(3.0, abs=0.5)

@@ -139,6 +139,9 @@ def test_a_vehicle_that_is_heard_again_is_given_time_to_say_where_it_is() -> Non
         return report.state(int(now * NANOSECONDS), now, LinkCounts())
 
     assert hear(10.0, place=True).mode is VehicleMode.GUIDED
+    telemetry.take(mavlink.MAVLink_heartbeat_message(2, 12, 0x80, 0, 4, 3), 12.9)
+    first = report.state(13 * NANOSECONDS, 12.9, LinkCounts())
+    assert (first.mode, first.faults) == (VehicleMode.LOST, ())
     again = hear(13.0, place=False)
     assert again.mode is VehicleMode.LOST
     assert again.stamp == 10 * NANOSECONDS
