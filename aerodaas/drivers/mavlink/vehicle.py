@@ -465,12 +465,12 @@ class MavlinkVehicle:
         whatever it shows: without, it would leave that mode by its own protection.
         """
         goal, frame, phase = connection.departure.goal, connection.alignment.frame, self._phase
-        if goal is None or frame is None or not self._watchdog.healthy(now):
+        able = connection.autopilot.stops_short and self._watchdog.healthy(now)
+        if goal is None or frame is None or not able:
             return
         done = phase.seen and phase.shown in {FlightMode.HOLD, FlightMode.GUIDED}
         near = self._touchdown.flew and goal - self._up() < _SHORT
-        rest = connection.autopilot.stops_short and done and near
-        if not (rest or phase.wish is FlightMode.GUIDED):
+        if not ((done and near) or phase.wish is FlightMode.GUIDED):
             return
         if self._climb_place is None:
             self._climb_place = self._report.odometry(frame, known=True).position
