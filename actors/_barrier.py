@@ -44,6 +44,8 @@ class Barrier:
         """Let `windows[source]` measurements of each source be under way while time goes on."""
         self.windows = windows
         self._missing: dict[str, dict[int, int]] = defaultdict(dict)
+        self._forgotten: dict[str, int] = {}
+        """The newest stamp of each source that is not waited for any more."""
 
     def expect(self, source: str, stamp: int, acknowledgements: int) -> None:
         """A measurement is about to be worked through."""
@@ -57,11 +59,13 @@ class Barrier:
 
         Sources without a window are nobody's to wait for.
         """
-        if source in self.windows:
+        if source in self.windows and stamp > self._forgotten.get(source, -1):
             self.expect(source, stamp, -1)
 
     def forget(self) -> None:
         """Stop waiting for anything that is under way: its reader is gone."""
+        for source, missing in self._missing.items():
+            self._forgotten[source] = max([self._forgotten.get(source, -1), *missing])
         self._missing.clear()
 
     def clear(self, *, drain: bool = False) -> bool:

@@ -96,3 +96,19 @@ def test_an_analysis_of_many_streams_answers_each_of_them() -> None:
     graph.add(Node("last", "analytics", object, None, inputs=["all", "a0"]))
     assert widest(graph, "last") == widest(graph, "a0") - 1 == 1
     assert widest(graph, "camera") == 6
+
+
+def test_an_answer_to_what_was_forgotten_comes_too_late_to_matter() -> None:
+    """A reader that was slow, not gone, must not stop time once more by answering after all."""
+    barrier = Barrier({"camera": 0})
+    for stamp in (1, 2):
+        barrier.expect("camera", stamp, 2)
+    barrier.acknowledge("camera", 1)
+    barrier.forget()
+    for stamp in (1, 2, 2):
+        barrier.acknowledge("camera", stamp)
+    assert barrier.clear(drain=True)
+    barrier.expect("camera", 3, 1)
+    assert not barrier.clear()
+    barrier.acknowledge("camera", 3)
+    assert barrier.clear(drain=True)
