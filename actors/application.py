@@ -43,6 +43,17 @@ class Application:
     plugins: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
     """By the name of a module that is the application's own file: definitions by attribute."""
 
+    def and_later(self, later: Application) -> Application:
+        """Everything of both: what was defined by then, and what has been since."""
+        plugins = {**self.plugins}
+        for name, attributes in later.plugins.items():
+            plugins[name] = {**plugins.get(name, {}), **attributes}
+        return Application(
+            {**self.sources, **later.sources},
+            {**self.definitions, **later.definitions},
+            plugins,
+        )
+
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
         """Arrive by serving what it holds."""
         return _arrived, (dict(self.sources), dict(self.definitions), dict(self.plugins))
@@ -104,7 +115,8 @@ def _define(prefix: str, found: Iterable[Any]) -> dict[str, bytes]:
         # A class that cannot be pickled is told of where it is used.
         with contextlib.suppress(Exception):
             data = _definitions.pickled_class(one)
-            name = f"{prefix}/{one.__qualname__}"
+            # A class keeps the name by which actors that run already put it into messages.
+            name = _definitions.name_of(one) or f"{prefix}/{one.__qualname__}"
             if len(data) <= _LARGEST and name not in definitions:
                 definitions[name] = data
                 if isinstance(one, type):

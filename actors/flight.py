@@ -221,6 +221,7 @@ class Flight:
 
     def learn(self, application: Application) -> None:
         """Have every actor know what the application defines by now."""
+        application = self.plan.session.application.and_later(application)
         session = replace(self.plan.session, application=application)
         self.plan = replace(self.plan, session=session)
         for reference in [one.handle.learn.remote(application) for one in self._members.values()]:
@@ -277,6 +278,10 @@ class Flight:
             drone = self._members[self._drones[robots[0].robot.id]]
             grown = drone.handle.grow.remote(robots, change.conduct, _GROWING)
             drone.info = self._ask(grown, 2 * _GROWING)
+        for stream, ends in change.ending.items():
+            camera = self._members[f"sensor/{stream}"]
+            camera.setup = (ends,)
+            self._ask(camera.handle.end_mission_when_finished.remote(ends))
         self._connect_all()
         self._start(fresh)
         if self._caretaker is not None:
@@ -356,7 +361,6 @@ class Flight:
         restarts: int = 0,
         setup: tuple[Any, ...] = (),
         options: Mapping[str, Any] | None = None,
-        **kwargs: Any,  # noqa: ANN401
     ) -> None:
         remote: Any = ray.remote
         # Calls that wait, for its life to end or for its loop, must not keep others waiting.
@@ -366,7 +370,7 @@ class Flight:
             remote = remote(concurrency_groups=groups)
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}
         made = remote(kind).options(**placed)
-        self._members[name] = _Member(name, made.remote(*args, **kwargs), setup, restarts)
+        self._members[name] = _Member(name, made.remote(*args), setup, restarts)
 
     def _options(self, name: str, place: Place, *, restarts: int) -> dict[str, Any]:
         """Ray's options; actors outlive the application, and therefore have a name."""
@@ -377,8 +381,8 @@ class Flight:
         for camera in cameras:
             args = (self.plan.session, camera.stream, camera.sensor, camera.state)
             name = f"sensor/{camera.stream}"
-            ends = camera.ends
-            self._create(name, SensorActor, camera.place, args, restarts=_RESTARTS, ends=ends)
+            setup = (camera.ends,)
+            self._create(name, SensorActor, camera.place, args, restarts=_RESTARTS, setup=setup)
 
     def _create_analyses(
         self, actors: Iterable[Analyses], environments: Mapping[str, Mapping[str, Any]]

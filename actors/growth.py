@@ -19,6 +19,8 @@ class Growth:
 
     cameras: tuple[Cameras, ...]
     """To be started."""
+    ending: dict[str, bool]
+    """Running cameras whose last picture ends the mission now, or no longer does, by stream."""
     analyses: tuple[Analyses, ...]
     """Actors to be started."""
     joining: dict[str, tuple[NodeSpec, ...]]
@@ -41,6 +43,7 @@ def growth(old: FlightPlan, new: FlightPlan) -> Growth:
     _require_same_tasks(old, new)
     running = {node.stream: node for actor in old.analyses for node in actor.nodes}
     known = {actor.name for actor in old.analyses}
+    ended = {camera.stream: camera.ends for camera in old.cameras}
     fresh = [
         (actor, tuple(node for node in actor.nodes if node.stream not in running))
         for actor in new.analyses
@@ -54,7 +57,12 @@ def growth(old: FlightPlan, new: FlightPlan) -> Growth:
         for actor in new.analyses
     }
     return Growth(
-        cameras=tuple(one for one in new.cameras if one not in old.cameras),
+        cameras=tuple(one for one in new.cameras if one.stream not in ended),
+        ending={
+            one.stream: one.ends
+            for one in new.cameras
+            if one.stream in ended and ended[one.stream] != one.ends
+        },
         analyses=tuple(
             replace(actor, nodes=nodes)
             for actor, nodes in fresh

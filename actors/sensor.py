@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerodaas.actors._base import StreamActor, StreamCount
+from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount
 from aerodaas.actors._names import end_stream
 from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
 from aerodaas.cameras.base import Camera, Picture
@@ -24,20 +24,24 @@ class SensorActor(StreamActor):
 
     niceness = 5
 
-    def __init__(
-        self, session: Session, stream: str, sensor: SensorConfig, state: str, *, ends: bool
-    ) -> None:
-        """Publish `stream` from `sensor`, placed by the vehicle states of the stream `state`.
-
-        With `ends`, the mission is over once the camera has no more pictures.
-        """
+    def __init__(self, session: Session, stream: str, sensor: SensorConfig, state: str) -> None:
+        """Publish `stream` from `sensor`, placed by the vehicle states of the stream `state`."""
         depth = MESSAGE_DEPTH if session.lockstep else 1
         super().__init__(session, f"sensor/{stream}", {state: depth})
         self._stream = stream
         self._sensor = sensor
-        self._ends = ends
+        self._ends = False
         self._ended = False
         self._vehicle: VehicleState | None = None
+
+    def prepare(self, ends: bool = False) -> ActorInfo:  # noqa: FBT001, FBT002 - Ray's
+        """Open the camera; with `ends`, the mission is over once it has no more pictures."""
+        self._ends = ends
+        return super().prepare()
+
+    def end_mission_when_finished(self, ends: bool) -> None:  # noqa: FBT001
+        """From now on, `ends` as `prepare` takes it."""
+        self._ends = ends
 
     def _open(self) -> None:
         environment = self.session.environment

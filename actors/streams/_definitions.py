@@ -20,7 +20,7 @@ from typing import Any
 
 from ray import cloudpickle
 
-__all__ = ["define", "named", "pickled", "pickled_class", "register"]
+__all__ = ["define", "name_of", "named", "pickled", "pickled_class", "register"]
 
 _lock = threading.RLock()
 _unbuilt: dict[str, bytes] = {}
@@ -43,6 +43,13 @@ def register(name: str, definition: type) -> None:
     with _lock:
         _built[name] = definition
         _references[id(definition)] = definition, (named, (name,))
+
+
+def name_of(definition: object) -> str | None:
+    """What a class that was registered in this process is called; None for any other."""
+    with _lock:
+        _, (build, arguments) = _references.get(id(definition), (None, (None, ())))
+        return arguments[0] if build is named else None
 
 
 def named(name: str) -> Any:  # noqa: ANN401 - a class
