@@ -26,7 +26,7 @@ from aerodaas.actors.streams import Outlet
 from aerodaas.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.config import RobotConfig, SensorConfig
 from aerodaas.data import Alert, Header
-from aerodaas.errors import AeroDaaSError, MissionError
+from aerodaas.errors import AeroDaaSError
 from aerodaas.geometry import GeodeticOrigin
 from aerodaas.navigation.commands import (
     Answer,
@@ -40,6 +40,7 @@ from aerodaas.navigation.commands import (
 from aerodaas.navigation.loop import SetpointLoop
 from aerodaas.navigation.mission import Mission
 from aerodaas.navigation.planner import BackgroundPlanner, Planner, solve
+from aerodaas.navigation.rehearsal import give
 from aerodaas.navigation.safety import Neighbour
 from aerodaas.plugins import load_plugin
 from aerodaas.recording.pace import NEVER
@@ -137,11 +138,7 @@ class Pilot:
         self.loop = SetpointLoop(self.vehicle, self.mission)
         self.state: VehicleState = self.vehicle.read()
         """The newest state that the loop or a sensor went by."""
-        for command in self.spec.initial:
-            answer = self.handle(command, 0)
-            if not answer.accepted or answer.refused:
-                reasons = [answer.text, *(f"{name}: {why}" for name, why in answer.refused.items())]
-                raise MissionError(f"{self.id}: {'; '.join(text for text in reasons if text)}")
+        give(self.id, self.spec.initial, lambda command: self.handle(command, 0))
 
     def make_planner(self, scheduler: TrajectoryScheduler) -> Planner:
         """What plans by `scheduler`; may take seconds to start."""

@@ -31,7 +31,8 @@ def checked(model: type[M], content: object, place: str, hint: str = "") -> M:
 
 def explained(error: ValidationError, model: type[BaseModel], content: object) -> str:
     """What is wrong, setting by setting, each with its value and what would be right."""
-    return "; ".join(_problem(one, model, content) for one in error.errors())
+    problems = [one for one in error.errors() if not _is_other_choice(one)] or error.errors()
+    return "; ".join(_problem(one, model, content) for one in problems)
 
 
 def near(name: str, known: Iterable[str]) -> str:
@@ -42,8 +43,15 @@ def near(name: str, known: Iterable[str]) -> str:
     return f"{meant} (known: {', '.join(choices) or 'none'})"
 
 
+def _is_other_choice(problem: ErrorDetails) -> bool:
+    """What pydantic says of a word that might have stood where there is more than a word."""
+    return problem["type"] == "literal_error" and not isinstance(problem["input"], str)
+
+
 def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> str:
-    place = problem["loc"]
+    # Among several kinds that a setting may have, pydantic names the one that it tried.
+    place = tuple(one for one in problem["loc"] if not (isinstance(one, str) and "[" in one))
+    said = problem["msg"].removeprefix("Value error, ")
     text = ".".join(str(part) for part in place) or "file"
     whose = _whose(content, place)
     if problem["type"] == "extra_forbidden":
@@ -55,8 +63,8 @@ def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> 
     word = isinstance(value, str) and _WORD.fullmatch(value) and _SECRET not in text
     shown = repr(value) if number or word else ""
     if problem["type"] == "missing" or not shown:
-        return f"{text}: {problem['msg']}{whose}"
-    return f"{text}: {problem['msg']}, not {shown}{whose}"
+        return f"{text}: {said}{whose}"
+    return f"{text}: {said}, not {shown}{whose}"
 
 
 def _whose(content: object, place: Sequence[int | str]) -> str:

@@ -6,6 +6,7 @@ takes seconds to start, and a fleet on its way to the field does not come back f
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Collection, Iterable
 from pathlib import Path
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel
 
+from aerodaas.analytics.base import Analytics
 from aerodaas.checked import checked, near
 from aerodaas.errors import ConfigError, GraphError
 from aerodaas.identifiers import find_scoped
@@ -21,12 +23,17 @@ from aerodaas.plugins import PluginKind, is_built_in, load_plugin, require_plugi
 
 if TYPE_CHECKING:
     from aerodaas.config import EnvironmentConfig, RobotConfig, SensorConfig
-    from aerodaas.graph import Graph
+    from aerodaas.graph import Graph, Node
 
 __all__ = ["check_environment", "check_graph", "check_plugins", "check_served", "check_tasks"]
 
 _PLAYED = {"folder", "mcap", "recorded", "video"}
 """Cameras that read what the setting `path` names."""
+_CAMERA = ("open", "capture", "close")
+_VEHICLE = (
+    "connect", "read", "preflight", "take_off", "send", "hold", "return_home", "land", "close"
+)  # fmt: skip
+_OWN_CAMERA = 'give the sensor a "driver" of its own, such as "simulated", "video" or module:Class'
 _LAST_PORT = 65535
 _NAMED = 200
 """Files of a folder that are looked through for the one that may have been meant."""
@@ -64,11 +71,14 @@ def check_plugins(
     machine: then what is to be played must be on it.
     """
     for robot in robots:
+        _require_methods("drivers", robot.driver, _VEHICLE, f"robot {robot.id}")
         _check_settings("drivers", robot.driver, robot.settings, f"robot {robot.id}")
         if is_built_in("drivers", robot.driver):
             load_plugin("drivers", robot.driver)(robot, config)
     for sensor in cameras:
         driver = config.camera_driver(sensor)
+        hint = "" if sensor.driver else f"; its robot's driver was taken: {_OWN_CAMERA}"
+        _require_methods("cameras", driver, _CAMERA, f"sensor {sensor.full_id}", hint)
         _check_settings("cameras", driver, sensor.settings, f"sensor {sensor.full_id}")
         if is_built_in("cameras", driver):
             load_plugin("cameras", driver)(sensor, config)
@@ -88,6 +98,7 @@ def check_graph(graph: Graph, config: EnvironmentConfig, flying: Collection[str]
             raise GraphError(
                 f"{node.id}: its rate must be a positive number of Hz, not {node.work.rate!r}"
             )
+        _check_process(node)
         for trigger in node.triggers:
             if trigger.method is not None and trigger.target not in flying:
                 raise GraphError(
@@ -97,6 +108,18 @@ def check_graph(graph: Graph, config: EnvironmentConfig, flying: Collection[str]
             if trigger.method is None and trigger.target not in graph.nodes:
                 raise GraphError(f"{node.id} wakes {trigger.target}, which is not in its graph")
     _check_names("runtime_env", config.runtime_env, graph)
+
+
+def _check_process(node: Node) -> None:
+    process, name = node.work.process, type(node.work).__name__
+    if getattr(process, "__func__", None) is Analytics.process:
+        raise GraphError(f"{name} ({node.id}) has no process(self, item, context), so does nothing")
+    try:
+        inspect.signature(process).bind(None, None)
+    except TypeError as error:
+        raise GraphError(
+            f"{name} ({node.id}): process is called with an item and a context: {error}"
+        ) from None
 
 
 def check_tasks(graph: Graph, config: EnvironmentConfig) -> None:
@@ -121,6 +144,20 @@ def _check_settings(kind: PluginKind, name: str, settings: dict[str, Any], place
     model = getattr(load_plugin(kind, name), "settings_model", None)
     if isinstance(model, type) and issubclass(model, BaseModel):
         checked(model, settings, f"{place}: settings")
+
+
+def _require_methods(
+    kind: PluginKind, name: str, methods: Iterable[str], place: str, hint: str = ""
+) -> None:
+    plugin = load_plugin(kind, name)
+    what = f"{place}: driver {name!r}"
+    if not callable(plugin):
+        raise ConfigError(f"{what} is no class but {plugin!r}{hint}")
+    # A function may make anything; what it makes is known only once it has been called.
+    missing = [one for one in methods if isinstance(plugin, type) and not hasattr(plugin, one)]
+    if missing:
+        kinds = kind.removesuffix("s").replace("driver", "vehicle")
+        raise ConfigError(f"{what} is no {kinds}, for it has no {', '.join(missing)}{hint}")
 
 
 def _check_path(sensor: SensorConfig) -> None:

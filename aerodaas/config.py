@@ -164,7 +164,7 @@ class SensorConfig(_Strict):
     type: Literal["camera", "odometry", "gps", "battery", "status"] = "camera"
     driver: str | None = None
     """None: a camera of its robot's own kind (see `EnvironmentConfig.camera_driver`)."""
-    rate: Positive = 15.0
+    rate: Positive = Field(default=15.0, le=1000.0)
     """Items per second."""
     settings: dict[str, Any] = Field(default_factory=dict)
     _robot: str | None = PrivateAttr(default=None)

@@ -11,7 +11,7 @@ from aerodaas import sharing
 from aerodaas.checks import check_environment
 from aerodaas.config import ComputeConfig, EnvironmentConfig, RobotConfig
 from aerodaas.errors import ConfigError, GraphError, MissionError, UnknownIdError
-from aerodaas.graph import Graph, NavigationEdge
+from aerodaas.graph import Graph, NavigationEdge, refusal
 from aerodaas.handles import Compute, Sensor
 from aerodaas.identifiers import find_scoped
 from aerodaas.interfaces import IAeroData, IEnvironment, INavigate, IRobot, ISensor
@@ -326,6 +326,11 @@ class Robot(PaperNames, IRobot):
         and MissionError for what the mission refuses in flight.
         """
         navigation = data
+        if not isinstance(data, IAeroData):
+            raise refusal(
+                f"{self.robot_id} navigates by AeroListData([Waypoint(…), …]), AeroNavigation or a "
+                f"stream of navigation, not by {type(data).__name__}"
+            )
         if not isinstance(navigation, AeroNavigation):
             navigation = self._environment.trajectory_scheduler().generate_navigation(data)
         stream = navigation.stream

@@ -211,6 +211,7 @@ class Run:
     def _plan(self) -> FlightPlan:
         from aerodaas.actors.plan import make_plan  # noqa: PLC0415
         from aerodaas.actors.session import Session  # noqa: PLC0415
+        from aerodaas.navigation.rehearsal import rehearse  # noqa: PLC0415 - loads geometry
 
         self._check_world()
         self._take_tasks()
@@ -222,7 +223,10 @@ class Run:
         session = Session(self.config, speed, pace=self._pace(), application=application)
         compute = self._environment.compute()
         joins = self.options.address or os.environ.get("RAY_ADDRESS")
-        return make_plan(session, self.graph, compute, scheduler, dispatch_with, here=not joins)
+        plan = make_plan(session, self.graph, compute, scheduler, dispatch_with, here=not joins)
+        for spec in (one for group in plan.drones for one in group):
+            rehearse(spec.robot, spec.initial, self.config, spec.scheduler)
+        return plan
 
     def _application(self, *others: object) -> Application:
         """What the application defines by now, that of `others` included.

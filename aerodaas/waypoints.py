@@ -67,6 +67,13 @@ def _require_finite(owner: str, **values: float | None) -> None:
             raise InvalidWaypointError(message)
 
 
+def _require_names(owner: str, waypoint_id: object, priority: object) -> None:
+    if not isinstance(waypoint_id, str) or not waypoint_id:
+        raise InvalidWaypointError(f"{owner}: an id is a text that is not empty")
+    if not isinstance(priority, int | np.integer):
+        raise InvalidWaypointError(f"{owner}: priority must be a whole number, not {priority!r}")
+
+
 @travels
 @dataclass(frozen=True, slots=True)
 class Waypoint:
@@ -97,6 +104,7 @@ class Waypoint:
     def __post_init__(self) -> None:
         """Check the numbers and turn the type's name into a WaypointType."""
         owner = f"waypoint {self.id!r}"
+        _require_names(owner, self.id, self.priority)
         _require_finite(owner, **{name: getattr(self, name) for name in _NUMBERS})
         try:
             object.__setattr__(self, "waypoint_type", WaypointType(self.waypoint_type))

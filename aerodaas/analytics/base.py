@@ -16,7 +16,17 @@ only what is cheap to send and checks only what the user could have got wrong.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, Literal, Protocol, TypeAlias, TypeVar, runtime_checkable
+from typing import (
+    Any,
+    ClassVar,
+    Literal,
+    Protocol,
+    TypeAlias,
+    TypeVar,
+    get_args,
+    get_origin,
+    runtime_checkable,
+)
 
 from typing_extensions import Self
 
@@ -77,7 +87,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     accepts: ClassVar[tuple[type, ...]] = (object,)
     """Item types that `analyse` takes."""
     produces: ClassVar[type] = object
-    """Type of the results."""
+    """Type of the results; by default what the brackets say: `Analytics[float]`."""
     isolated: bool = False
     """True for an analysis that needs a process of its own, such as a neural network."""
     scheduled: bool = False
@@ -97,6 +107,16 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     _compute: str | None = None
     _runtime_env: RuntimeEnvConfig | None = None
     _triggers: tuple[Trigger, ...] = ()
+
+    def __init_subclass__(cls, **more: Any) -> None:  # noqa: ANN401 - of other bases
+        """Produce what the brackets say, unless the class says it."""
+        super().__init_subclass__(**more)
+        if "produces" in vars(cls):
+            return
+        for base in vars(cls).get("__orig_bases__", ()):
+            results = [one for one in get_args(base) if isinstance(one, type) and one is not Any]
+            if results and issubclass(get_origin(base), Analytics):
+                cls.produces = results[0]
 
     def open(self) -> None:
         """Load models and connect; called once in the actor, before the mission starts."""

@@ -20,7 +20,7 @@ ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 SECOND = 1_000_000_000
 STAMPS = [2_000_000_000, 2_470_000_000, 3_010_000_000]
 """Mission time at which each picture was taken; it was published 40 ms later."""
-PROVENANCE = Provenance(0, "flight", 0, "{}", "app.py", "", {})
+PROVENANCE = Provenance(0, "flight", 0, "{}", app="app.py")
 
 
 @pytest.fixture(scope="module")
