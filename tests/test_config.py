@@ -23,7 +23,7 @@ limits = st.fixed_dictionaries(
 )
 sensors = st.fixed_dictionaries(
     {"type": st.sampled_from(["camera", "odometry", "gps", "battery", "status"])},
-    optional={"rate": numbers, "settings": st.dictionaries(names, st.integers())},
+    optional={"rate": st.floats(0.01, 1000.0), "settings": st.dictionaries(names, st.integers())},
 )
 
 

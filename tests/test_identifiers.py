@@ -14,6 +14,7 @@ from aerodaas import AeroNavigation, Analytics, Environment, Waypoint
 from aerodaas.actors import _names
 from aerodaas.actors.plan import make_plan
 from aerodaas.actors.session import Session
+from aerodaas.analytics.base import Context
 from aerodaas.config import validated
 from aerodaas.errors import ConfigError, GraphError
 from aerodaas.identifiers import INTERNAL, is_internal, require_name, safe_name
@@ -42,6 +43,10 @@ class Anything(Analytics[float]):
     def __init__(self, name: str) -> None:
         """Be called `name`."""
         self.name = name
+
+    def process(self, item: Any, context: Context) -> float:  # noqa: ARG002, ANN401
+        """Nothing flies."""
+        return 0.0
 
 
 @pytest.mark.parametrize("name", [f"a{INTERNAL}b", "a/b", "", " ", "a b", "9", "a>b"])
