@@ -18,6 +18,7 @@ from typing import Any, Literal
 
 import ray
 
+from aerodaas.actors._dead_man import exit_soon, leave
 from aerodaas.actors._names import alert_stream
 from aerodaas.actors.application import Application
 from aerodaas.actors.session import Session
@@ -227,7 +228,11 @@ class StreamActor:
         )
 
     def stop(self) -> ActorReport:
-        """Finish what is under way, close everything, and report for the last time."""
+        """Finish what is under way, close everything, and report for the last time.
+
+        The process ends soon afterwards, at the latest by itself.
+        """
+        exit_soon()
         self._stopping.set()
         if self.inbox is not None:
             self.inbox.wake()
@@ -240,6 +245,13 @@ class StreamActor:
         if self.inbox is not None:
             self.inbox.close()
         return report
+
+    def meet(self) -> None:
+        """Let its caller learn where it lives."""
+
+    def leave(self) -> None:
+        """End the process; `stop` came first."""
+        leave()
 
     @property
     def scope(self) -> str:

@@ -29,7 +29,7 @@ def may_fly(drone: Any) -> bool:  # noqa: ANN401 - an actor's handle
 
 
 def end_actors(groups: Iterable[Sequence[Any]], helpers: Sequence[Any]) -> dict[Any, ActorReport]:
-    """Stop each group of actors in turn, then kill them all, and the `helpers` too.
+    """Stop each group of actors in turn, then end the processes of all, the `helpers`' too.
 
     Returns the last report of each that gave one, by handle.
     """
@@ -46,5 +46,7 @@ def end_actors(groups: Iterable[Sequence[Any]], helpers: Sequence[Any]) -> dict[
                 reports[references[reference]] = ray.get(reference)
     for actor in killed:
         with contextlib.suppress(RayError):
+            # To be killed takes the cluster's head, which may be lost.
+            actor.leave.remote()
             ray.kill(actor)
     return reports

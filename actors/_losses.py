@@ -27,7 +27,7 @@ class Pulse:
     """Knows when this process was stopped from outside for so long that its drones came home."""
 
     def __init__(self) -> None:
-        self._last = time.monotonic()
+        self._last = float("inf")
         self.frozen = 0.0
         """Seconds of the last such stop; 0 without any."""
 

@@ -8,6 +8,7 @@ it that nothing is left running afterwards.
 from __future__ import annotations
 
 import contextlib
+import itertools
 import threading
 import time
 from collections.abc import Sequence
@@ -17,6 +18,7 @@ import ray
 from ray.exceptions import RayError
 
 from aerodaas.actors._application_process import ApplicationProcess
+from aerodaas.actors._dead_man import exit_soon, leave
 from aerodaas.actors._ending import end_actors, may_fly
 from aerodaas.actors.run_lock import RunLock
 
@@ -44,13 +46,21 @@ class Caretaker:
         `groups` are stopped in turn, the `helpers` killed. In lockstep, where nothing falls down,
         the drones are not waited for.
         """
+        self._ended: tuple[Sequence[Sequence[Any]], Sequence[Any]] = (), ()
         self._silent_from = time.monotonic() + _LAUNCH
         self._application = application
         self._drones = drones
-        self._ended = groups, helpers
+        self.look_after(groups, helpers)
         self._lock = RunLock()
         self._itself = ray.get_runtime_context().current_actor
         threading.Thread(target=self._watch, name="caretaker", daemon=True).start()
+
+    def meet(self) -> None:
+        """Let its caller learn where it lives."""
+
+    def leave(self) -> None:
+        """End the process: the application has ended the run itself."""
+        leave()
 
     def heard(self) -> None:
         """Note that the application is alive."""
@@ -59,6 +69,9 @@ class Caretaker:
     def look_after(self, groups: Sequence[Sequence[Any]], helpers: Sequence[Any]) -> None:
         """End these, instead, once it is time to: actors have come in flight."""
         self._ended = groups, helpers
+        for actor in (*itertools.chain(*groups), *helpers):
+            # Where an actor lives is asked of the cluster's head, once, and that may be lost.
+            actor.meet.remote()
 
     def _watch(self) -> None:
         lockstep = self._application.lockstep
@@ -66,6 +79,7 @@ class Caretaker:
             time.sleep(_LOOK_INTERVAL)
         end_actors(*self._ended)
         self._lock.release()
+        exit_soon()
         with contextlib.suppress(RayError):
             # In Ray's own way, or it would tell the terminal of a worker that died.
             ray.kill(self._itself)

@@ -39,6 +39,8 @@ _SHARE = 0.001
 _NAMESPACE = "aerodaas"
 """Ray's, for the names of actors that outlive their application."""
 
+_PRINTS = "print_to_stdstream"
+
 _local: LocalRay | None = None
 """The Ray that this process has had started."""
 
@@ -77,6 +79,7 @@ def connect(address: str | None) -> None:
     begin(None)
     assert _local is not None  # noqa: S101 - begun
     address = _local.address
+    _set_variables()
     take_up_token()
     _init(address, _node_ip_address=_local.node_address)
 
@@ -85,15 +88,20 @@ def join(address: str) -> None:
     """Join the cluster at `address`, whatever its nodes offer; AeroDaaSError if that fails."""
     if ray.is_initialized():
         return
+    _set_variables()
     greet(address)
     _init(address)
 
 
-def _init(address: str, **more: Any) -> None:  # noqa: ANN401 - as Ray takes them
+def _set_variables() -> None:
+    """Before Ray's C++ part is used for the first time: it reads them once."""
     for name, value in VARIABLES.items():
         os.environ.setdefault(name, value)
     # The first error is told; Ray would print the tracebacks of those that followed.
     os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
+
+
+def _init(address: str, **more: Any) -> None:  # noqa: ANN401 - as Ray takes them
     quiet: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
     try:
         with hushed(), _fatal_only():
@@ -101,6 +109,17 @@ def _init(address: str, **more: Any) -> None:  # noqa: ANN401 - as Ray takes the
     except (ConnectionError, RuntimeError, ValueError) as error:
         reason = str(error).strip().splitlines()[0]
         raise _unreachable(address, reason) from None
+    _silence_nodes()
+
+
+def _silence_nodes() -> None:
+    """Ray prints what its nodes say of processes that die; the run tells of them by name.
+
+    `log_to_driver` does not cover it, nor does anything else that Ray lets one choose.
+    """
+    worker = ray._private.worker  # noqa: SLF001
+    if hasattr(worker, _PRINTS):
+        setattr(worker, _PRINTS, lambda *_, **__: None)
 
 
 @contextlib.contextmanager

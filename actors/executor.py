@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import ray
 
 from aerodaas.actors._coding import CodedFrame, decoded
+from aerodaas.actors._dead_man import leave
 from aerodaas.actors.application import Application
 from aerodaas.actors.streams import decode_message, encode_message
 from aerodaas.analytics.base import Analytics, ComputeKind
@@ -77,6 +78,13 @@ class CloudExecutor:
     def ready(self) -> bool:
         """Whether it is prepared; one that Ray has restarted is not."""
         return bool(self._analyses)
+
+    def meet(self) -> None:
+        """Let its caller learn where it lives."""
+
+    def leave(self) -> None:
+        """End the process."""
+        leave()
 
     def ping(self, data: bytes) -> int:
         """Answer at once, to measure the way here; returns the number of bytes."""

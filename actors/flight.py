@@ -6,7 +6,7 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,10 @@ from aerodaas.actors._application_process import ApplicationProcess
 from aerodaas.actors._base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors._cloud import Executor
 from aerodaas.actors._ending import end_actors, may_fly
+from aerodaas.actors._head_watch import HeadWatch
 from aerodaas.actors._lifeline import ASKED_AGAIN, LIFE, LIFELINES, Life, Lifelines
 from aerodaas.actors._losses import DeadError, Pulse, SilentError, drone_lost
+from aerodaas.actors._member import Member, ask, require_clock, routes
 from aerodaas.actors._names import done_stream
 from aerodaas.actors._offload import CloudProcess
 from aerodaas.actors._robot_report import RobotReport
@@ -35,7 +37,7 @@ from aerodaas.actors.isolation import isolation_options
 from aerodaas.actors.plan import Analyses, Cameras, Dispatching, FlightPlan
 from aerodaas.actors.recorder import RecorderActor
 from aerodaas.actors.sensor import SensorActor
-from aerodaas.clock import NANOSECONDS, host_time_ns
+from aerodaas.clock import host_time_ns
 from aerodaas.data import Alert
 from aerodaas.errors import AeroDaaSError, MissionError
 from aerodaas.navigation.commands import Answer, Command
@@ -47,15 +49,12 @@ __all__ = ["Flight", "FlightState"]
 _PREPARE_TIMEOUT = 90.0
 _GROWING = 10.0
 """Wall seconds that an actor may take to join in, or to come to rest for it."""
-_ANSWER_TIMEOUT = 5.0
 _SILENT_FOR = 30.0
 """Seconds that a drone's actor may not answer before the run counts as failed; it flies on."""
 _REPORT_INTERVAL = 0.5
 _RESTARTS = 3
 _LOOKS = 2
 """Calls of an executor in the cloud that only look whether and how far away it is."""
-_CLOCKS_APART = 1.0
-"""Seconds by which clocks may differ; missions are timed by them, and latencies measured."""
 
 
 @dataclass(frozen=True)
@@ -72,25 +71,6 @@ class FlightState:
         """The newest alerts of all actors, oldest first."""
         alerts = [alert for report in self.reports.values() for alert in report.alerts]
         return sorted(alerts, key=lambda alert: alert.header.stamp)
-
-
-@dataclass
-class _Member:
-    """One actor of the run."""
-
-    name: str
-    handle: Any
-    setup: tuple[Any, ...]
-    """What `prepare` is given."""
-    restarts: int
-    """How often Ray restarts it."""
-    further: dict[str, int] = field(default_factory=dict)
-    """Streams that it has come to read in flight, and how many messages of each may wait."""
-    info: ActorInfo | None = None
-    report: ActorReport = field(default_factory=lambda: ActorReport("new"))
-    pending: ray.ObjectRef[ActorReport] | None = None
-    lost_at: float | None = None
-    """Host's monotonic seconds at which it was found dead; None while it lives."""
 
 
 class Flight:
@@ -113,7 +93,7 @@ class Flight:
         # The recorder on a cluster's node does not share our working directory.
         self.recording = recording.absolute() if recording and plan.recorded else None
         self._drones: dict[str, str] = {}
-        self._members: dict[str, _Member] = {}
+        self._members: dict[str, Member] = {}
         self._helpers: list[Any] = []
         """Actors without streams, to be killed at the end."""
         self._job = ray.get_runtime_context().get_job_id()
@@ -121,6 +101,7 @@ class Flight:
         self._pulse = Pulse()
         self._opening: list[Any] = []
         self._lifelines: list[Lifelines] = []
+        self._head: HeadWatch | None = None
         session, edge = plan.session, Place()
         environments = _environments(plan)
         for specs, place in zip(plan.drones, plan.edges, strict=True):
@@ -164,14 +145,15 @@ class Flight:
         """
         self._prepare(list(self._members.values()), progress)
         for reference in self._opening:
-            self._ask(reference, _PREPARE_TIMEOUT)
+            ask(reference, _PREPARE_TIMEOUT)
         if self._caretaker is None:
             # Until here the local Ray would have ended with us.
             self._appoint_caretaker()
         self._origin = host_time_ns()
         self._start(list(self._members.values()))
+        self._head = HeadWatch(ray.get_runtime_context().gcs_address, self._note)
 
-    def _start(self, members: list[_Member]) -> None:
+    def _start(self, members: list[Member]) -> None:
         # Those that only listen go first, so that nobody speaks to an empty room.
         for member in reversed(members):
             member.handle.start.remote(self._origin)
@@ -201,9 +183,7 @@ class Flight:
         """What a drone's actor says; its last word while it is too busy to say anything."""
         before = self._answers.get(name)
         try:
-            robots: dict[str, RobotReport] = self._ask(
-                self._members[name].handle.robots.remote(newest)
-            )
+            robots: dict[str, RobotReport] = ask(self._members[name].handle.robots.remote(newest))
         except DeadError:
             member = self._members[name]
             raise drone_lost(name, member.report, self._pulse.frozen) from None
@@ -227,7 +207,7 @@ class Flight:
         for reference in [one.handle.learn.remote(application) for one in self._members.values()]:
             # One that has died learns it when it is set up anew.
             with contextlib.suppress(AeroDaaSError):
-                self._ask(reference)
+                ask(reference)
 
     def grow(self, plan: FlightPlan) -> None:
         """Fly on by `plan`, the graph as it is now; returns when all that is new runs.
@@ -239,7 +219,7 @@ class Flight:
         drones = [self._members[name].handle for name in sorted(self._ids())]
         held = drones if plan.session.lockstep else []
         try:
-            if not all(self._ask(one.hold.remote(_GROWING), 2 * _GROWING) for one in held):
+            if not all(ask(one.hold.remote(_GROWING), 2 * _GROWING) for one in held):
                 raise MissionError("the mission did not come to rest, so nothing can join it")
             self._join(change)
         finally:
@@ -251,7 +231,7 @@ class Flight:
         """Have all robots plan by `scheduler` from now on."""
         for name in sorted(self._ids()):
             handle = self._members[name].handle
-            self._ask(handle.use_scheduler.remote(scheduler, _GROWING), _PREPARE_TIMEOUT)
+            ask(handle.use_scheduler.remote(scheduler, _GROWING), _PREPARE_TIMEOUT)
 
     def _join(self, change: Growth) -> None:
         known = set(self._members)
@@ -260,30 +240,35 @@ class Flight:
             self._create_cameras(change.cameras)
             self._create_analyses(change.analyses, environments)
             fresh = [member for name, member in self._members.items() if name not in known]
+            # Before they can do anything: the application may be killed at any time.
+            self._inform_caretaker()
             self._prepare(fresh, lambda _: None)
             for name, nodes in change.joining.items():
                 member = self._members[name]
-                member.info = self._ask(member.handle.join.remote(*nodes), _PREPARE_TIMEOUT)
+                member.info = ask(member.handle.join.remote(*nodes), _PREPARE_TIMEOUT)
                 member.setup += nodes
         except BaseException:
             for name in set(self._members) - known:
                 ray.kill(self._members.pop(name).handle)
+            self._inform_caretaker()
             raise
         for name, streams in change.acknowledging.items():
-            self._ask(self._members[name].handle.acknowledge.remote(streams))
+            ask(self._members[name].handle.acknowledge.remote(streams))
         if (recorder := self._members.get("recorder")) is not None and change.recorded:
             recorder.further |= change.recorded
-            recorder.info = self._ask(recorder.handle.listen.remote(change.recorded), _GROWING)
+            recorder.info = ask(recorder.handle.listen.remote(change.recorded), _GROWING)
         for robots in change.drones:
             drone = self._members[self._drones[robots[0].robot.id]]
             grown = drone.handle.grow.remote(robots, change.conduct, _GROWING)
-            drone.info = self._ask(grown, 2 * _GROWING)
+            drone.info = ask(grown, 2 * _GROWING)
         for stream, ends in change.ending.items():
             camera = self._members[f"sensor/{stream}"]
             camera.setup = (ends,)
-            self._ask(camera.handle.end_mission_when_finished.remote(ends))
+            ask(camera.handle.end_mission_when_finished.remote(ends))
         self._connect_all()
         self._start(fresh)
+
+    def _inform_caretaker(self) -> None:
         if self._caretaker is not None:
             self._caretaker.look_after.remote(self._in_ending_order(), list(self._helpers))
 
@@ -293,11 +278,16 @@ class Flight:
         drones = [self._members[name].handle for name in self._ids()]
         return not self.plan.session.lockstep and any(map(may_fly, drones))
 
+    @property
+    def headless(self) -> str:
+        """Where the head of the cluster was, if it is out of reach; else empty."""
+        return self._head.address if self._head is not None and self._head.lost else ""
+
     def command(self, robot: str, command: Command) -> Answer:
         """Tell a robot's mission something."""
         handle = self._members[self._drones[robot]].handle
         method = handle.command.options(concurrency_group=COMMANDS)
-        answer: Answer = self._ask(method.remote(robot, command))
+        answer: Answer = ask(method.remote(robot, command))
         return answer
 
     def reports(self) -> dict[str, ActorReport]:
@@ -319,9 +309,7 @@ class Flight:
         """Stop all actors, the recorder last, and return their last reports."""
         if self._stopped:
             return self.reports()
-        self._stopped = True
-        for lifelines in self._lifelines:
-            lifelines.end()
+        self._watch_no_longer()
         last = end_actors(self._in_ending_order(), self._helpers)
         for member in self._members.values():
             member.report = last.get(member.handle, member.report)
@@ -329,9 +317,14 @@ class Flight:
 
     def leave(self) -> None:
         """Leave the drones, and all that they need, to the caretaker."""
+        self._watch_no_longer()
+
+    def _watch_no_longer(self) -> None:
         self._stopped = True
         for lifelines in self._lifelines:
             lifelines.end()
+        if self._head is not None:
+            self._head.end()
 
     def _in_ending_order(self) -> list[list[Any]]:
         """All actors with streams; the recorder last, for it records the end of the others."""
@@ -370,7 +363,7 @@ class Flight:
             remote = remote(concurrency_groups=groups)
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}
         made = remote(kind).options(**placed)
-        self._members[name] = _Member(name, made.remote(*args), setup, restarts)
+        self._members[name] = Member(name, made.remote(*args), setup, restarts)
 
     def _options(self, name: str, place: Place, *, restarts: int) -> dict[str, Any]:
         """Ray's options; actors outlive the application, and therefore have a name."""
@@ -431,7 +424,7 @@ class Flight:
         models = frozenset(process.works)
         return Executor(process.site, handle, [works], models, process.slots, process.compression)
 
-    def _prepare(self, members: list[_Member], progress: Callable[[str], None]) -> None:
+    def _prepare(self, members: list[Member], progress: Callable[[str], None]) -> None:
         waiting = {member.handle.prepare.remote(*member.setup): member for member in members}
         deadline, began = time.monotonic() + _PREPARE_TIMEOUT, host_time_ns()
         while waiting:
@@ -440,31 +433,19 @@ class Flight:
                 names = ", ".join(sorted(member.name for member in waiting.values()))
                 raise MissionError(f"{names} not ready within {_PREPARE_TIMEOUT:.0f} s")
             member = waiting.pop(ready[0])
-            info: ActorInfo = self._ask(ready[0])
-            _require_clock(member.name, info, began)
+            info: ActorInfo = ask(ready[0])
+            require_clock(member.name, info, began)
             member.info = info
             progress(member.name)
         self._connect_all()
 
     def _connect_all(self) -> None:
         for reference in [self._connect(member) for member in self._members.values()]:
-            self._ask(reference)
+            ask(reference)
 
-    def _connect(self, member: _Member) -> Any:  # noqa: ANN401 - Ray's reference
+    def _connect(self, member: Member) -> Any:  # noqa: ANN401 - Ray's reference
         """Tell a publisher of its readers on other nodes, or without shared memory."""
-        here = member.info
-        assert here is not None  # noqa: S101 - just prepared
-        known = [(one.handle, one.info) for one in self._members.values() if one.info is not None]
-        routes = {
-            stream: [
-                handle
-                for handle, reader in known
-                if stream in reader.reads and not _share_memory(here, reader)
-            ]
-            for stream in here.publishes
-        }
-        routes = {stream: readers for stream, readers in routes.items() if readers}
-        return member.handle.connect.remote(routes)
+        return member.handle.connect.remote(routes(member, self._members.values()))
 
     def _gather_reports(self) -> None:
         for member in self._members.values():
@@ -509,14 +490,14 @@ class Flight:
             self._lost(member)
             threading.Thread(target=self._revive, args=(member,), daemon=True).start()
 
-    def _lost(self, member: _Member) -> None:
+    def _lost(self, member: Member) -> None:
         error = MissionError(f"the actor {member.name} died")
         if member.lost_at is None:
             member.lost_at = time.monotonic()
             self._note("actor_lost", str(error))
         member.report = ActorReport("failed", error)
 
-    def _back(self, member: _Member) -> None:
+    def _back(self, member: Member) -> None:
         if member.lost_at is not None:
             absence = time.monotonic() - member.lost_at
             member.lost_at = None
@@ -527,7 +508,7 @@ class Flight:
         for name in self._ids():
             self._members[name].handle.note.remote(kind, text)
 
-    def _revive(self, member: _Member) -> None:
+    def _revive(self, member: Member) -> None:
         """Set an actor up anew, in a thread, as soon as Ray has restarted it."""
         actor, lost_at = member.handle, member.lost_at
         while member.lost_at == lost_at and not self._stopped:
@@ -548,22 +529,6 @@ class Flight:
                 return
             time.sleep(ASKED_AGAIN)
 
-    @staticmethod
-    def _ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN401 - as it says
-        try:
-            return ray.get(reference, timeout=timeout)
-        except RayTaskError as error:
-            cause = error.cause
-            if isinstance(cause, AeroDaaSError):
-                raise cause from None
-            raise MissionError(f"{type(cause).__name__}: {cause}") from cause
-        except RayActorError as error:
-            # Ray puts the remote traceback first and what went wrong last.
-            reason = str(error).strip().splitlines()[-1]
-            raise DeadError(f"an actor died: {reason}") from None
-        except ray.exceptions.GetTimeoutError:
-            raise SilentError(f"an actor did not answer within {timeout:.0f} s") from None
-
 
 def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
     """Ray's options for the environment of each process that runs analyses.
@@ -579,18 +544,3 @@ def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
     return {
         name: isolation_options(one.runtime_env, one.place, name) for name, one in processes.items()
     }
-
-
-def _require_clock(name: str, info: ActorInfo, began: int) -> None:
-    """A clock that reads what it cannot have read while `prepare` was under way is wrong."""
-    ahead = max(info.clock - host_time_ns(), 0) - max(began - info.clock, 0)
-    if abs(ahead) > _CLOCKS_APART * NANOSECONDS:
-        side = "ahead of" if ahead > 0 else "behind"
-        raise MissionError(
-            f"the clock of the machine that runs {name} is {abs(ahead) / NANOSECONDS:.0f} s {side} "
-            "this one's; set both by NTP (`timedatectl set-ntp true`) before flying"
-        )
-
-
-def _share_memory(one: ActorInfo, other: ActorInfo) -> bool:
-    return one.node_id == other.node_id and one.shared_memory and other.shared_memory

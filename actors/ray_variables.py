@@ -14,4 +14,7 @@ VARIABLES = {
     "RAY_timeout_ms_task_wait_for_death_info": "100",
     # Ray would run its workers at nice 15, the drone's actor, too; the others lower themselves.
     "RAY_worker_niceness": "0",
+    # Ray ends all processes of a node, the drone's, too, whose head is silent for a minute. A day
+    # lets drones come home; a run's processes end by themselves afterwards.
+    "RAY_gcs_rpc_server_reconnect_timeout_s": "86400",
 }

@@ -24,7 +24,7 @@ from aerodaas.view.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
 if TYPE_CHECKING:
     from aerodaas.actors.flight import FlightState
 
-__all__ = ["Starting", "Watching", "show_left", "show_results", "show_speed"]
+__all__ = ["Starting", "Watching", "show_headless", "show_left", "show_results", "show_speed"]
 
 _ALERTS_SHOWN = 4
 
@@ -188,6 +188,16 @@ def show_left(recording: Path | None) -> None:
     """Say what becomes of drones that still fly when the application ends."""
     where = f"; its recording: {_shown(recording)}" if recording else ""
     line = f"a drone is still flying: it comes down by itself, and its processes end then{where}"
+    Console(highlight=False, soft_wrap=True, stderr=True).print(line, markup=False)
+
+
+def show_headless(head: str, recording: Path | None) -> None:
+    """Say how a run ended whose cluster has lost its head, at the address `head`."""
+    where = f"; its recording: {_shown(recording)}" if recording else ""
+    line = (
+        f"the cluster's head at {head} is out of reach: what runs here for this flight ends by "
+        f"itself within half a minute{where}"
+    )
     Console(highlight=False, soft_wrap=True, stderr=True).print(line, markup=False)
 
 

@@ -305,7 +305,12 @@ class Run:
             return
 
     def _finish(self) -> None:
-        from aerodaas.console import show_left, show_results, show_speed  # noqa: PLC0415
+        from aerodaas.console import (  # noqa: PLC0415
+            show_headless,
+            show_left,
+            show_results,
+            show_speed,
+        )
 
         assert self._flight is not None  # noqa: S101 - launched
         self._finished.set()
@@ -326,6 +331,8 @@ class Run:
             self.options, seconds(max(stamps, default=0)), flown, self._launched - self._began
         )
         show_results(self.options, self._flight.recording)
+        if self._flight.headless:
+            show_headless(self._flight.headless, self._flight.recording)
 
     def abandon(self) -> None:
         """Land and stop: the application has ended without waiting."""

@@ -34,7 +34,8 @@ if pgrep -x raylet >/dev/null 2>&1; then
 fi
 
 # Ray gives a head up that is silent for a minute, and ends this node with the drone's actor on
-# it. A day lets the drone come home by its own rules first.
+# it. A day lets the drone come home by its own rules first; the processes of its run end by
+# themselves once it has landed.
 export RAY_gcs_rpc_server_reconnect_timeout_s="${RAY_gcs_rpc_server_reconnect_timeout_s:-86400}"
 export RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL=minor
 # A frame goes to the cloud in the call that it is for, instead of by a reference.
