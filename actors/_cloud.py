@@ -31,6 +31,8 @@ _PATIENCE = 4
 """An execution that takes so many times what was expected is lost, ..."""
 _LEAST_PATIENCE = NANOSECONDS
 """... but not before this."""
+_SETTLING = NANOSECONDS
+"""Mission time that an executor which is back is given for answers that are overdue."""
 
 
 @dataclass(frozen=True)
@@ -109,6 +111,8 @@ class Cloud:
         self._timeout = timeout_ns
         self._wake = wake
         self._started: dict[int, _Sent] = {}
+        self._overdue: dict[int, _Sent] = {}
+        """Given up, but their frames may still be on the way."""
         self._answered: deque[_Sent] = deque()
         self._answered_since = -1
         """When the newest execution that was answered had been sent."""
@@ -137,18 +141,25 @@ class Cloud:
         self.parcels.later(partial(self._carry, sent, message, until))
 
     def answers(self, now: int) -> Iterator[CloudAnswer]:
-        """Yield what has come back or timed out; what comes after its time-out is passed over."""
+        """Yield what has come back or timed out.
+
+        What comes after its time-out tells of the link only.
+        """
         while self._answered:
             sent = self._answered.popleft()
             if self._started.pop(sent.task.id, None) is not None:
-                answer = self._answer(sent)
-                self.parcels.uplink.lose(sent.way)
-                yield answer
+                yield self._answer(sent)
+            elif self._overdue.pop(sent.task.id, None) is not None:
+                self._hear_late(sent)
+            self.parcels.uplink.lose(sent.way)
         for sent in list(self._started.values()):
             if now > sent.until:
                 del self._started[sent.task.id]
-                self.parcels.uplink.lose(sent.way)
-                self.gone |= self._answered_since < sent.at
+                if self._answered_since < sent.at:
+                    self.gone = True
+                    self._overdue[sent.task.id] = sent
+                else:
+                    self.parcels.uplink.lose(sent.way)
                 yield CloudAnswer(
                     sent.task,
                     timed_out=now >= sent.task.deadline,
@@ -177,15 +188,30 @@ class Cloud:
                 self.gone = False
                 self._carried.clear()
                 self._answered_since = now
+                self.parcels.look_again()
             elif probe.exception() is None:
                 self._prepare()
         if not self.gone:
+            if now - self._answered_since > _SETTLING:
+                self._forget_overdue()
             self.parcels.ping(self.executor.handle)
         elif self._probe is None and now - self._probed >= _PROBE_EVERY:
             self._probed = now
             future: Future[bool] = self.executor.handle.ready.remote().future()
             future.add_done_callback(lambda _: self._wake())
             self._probe = future
+
+    def _hear_late(self, sent: _Sent) -> None:
+        """Learn from an answer after its time-out: by what was known it would have come sooner."""
+        if sent.future is not None and sent.future.exception() is None:
+            self.parcels.link.forget()
+            self._answer(sent)
+
+    def _forget_overdue(self) -> None:
+        """What was sent later has been answered, so nothing is on the way any more."""
+        for sent in self._overdue.values():
+            self.parcels.uplink.lose(sent.way)
+        self._overdue.clear()
 
     def finish(self, timeout: float) -> None:
         """Wait up to `timeout` seconds for what is under way, so that its executor may be ended."""
@@ -213,7 +239,10 @@ class Cloud:
             sent.began = time.perf_counter()
             if sent.carries:
                 sent.way = (self.executor.site, sent.task.id)
-                self.parcels.uplink.depart(sent.way, len(parcel.data), sent.began)
+                work = self.executions.seconds(sent.task.profile.model)
+                if work is None:
+                    work = sent.task.profile.cloud_time / self._second
+                self.parcels.uplink.depart(sent.way, len(parcel.data), sent.began, work)
             execute, left = self.executor.handle.execute, until - time.monotonic()
             data = parcel.data if sent.carries else b""
             reference = execute.remote(sent.task.profile.model, parcel.name, data, left)

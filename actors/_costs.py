@@ -6,8 +6,9 @@ follow the network, and quantiles rather than means, so that one odd value does 
 
 from __future__ import annotations
 
+import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 __all__ = ["Executions", "Link", "Uplink", "quantile"]
 
@@ -40,6 +41,10 @@ class Link:
         else:
             self._transfers.append((size, seconds))
 
+    def forget(self) -> None:
+        """What was known of the bandwidth has turned out to be wrong."""
+        self._transfers.clear()
+
     @property
     def latency(self) -> float:
         """Seconds that an empty message takes there and back; 0 before the first one did."""
@@ -62,31 +67,48 @@ class Link:
 class Uplink:
     """What is under way on a link that carries one thing after another. Threads may share it."""
 
-    def __init__(self, link: Link) -> None:
-        """Learn about `link` from what it carries."""
+    def __init__(self, link: Link, clock: Callable[[], float] = time.perf_counter) -> None:
+        """Learn about `link` from what it carries; `clock` tells the seconds of `depart`."""
         self._link = link
-        self._under_way: dict[object, tuple[float, float]] = {}
+        self._clock = clock
+        self._under_way: dict[object, tuple[float, float, float]] = {}
         self._arrived = float("-inf")
 
     @property
     def waiting(self) -> float:
         """Bytes that must arrive before what is sent now."""
-        return sum(size for size, _ in tuple(self._under_way.values()))
+        return sum(size for size, _, _ in tuple(self._under_way.values()))
 
     def seconds(self, size: float) -> float:
         """Expected seconds from sending `size` bytes now until a small answer, without any work."""
-        return self._link.seconds(size + self.waiting)
+        ahead = size + self.waiting
+        return max(self._link.seconds(ahead), self._link.latency + ahead / self._at_most())
 
-    def depart(self, name: object, size: float, at: float) -> None:
-        """Something of so many bytes is handed to the link at `at`, seconds."""
-        self._under_way[name] = size, at
+    def _at_most(self) -> float:
+        """Bytes per second that the link has at most, or the oldest would have arrived.
+
+        So a link that has become slow is known as one before anything has crossed it.
+        """
+        under_way = tuple(self._under_way.values())
+        if not under_way:
+            return float("inf")
+        size, departed, work = under_way[0]
+        crossing = self._clock() - max(departed, self._arrived) - work - self._link.latency
+        return size / crossing if crossing > 0 else float("inf")
+
+    def depart(self, name: object, size: float, at: float, work: float = 0.0) -> None:
+        """Something of so many bytes is handed to the link at `at`, seconds.
+
+        Its answer takes `work` seconds more than the way there and back.
+        """
+        self._under_way[name] = size, at, work
 
     def arrive(self, name: object, at: float) -> None:
         """It was there, and answered but for the work, at `at`; learn what the link took for it.
 
         What it waited for others is theirs: counted twice, a queue would look like a slow link.
         """
-        size, departed = self._under_way.pop(name, (0.0, at))
+        size, departed, _ = self._under_way.pop(name, (0.0, at, 0.0))
         queued = self._arrived > departed
         taken = at - max(departed, self._arrived) + (self._link.latency if queued else 0.0)
         self._arrived = max(self._arrived, at)

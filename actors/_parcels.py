@@ -119,6 +119,10 @@ class Parcels:
             self._transferred = now
         self.later(lambda: self._ping(executor, _LARGE if large else 0))
 
+    def look_again(self) -> None:
+        """Have the next ping go at once, and see the bandwidth: the link may be another one now."""
+        self._pinged = self._transferred = float("-inf")
+
     def close(self) -> None:
         """Stop packing."""
         self._packer.shutdown(wait=False, cancel_futures=True)
@@ -131,6 +135,9 @@ class Parcels:
 
         def answered(future: Future[int]) -> None:
             if future.exception() is None:
+                if size:
+                    # Nothing else was on the link, so this says more than all that came before.
+                    self.link.forget()
                 self.link.observe(size, time.perf_counter() - began)
 
         self._pinging.add_done_callback(answered)

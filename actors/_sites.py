@@ -17,6 +17,9 @@ _UNKNOWN = 0.3
 """Seconds expected of an executor that has not executed an analysis yet."""
 
 
+_TOO_LATE = "its frame would have been there too late"
+
+
 class Sites:
     """The executors in the cloud. A task goes to the one that is expected to answer first."""
 
@@ -51,14 +54,21 @@ class Sites:
         return min((cloud.parcels.expected for cloud in self._able(model)), default=0.0)
 
     def send(self, task: Task, message: Message[Any], now: int, budget: float) -> None:
-        """Start an execution whose result is of use for `budget` seconds of the host."""
+        """Start an execution whose result is of use for `budget` seconds of the host.
+
+        A frame that must come too late is not sent.
+        """
         model = task.profile.model
         able = self._able(model)
-        if able:
-            best = min(able, key=lambda cloud: self._delay(cloud, model))
-            best.send(task, message, now, budget)
-        else:
+        if not able:
             self._homeless.append(CloudAnswer(task, error="nothing in the cloud runs it"))
+            return
+        best = min(able, key=lambda cloud: self._delay(cloud, model))
+        if best.parcels.expected > budget:
+            # It would keep the link from those that come after it.
+            self._homeless.append(CloudAnswer(task, timed_out=True, error=_TOO_LATE))
+        else:
+            best.send(task, message, now, budget)
 
     def answers(self, now: int) -> Iterator[CloudAnswer]:
         """Yield what has come back, timed out, or could not be sent."""

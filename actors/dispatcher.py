@@ -292,7 +292,7 @@ class DispatcherActor(StreamActor):
         if answer.lost:
             self._lose(task, answer.error, now)
         elif answer.timed_out:
-            self._why[task.id] = "the cloud did not answer"
+            self._why[task.id] = answer.error
             self._guarded("finished", task, now, Outcome.TIMEOUT)
         elif answer.message is None:
             self._why[task.id] = answer.error

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from concurrent.futures import Future
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,20 +12,25 @@ import pytest
 
 from aerodaas.actors._cloud import Cloud, CloudAnswer, Executor
 from aerodaas.actors._parcels import Parcels
+from aerodaas.actors._sites import Sites
+from aerodaas.actors.executor import Executed
+from aerodaas.actors.streams import encode_message
 from aerodaas.clock import NANOSECONDS
 from aerodaas.data import Header
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
-from aerodaas.status import Message
+from aerodaas.status import Hop, Message
 
 
 class _Frozen:
-    """An executor's handle that takes every call and never answers."""
+    """An executor's handle that takes every call and never answers by itself."""
 
     def __init__(self) -> None:
+        self.asked: list[Future[Any]] = []
         self.execute = self.ping = self.ready = SimpleNamespace(remote=self._take)
 
     def _take(self, *_: object) -> Any:  # noqa: ANN401
-        return SimpleNamespace(future=Future)
+        self.asked.append(Future())
+        return SimpleNamespace(future=lambda: self.asked[-1])
 
 
 @pytest.fixture
@@ -81,6 +88,62 @@ def test_what_waits_for_the_link_is_part_of_what_is_expected(cloud: Cloud) -> No
     cloud.parcels.link.observe(50_000, 2.0)
     cloud.executions.observe("m", 0.1)
     for number in range(4):
-        cloud.parcels.uplink.depart(number, 50_000, 0.0)
+        cloud.parcels.uplink.depart(number, 50_000, time.perf_counter())
     cloud.parcels._size = 50_000
     assert cloud.expected("m") == pytest.approx(10.1)
+
+
+def test_frames_that_were_given_up_are_still_on_the_link(cloud: Cloud) -> None:
+    """Until they are answered, late, or what was sent after them is: nothing overtakes them."""
+    cloud.executions.observe("m", 0.05)
+    _send(cloud, _task(1, 20.0))
+    while not cloud.executor.handle.asked:
+        time.sleep(0.001)
+    _given_up(cloud)
+    assert cloud.gone
+    cloud.probe(30 * NANOSECONDS)
+    assert cloud.parcels.uplink.waiting > 0
+    cloud.executor.handle.asked[-1].set_result(result=True)
+    cloud.probe(31 * NANOSECONDS)
+    assert cloud.parcels.uplink.waiting > 0
+    cloud.probe(33 * NANOSECONDS)
+    assert cloud.parcels.uplink.waiting == 0
+
+
+@pytest.mark.parametrize(("budget", "sent"), [(1.9, False), (2.1, True)])
+def test_a_frame_that_has_to_be_late_is_not_sent(budget: float, *, sent: bool) -> None:
+    """50 kB over 25 kB/s take two seconds; the task ends at once where that is too long."""
+    handle = _Frozen()
+    executor = Executor("site", handle, [], frozenset({"m"}), 2, "none")
+    sites = Sites((executor,), 10 * NANOSECONDS, lambda: None)
+    parcels = sites._parcels["site"]
+    parcels.link.observe(50_000, 2.0)
+    parcels._size = 50_000
+    message: Message[Any] = Message("camera", 1, 0, Header(0, 0, "camera"), 0, (), b"x")
+    sites.send(_task(1, 20.0), message, 0, budget)
+    answers = list(sites.answers(0))
+    parcels._packer.shutdown(wait=True)
+    assert len(handle.asked) == sent
+    assert [answer.timed_out for answer in answers] == [True] * (not sent)
+    assert all("too late" in answer.error for answer in answers)
+
+
+def test_a_late_answer_tells_of_the_link(cloud: Cloud) -> None:
+    """At once, though all that was known before said something else."""
+    link = cloud.parcels.link
+    for _ in range(9):
+        link.observe(50_000, 0.02)
+    cloud.executions.observe("m", 0.05)
+    message: Message[Any] = Message("camera", 1, 0, Header(0, 0, "camera"), 0, (), bytes(50_000))
+    cloud.send(_task(1, 20.0), message, 0, 30.0)
+    while not cloud.executor.handle.asked:
+        time.sleep(0.001)
+    assert cloud.expected("m") == pytest.approx(0.15, abs=0.1)
+    _given_up(cloud)
+    time.sleep(0.3)
+    hops = (Hop("camera", 0, 0), Hop("m", 0, 10_000_000))
+    answered = encode_message(replace(message, hops=hops, item=b""))
+    cloud.executor.handle.asked[0].set_result(Executed(answered, 0.0))
+    assert list(cloud.answers(20 * NANOSECONDS)) == [], "its task has ended already"
+    assert link.bandwidth < 50_000 / 0.28
+    assert cloud.parcels.uplink.waiting == 0

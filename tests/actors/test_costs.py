@@ -111,20 +111,42 @@ def test_a_queue_on_a_link_is_waited_for_and_not_taken_for_slowness(
     """All sent at once: each waits for those before it, and the bandwidth is still recovered."""
     link = Link()
     link.observe(0, latency)
-    uplink = Uplink(link)
+    now = 0.0
+    uplink = Uplink(link, lambda: now)
     for number, size in enumerate(sizes):
         uplink.depart(number, size, 0.0)
     assert uplink.waiting == sum(sizes)
     sent = 0
     for number, size in enumerate(sizes):
         sent += size
-        uplink.arrive(number, latency + sent / bandwidth)
+        now = latency + sent / bandwidth
+        uplink.arrive(number, now)
         assert link.bandwidth == pytest.approx(bandwidth, rel=0.01)
         left = sum(sizes[number + 1 :])
         assert uplink.waiting == left
         assert uplink.seconds(50_000) == pytest.approx(
             latency + (left + 50_000) / bandwidth, rel=0.01
         )
+
+
+@given(st.floats(0.01, 30.0), st.floats(0.0, 1.0), st.integers(20_000, 500_000))
+def test_a_link_that_has_become_slow_is_known_before_anything_has_crossed_it(
+    overdue: float, work: float, size: int
+) -> None:
+    """What has been under way for so long will take as long again, for each of its size."""
+    now = 0.0
+    link = Link()
+    link.observe(0, 0.02)
+    link.observe(50_000, 0.03)
+    uplink = Uplink(link, lambda: now)
+    uplink.depart("a", size, 0.0, work)
+    now = link.seconds(size) + work
+    assert uplink.seconds(size) == pytest.approx(link.seconds(2 * size))
+    now = 0.02 + work + overdue
+    expected = max(link.seconds(2 * size), 0.02 + 2 * overdue)
+    assert uplink.seconds(size) == pytest.approx(expected)
+    uplink.lose("a")
+    assert uplink.seconds(size) == pytest.approx(link.seconds(size))
 
 
 def test_what_is_lost_on_a_link_is_waited_for_no_longer() -> None:

@@ -19,10 +19,11 @@ from aerodaas import AeroStreamData, Environment
 from aerodaas.actors.dispatcher import DispatcherActor
 from aerodaas.actors.session import Session
 from aerodaas.analytics import SyntheticAnalytics
+from aerodaas.clock import NANOSECONDS
 from aerodaas.config import EnvironmentConfig
 from aerodaas.recording.reader import Recording
 from aerodaas.run import Run
-from aerodaas.schedulers.analytics.base import Resources
+from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Resources
 from aerodaas.schedulers.analytics.dems import Dems
 
 pytestmark = pytest.mark.wall_clock
@@ -118,6 +119,17 @@ def test_it_tells_how_it_fares_before_it_is_set_up() -> None:
     assert report.phase == "new"
     assert report.values["tasks"] == 0
     assert actor.stop().error is None
+
+
+@pytest.mark.parametrize(
+    ("edge_time", "patience"), [(10, 1000), (250, 1000), (251, 1004), (3000, 12_000)]
+)
+def test_an_execution_on_the_edge_has_four_times_its_time(edge_time: int, patience: int) -> None:
+    """But a second at least, for a first inference takes longer; milliseconds."""
+    environment = EnvironmentConfig.model_validate({"robots": [robot()]})
+    actor = DispatcherActor(Session(environment), Dems(), (), Resources())
+    profile = Profile("m", 10.0, NANOSECONDS, edge_time * MILLISECOND, NANOSECONDS)
+    assert actor._patience_with(profile) == patience * MILLISECOND
 
 
 @pytest.mark.slow

@@ -122,6 +122,8 @@ class Told:
     flight: Flight
     ends: dict[str, list[tuple[float, str, str]]]
     """Mission seconds, outcome and reason of each end, by task."""
+    sent: dict[str, float]
+    """Mission seconds at which each task that went to the cloud was first sent there."""
 
     @classmethod
     def of(cls, watched: Watched) -> Told:
@@ -129,14 +131,17 @@ class Told:
         path = watched.run.recording
         assert path is not None
         ends: dict[str, list[tuple[float, str, str]]] = defaultdict(list)
+        sent: dict[str, float] = {}
         with Recording.open(path) as recording:
             flight = Flight.read(recording)
             for record in recording.records(schemas={"aerodaas.Decision"}):
                 value = record.value
+                if value["action"] == "cloud":
+                    sent.setdefault(value["task"], value["stamp"] / 1e9)
                 if value["action"] in ENDS:
                     end = (value["stamp"] / 1e9, value["action"], value["reason"])
                     ends[value["task"]].append(end)
-        return cls(flight, dict(ends))
+        return cls(flight, dict(ends), sent)
 
     def alerts(self, kind: str) -> list[str]:
         """Texts of the alerts of this kind."""
@@ -175,6 +180,18 @@ class Told:
             for name, known in numbers.items()
             for number in range(min(known), max(known) - int(RATE))
             if number not in known
+        ]
+
+    def sent_to_cloud(self, begin: float, end: float) -> list[str]:
+        """Tasks sent to the cloud between these mission seconds, and ended since.
+
+        What was decided for the cloud, but not sent because it had to be late, is none.
+        """
+        kept = "too late"
+        return [
+            one
+            for one, at in self.sent.items()
+            if begin < at < end and one in self.ends and kept not in self.ends[one][-1][2]
         ]
 
     def recovery(self, after: float, where: str = "") -> float:

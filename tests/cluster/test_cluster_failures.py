@@ -114,6 +114,29 @@ def test_a_tenth_of_the_bandwidth_and_400_ms_more(watched: Watched) -> None:
     told.each_counted_once()
 
 
+def test_a_link_too_slow_for_any_frame(watched: Watched) -> None:
+    """At 200 kbit/s a frame takes 2.3 s, its deadline is 0.9 s: what must be late is not sent."""
+    with watched.flying():
+        watched.broke()
+        on_clouds(watched.cluster, lambda name: watched.cluster.shape(name, Shape(0.04, 2e5)))
+        time.sleep(30.0)
+        on_clouds(watched.cluster, lambda name: watched.cluster.shape(name, PLAIN))
+        mended = watched.now()
+        watched.goes_on()
+        time.sleep(20.0)
+    told = Told.of(watched)
+    report("200 kbit/s", told, watched)
+    sent = told.sent_to_cloud(watched.broken_at, mended)
+    late = [task for task in sent if told.ends[task][-1][1] != "done"]
+    print(f"sent to the cloud meanwhile: {len(sent)}, of them not in time: {len(late)}")  # noqa: T201
+    print(f"cloud used again {told.recovery(mended, 'cloud'):.1f} s after")  # noqa: T201
+    told.safe()
+    told.each_counted_once()
+    assert len(late) <= 8
+    assert not told.sent_to_cloud(watched.broken_at + 5.0, mended), "it is known to be too slow"
+    assert told.recovery(mended, "cloud") < 20.0
+
+
 def test_the_cloud_is_cut_off_for_ten_seconds(watched: Watched) -> None:
     """The edge goes on alone; afterwards the cloud is used again."""
     with watched.flying():
