@@ -6,6 +6,7 @@ import logging
 import queue
 import threading
 from collections.abc import Callable
+from functools import partial
 
 __all__ = ["Publisher"]
 
@@ -19,9 +20,16 @@ _CLOSING = 2.0
 class Publisher:
     """Does what one thread hands over, in order, in another one; at once before `start`."""
 
-    def __init__(self) -> None:
-        """Publish in the caller's own thread, as lockstep needs it."""
+    def __init__(self, on_drop: Callable[[int], None] = lambda _: None) -> None:
+        """Publish in the caller's own thread, as lockstep needs it.
+
+        `on_drop` is called in the thread that publishes, once it has caught up with what was
+        dropped, with the number of messages dropped since the last time.
+        """
         self.dropped = 0
+        """Messages that gave way because too many waited."""
+        self._on_drop = on_drop
+        self._told = 0
         self._waiting: queue.SimpleQueue[Callable[[], object] | None] = queue.SimpleQueue()
         self._thread: threading.Thread | None = None
 
@@ -49,6 +57,9 @@ class Publisher:
     def _run(self) -> None:
         while (work := self._waiting.get()) is not None:
             _tried(work)
+            if self.dropped > self._told and self._waiting.empty():
+                since, self._told = self.dropped - self._told, self.dropped
+                _tried(partial(self._on_drop, since))
 
 
 def _tried(work: Callable[[], object]) -> None:

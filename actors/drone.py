@@ -94,7 +94,7 @@ class DroneActor(StreamActor):
         self._reports: dict[str, RobotReport] = {}
         """How each robot fares: replaced by the loop, never changed."""
         self._calls = LoopCalls(self._wake)
-        self._publisher = Publisher()
+        self._publisher = Publisher(self._unpublished)
         self._gate = GrowthGate(self._serve)
         self._due: dict[str, int] = {}
         self._late = 0
@@ -345,6 +345,10 @@ class DroneActor(StreamActor):
             self.alert("application_lost", reason)
         self._orphaned = silent
 
+    def _unpublished(self, count: int) -> None:
+        text = f"{count} messages of the setpoint loop were not published: too many waited"
+        self.alert("unpublished", text)
+
     def _fail(self, error: AeroDaaSError) -> None:
         for pilot in self._pilots.values():
             pilot.abandon()
@@ -352,7 +356,12 @@ class DroneActor(StreamActor):
 
     def _values(self) -> dict[str, Any]:
         alone = {name: pilot.vehicle.capabilities.alone for name, pilot in self._pilots.items()}
-        return {"loop_late": self._late, "not_granted": self._refused, ALONE: alone}
+        return {
+            "loop_late": self._late,
+            "unpublished": self._publisher.dropped,
+            "not_granted": self._refused,
+            ALONE: alone,
+        }
 
     def _close(self) -> None:
         self._calls.close("the drone's actor has been stopped")
