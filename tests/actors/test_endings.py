@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -38,11 +39,11 @@ print("in the air", flush=True)
 
 
 @contextmanager
-def running(folder: Path, ending: str) -> Iterator[subprocess.Popen[str]]:
+def running(folder: Path, ending: str, *more: str) -> Iterator[subprocess.Popen[str]]:
     """Run an application that is in the air when it comes to its `ending`, in real time."""
     (folder / "environment.json").write_text(json.dumps(FLAT))
     (folder / "app.py").write_text(_APP + ending)
-    words = ["run", str(folder / "app.py"), "--speed", "1", "--record", str(folder / "out")]
+    words = ["run", str(folder / "app.py"), "--speed", "1", "--record", str(folder / "out"), *more]
     with subprocess.Popen(
         [sys.executable, "-c", "from aerodaas.cli import main; main()", *words],
         stdout=subprocess.PIPE,
@@ -85,6 +86,14 @@ def everyone(process: subprocess.Popen[str]) -> list[psutil.Process]:
     return [parent, *parent.children(recursive=True)]
 
 
+def require_gone(processes: list[psutil.Process], seconds: float) -> None:
+    """Wait until all of these have ended."""
+    deadline = time.monotonic() + seconds
+    while any(one.is_running() and one.status() != psutil.STATUS_ZOMBIE for one in processes):
+        assert time.monotonic() < deadline, [one for one in processes if one.is_running()]
+        time.sleep(0.2)
+
+
 @pytest.mark.parametrize(
     ("sent", "code", "reason"),
     [
@@ -112,10 +121,43 @@ def test_an_interrupted_run_lands(
     flight = landed(tmp_path)
     reasons = [band.reason for band in flight.robots["drone"].bands if band.state == "landing"]
     assert reasons == [reason]
-    deadline = time.monotonic() + 20
-    while any(one.is_running() and one.status() != psutil.STATUS_ZOMBIE for one in processes):
-        assert time.monotonic() < deadline, [one for one in processes if one.is_running()]
-        time.sleep(0.2)
+    require_gone(processes, 20.0)
+
+
+def test_a_second_interrupt_leaves_the_drone_to_itself(tmp_path: Path) -> None:
+    """The application returns at once and says so; the drone lands, and then nothing is left."""
+    with running(tmp_path, "drone.wait()") as process:
+        airborne(process)
+        processes = everyone(process)
+        os.killpg(process.pid, signal.SIGINT)
+        time.sleep(1.0)
+        os.killpg(process.pid, signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+        assert process.returncode == 130, said
+    assert "a drone is still flying: it comes down by itself" in said
+    assert str(tmp_path / "out" / "flight.mcap") in said
+    assert "Traceback" not in said
+    require_gone(processes, 120.0)
+    landed(tmp_path)
+
+
+def test_rays_own_words_do_not_reach_the_terminal(tmp_path: Path) -> None:
+    """Of processes that die in flight people are told by us, in a line each."""
+    with running(tmp_path, "drone.wait()", "--no-view") as process:
+        airborne(process)
+        for one in everyone(process):
+            with contextlib.suppress(psutil.Error):
+                if " ".join(one.cmdline()).startswith(("ray::RecorderActor", "ray::SensorActor")):
+                    one.kill()
+        time.sleep(8.0)
+        process.send_signal(signal.SIGTERM)
+        rest, said = process.communicate(timeout=120)
+    assert "the actor recorder died" in said
+    assert "recorder is back after" in said
+    for text in (rest, said):
+        assert "raylet" not in text
+        assert "ray." not in text
+        assert "worker" not in text
 
 
 @pytest.mark.parametrize(

@@ -10,6 +10,7 @@ from typing import ClassVar
 
 from aerodaas import (
     AeroNavigation,
+    Frame,
     NavigableAnalytics,
     NavigationType,
     Odometry,
@@ -21,7 +22,7 @@ from aerodaas.analytics.base import Context
 from aerodaas.clock import seconds
 from aerodaas.schedulers.waypoint.base import Situation
 
-__all__ = ["DyingScheduler", "HangingScheduler", "Mortal", "RaisingScheduler", "Stuck"]
+__all__ = ["DyingScheduler", "Forward", "HangingScheduler", "Mortal", "RaisingScheduler", "Stuck"]
 
 _EVER = 1000.0
 
@@ -60,6 +61,17 @@ class Mortal(NavigableAnalytics):
             if seconds(context.now() - self._again) > 5.0:
                 return AeroNavigation(NavigationType.ANALYTICS_DRIVEN)
         command = VelocityCommand(forward=1.0)
+        return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
+
+
+class Forward(NavigableAnalytics):
+    """Steers forward for as long as pictures come."""
+
+    accepts: ClassVar[tuple[type, ...]] = (Frame,)
+
+    def process(self, item: Frame, context: Context) -> AeroNavigation:  # noqa: ARG002
+        """Fly on."""
+        command = VelocityCommand(forward=0.5)
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
 
 

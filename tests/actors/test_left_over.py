@@ -1,0 +1,200 @@
+"""What applications leave that are killed, or run beside each other: nothing, in the end."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psutil
+import pytest
+from flying import FLAT
+
+from aerodaas.actors.local_ray import LocalRay
+from aerodaas.actors.ray_variables import VARIABLES
+from aerodaas.actors.supervisor import VARIABLE
+from aerodaas.recording.flight import Flight
+from aerodaas.recording.reader import Recording
+
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
+
+_ROOT = Path(__file__).resolve().parents[2]
+_APP = """
+from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
+
+env = Environment("environment.json")
+drone = env.get_robot_by_id("drone")
+drone.get_sensor_by_id("odom_drone").get_data_stream()
+hover = Waypoint("there", 4, 0, 2, hover_duration={hover})
+drone.navigate(AeroNavigation(NavigationType.DISTANCE_DRIVEN, [hover]))
+drone.start_mission()
+"""
+
+
+def write(folder: Path, hover: float) -> None:
+    """An application that hovers for so many seconds."""
+    folder.mkdir(exist_ok=True)
+    (folder / "environment.json").write_text(json.dumps(FLAT))
+    (folder / "app.py").write_text(_APP.format(hover=hover))
+
+
+@contextmanager
+def started(folder: Path, command: str, *words: str) -> Iterator[subprocess.Popen[str]]:
+    """`aerodaas COMMAND` with these words, in a session of its own."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "aerodaas", command, *words],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(_ROOT)},
+        start_new_session=True,
+    ) as process:
+        yield process
+        process.kill()
+
+
+def until(happened: Callable[[], bool], seconds: float) -> None:
+    """Wait for something to happen."""
+    end = time.monotonic() + seconds
+    while not happened():
+        assert time.monotonic() < end, "it never happened"
+        time.sleep(0.1)
+
+
+def actors(pid: int) -> set[psutil.Process]:
+    """All actors below a process."""
+    found = set()
+    for one in psutil.Process(pid).children(recursive=True):
+        with contextlib.suppress(psutil.Error):
+            if " ".join(one.cmdline()).startswith("ray::") and "Actor" in one.cmdline()[0]:
+                found.add(one)
+    return found
+
+
+def gone(processes: set[psutil.Process]) -> bool:
+    """Whether none of them runs any more."""
+    return not any(one.is_running() for one in processes)
+
+
+def shared_memory(processes: set[psutil.Process]) -> set[Path]:
+    """Files in shared memory that these have open."""
+    found = set()
+    for process in processes:
+        with contextlib.suppress(psutil.Error):
+            maps = process.memory_maps(grouped=False)
+            found |= {Path(one.path) for one in maps if one.path.startswith("/dev/shm/")}  # noqa: S108
+    return {path for path in found if path.exists()}
+
+
+def folders(processes: set[psutil.Process]) -> set[Path]:
+    """Folders of their Rays."""
+    found = set()
+    for process in processes:
+        with contextlib.suppress(psutil.Error):
+            found.add(process.environ().get(VARIABLE, ""))
+    return {Path(one) for one in found - {""}}
+
+
+def under_way(pid: int) -> bool:
+    """Whether the run of an application has begun: its caretaker is there."""
+    for one in psutil.Process(pid).children(recursive=True):
+        with contextlib.suppress(psutil.Error):
+            if " ".join(one.cmdline()).startswith("ray::Caretaker"):
+                return True
+    return False
+
+
+def kill_in_flight(process: subprocess.Popen[str], recording: Path) -> None:
+    """Kill an application once it flies, and wait until all that it has started is gone."""
+    until(lambda: under_way(process.pid), 60.0)
+    time.sleep(3.0)
+    everyone = set(psutil.Process(process.pid).children(recursive=True))
+    own = folders(everyone)
+    memory = shared_memory(everyone)
+    assert len(actors(process.pid)) >= 2
+    assert len(own) == 1
+    assert memory
+    process.kill()
+    process.wait()
+    until(lambda: gone(everyone), 60.0)
+    until(lambda: not any(path.exists() for path in own), 20.0)
+    assert not any(path.exists() for path in memory)
+    with Recording.open(recording) as written:
+        assert written.complete
+
+
+def test_killed_in_lockstep(tmp_path: Path) -> None:
+    """Nothing falls down, so all of it ends at once, its recording closed."""
+    write(tmp_path, hover=100_000)
+    words = ("app.py", "--no-view", "--record", "out")
+    with started(tmp_path, "run", *words) as process:
+        kill_in_flight(process, tmp_path / "out" / "flight.mcap")
+
+
+def test_several_applications_at_once(tmp_path: Path) -> None:
+    """Each has a Ray of its own, and one that is killed takes nothing from the other."""
+    names = ("one", "two", "three")
+    with contextlib.ExitStack() as stack:
+        running = {}
+        for name in names:
+            write(tmp_path / name, hover=20)
+            words = ("app.py", "--no-view", "--speed", "1", "--record", "out")
+            running[name] = stack.enter_context(started(tmp_path / name, "run", *words))
+        recordings = {name: tmp_path / name / "out" / "flight.mcap" for name in names}
+        until(lambda: all(under_way(one.pid) for one in running.values()), 120.0)
+        time.sleep(3.0)
+        everyone = {
+            name: set(psutil.Process(one.pid).children(recursive=True))
+            for name, one in running.items()
+        }
+        own = [folders(processes) for processes in everyone.values()]
+        assert len(set().union(*own)) == len(names)
+        running["one"].kill()
+        for name in ("two", "three"):
+            said, _ = running[name].communicate(timeout=120)
+            assert running[name].returncode == 0, said
+    until(lambda: all(map(gone, everyone.values())), 60.0)
+    assert not any(path.exists() for found in own for path in found)
+    for name, path in recordings.items():
+        with Recording.open(path) as recording:
+            assert recording.complete
+            flight = Flight.read(recording)
+        assert flight.robots["drone"].outcome.startswith("landed")
+        assert (flight.robots["drone"].visited == ("there",)) is (name != "one")
+
+
+def test_what_a_killed_supervisor_left_is_pruned(tmp_path: Path) -> None:
+    """The flight ends well; the next run's removes processes, folder and the sessions in it."""
+    write(tmp_path, hover=8)
+    words = ("app.py", "--no-view", "--speed", "1", "--record", "out")
+    with started(tmp_path, "run", *words) as process:
+        until(lambda: under_way(process.pid), 60.0)
+        (keeper,) = (
+            one
+            for one in psutil.Process(process.pid).children()
+            if any("supervisor.py" in word for word in one.cmdline())
+        )
+        left = {one for one in keeper.children(recursive=True) if VARIABLE in one.environ()}
+        (folder,) = folders(left)
+        assert (folder / "ray" / "session_latest").exists()
+        keeper.kill()
+        said, _ = process.communicate(timeout=120)
+        assert process.returncode == 0, said
+    with Recording.open(tmp_path / "out" / "flight.mcap") as recording:
+        assert recording.complete
+        assert Flight.read(recording).robots["drone"].visited == ("there",)
+    assert any(one.is_running() for one in left)
+    ray = LocalRay(VARIABLES)
+    try:
+        assert ray.address
+        assert gone(left)
+        assert not folder.exists()
+    finally:
+        ray.end()

@@ -1,0 +1,267 @@
+"""Parts of a run that die or hang on one machine, with no cluster around them."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+from faulty import Forward
+from flying import FLAT, Flyer, hop, recorded, robot
+from required import needs_root
+
+from aerodaas import AeroNavigation, Environment, NavigationType
+from aerodaas.analytics import SyntheticAnalytics
+from aerodaas.cluster.machine import run
+from aerodaas.recording.flight import Flight
+from aerodaas.recording.reader import Recording
+from aerodaas.run import Run
+from aerodaas.status import MissionState
+
+pytestmark = pytest.mark.wall_clock
+
+ROOT = Path(__file__).resolve().parents[2]
+CAMERA = {"id": "cam", "type": "camera", "rate": 5, "settings": {"width": 64, "height": 36}}
+
+
+def with_camera(**more: Any) -> dict[str, Any]:  # noqa: ANN401
+    """A drone with a small camera."""
+    return {**FLAT, "robots": [robot(sensors=[CAMERA])], "recording": {"images": "none"}, **more}
+
+
+def hover(env: Environment) -> None:
+    """Stay in the air, its camera on."""
+    drone = env.get_robot_by_id("drone")
+    drone.get_sensor_by_id("cam").get_data_stream()
+    drone.navigate(hop((2, 0), hover=900))
+
+
+def until(run: Run, holds: Callable[[], bool], seconds: float = 60.0) -> None:
+    """Wait until `holds`; the mission must go on meanwhile."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it never happened"
+        assert not run.look().over, "the mission is over"
+        time.sleep(0.05)
+
+
+def process_of(run: Run, actor: str) -> psutil.Process:
+    """The process of an actor."""
+    assert run._flight is not None
+    return psutil.Process(run._flight.infos()[actor].pid)
+
+
+def state_of(run: Run) -> MissionState:
+    """The mission's state."""
+    return run.look().robots["drone"].status.state
+
+
+def alerts(flight: Flight) -> dict[str, list[str]]:
+    """Texts of the alerts recorded, by kind."""
+    found: dict[str, list[str]] = defaultdict(list)
+    for _, kind, text in flight.alerts:
+        found[kind].append(text)
+    return found
+
+
+@contextmanager
+def frozen(process: psutil.Process) -> Iterator[None]:
+    """Stop a process without its knowing, and let it go on when left."""
+    process.send_signal(signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        process.send_signal(signal.SIGCONT)
+
+
+def test_the_recorder_dies(flyer: Flyer) -> None:
+    """The drone flies on; both files can be read, and the second says what happened."""
+    with flyer.flying(hover, with_camera(), speed=1.0, lockstep=False) as env:
+        run = env.launch()
+        until(run, lambda: state_of(run) is MissionState.ENROUTE)
+        before = process_of(run, "recorder")
+        time.sleep(2.0)
+        before.kill()
+        until(run, lambda: run.reports()["recorder"].phase == "failed")
+        until(run, lambda: run.reports()["recorder"].phase == "running")
+        assert process_of(run, "recorder").pid != before.pid
+        env.get_robot_by_id("drone").end_mission()
+    first = flyer.folder / "flight" / "flight.mcap"
+    with Recording.open(first) as recording:
+        assert not recording.complete
+        assert Flight.read(recording).robots["drone"].position[:, 2].max() > 0.5
+    with Recording.open(first.with_name("flight.2.mcap")) as recording:
+        assert recording.complete
+        flight = Flight.read(recording)
+    assert flight.robots["drone"].outcome.startswith("landed")
+    assert any("recorder is back after" in text for text in alerts(flight)["actor_back"])
+
+
+def test_a_sensor_that_steers_dies(flyer: Flyer) -> None:
+    """The drone holds until there are pictures again, then goes on following."""
+
+    def build(env: Environment) -> None:
+        drone = env.get_robot_by_id("drone")
+        frames = drone.get_sensor_by_id("cam").get_data_stream()
+        steering = Forward().deploy(env.get_compute_resource_by_id("edge")).analyse(frames)
+        drone.navigate(AeroNavigation(NavigationType.ANALYTICS_DRIVEN, steering))
+
+    content = with_camera()
+    content["robots"][0]["limits"] = {**content["robots"][0]["limits"], "silence_return": 60.0}
+    with flyer.flying(build, content, speed=1.0, lockstep=False) as env:
+        run = env.launch()
+        until(run, lambda: state_of(run) is MissionState.FOLLOWING)
+        before = process_of(run, "sensor/drone/cam").pid
+        os.kill(before, signal.SIGKILL)
+        until(run, lambda: state_of(run) is MissionState.HOLDING)
+        until(run, lambda: state_of(run) is MissionState.FOLLOWING)
+        assert process_of(run, "sensor/drone/cam").pid != before
+        env.get_robot_by_id("drone").end_mission()
+    flight = recorded(run)
+    assert flight.robots["drone"].outcome.startswith("landed")
+    assert alerts(flight)["actor_lost"] == ["the actor sensor/drone/cam died"]
+    assert any("sensor/drone/cam is back" in text for text in alerts(flight)["actor_back"])
+
+
+def test_a_sensor_dies_in_lockstep(flyer: Flyer) -> None:
+    """Time goes on without its pictures, and the mission to its end."""
+    content = with_camera()
+    content["robots"][0]["sensors"] = [{**CAMERA, "rate": 10}]
+
+    def build(env: Environment) -> None:
+        drone = env.get_robot_by_id("drone")
+        drone.get_sensor_by_id("cam").get_data_stream()
+        drone.navigate(hop((4, 0), hover=60))
+
+    with flyer.flying(build, content) as env:
+        run = env.launch()
+        until(run, lambda: state_of(run) is MissionState.ENROUTE)
+        process_of(run, "sensor/drone/cam").kill()
+    flight = recorded(run)
+    assert flight.robots["drone"].outcome == "landed: all waypoints are visited"
+    assert flight.robots["drone"].visited == ("wp0",)
+    assert "the actor sensor/drone/cam died" in alerts(flight)["actor_lost"]
+
+
+def managed(scheduler: str) -> Callable[[Environment], None]:
+    """One analysis of 20 ms under a scheduler of this name."""
+
+    def build(env: Environment) -> None:
+        env.set_analytics_scheduler(scheduler)
+        drone = env.get_robot_by_id("drone")
+        model = SyntheticAnalytics("model", 20.0, 20.0)
+        model.deploy(env.get_compute_resource_by_id("edge"))
+        model.analyse(drone.get_sensor_by_id("cam").get_data_stream())
+        drone.navigate(hop((2, 0), hover=900))
+
+    return build
+
+
+def done(run: Run) -> int:
+    """Tasks that were done in time so far."""
+    outcomes = run.look().reports["dispatcher"].values.get("outcomes", {})
+    return int(outcomes.get("done", 0))
+
+
+def test_an_executor_on_the_edge_is_frozen(flyer: Flyer) -> None:
+    """It is lost after four times what it should take, not for good, and used once it goes on."""
+    task = {"benefit": 10, "deadline": 1000, "edge_time": 50}
+    content = with_camera(schedulers={"tasks": {"model": task}})
+    with flyer.flying(managed("edf"), content, speed=1.0, lockstep=False) as env:
+        run = env.launch()
+        until(run, lambda: done(run) > 5)
+        with frozen(process_of(run, "analytics/edge")):
+            until(run, lambda: bool(run.look().reports["dispatcher"].values.get("edge_down")), 20.0)
+        before = done(run)
+        until(run, lambda: done(run) > before + 5)
+        env.get_robot_by_id("drone").end_mission()
+    told = alerts(recorded(run))
+    assert "drone/model does not answer on the edge" in told["executor_lost"]
+    assert "drone/model is back on the edge" in told["executor_back"]
+    assert "actor_lost" not in told
+
+
+def cloud_executor() -> psutil.Process:
+    """The one executor that stands for the cloud on this machine."""
+    found = [
+        one
+        for one in psutil.Process().children(recursive=True)
+        if " ".join(one.cmdline()).startswith("ray::CloudExecutor")
+    ]
+    assert len(found) == 1
+    return found[0]
+
+
+def test_an_executor_in_the_cloud_is_frozen(flyer: Flyer) -> None:
+    """Lost by what was expected of it, seconds before a time-out; probed, and used again."""
+    task = {"benefit": 10, "deadline": 1000, "cloud_time": 50, "cloud_cost": 1, "edge_time": 50}
+    clouds = [{"id": "edge"}, {"id": "cloud", "kind": "cloud"}]
+    content = with_camera(compute=clouds, schedulers={"tasks": {"model": task}})
+    with flyer.flying(managed("cld"), content, speed=1.0, lockstep=False) as env:
+        run = env.launch()
+        until(run, lambda: done(run) > 5)
+        with frozen(cloud_executor()):
+            until(
+                run,
+                lambda: run.look().reports["dispatcher"].values.get("cloud_slots") == 0,
+                20.0,
+            )
+        before = done(run)
+        until(run, lambda: done(run) > before + 5)
+        env.get_robot_by_id("drone").end_mission()
+    told = alerts(recorded(run))
+    assert any("the cloud is gone" in text for text in told["cloud_lost"])
+    assert "the cloud answers again" in told["cloud_back"]
+
+
+_SURVEY = """
+from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
+
+env = Environment("environment.json")
+drone = env.get_robot_by_id("drone")
+drone.get_sensor_by_id("cam").get_data_stream()
+hover = Waypoint("there", 2, 0, 2, hover_duration=8)
+drone.navigate(AeroNavigation(NavigationType.DISTANCE_DRIVEN, [hover]))
+drone.start_mission()
+"""
+
+
+@needs_root
+def test_a_full_disk_is_told_without_a_view(tmp_path: Path) -> None:
+    """On standard error, as it happens; the drone flies on and lands."""
+    content = with_camera(recording={"images": "png"})
+    content["simulation"] = {**content["simulation"], "world": "field"}
+    (tmp_path / "environment.json").write_text(json.dumps(content))
+    (tmp_path / "app.py").write_text(_SURVEY)
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    run("mount", "-t", "tmpfs", "-o", "size=200k", "tmpfs", str(disk))
+    try:
+        words = ["run", str(tmp_path / "app.py"), "--no-view", "--speed", "1"]
+        flown = subprocess.run(
+            [sys.executable, "-m", "aerodaas", *words, "--record", str(disk / "out")],
+            capture_output=True,
+            text=True,
+            env={**os.environ, "PYTHONPATH": str(ROOT)},
+            timeout=120,
+            check=False,
+        )
+        with Recording.open(disk / "out" / "flight.mcap") as recording:
+            flight = Flight.read(recording)
+    finally:
+        run("umount", str(disk))
+    assert "recorder: " in flown.stderr
+    assert "No space left on device" in flown.stderr
+    assert "Traceback" not in flown.stderr
+    assert flight.robots["drone"].position[:, 2].max() > 0.0
+    assert flown.returncode == 0, flown.stderr
