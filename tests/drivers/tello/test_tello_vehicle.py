@@ -240,13 +240,23 @@ def test_silence_of_the_tello_is_loss_of_the_link() -> None:
 
 
 @pytest.mark.slow
-def test_a_tello_that_lands_by_itself_is_left_alone() -> None:
-    """Nobody asked for it: its own protection has taken over."""
-    with flight(TelloOptions(battery=0.3, capacity=0.01), battery_minimum=0.0) as pair:
+@pytest.mark.parametrize(
+    ("capacity", "battery", "ended", "words"),
+    [
+        (0.05, 0.12, FlightEnd.LANDED, "landed by itself"),
+        # It holds too little for its own landing.
+        (0.01, 0.3, FlightEnd.FELL, "motors have stopped in flight"),
+    ],
+)
+def test_a_tello_that_comes_down_by_itself_is_left_alone(
+    capacity: float, battery: float, ended: FlightEnd, words: str
+) -> None:
+    """Nobody asked for it: its own protection has taken over, or its battery is empty."""
+    with flight(TelloOptions(battery=battery, capacity=capacity), battery_minimum=0.0) as pair:
         pair.take_off()
         state = pair.until(VehicleMode.FAILSAFE, 30.0)
-        assert state.ended is FlightEnd.LANDED
-        with pytest.raises(VehicleError, match="landed by itself"):
+        assert state.ended is ended
+        with pytest.raises(VehicleError, match=words):
             pair.vehicle.send(VelocitySetpoint(np.zeros(3)))
 
 
