@@ -11,13 +11,13 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
 from aerodaas.actors._link import StreamLink
 from aerodaas.actors._names import ACKS
+from aerodaas.actors._triggers import Triggers, TriggerSpec
 from aerodaas.actors.replayed import RecordedWork
 from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
 from aerodaas.actors.streams import Outlet
@@ -41,15 +41,6 @@ _HUNG = 5.0
 @dataclass(frozen=True)
 class Wake:
     """Tells a dormant analysis to work from now on."""
-
-
-@dataclass(frozen=True)
-class TriggerSpec:
-    """Publishes `command` on `stream` when a result satisfies `when`."""
-
-    stream: str
-    command: Any
-    when: Callable[[Any], bool] | None
 
 
 @dataclass(frozen=True)
@@ -214,9 +205,7 @@ class _Worker:
         name = type(self.node.work).__name__
         self.inbox = self._actor.reader(f"analytics/{self.node.stream}", self.depths, name)
         self._results = self._actor.outlet(self.node.stream, f"{name}'s result")
-        self._commands = {
-            trigger.stream: self._actor.outlet(trigger.stream) for trigger in self.node.triggers
-        }
+        self._triggers = Triggers(self.node.triggers, self._actor.outlet)
         self._acks: Outlet | None = None
         if session.lockstep:
             self.acknowledge(wanted=self.node.acknowledges)
@@ -277,7 +266,7 @@ class _Worker:
         item = self._process(None, stamp) if awake else None
         if item is not None:
             origin = Message(self.node.stream, header.id, stamp, header, captured, (), item)
-            self._fire(item, origin)
+            self._triggers.fire(item, origin, self._stamp(origin), self._complain)
         if awake or self._actor.session.lockstep:
             self._acknowledge(self._results.measure(item, header, captured))
 
@@ -310,7 +299,7 @@ class _Worker:
             self._recorded.turn_to(message.header)
             result = self._process(message.item, message.header.stamp)
         if result is not None:
-            self._fire(result, message)
+            self._triggers.fire(result, message, self._stamp(message), self._complain)
         # An answer without a result tells a replay that this item was worked on.
         if awake or self._actor.session.lockstep or self.node.answers_always:
             stamp = self._stamp(message)
@@ -338,18 +327,6 @@ class _Worker:
         if line != self.last_error:
             self.last_error = line
             self._actor.tell("analysis_failed", line, self._now, {})
-
-    def _fire(self, result: Any, origin: Message[Any]) -> None:  # noqa: ANN401
-        for trigger in self.node.triggers:
-            try:
-                wanted = result is not None and (trigger.when is None or trigger.when(result))
-            except Exception as error:  # noqa: BLE001 - a user's condition may raise anything
-                self._complain(error)
-                continue
-            if wanted:
-                self._commands[trigger.stream].derive(
-                    trigger.command, origin, host_time_ns(), self._stamp(origin)
-                )
 
     def _acknowledge(self, message: Message[Any]) -> None:
         if self._acks is not None:

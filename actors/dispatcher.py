@@ -17,6 +17,7 @@ import itertools
 from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from aerodaas.actors._base import StreamActor, failure_line
@@ -27,6 +28,7 @@ from aerodaas.actors._fence import FencedDispatch
 from aerodaas.actors._lifeline import Life, Lifelines
 from aerodaas.actors._names import ACKS, DECISIONS, done_stream, task_stream
 from aerodaas.actors._sites import Sites
+from aerodaas.actors._triggers import Triggers, TriggerSpec
 from aerodaas.actors._way import Way
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.clock import NANOSECONDS, host_time_ns
@@ -71,6 +73,7 @@ class Managed:
     """True in lockstep for an analysis whose results nobody reads."""
     open_times: frozenset[str] = frozenset()
     """Times of the profile that the user left to be measured."""
+    triggers: tuple[TriggerSpec, ...] = ()
 
 
 class DispatcherActor(StreamActor):
@@ -158,6 +161,7 @@ class DispatcherActor(StreamActor):
             if one.acknowledges and self.session.lockstep
         }
         self._answers = {one.stream: self.outlet(one.stream) for one in self._managed}
+        self._triggers = {one.stream: Triggers(one.triggers, self.outlet) for one in self._managed}
 
     def _run(self) -> None:
         assert self.inbox is not None  # noqa: S101 - prepare came first
@@ -435,11 +439,17 @@ class DispatcherActor(StreamActor):
         self._log.note(task, result.outcome.value, reason, result.finished, totals)
 
     def _publish(self, node: str, origin: Message[Any], item: Any) -> None:  # noqa: ANN401
+        if item is not None:
+            stamp = origin.stamp if self.session.lockstep else self.clock.now()
+            self._triggers[node].fire(item, origin, stamp, partial(self._complain, node))
         if item is not None or self.session.lockstep:
             self._answers[node].derive(item, origin, host_time_ns(), origin.stamp)
         if node in self._acks:
             done = ((origin.header.source, origin.header.stamp),)
             self._acks[node].derive(done, origin, host_time_ns(), origin.stamp)
+
+    def _complain(self, node: str, error: Exception) -> None:
+        self.alert("analysis_failed", f"{node}: {failure_line(error)}")
 
     def _time(self, stamp: int = 0) -> int:
         self._now = max(self._now, stamp if self.session.lockstep else self.clock.now())

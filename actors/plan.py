@@ -17,7 +17,8 @@ from aerodaas.actors._names import (
     trigger_stream,
 )
 from aerodaas.actors._offload import CloudProcess, allowed, cloud_processes, priced, short_name
-from aerodaas.actors.analytics import NodeSpec, TriggerSpec, Wake
+from aerodaas.actors._triggers import TriggerSpec
+from aerodaas.actors.analytics import NodeSpec, Wake
 from aerodaas.actors.cluster import Place
 from aerodaas.actors.dispatcher import Managed
 from aerodaas.actors.drone import Conduct
@@ -215,10 +216,12 @@ class _Planner:
             profile=priced(profile, allowed(node, self.compute)),
             acknowledges=self.acknowledgements(node.id) == 0,
             open_times=frozenset(time for time in times if getattr(own, time) is None),
+            triggers=self.triggers_of(node),
         )
 
-    def node_spec(self, node: Node) -> NodeSpec:
-        triggers = tuple(
+    @staticmethod
+    def triggers_of(node: Node) -> tuple[TriggerSpec, ...]:
+        return tuple(
             TriggerSpec(
                 trigger_stream(trigger.target, node.id),
                 TRIGGERED[trigger.method] if trigger.method else Wake(),
@@ -226,6 +229,8 @@ class _Planner:
             )
             for trigger in node.triggers
         )
+
+    def node_spec(self, node: Node) -> NodeSpec:
         managed = self.is_managed(node)
         wakers = [n for n in self.analyses() if any(t.target == node.id for t in n.triggers)]
         return NodeSpec(
@@ -239,7 +244,8 @@ class _Planner:
             state=self.state_of(node),
             external=node.kind == "external",
             dormant=node.dormant,
-            triggers=triggers,
+            # The dispatcher publishes the results of those that it manages, wherever they ran.
+            triggers=() if managed else self.triggers_of(node),
             kind=self.place_of(node).kind,
             acknowledges=self.acknowledgements(node.id) == 0 and not managed,
             answers_always=managed,

@@ -177,3 +177,26 @@ def test_in_real_time_each_drone_has_its_own_actor(tmp_path: Path) -> None:
     assert [len(group) for group in plan(env, speed=1.0).drones] == [1, 1]
     assert [len(group) for group in plan(env).drones] == [2]
     assert plan(env, speed=1.0).conduct.windows == {}
+
+
+def test_triggers_belong_to_whoever_publishes_the_results(environment: Environment) -> None:
+    """Of what is scheduled the dispatcher, which alone sees what the cloud has found."""
+    drone = environment.get_robot_by_id("drone")
+    drone.navigate(hop((1, 0)))
+    seen = SyntheticAnalytics("seen", 5, 5).trigger(drone.end_mission)
+    seen.deploy(environment.get_compute_resource_by_id("cloud")).analyse(camera(environment))
+    Above(1.0).trigger(drone.end_mission).analyse(odometry(environment))
+    scheduler = environment.trajectory_scheduler()
+    made = make_plan(
+        Session(environment.config, 1.0),
+        environment.graph,
+        environment.compute(),
+        scheduler,
+        load_scheduler("cld"),
+    )
+    assert made.dispatch is not None
+    (managed,) = made.dispatch.managed
+    assert len(managed.triggers) == 1
+    counts = {node.stream: len(node.triggers) for actor in made.analyses for node in actor.nodes}
+    assert sorted(counts.values()) == [0, 1]
+    assert counts["drone/above"] == 1
