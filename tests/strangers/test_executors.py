@@ -159,3 +159,9 @@ def test_results_are_the_applications_own_before_and_after(flown: Flown) -> None
     assert len(counts) > 30
     assert flown.lines("drone/sleeper") == {"True True"}
     assert flown.lines("drone/reader") == {"True fragile"}
+
+
+def test_rays_own_words_do_not_reach_the_terminal(flown: Flown) -> None:
+    """It has a paragraph for each worker that dies, and advice about its memory."""
+    assert "raylet" not in flown.said
+    assert "OOM" not in flown.said
