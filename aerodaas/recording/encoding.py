@@ -112,8 +112,9 @@ def _plain_container(value: object, depth: int) -> Any:  # noqa: ANN401 - any JS
         whole = value.size <= _LONGEST_ARRAY and value.dtype.kind in "biuf"
         shape = {"shape": list(value.shape), "dtype": str(value.dtype)}
         return plain(value.tolist(), depth) if whole else shape
-    if isinstance(value, tuple) and hasattr(value, "_asdict"):
-        value = value._asdict()
+    names = getattr(value, "_fields", None)
+    if isinstance(value, tuple) and isinstance(names, tuple):
+        value = dict(zip(names, value, strict=True))
     if isinstance(value, Mapping):
         return {str(key): plain(item, depth) for key, item in value.items()}
     if isinstance(value, list | tuple | AbstractSet):

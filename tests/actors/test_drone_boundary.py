@@ -47,7 +47,7 @@ class Pretender:
         return Pretender, ()
 
     @property  # type: ignore[misc] # the very attack
-    def __class__(self) -> type:
+    def __class__(self) -> type:  # pyright: ignore[reportIncompatibleMethodOverride]
         raise Mute
 
 

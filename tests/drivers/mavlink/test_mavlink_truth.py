@@ -39,7 +39,9 @@ def world(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> It
 
 def fly(world: Stepped, place: np.ndarray, duration: float) -> VehicleState:
     """Stream a place for `duration` seconds."""
-    for _ in range(round(duration / 0.05)):
+    world.vehicle.send(PositionSetpoint(place, None, 3.0))
+    state = world.turn()
+    for _ in range(round(duration / 0.05) - 1):
         world.vehicle.send(PositionSetpoint(place, None, 3.0))
         state = world.turn()
     return state
@@ -155,8 +157,9 @@ def test_a_local_frame_that_jumps(world: Stepped) -> None:
 def test_telemetry_that_stands_still_is_a_loss(world: Stepped) -> None:
     """Packets that come with old stamps say nothing: lost within two seconds, and its age shows."""
     world.autopilot.freeze()
-    for _ in range(40):
-        state = world.turn()
+    for _ in range(39):
+        world.turn()
+    state = world.turn()
     assert state.mode is VehicleMode.LOST
     assert told(state, "telemetry: packets come, and say nothing new")
     world.autopilot.freeze(off=True)
@@ -177,7 +180,7 @@ def test_a_log_that_blocks_holds_nobody_up() -> None:
     entered, let_go = threading.Event(), threading.Event()
 
     class Blocking(logging.Handler):
-        def emit(self, _: logging.LogRecord) -> None:
+        def emit(self, record: logging.LogRecord) -> None:  # noqa: ARG002 - the base's
             entered.set()
             let_go.wait(60.0)
 
