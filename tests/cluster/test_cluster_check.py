@@ -284,7 +284,7 @@ _PRETEND = """
 import json, sys
 from aerodaas.actors import greeting
 from ray._raylet import GcsClient
-greeting._take_up_token()
+greeting.take_up_token()
 client = GcsClient(address=sys.argv[1])
 told = json.loads(client.internal_kv_get(b"CLUSTER_METADATA", b"cluster"))
 import platform, ray
