@@ -6,8 +6,8 @@ import os
 import signal
 import threading
 import time
-from functools import partial
 from collections.abc import Callable
+from functools import partial
 
 import pytest
 from analyses import Above, Broken, Jitter, ProcessId, Ticker
