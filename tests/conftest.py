@@ -91,6 +91,7 @@ def runtime(plugin_folder: Path) -> Iterator[None]:
     ours = [path for path in sys.path if path and Path(path).resolve().is_relative_to(_ROOT)]
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("PYTHONPATH", os.pathsep.join([*ours, str(plugin_folder)]))
+        cluster.disconnect()  # from one that a refused application has begun without these paths
         cluster.connect(None)
         yield
         cluster.disconnect()
