@@ -62,7 +62,7 @@ class Dems(Dem):
 
     def executor_idle(self, now: int) -> Iterable[Decision]:
         """Steal what fits before the queue, else run its head."""
-        stolen = self._steal(now) if self.tentative else None
+        stolen = self._steal(now)
         if stolen is None:
             return super().executor_idle(now)
         del self.tentative[stolen]

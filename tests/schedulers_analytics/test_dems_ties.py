@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
+from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Resources
 from aerodaas.schedulers.analytics.dem import Dem
 from aerodaas.schedulers.analytics.dems import Dems
 from aerodaas.testing.scheduler_kit import End, play
@@ -102,3 +102,51 @@ def test_the_cloud_is_left_for_at_the_last_moment(deadline: float) -> None:
     assert play(Dems(), tasks)[1] == End("cloud", "done", 0, 300)
     late = [(0.0, _blocker(900)), (0.0, _model("m", deadline=299, edge=400))]
     assert play(Dems(), late)[1].outcome == "dropped"
+
+
+def test_what_must_leave_now_does_not_wait_to_be_stolen() -> None:
+    """Its latest start (300 - 290 - 10) is now: it leaves, though an idle edge could just do it.
+
+    With a millisecond to wait it does wait, and the idle edge takes it.
+    """
+    now = _model("m", deadline=300, edge=300, cloud=290)
+    assert play(Dems(), [(0.0, now)])[0] == End("cloud", "done", 0, 290)
+    later = _model("m", deadline=300, edge=300, cloud=289)
+    assert play(Dems(), [(0.0, later)])[0] == End("edge", "done", 0, 300)
+
+
+def test_without_a_cloud_a_task_waits_for_the_edge_alone() -> None:
+    """Until 900 - 300 - 10, however slow the cloud would have been."""
+    tasks = [(0.0, _blocker(900)), (0.0, _model("m", deadline=900, edge=300, cloud=890))]
+    nowhere = Resources(cloud_slots=0)
+    taken = play(Dems(), tasks, edge_ms=[300, 300], resources=nowhere)
+    assert taken[1] == End("edge", "done", 300, 600)
+    never = play(Dems(), tasks, resources=nowhere)
+    assert never[1] == End("nowhere", "dropped", 590, 590)
+
+
+@pytest.mark.parametrize("reverse", [False, True])
+@pytest.mark.parametrize(
+    ("edge", "cost", "other_cost"),
+    [
+        pytest.param(250, 110, 20, id="what loses money in the cloud before what pays there"),
+        pytest.param(200, 99, 100, id="0.49 a millisecond before 0.396, which breaks even"),
+    ],
+)
+def test_stealing_before_a_queue_as_published(
+    edge: float,
+    cost: float,
+    other_cost: float,
+    reverse: bool,  # noqa: FBT001
+) -> None:
+    """With 400 of room before the head, the better of two is stolen, whichever arrived first."""
+    better = _model("better", deadline=800 + edge, edge=edge, cloud_cost=cost)
+    other = _model("other", deadline=1050, edge=250, cloud_cost=other_cost)
+    pair = [other, better] if reverse else [better, other]
+    tasks = [(0.0, _blocker(700)), (0.0, _model("head", deadline=1000, edge=100))]
+    tasks += [(0.0, profile) for profile in pair]
+    times = [500, 100, *(profile.edge_time / MILLISECOND for profile in pair)]
+    ends = play(Dems(published=True), tasks, edge_ms=times)
+    assert ends[2 + pair.index(better)] == End("edge", "done", 500, 500 + edge)
+    assert ends[1] == End("edge", "done", 500 + edge, 600 + edge)
+    assert ends[2 + pair.index(other)].place != "edge"

@@ -60,3 +60,12 @@ def test_channels_follow_the_family() -> None:
         buffer = box.buffer(1, np.float32)
         box.write(image, buffer[0])
         assert buffer[0, :, 4, 4] == pytest.approx(np.array(expected))
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float16])
+def test_types_of_numbers(kind: type[np.float32 | np.float16]) -> None:
+    """The input has the network's type, the points have 32 bits."""
+    box = Letterbox((101, 64), (64, 64), Preprocessing())
+    buffer = box.buffer(2, kind)
+    assert (buffer.dtype, buffer.shape) == (np.dtype(kind), (2, 3, 64, 64))
+    assert box.restore(np.zeros((4, 2), np.float32)).dtype == np.float32
