@@ -48,11 +48,11 @@ def main(
     and so are decorated functions, properties among them, which mutmut does not mutate. All happens
     in a temporary copy of the project, which is removed at the end.
 
-    Needs `pip install -e .[dev,mutation]`. Sampling 60 mutants of one file takes one to three
+    Needs `pip install -e .[dev]`. Sampling 60 mutants of one file takes one to three
     minutes; on a machine that others use, put `nice -n 10` before it.
     """
     if importlib.util.find_spec("mutmut") is None:
-        sys.exit("mutmut is not installed; run: pip install -e .[mutation]")
+        sys.exit("mutmut is not installed; run: pip install -e .[dev]")
     root = root.resolve()
     missing = [str(path) for path in sources if not path.is_file()]
     if missing:

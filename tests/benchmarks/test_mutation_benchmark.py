@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 from bench_runs import run_benchmark
 
-pytest.importorskip("mutmut", reason='needs mutmut: pip install "aerodaas[mutation]"')
-
 CODE = '''"""Ages."""
 
 
