@@ -44,10 +44,9 @@ def _worker_share(nodeid: str) -> str:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Order the files for parallel workers; run what met a busy machine once more, in CI only.
+    """Files without Ray come first; what met a busy machine is run once more, in CI only.
 
-    Those without Ray come first: one mistake in a function is told within seconds. Then come files
-    with slow tests, so that no worker is left with a long one at the end.
+    One mistake in a function is then told within seconds.
     """
     files: dict[str, list[pytest.Item]] = {}
     for item in items:
@@ -55,12 +54,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if _CI and item.get_closest_marker("wall_clock"):
             item.add_marker(pytest.mark.flaky(reruns=1))
 
-    def rank(name: str) -> tuple[bool, bool]:
-        ray = any("runtime" in getattr(item, "fixturenames", ()) for item in files[name])
-        slow = any(item.get_closest_marker("slow") for item in files[name])
-        return ray or slow, not slow
+    def flies(name: str) -> bool:
+        items = files[name]
+        ray = any("runtime" in getattr(item, "fixturenames", ()) for item in items)
+        return ray or any(item.get_closest_marker("slow") for item in items)
 
-    items[:] = [item for name in sorted(files, key=rank) for item in files[name]]
+    items[:] = [item for name in sorted(files, key=flies) for item in files[name]]
 
 
 @pytest.fixture(autouse=True)
