@@ -246,8 +246,8 @@ class Cloud:
             execute, left = self.executor.handle.execute, until - time.monotonic()
             data = parcel.data if sent.carries else b""
             reference = execute.remote(sent.task.profile.model, parcel.name, data, left)
-            sent.future = reference.future()
-            sent.future.add_done_callback(lambda _: self._came_back(sent))
+            future = sent.future = reference.future()
+            future.add_done_callback(lambda _: self._came_back(sent))
         except Exception as error:  # noqa: BLE001 - whatever it is, it must not be silence
             sent.problem = f"{type(error).__name__}: {error}"
             self._came_back(sent)

@@ -85,7 +85,9 @@ def fastest(
 
     `link` gives the seconds that a number of bytes is on its way.
     """
-    totals = {coding: cost.seconds + link(cost.size) for coding, cost in costs.items()}
+    totals: dict[Coding, float] = {
+        coding: cost.seconds + link(cost.size) for coding, cost in costs.items()
+    }
     best = min(totals, key=lambda coding: totals[coding])
     return best, totals[best]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, cast
 
 import ray
 from ray.exceptions import GetTimeoutError, RayActorError, RayError
@@ -21,11 +21,13 @@ _ANSWER_TIMEOUT = 5.0
 def may_fly(drone: Any) -> bool:  # noqa: ANN401 - an actor's handle
     """Whether the mission of a drone's actor goes on, or may do so as far as anyone can tell."""
     try:
-        return bool(ray.get(drone.report.remote(), timeout=_ANSWER_TIMEOUT).phase == "running")
+        report = cast("ActorReport", ray.get(drone.report.remote(), timeout=_ANSWER_TIMEOUT))
     except RayActorError:
         return False
     except GetTimeoutError:
         return True
+    else:
+        return report.phase == "running"
 
 
 def end_actors(groups: Iterable[Sequence[Any]], helpers: Sequence[Any]) -> dict[Any, ActorReport]:

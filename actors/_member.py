@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import ray
-from ray.exceptions import RayActorError, RayTaskError
+from ray.exceptions import GetTimeoutError, RayActorError, RayTaskError
 
 from aerodaas.actors._base import ActorInfo, ActorReport
 from aerodaas.actors._losses import DeadError, SilentError
@@ -53,7 +53,7 @@ def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN40
         # Ray puts the remote traceback first and what went wrong last.
         reason = str(error).strip().splitlines()[-1]
         raise DeadError(f"an actor died: {reason}") from None
-    except ray.exceptions.GetTimeoutError:
+    except GetTimeoutError:
         raise SilentError(f"an actor did not answer within {timeout:.0f} s") from None
 
 

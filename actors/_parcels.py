@@ -131,7 +131,8 @@ class Parcels:
         # Random, so that no link compresses it.
         data = os.urandom(size)
         began = time.perf_counter()
-        self._pinging = executor.ping.remote(data).future()
+        pinging: Future[int] = executor.ping.remote(data).future()
+        self._pinging = pinging
 
         def answered(future: Future[int]) -> None:
             if future.exception() is None:
@@ -140,7 +141,7 @@ class Parcels:
                     self.link.forget()
                 self.link.observe(size, time.perf_counter() - began)
 
-        self._pinging.add_done_callback(answered)
+        pinging.add_done_callback(answered)
 
     def _pack(self, message: Message[Any]) -> Parcel:
         frame = message.item if isinstance(message.item, Frame) else None

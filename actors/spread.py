@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 import ray
+from ray import cloudpickle
 
 from aerodaas.actors import cluster
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
@@ -47,7 +48,7 @@ def shipped(wanted: str) -> str | type[AnalyticsScheduler]:
     if ".py:" not in wanted:
         return wanted
     found = type(load_scheduler(wanted))
-    ray.cloudpickle.register_pickle_by_value(sys.modules[found.__module__])
+    cloudpickle.register_pickle_by_value(sys.modules[found.__module__])
     return found
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import inspect
 import types
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
@@ -40,7 +41,7 @@ def _search(item: object, error: Exception, depth: int) -> tuple[str, Exception]
 
 def _failure(part: object) -> Exception | None:
     try:
-        cloudpickle.dumps(part)
+        cloudpickle.dumps(part)  # pyright: ignore[reportPrivateImportUsage]
     except Exception as error:  # noqa: BLE001 - a user's class may raise anything
         return error
     return None
@@ -63,7 +64,7 @@ def _parts(item: object) -> Iterator[tuple[str, object]]:
 def _attributes(item: object) -> Iterator[tuple[str, object]]:
     state = None if isinstance(item, type) else _state(item)
     yield from state.items() if isinstance(state, dict) else ()
-    for one in type(item).__mro__:
+    for one in inspect.getmro(type(item)):
         slots = one.__dict__.get("__slots__", ())
         for name in (slots,) if isinstance(slots, str) else slots:
             if name not in {"__dict__", "__weakref__"} and hasattr(item, name):

@@ -71,7 +71,7 @@ def _carried(name: str, data: bytes) -> Any:  # noqa: ANN401 - a class
 
 def pickled_class(definition: object) -> bytes:
     """A class or a function with everything that it needs; raises what pickling raises."""
-    data: bytes = cloudpickle.dumps(definition, protocol=5)
+    data: bytes = cloudpickle.dumps(definition, protocol=5)  # pyright: ignore[reportPrivateImportUsage]
     return data
 
 

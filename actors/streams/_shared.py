@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import functools
+import importlib
 import weakref
 from typing import Any
 
@@ -29,8 +30,7 @@ _COPIED_BYTES = 65536
 
 @functools.cache
 def _iceoryx() -> Any:  # noqa: ANN401 - the library ships no types
-    import iceoryx2  # noqa: PLC0415 - loaded only where a stream is opened
-
+    iceoryx2: Any = importlib.import_module("iceoryx2")  # only where a stream is opened
     iceoryx2.set_log_level(iceoryx2.LogLevel.Fatal)
     return iceoryx2
 

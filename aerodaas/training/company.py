@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -10,7 +11,7 @@ from pathlib import Path
 from typing import TypeVar
 
 import torch
-from torch import distributed, multiprocessing, nn
+from torch import distributed, nn
 
 __all__ = ["average", "company", "rank", "share", "together"]
 
@@ -30,9 +31,13 @@ def company(size: int, work: Callable[[], object]) -> Iterator[None]:
         threads = torch.get_num_threads()
         each = max(1, threads // size)
         meeting = f"file://{Path(folder, 'meeting')}"
-        others = multiprocessing.spawn(
-            _join, (size, each, meeting, work), nprocs=size - 1, join=False
-        )
+        fresh = multiprocessing.get_context("spawn")  # a forked process can't use PyTorch's threads
+        others = [
+            fresh.Process(target=_join, args=(number, size, each, meeting, work), daemon=True)
+            for number in range(1, size)
+        ]
+        for process in others:
+            process.start()
         distributed.init_process_group("gloo", meeting, rank=0, world_size=size)
         torch.set_num_threads(each)
         try:
@@ -40,14 +45,14 @@ def company(size: int, work: Callable[[], object]) -> Iterator[None]:
         finally:
             torch.set_num_threads(threads)
             distributed.destroy_process_group()
-            for process in others.processes:
+            for process in others:
                 process.terminate()
                 process.join()
 
 
 def _join(number: int, size: int, threads: int, meeting: str, work: Callable[[], object]) -> None:
     torch.set_num_threads(threads)
-    distributed.init_process_group("gloo", meeting, rank=number + 1, world_size=size)
+    distributed.init_process_group("gloo", meeting, rank=number, world_size=size)
     work()
 
 

@@ -57,16 +57,12 @@ def _centred(boxes: Tensor) -> Tensor:
 def fused(module: nn.Module) -> nn.Module:
     """Fold each batch norm of `module` into the convolution before it; returns it."""
     for name, child in module.named_children():
-        if isinstance(child, nn.Sequential) and len(child) > 1 and _foldable(child):
-            folded = fuse_conv_bn_eval(child[0], child[1])
-            setattr(module, name, nn.Sequential(folded, *child[2:]))
-        else:
-            setattr(module, name, fused(child))
+        match list(child.children()) if isinstance(child, nn.Sequential) else []:
+            case [nn.Conv2d() as conv, nn.BatchNorm2d() as norm, *rest]:
+                setattr(module, name, nn.Sequential(fuse_conv_bn_eval(conv, norm), *rest))
+            case _:
+                setattr(module, name, fused(child))
     return module
-
-
-def _foldable(child: nn.Sequential) -> bool:
-    return isinstance(child[0], nn.Conv2d) and isinstance(child[1], nn.BatchNorm2d)
 
 
 def export_detector(weights: Path, path: Path, thresholds: list[float]) -> None:

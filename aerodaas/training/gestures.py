@@ -81,7 +81,8 @@ def train(seed: int, count: int) -> tuple[bytes, dict[str, Any]]:
     from sklearn.svm import SVC  # noqa: PLC0415 - only for training
 
     features, classes = draw(seed, count)
-    machine = SVC(C=10.0, gamma=0.08, probability=True, random_state=seed, cache_size=500)
+    settings: dict[str, Any] = {"C": 10.0, "gamma": 0.08, "probability": True, "cache_size": 500}
+    machine = SVC(**settings, random_state=seed)
     machine.fit(features, classes)
     held_features, held_classes = draw(seed + _HELD_OUT, count // 4)
     content = _as_onnx(machine)
@@ -110,9 +111,10 @@ def _as_onnx(machine: Any) -> bytes:  # noqa: ANN401 - scikit-learn has no types
     from skl2onnx import to_onnx  # noqa: PLC0415
     from skl2onnx.common.data_types import FloatTensorType  # noqa: PLC0415
 
-    model = to_onnx(
+    inputs: list[tuple[str, Any]] = [("features", FloatTensorType([None, 3 * POINTS]))]
+    model: Any = to_onnx(
         machine,
-        initial_types=[("features", FloatTensorType([None, 3 * POINTS]))],
+        initial_types=inputs,
         options={"zipmap": False},
         target_opset={"": _OPSET, "ai.onnx.ml": _OPSET_ML},
     )

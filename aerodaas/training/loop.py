@@ -66,7 +66,7 @@ def learn(network: nn.Module, loss: Loss, course: Course, folder: Path) -> Itera
     """
     cv2.setNumThreads(0)
     device = torch.device("cuda" if torch.cuda.is_available() else "cpu")
-    network.to(device=device, memory_format=torch.channels_last)
+    network.to(device=device, memory_format=torch.channels_last)  # pyright: ignore[reportCallIssue] - not among PyTorch's overloads
     if course.start is not None:
         network.load_state_dict(torch.load(course.start, weights_only=True, map_location=device))
     mean = copy.deepcopy(network).eval()

@@ -7,6 +7,7 @@ and plain distances instead of SiLU and their distributions, since both run fast
 from __future__ import annotations
 
 import math
+from typing import cast
 
 import torch
 from torch import Tensor, nn
@@ -71,15 +72,17 @@ class _Pooling(nn.Module):
         return self.leave(torch.cat(parts, 1))
 
 
-def _branch(width: int, hidden: int, outputs: int) -> nn.Sequential:
-    """Two depthwise-separable convolutions and a linear one."""
-    return nn.Sequential(
+def _branch(width: int, hidden: int, outputs: int, bias: float) -> nn.Sequential:
+    """Two depthwise-separable convolutions and a linear one, which starts at `bias`."""
+    body = (
         _conv(width, width, 3, groups=width),
         _conv(width, hidden, 1),
         _conv(hidden, hidden, 3, groups=hidden),
         _conv(hidden, hidden, 1),
-        nn.Conv2d(hidden, outputs, 1),
     )
+    last = nn.Conv2d(hidden, outputs, 1)
+    nn.init.constant_(cast("Tensor", last.bias), bias)
+    return nn.Sequential(*body, last)
 
 
 class Eyes(nn.Module):
@@ -105,11 +108,9 @@ class Eyes(nn.Module):
         self.down_middle = _Stage(w3 + w4, w4, add=False)
         self.down_coarse_enter = _conv(w4, w4, 3, 2)
         self.down_coarse = _Stage(w4 + w5, w5, add=False)
-        self.boxes = nn.ModuleList(_branch(w, 48, 4) for w in (w3, w4, w5))
-        self.kinds = nn.ModuleList(_branch(w, 48, self.classes) for w in (w3, w4, w5))
-        for box, kind in zip(self.boxes, self.kinds, strict=True):
-            nn.init.constant_(box[-1].bias, 0.7)
-            nn.init.constant_(kind[-1].bias, math.log(_PRIOR / (1 - _PRIOR)))
+        rare = math.log(_PRIOR / (1 - _PRIOR))
+        self.boxes = nn.ModuleList(_branch(w, 48, 4, 0.7) for w in (w3, w4, w5))
+        self.kinds = nn.ModuleList(_branch(w, 48, self.classes, rare) for w in (w3, w4, w5))
 
     def maps(self, x: Tensor) -> list[Tensor]:
         """Features at each stride."""
