@@ -86,7 +86,7 @@ class Navigator:
             return f"{distance:.0f} m away is beyond the range of {self._max_range:g} m"
         if waypoint.deadline is not None and waypoint.deadline <= now:
             return f"its deadline of {waypoint.deadline:g} s is past, it is {now:.1f} s now"
-        known = next((stop for stop in self.queue if stop.id == waypoint.id), None)
+        known = self.queue.find(waypoint.id)
         if known is not None and (not source or known.source != source):
             return "a waypoint of this id is already queued; use another id"
         return self._fence.objection(waypoint.position)

@@ -75,7 +75,7 @@ class WaypointQueue:
         for waypoint in arriving:
             hover = waypoint.hover_duration
             stop = Stop(waypoint, group, index is not None, source, cause, hover)
-            known = self._find(waypoint.id)
+            known = self.find(waypoint.id)
             if known is not None and known.waypoint.priority == waypoint.priority:
                 level = self._levels[waypoint.priority]
                 stop.under_way = known.under_way
@@ -100,7 +100,7 @@ class WaypointQueue:
             raise InvalidWaypointError(message)
         seen: set[str] = set()
         for waypoint in arriving:
-            known = self._find(waypoint.id)
+            known = self.find(waypoint.id)
             taken = known is not None and (not source or known.source != source)
             if taken or waypoint.id in seen:
                 message = f"a waypoint called {waypoint.id!r} is already queued; use another id"
@@ -131,9 +131,9 @@ class WaypointQueue:
         """Count the stops."""
         return sum(map(len, self._levels.values()))
 
-    def __contains__(self, waypoint_id: object) -> bool:
-        """Tell whether a waypoint of this id is queued."""
-        return any(stop.id == waypoint_id for stop in self)
+    def find(self, waypoint_id: str) -> Stop | None:
+        """The stop of this id; None if no such id is queued."""
+        return next((stop for stop in self if stop.id == waypoint_id), None)
 
     def remove(self, waypoint_id: str) -> Stop | None:
         """Take a stop out, served or given up; None if no such id is queued."""
@@ -201,9 +201,6 @@ class WaypointQueue:
 
     def _ordered_levels(self) -> list[list[Stop]]:
         return [self._levels[priority] for priority in sorted(self._levels)]
-
-    def _find(self, waypoint_id: str) -> Stop | None:
-        return next((stop for stop in self if stop.id == waypoint_id), None)
 
     @staticmethod
     def _leave(stops: Iterable[Stop]) -> None:

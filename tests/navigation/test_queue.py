@@ -31,6 +31,7 @@ class QueueMachine(RuleBasedStateMachine):
         self.queue = WaypointQueue()
         self.expected: set[str] = set()
         self.groups: dict[str, list[str]] = {}
+        self.pinned: set[str] = set()
         self.count = 0
 
     @rule(
@@ -45,6 +46,8 @@ class QueueMachine(RuleBasedStateMachine):
         self.count += len(added)
         self.queue.add(added, group=group, index=index)
         self.expected |= {one.id for one in added}
+        if index is not None:
+            self.pinned |= {one.id for one in added}
         if group:
             self.groups[group] = [one.id for one in added]
 
@@ -64,7 +67,7 @@ class QueueMachine(RuleBasedStateMachine):
         level = self.queue.level
         if level is None:
             return
-        pinned = {i: stop.id for i, stop in enumerate(self.queue) if stop.pinned}
+        pinned = {i: name for i, name in enumerate(ids(self.queue)) if name in self.pinned}
         order = data.draw(st.permutations(asked))
         kept = order[: data.draw(st.integers(0, len(order)))]
         given_up = self.queue.reorder(level, asked, kept)
@@ -114,6 +117,19 @@ def test_an_index_counts_from_the_next(index: int) -> None:
     queue.add([waypoint(f"w{i}") for i in range(5)])
     queue.add([waypoint("x"), waypoint("y")], index=index)
     assert ids(queue)[index : index + 2] == ["x", "y"]
+
+
+def test_a_plan_of_a_level_that_was_served_meanwhile_changes_nothing() -> None:
+    """Its last waypoint was visited, or has become more urgent, before the plan was made."""
+    queue = WaypointQueue()
+    queue.add([waypoint("a"), waypoint("b", priority=2)])
+    assert queue.reorder(7, ["gone"], ["gone"]) == []
+    assert ids(queue) == ["b", "a"]
+    assert queue.level == 2
+    queue.remove("b")
+    queue.remove("a")
+    assert queue.reorder(2, ["b"], []) == []
+    assert (queue.level, queue.head, len(queue)) == (None, None, 0)
 
 
 def test_an_interrupted_stop_keeps_its_remaining_hover() -> None:

@@ -1,0 +1,98 @@
+"""When GEMS takes a model's waiting tasks to the cloud, at the edges of its rule; milliseconds."""
+
+from __future__ import annotations
+
+import pytest
+
+from aerodaas.clock import NANOSECONDS
+from aerodaas.schedulers.analytics.base import MILLISECOND, Drop, Profile, QoeGoal, Resources, Task
+from aerodaas.schedulers.analytics.gems import Gems
+from aerodaas.testing.scheduler_kit import End, play
+
+WINDOW = 20 * NANOSECONDS
+BLOCK = Profile("block", 100, 1000 * MILLISECOND, 50 * MILLISECOND, 300 * MILLISECOND, 1, 20)
+
+
+def _m(deadline: float, *, share: float = 0.9, cost: float = 20, cloud: float = 300) -> Profile:
+    """A task of the model m, of 100 on the edge."""
+    times = [round(ms * MILLISECOND) for ms in (deadline, 100, cloud)]
+    return Profile("m", 100, times[0], times[1], times[2], 1, cost, QoeGoal(100, share, WINDOW))
+
+
+HOPELESS = 40
+"""A deadline that neither the edge nor the cloud can meet."""
+
+
+@pytest.mark.parametrize(("share", "place"), [(0.5, "edge"), (0.51, "cloud")])
+def test_a_model_at_its_share_is_not_in_danger(share: float, place: str) -> None:
+    """One of two in time is a half: the third task stays for a goal of 0.5, and leaves for more."""
+    tasks = [
+        (0.0, _m(900, share=share)),
+        (200.0, BLOCK),
+        (200.0, _m(900, share=share)),
+        (210.0, _m(HOPELESS, share=share)),
+    ]
+    assert play(Gems(), tasks)[2].place == place
+
+
+@pytest.mark.parametrize(("deadline", "place"), [(310, "edge"), (311, "cloud")])
+def test_only_what_the_cloud_ends_before_its_deadline_is_rescued(
+    deadline: float, place: str
+) -> None:
+    """Sent at 10, the cloud's result comes at 310."""
+    ends = play(Gems(), [(0, BLOCK), (0, _m(deadline)), (10, _m(HOPELESS))])
+    assert ends[1].place == place
+    assert ends[1].outcome == "done"
+
+
+@pytest.mark.parametrize(("cost", "place"), [(100, "edge"), (99, "cloud")])
+def test_only_what_gains_in_the_cloud_is_rescued(cost: float, place: str) -> None:
+    """At a cost of its benefit nothing is gained."""
+    ends = play(Gems(), [(0, BLOCK), (0, _m(900, cost=cost)), (10, _m(HOPELESS, cost=cost))])
+    assert ends[1].place == place
+
+
+def test_without_a_cloud_nothing_is_rescued() -> None:
+    """It waits for the edge, in danger or not."""
+    tasks = [(0.0, BLOCK), (0.0, _m(900)), (10.0, _m(HOPELESS))]
+    ends = play(Gems(), tasks, resources=Resources(cloud_slots=0))
+    assert ends[1] == End("edge", "done", 50, 150)
+
+
+def test_all_waiting_tasks_of_the_model_are_rescued_and_no_other_models() -> None:
+    """Two of m leave at the drop; the one of another model, between them, stays."""
+    other = Profile("n", 100, 800 * MILLISECOND, 100 * MILLISECOND, 300 * MILLISECOND, 1, 20)
+    ends = play(Gems(), [(0, BLOCK), (0, _m(900)), (0, other), (0, _m(700)), (10, _m(HOPELESS))])
+    assert ends[1] == End("cloud", "done", 10, 310)
+    assert ends[3] == End("cloud", "done", 10, 310)
+    assert ends[2] == End("edge", "done", 50, 150)
+
+
+def test_a_late_result_counts_against_its_model() -> None:
+    """The first task ends late on the edge, at 150, and the one that waits leaves then."""
+    tasks = [(0.0, _m(120)), (0.0, _m(900)), (0.0, _m(900))]
+    ends = play(Gems(), tasks, edge_ms=[150, 100, 100])
+    assert ends[0] == End("edge", "late", 0, 150)
+    assert {end.place for end in ends[1:]} == {"cloud"}
+
+
+@pytest.mark.parametrize("at", [999, 1000])
+def test_windows_are_whole_multiples_of_their_length(at: int) -> None:
+    """A drop at 990 counts until 999, whenever the model's first task came."""
+    goal = QoeGoal(100, 0.9, NANOSECONDS)
+    times = (900 * MILLISECOND, 100 * MILLISECOND, 300 * MILLISECOND)
+    waiting = Profile("m", 100, *times, 1, 20, goal)
+    hopeless = Profile("m", 100, HOPELESS * MILLISECOND, *times[1:], 1, 20, goal)
+    gems = Gems()
+    gems.start(Resources(), 0)
+    early = Task(1, hopeless, 990 * MILLISECOND, 1030 * MILLISECOND)
+    assert [type(one) for one in gems.task_arrived(early, early.arrival)] == [Drop]
+    assert gems._in_danger(Task(2, waiting, 0, 2**62), at * MILLISECOND) == (at == 999)
+
+
+def test_the_reason_of_a_drop_is_kept() -> None:
+    """GEMS counts it, and passes it on."""
+    gems = Gems()
+    gems.start(Resources(), 0)
+    task = Task(1, _m(900), 0, 900)
+    assert gems.drop(task, 5, "too late") == Drop(task, "too late")
