@@ -29,9 +29,30 @@ RENAMED = {
 _NOT_COPIED = shutil.ignore_patterns(
     ".git", ".venv*", "__pycache__", "*.pyc", ".*_cache", ".hypothesis", "runs", "shared", "mutants"
 )
-_SELECTION = '''"""Leaves out what a mutation run has no time for: Ray, and long flights."""
+_SELECTION = '''"""Leaves out what a mutation run has no time for: Ray, and long flights.
+
+The fastest tests come first, so that a mutant is found by the cheapest that notices it; one that
+loops for ever is ended after 20 times what its test takes; a failing property is not shrunk.
+"""
+
+import json
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, Phase, settings
 
 LEFT_OUT = ("slow", "sitl", "wall_clock")
+STATS = Path("mutmut-stats.json")
+
+settings.register_profile(
+    "mutation",
+    phases=(Phase.explicit, Phase.generate),
+    derandomize=True,
+    database=None,
+    deadline=None,
+    suppress_health_check=list(HealthCheck),
+)
+settings.load_profile("mutation")
 
 
 def pytest_collection_modifyitems(config, items):
@@ -42,6 +63,12 @@ def pytest_collection_modifyitems(config, items):
         and not any(item.get_closest_marker(name) for name in LEFT_OUT)
     ]
     config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+    if STATS.exists():
+        took = json.loads(STATS.read_text(encoding="utf-8"))["duration_by_test"]
+        kept.sort(key=lambda item: took.get(item.nodeid, 0.0))
+        for item in kept:
+            patience = 5 + 20 * took.get(item.nodeid, 15.0)
+            item.add_marker(pytest.mark.timeout(patience), append=False)
     items[:] = kept
 '''
 
@@ -151,6 +178,7 @@ class MutationRun:
             "pytest_add_cli_args": ["-pno:cacheprovider", "-pmutation_selection", "-oaddopts="],
             "pytest_add_cli_args_test_selection": self.tests,
             "do_not_mutate_patterns": [r"raise \w+"],
+            "timeout_multiplier": 5,
             "use_git_change_detection": False,
             "track_dependencies": False,
         }  # fmt: skip
