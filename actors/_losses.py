@@ -44,8 +44,8 @@ def drone_lost(name: str, report: ActorReport, frozen: float) -> MissionError:
     robots = ", ".join(name.rpartition("/")[2].split("+"))
     if frozen:
         return MissionError(
-            f"{robots}: this application did not run for {frozen:.0f} s, so the drone came home by "
-            "itself and its processes have ended"
+            f"{robots}: this application did not run for {frozen:.0f} s, after which a drone comes "
+            "home by itself; its processes have ended"
         )
     alone = report.values.get(ALONE, {})
     what = "; ".join(dict.fromkeys(alone.values())) or "its own failsafe is what remains"

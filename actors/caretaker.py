@@ -47,6 +47,7 @@ class Caretaker:
         the drones are not waited for.
         """
         self._ended: tuple[Sequence[Sequence[Any]], Sequence[Any]] = (), ()
+        self._ending = False
         self._silent_from = time.monotonic() + _LAUNCH
         self._application = application
         self._drones = drones
@@ -66,6 +67,10 @@ class Caretaker:
         """Note that the application is alive."""
         self._silent_from = time.monotonic() + _SILENCE
 
+    def ending(self) -> bool:
+        """Whether it ends the run, or has."""
+        return self._ending
+
     def look_after(self, groups: Sequence[Sequence[Any]], helpers: Sequence[Any]) -> None:
         """End these, instead, once it is time to: actors have come in flight."""
         self._ended = groups, helpers
@@ -77,6 +82,7 @@ class Caretaker:
         lockstep = self._application.lockstep
         while not self._gone() or (not lockstep and any(map(may_fly, self._drones))):
             time.sleep(_LOOK_INTERVAL)
+        self._ending = True
         end_actors(*self._ended)
         self._lock.release()
         exit_soon()

@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import ray
 from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
@@ -185,14 +185,26 @@ class Flight:
         try:
             robots: dict[str, RobotReport] = ask(self._members[name].handle.robots.remote(newest))
         except DeadError:
-            member = self._members[name]
-            raise drone_lost(name, member.report, self._pulse.frozen) from None
+            raise self._drone_lost(self._members[name]) from None
         except SilentError:
             if before is None or time.monotonic() - before[0] > _SILENT_FOR:
                 raise
             return before[1]
         self._answers[name] = time.monotonic(), robots
         return robots
+
+    def _drone_lost(self, member: Member) -> MissionError:
+        """Why a drone's actor has gone: an application that stood still is no proof of it."""
+        frozen = self._pulse.frozen
+        if frozen and self._caretaker is not None:
+            try:
+                ended = ask(self._caretaker.ending.remote())
+            except DeadError:
+                ended = True
+            except SilentError:
+                ended = False
+            frozen = frozen if ended else 0.0
+        return drone_lost(member.name, member.report, frozen)
 
     @property
     def reachable(self) -> bool:
@@ -454,12 +466,12 @@ class Flight:
             ready, _ = ray.wait([member.pending], timeout=0.05)
             if not ready:
                 continue
-            reference, member.pending = member.pending, None
+            member.pending = None
             try:
-                member.report = ray.get(reference)
+                member.report = ray.get(ready[0])
             except RayActorError:
                 if member.name in self._ids():
-                    raise drone_lost(member.name, member.report, self._pulse.frozen) from None
+                    raise self._drone_lost(member) from None
                 # Of those with a lifeline, that tells, and sooner.
                 if not member.restarts:
                     self._lost(member)
@@ -513,7 +525,7 @@ class Flight:
         actor, lost_at = member.handle, member.lost_at
         while member.lost_at == lost_at and not self._stopped:
             try:
-                if ray.get(actor.report.remote()).phase == "new":
+                if cast("ActorReport", ray.get(actor.report.remote())).phase == "new":
                     ray.get(actor.learn.remote(self.plan.session.application))
                     member.info = ray.get(actor.prepare.remote(*member.setup))
                     if member.further:

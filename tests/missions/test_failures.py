@@ -178,14 +178,22 @@ def test_killed_sensor_is_restarted(flyer: Flyer) -> None:
 
 
 @pytest.mark.wall_clock
-def test_drone_actor_dies(flyer: Flyer) -> None:
-    """Nobody can fly any more: the application ends with the reason, and nothing is left over."""
+@pytest.mark.parametrize("pause", [0.0, 7.0])
+def test_drone_actor_dies(flyer: Flyer, pause: float) -> None:
+    """Nobody can fly any more: the application ends with the reason, and nothing is left over.
+
+    An application that stood still before is not taken for the reason, while its run goes on.
+    """
     with flyer.options(speed=5.0):
         env = Environment(flyer.write(environment()))
         env.get_robot_by_id("drone").navigate(hop((300, 0)))
         run = env.launch()
         assert run._flight is not None
         assert wait_for(lambda: bool(run.look().reports["drone/drone"].values), 20.0)
+        with run._polling:
+            time.sleep(pause)
+        time.sleep(1.0)
+        run.look()
         os.kill(run._flight.infos()["drone/drone"].pid, signal.SIGKILL)
         with pytest.raises(
             MissionError, match="the actor of drone died: a simulated drone ends with its process"
