@@ -5,7 +5,16 @@ from __future__ import annotations
 import pytest
 
 from aerodaas.clock import NANOSECONDS
-from aerodaas.schedulers.analytics.base import MILLISECOND, Drop, Profile, QoeGoal, Resources, Task
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    Drop,
+    Profile,
+    QoeGoal,
+    Resources,
+    SendToCloud,
+    Task,
+    WakeAt,
+)
 from aerodaas.schedulers.analytics.gems import Gems
 from aerodaas.testing.scheduler_kit import End, play
 
@@ -96,3 +105,56 @@ def test_the_reason_of_a_drop_is_kept() -> None:
     gems.start(Resources(), 0)
     task = Task(1, _m(900), 0, 900)
     assert gems.drop(task, 5, "too late") == Drop(task, "too late")
+
+
+def test_a_drop_at_its_turn_on_the_edge_rescues() -> None:
+    """The block takes 100, not 50: the next can't end by 160; of those behind, one runs at once."""
+    tasks = [(0.0, BLOCK), (0.0, _m(160)), (0.0, _m(900)), (0.0, _m(901))]
+    ends = play(Gems(), tasks, edge_ms=[100, 100, 100, 100])
+    assert ends[1] == End("nowhere", "dropped", 100, 100)
+    assert ends[2] == End("edge", "done", 100, 200)
+    assert ends[3] == End("cloud", "done", 100, 400)
+
+
+def test_a_drop_at_its_latest_start_rescues() -> None:
+    """Not stolen until 690, one that would lose money in the cloud is dropped."""
+    long = Profile("long", 100, 2000 * MILLISECOND, 800 * MILLISECOND, 300 * MILLISECOND, 1, 20)
+    ends = play(Gems(), [(0, long), (1, _m(800, cost=110)), (2, _m(1500))])
+    assert ends[1] == End("nowhere", "dropped", 691, 691)
+    assert ends[2] == End("cloud", "done", 691, 991)
+
+
+def test_as_published_the_cloud_s_times_are_not_learnt() -> None:
+    """After twelve results of 350 instead of 300, a task still leaves for the cloud at 290."""
+    endless = Profile("endless", 100, 2**60, 2**59, 300 * MILLISECOND, 1, 20)
+    stream = [(0.0, endless), *((1000.0 * number, _m(600)) for number in range(14))]
+    for published, wait in ((True, 290), (False, 240)):
+        ends = play(Gems(published=published), stream, cloud_ms=[350] * len(stream))
+        assert ends[-1].started - stream[-1][0] == wait
+
+
+def test_as_published_what_gains_nothing_in_the_cloud_waits_to_be_stolen() -> None:
+    """Only what loses is dropped at once; a cost of the benefit loses nothing."""
+    long = Profile("long", 100, 2000 * MILLISECOND, 900 * MILLISECOND, 300 * MILLISECOND, 1, 20)
+    tasks = [(0.0, long), (1.0, _m(900, cost=100)), (1.0, _m(900, cost=100.5))]
+    ends = play(Gems(published=True), tasks)
+    assert ends[1] == End("nowhere", "dropped", 791, 791)
+    assert ends[2] == End("nowhere", "dropped", 1, 1)
+
+
+def test_as_published_nothing_is_stolen_for_an_empty_queue() -> None:
+    """The edge is free at 300, and a waiting task that would fit leaves for the cloud at 590."""
+    long = Profile("long", 100, 2000 * MILLISECOND, 900 * MILLISECOND, 300 * MILLISECOND, 1, 20)
+    tasks = [(0.0, long), (0.0, _m(900))]
+    assert play(Gems(published=True), tasks, edge_ms=[300, 100])[1].started == 590
+    assert play(Gems(), tasks, edge_ms=[300, 100])[1] == End("edge", "done", 300, 400)
+
+
+@pytest.mark.parametrize("published", [False, True])
+def test_the_reason_to_leave_for_the_cloud_is_kept(published: bool) -> None:  # noqa: FBT001
+    """At its latest start the task is sent for the reason for which it had waited."""
+    gems = Gems(published=published)
+    gems.start(Resources(), 0)
+    task = Task(1, _m(600), 0, 600 * MILLISECOND)
+    assert list(gems.to_cloud(task, 0, "why")) == [WakeAt(290 * MILLISECOND)]
+    assert list(gems.timer(290 * MILLISECOND)) == [SendToCloud(task, "why", 300 * MILLISECOND)]
