@@ -79,16 +79,17 @@ def test_telemetry_that_stands_still_counts_as_loss() -> None:
     assert "no word from the vehicle" in one.status.reason
 
 
-def test_two_short_losses_do_not_add_up() -> None:
-    """Each counts from its own beginning."""
+@pytest.mark.parametrize("lost", ["lost", "blind"])
+def test_two_short_losses_do_not_add_up(lost: str) -> None:
+    """Of the link or of the position, each counts from its own beginning."""
     timeout = LimitsConfig().link_timeout
     one = flight(add(Waypoint("far", 60, 0, 1.5)))
     one.run(10.0)
     for _ in range(3):
-        one.vehicle.lost = True
+        setattr(one.vehicle, lost, True)
         one.run(0.7 * timeout)
         one.expect(S.HOLDING)
-        one.vehicle.lost = False
+        setattr(one.vehicle, lost, False)
         one.run(0.5)
         one.expect(S.ENROUTE)
 
