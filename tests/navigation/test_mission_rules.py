@@ -198,7 +198,7 @@ def test_the_fence_is_seen_from_as_far_as_full_speed_needs() -> None:
 
 
 def test_each_of_two_drones_takes_half_of_the_room_between_them() -> None:
-    """Flying towards each other, both guarded alike, they stay apart by the separation."""
+    """Flying towards each other, neither braking harder than it may, they stay apart by it."""
     limits = LimitsConfig(max_speed=5.0, separation=3.0, max_acceleration=2.0)
     guards = [SetpointGuard(limits, np.zeros(3)) for _ in range(2)]
     x, speeds, step = [-20.0, 20.0], [0.0, 0.0], 0.05
@@ -213,7 +213,8 @@ def test_each_of_two_drones_takes_half_of_the_room_between_them() -> None:
             asked = VelocitySetpoint(np.array([5.0 * sign, 0.0, 0.0]))
             sent = guards[i].clamp(asked, odometries[i], step, [other]).setpoint
             assert isinstance(sent, VelocitySetpoint)
-            speeds[i] = float(sent.velocity[0])
+            change = float(sent.velocity[0]) - speeds[i]
+            speeds[i] += float(np.clip(change, -2.0 * step, 2.0 * step))
         x = [place + speed * step for place, speed in zip(x, speeds, strict=True)]
         nearest = min(nearest, x[1] - x[0])
     assert 3.0 <= nearest < 4.0
