@@ -43,10 +43,12 @@ def _worker_share(nodeid: str) -> str:
     return "tests/cluster" if file.startswith("tests/cluster/") else file
 
 
+@pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Files without Ray come first; what met a busy machine is run once more, in CI only.
+    """Files without Ray come first, so that a mistake in a function is told within seconds.
 
-    One mistake in a function is then told within seconds.
+    Where slow ones run, they come before, so that no worker is left alone with one at the end.
+    What goes by the wall clock and met a busy machine is run once more, in CI only.
     """
     files: dict[str, list[pytest.Item]] = {}
     for item in items:
@@ -54,12 +56,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         if _CI and item.get_closest_marker("wall_clock"):
             item.add_marker(pytest.mark.flaky(reruns=1))
 
-    def flies(name: str) -> bool:
-        items = files[name]
-        ray = any("runtime" in getattr(item, "fixturenames", ()) for item in items)
-        return ray or any(item.get_closest_marker("slow") for item in items)
+    def turn(name: str) -> int:
+        if any(item.get_closest_marker("slow") for item in files[name]):
+            return 0
+        ray = any("runtime" in getattr(item, "fixturenames", ()) for item in files[name])
+        return 2 if ray else 1
 
-    items[:] = [item for name in sorted(files, key=flies) for item in files[name]]
+    items[:] = [item for name in sorted(files, key=turn) for item in files[name]]
 
 
 @pytest.fixture(autouse=True)

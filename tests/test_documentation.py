@@ -61,6 +61,7 @@ def test_the_first_application_flies(flyer: Flyer) -> None:
     assert drone.outcome.startswith("landed")
 
 
+@pytest.mark.slow
 def test_acting_in_flight_works_as_shown(flyer: Flyer, capsys: pytest.CaptureFixture[str]) -> None:
     """Reading, pausing, polling and resuming, as printed."""
     (environment,) = blocks("getting-started.md", "json")
@@ -74,6 +75,7 @@ def test_acting_in_flight_works_as_shown(flyer: Flyer, capsys: pytest.CaptureFix
     assert " m up" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_example_plug_ins_fly_together(flyer: Flyer, plugin_folder: Path) -> None:
     """Camera, analysis, scheduler and driver of the page, in one flight."""
     (environment,) = blocks("writing-plugins.md", "json")

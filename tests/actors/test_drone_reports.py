@@ -30,7 +30,9 @@ def _square(name: str) -> AeroNavigation:
     return AeroNavigation(NavigationType.DISTANCE_DRIVEN, stops, priority=len(name) % 3)
 
 
-@pytest.mark.parametrize("speed", [None, 4.0], ids=["lockstep", "real time"])
+@pytest.mark.parametrize(
+    "speed", [None, pytest.param(4.0, marks=pytest.mark.slow)], ids=["lockstep", "real time"]
+)
 def test_reading_never_meets_a_mission_that_changes(speed: float | None) -> None:
     """100,000 reads from four threads while commands and plans turn the queue over: none raises.
 

@@ -28,7 +28,9 @@ from aerodaas.status import MissionState
 pytestmark = pytest.mark.wall_clock
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 10, "settings": {"width": 64, "height": 36}}
-BOTH = pytest.mark.parametrize("speed", [5.0, None], ids=["real time", "lockstep"])
+BOTH = pytest.mark.parametrize(
+    "speed", [pytest.param(5.0, marks=pytest.mark.slow), None], ids=["real time", "lockstep"]
+)
 
 
 class Backwards(TrajectoryScheduler):
@@ -188,6 +190,7 @@ def test_what_cannot_join_is_refused_at_the_call(flyer: Flyer) -> None:
         drone_of(env).end_mission()
 
 
+@pytest.mark.slow
 def test_one_environment_flies_twice(flyer: Flyer) -> None:
     """The second start flies what was given since, into a recording of its own."""
     path = flyer.write(FLAT)

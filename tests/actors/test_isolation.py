@@ -58,6 +58,7 @@ def wheel(folder: Path, version: str) -> str:
     return str(path)
 
 
+@pytest.mark.slow
 def test_two_versions_of_a_package_fly_side_by_side(flyer: Flyer) -> None:
     """From the application and from the environment file; the others see neither."""
     one, two = wheel(flyer.folder, "1.0"), wheel(flyer.folder, "2.0")

@@ -201,6 +201,7 @@ def detector(path: Path, score: float) -> Path:
     return constant_model(path, [rows], metadata=names)
 
 
+@pytest.mark.slow
 def test_another_scheduler_and_another_model(flyer: Flyer) -> None:
     """Both see what was seen; decisions, and what is found, are the new ones'."""
 
@@ -263,6 +264,7 @@ def by_depth(env: Environment) -> None:
     end_after(env, 20)
 
 
+@pytest.mark.slow
 def test_depth_is_recorded_and_replayed_to_the_millimetre(flyer: Flyer) -> None:
     """As the picture's companion, not as another camera; boxes keep what was measured in them."""
     content = with_camera("jpeg")

@@ -130,6 +130,7 @@ def test_bending_and_crouching_is_no_fall(camera: CameraModel, seconds: float) -
     assert scene.play() == []
 
 
+@pytest.mark.slow
 @LENSES
 @given(
     swing=st.floats(0.0, 0.3),
@@ -154,6 +155,7 @@ def test_a_drone_that_moves_makes_nobody_fall(
     assert scene.play() == []
 
 
+@pytest.mark.slow
 @LENSES
 @given(course=st.floats(-math.pi, math.pi), speed=st.floats(0.3, 2.5), height=st.floats(0.8, 3.0))
 @settings(max_examples=40, deadline=None)

@@ -277,6 +277,7 @@ def test_a_car_from_its_side_is_no_nearer_than_from_behind() -> None:
     assert found.distance == pytest.approx(9.0, rel=0.05)
 
 
+@pytest.mark.slow
 @given(
     gaps=st.lists(st.tuples(st.floats(5, 40), st.floats(0.2, 6.0)), max_size=4),
     speed=st.floats(0.0, 1.0),
@@ -435,6 +436,7 @@ def vest_world(target: Path, rate: float) -> World:
     )
 
 
+@pytest.mark.slow
 @given(
     speed=st.floats(0.2, 1.1),
     walk=st.floats(6.0, 14.0),

@@ -167,6 +167,7 @@ def in_flight() -> Flight:
     return one
 
 
+@pytest.mark.slow
 @given(asked=requests, pause=st.integers(1, 60))
 @settings(max_examples=60, deadline=None)
 @example(

@@ -151,6 +151,7 @@ def test_remote_service_dies(flyer: Flyer) -> None:
     assert "return-home: accepted" in alerts(flight)["remote_command"]
 
 
+@pytest.mark.slow
 def test_killed_sensor_is_restarted(flyer: Flyer) -> None:
     """The drone flies on, frames come again, and the recording says who died and for how long."""
     camera = {"id": "cam", "type": "camera", "rate": 5}
@@ -178,7 +179,7 @@ def test_killed_sensor_is_restarted(flyer: Flyer) -> None:
 
 
 @pytest.mark.wall_clock
-@pytest.mark.parametrize("pause", [0.0, 7.0])
+@pytest.mark.parametrize("pause", [0.0, pytest.param(7.0, marks=pytest.mark.slow)])
 def test_drone_actor_dies(flyer: Flyer, pause: float) -> None:
     """Nobody can fly any more: the application ends with the reason, and nothing is left over.
 

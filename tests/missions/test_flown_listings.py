@@ -15,6 +15,7 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+import pytest
 from flying import FLAT, Flyer, recorded, robot
 from scripted import RemoteUser, ScriptedDetector, free_port
 
@@ -43,6 +44,8 @@ from aerodaas import (
 from aerodaas.analytics import CarFollowAnalytics, RemoteAnalytics, VipFollowAnalytics
 from aerodaas.recording.flight import RobotFlight
 from aerodaas.run import Run
+
+pytestmark = pytest.mark.slow
 
 _QUICK = {"cruise_speed": 8.0, "max_speed": 10.0, "max_climb": 4.0, "max_acceleration": 6.0}
 

@@ -202,6 +202,8 @@ from typing import TYPE_CHECKING
 
 from .results import Shade
 
+pytestmark = pytest.mark.slow
+
 if TYPE_CHECKING:
     from .app import main
 """

@@ -220,6 +220,7 @@ def test_classes_are_the_same_in_every_process(flown: Flown) -> None:
     assert flown.lines("drone/listen") == {f"{kind} True True" for kind in kinds}
 
 
+@pytest.mark.slow
 def test_a_recording_of_unknown_classes_can_be_used(flown: Flown, tmp_path: Path) -> None:
     """Report, export and replay work on it, and nothing in it is executed."""
     folder, recording = flown.recording.parents[2], str(flown.recording)

@@ -130,6 +130,8 @@ Global().deploy(edge).analyse(camera)
 """
 CONDITION = """
 import threading
+
+pytestmark = pytest.mark.slow
 lock = threading.Lock()
 class Fine(Analytics[float]):
     pass
