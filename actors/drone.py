@@ -7,6 +7,7 @@ measured there, and goes on once everyone whose work can reach a drone is done.
 
 from __future__ import annotations
 
+import contextlib
 import time
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -177,6 +178,12 @@ class DroneActor(StreamActor):
     def note(self, kind: str, text: str) -> None:
         """Have recorded what the application has found out."""
         self.alert(kind, text)
+
+    def wait_no_longer(self) -> None:
+        """In lockstep, go on without what is under way: who should have answered died or is new."""
+        if self.session.lockstep:
+            with contextlib.suppress(LoopOverError):
+                self._calls.ask(self._barrier.forget, _ANSWER_TIMEOUT)
 
     def robots(self, newest: int = 200) -> dict[str, RobotReport]:
         """How each robot fared at its last turn, with the `newest` latencies.

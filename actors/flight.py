@@ -507,6 +507,7 @@ class Flight:
         if member.lost_at is None:
             member.lost_at = time.monotonic()
             self._note("actor_lost", str(error))
+            self._wait_no_longer()
         member.report = ActorReport("failed", error)
 
     def _back(self, member: Member) -> None:
@@ -514,7 +515,12 @@ class Flight:
             absence = time.monotonic() - member.lost_at
             member.lost_at = None
             member.report = ActorReport("running")
+            self._wait_no_longer()
             self._note("actor_back", f"{member.name} is back after {absence:.1f} s")
+
+    def _wait_no_longer(self) -> None:
+        for name in self._ids():
+            self._members[name].handle.wait_no_longer.remote()
 
     def _note(self, kind: str, text: str) -> None:
         for name in self._ids():

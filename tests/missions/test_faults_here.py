@@ -150,7 +150,10 @@ def test_a_sensor_dies_in_lockstep(flyer: Flyer) -> None:
     flight = recorded(run)
     assert flight.robots["drone"].outcome == "landed: all waypoints are visited"
     assert flight.robots["drone"].visited == ("wp0",)
-    assert "the actor sensor/drone/cam died" in alerts(flight)["actor_lost"]
+    told = alerts(flight)
+    assert "the actor sensor/drone/cam died" in told["actor_lost"]
+    assert "sensor/drone/cam is back" in told["actor_back"][0]
+    assert "reader_lost" not in told, "nobody is waited for in vain who died, or who is new"
 
 
 def managed(scheduler: str) -> Callable[[Environment], None]:
