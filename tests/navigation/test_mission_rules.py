@@ -247,6 +247,43 @@ class Reversed(OrderedScheduler):
         return list(reversed(pending))[:-1]
 
 
+@pytest.mark.parametrize(
+    ("yaw", "told", "velocity"),
+    [
+        (0.0, (1.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
+        (0.0, (0.0, 1.0, 0.0), (0.0, 1.0, 0.0)),
+        (90.0, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)),
+        (90.0, (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0)),
+        (-90.0, (1.0, 0.0, 0.5), (0.0, -1.0, 0.5)),
+        (180.0, (1.0, 1.0, -0.5), (-1.0, -1.0, -0.5)),
+    ],
+)
+def test_a_command_is_by_where_the_nose_points(
+    yaw: float, told: tuple[float, float, float], velocity: tuple[float, float, float]
+) -> None:
+    """Counter-clockwise from east: with the nose north, forward is north and left is west."""
+    one = flight(live(), vehicle=KinematicVehicle((0.0, 0.0, 0.0)))
+    one.run(10.0)
+    one.vehicle.yaw = math.radians(yaw)
+    item = VelocityCommand(*told, yaw_rate=0.25)
+    one.tell(StreamItem("drone/follow", AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [item])))
+    asked = one.turn().asked
+    assert isinstance(asked, VelocitySetpoint)
+    assert asked.velocity == pytest.approx(velocity, abs=1e-9)
+    assert asked.yaw_rate == 0.25
+
+
+def test_a_command_moves_the_drone_until_it_expires_and_not_then() -> None:
+    """Of 0.5 s, the turns at 0 to 0.45 s fly by it; at 0.5 s the drone holds."""
+    one = flight(live())
+    one.run(10.0)
+    item = VelocityCommand(1.0, valid_for=0.5)
+    one.tell(StreamItem("drone/follow", AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [item])))
+    told = [one.turn().asked for _ in range(11)]
+    flown = [isinstance(one, VelocitySetpoint) and one.velocity[0] == 1.0 for one in told]
+    assert flown == [True] * 10 + [False]
+
+
 def test_an_abort_forgets_the_command_of_the_moment() -> None:
     """A velocity command that is still fresh moves the drone no more."""
     one = flight(add(Waypoint("far", 40, 0, 1.5)), live())
