@@ -1,0 +1,332 @@
+"""What each kind of message says, in whose units, and for how long it is believed."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.events import event_number
+from aerodaas.drivers.mavlink.telemetry import Sensors, Telemetry
+
+ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+
+
+def beat(state: int, base: int = ARMED, custom: int = 0) -> Any:  # noqa: ANN401 - no types there
+    """A HEARTBEAT."""
+    return mavlink.MAVLink_heartbeat_message(2, 12, base, custom, state, 3)
+
+
+def local(boot: int, *values: float) -> Any:  # noqa: ANN401
+    """A local position of x, y, z, vx, vy, vz."""
+    return mavlink.MAVLink_local_position_ned_message(boot, *(values or (0.0,) * 6))
+
+
+def attitude(boot: int, *angles: float) -> Any:  # noqa: ANN401
+    """Roll, pitch, yaw and their rates."""
+    return mavlink.MAVLink_attitude_message(boot, *(angles or (0.0,) * 6))
+
+
+def globe(boot: int, latitude: int, longitude: int, altitude: int) -> Any:  # noqa: ANN401
+    """A global position."""
+    return mavlink.MAVLink_global_position_int_message(
+        boot, latitude, longitude, altitude, 77, 0, 0, 0, 0
+    )
+
+
+def gps(fix: int = 3, satellites: int = 9, ellipsoid: int = 535123) -> Any:  # noqa: ANN401
+    """47.5 degrees north, 8.25 west, 488 m above the sea."""
+    return mavlink.MAVLink_gps_raw_int_message(
+        0, fix, 475000000, -82500000, 488000, 80, 80, 0, 0, satellites, ellipsoid, 1500, 2500
+    )
+
+
+def status(left: int = 87, voltage: int = 15300, current: int = 1234) -> Any:  # noqa: ANN401
+    """A battery and the sensors' bits: present, enabled, healthy."""
+    return mavlink.MAVLink_sys_status_message(
+        7, 6, 5, 100, voltage, current, left, 0, 0, 0, 0, 0, 0
+    )
+
+
+def told(*messages: Any, now: float = 10.0) -> Telemetry:  # noqa: ANN401
+    """What is known after these messages, all at once."""
+    telemetry = Telemetry()
+    for message in messages:
+        telemetry.take(message, now)
+    return telemetry
+
+
+def test_before_any_word_nothing_is_known() -> None:
+    """No place, no charge, no time, and silence for ever."""
+    telemetry = Telemetry()
+    assert not telemetry.knows_place(0.0)
+    assert telemetry.silence(0.0) == math.inf
+    assert not telemetry.armed
+    assert not telemetry.critical
+    assert telemetry.position is telemetry.place is telemetry.altitude is telemetry.home is None
+    assert telemetry.gps is telemetry.on_ground is telemetry.sensors is None
+    assert telemetry.velocity.tolist() == [0.0, 0.0, 0.0]
+    assert math.isnan(telemetry.battery.fraction)
+    assert math.isnan(telemetry.boot_time)
+    assert math.isnan(telemetry.clock)
+    assert (telemetry.reboots, telemetry.software, telemetry.custom_mode) == (0, "", 0)
+    assert telemetry.back_at == telemetry.beat_at == -math.inf
+
+
+@pytest.mark.parametrize(
+    ("state", "base", "armed", "critical"),
+    [
+        (mavlink.MAV_STATE_ACTIVE, ARMED, True, False),
+        (mavlink.MAV_STATE_ACTIVE, 0xFF & ~ARMED, False, False),
+        (mavlink.MAV_STATE_CRITICAL, ARMED | 1, True, True),
+        (mavlink.MAV_STATE_EMERGENCY, ARMED, True, True),
+        (mavlink.MAV_STATE_FLIGHT_TERMINATION, ARMED, False, False),
+        (mavlink.MAV_STATE_STANDBY, 0, False, False),
+    ],
+)
+def test_a_heartbeat(state: int, base: int, *, armed: bool, critical: bool) -> None:
+    """Armed by its own bit, unless it is terminated; critical in two of its states."""
+    telemetry = told(beat(state, base, 0x04030000), now=5.0)
+    assert (telemetry.armed, telemetry.critical) == (armed, critical)
+    assert (telemetry.custom_mode, telemetry.beat_at, telemetry.heard_at) == (0x04030000, 5.0, 5.0)
+    assert telemetry.seen == {"HEARTBEAT": 5.0}
+
+
+def test_a_local_position_stays_in_the_autopilots_frame() -> None:
+    """North, east, down, each its own; one that is no number leaves the one before."""
+    telemetry = told(local(1000, 1.0, 2.0, -3.0, 0.1, 0.2, -0.3))
+    assert telemetry.position is not None
+    assert telemetry.position == pytest.approx([1.0, 2.0, -3.0])
+    assert telemetry.velocity == pytest.approx([0.1, 0.2, -0.3])
+    assert telemetry.position_at == 10.0
+    for index in range(6):
+        spoilt = [9.0] * 6
+        spoilt[index] = math.nan
+        telemetry.take(local(1001 + index, *spoilt), 11.0)
+        assert telemetry.position == pytest.approx([1.0, 2.0, -3.0])
+        assert telemetry.velocity == pytest.approx([0.1, 0.2, -0.3])
+        assert telemetry.position_at == 10.0
+
+
+def test_an_attitude_is_turned_into_our_sense() -> None:
+    """Heading east is yaw 0; nose up, and turning with the clock, are negative with us."""
+    telemetry = told(attitude(1000, 0.1, 0.2, math.pi / 2, 9.0, 9.0, 0.4))
+    seen = telemetry.attitude
+    assert (seen.roll, seen.pitch, seen.yaw_rate) == pytest.approx((0.1, -0.2, -0.4))
+    assert seen.yaw == pytest.approx(0.0, abs=1e-6)
+    telemetry.take(attitude(1001, 0.0, 0.0, 0.0, 0.0, 0.0, math.inf), 11.0)
+    assert telemetry.attitude is seen
+    assert telemetry.attitude_at == 10.0
+
+
+@pytest.mark.parametrize(
+    ("position_at", "attitude_at", "known"),
+    [
+        (10.0, 10.0, True),
+        (9.01, 9.01, True),
+        (9.0, 10.0, False),
+        (10.0, 9.0, False),
+    ],
+)
+def test_a_place_is_known_for_less_than_a_second(
+    position_at: float, attitude_at: float, *, known: bool
+) -> None:
+    """Both where it is and how it stands."""
+    telemetry = Telemetry()
+    telemetry.take(local(1000), position_at)
+    telemetry.take(attitude(1000), attitude_at)
+    assert telemetry.knows_place(10.0) is known
+
+
+def test_a_global_position_is_in_degrees_and_metres() -> None:
+    """Times 10^7, and in millimetres above the sea; zero on one axis alone is a place."""
+    telemetry = told(globe(1, 473977420, -85455940, 488123))
+    assert telemetry.place == pytest.approx((47.397742, -8.545594))
+    assert telemetry.altitude == 488.123
+    telemetry.take(globe(2, 0, 85455940, 5000), 10.0)
+    assert telemetry.place == pytest.approx((0.0, 8.545594))
+    telemetry.take(globe(3, 473977420, 0, 6000), 10.0)
+    assert telemetry.place == pytest.approx((47.397742, 0.0))
+    telemetry.take(globe(4, 0, 0, 6000), 10.0)
+    assert telemetry.place is telemetry.altitude is None
+
+
+def test_a_gps_fix_in_our_units() -> None:
+    """Degrees, metres above the ellipsoid, or the sea where it does not say, metres of error."""
+    fix = told(gps()).gps
+    assert fix is not None
+    assert (fix.latitude, fix.longitude) == (47.5, -8.25)
+    assert fix.altitude == 535.123
+    assert (fix.horizontal_sigma, fix.vertical_sigma) == (1.5, 2.5)
+    assert fix.satellites == 9
+    unsaid = told(gps(satellites=255, ellipsoid=0)).gps
+    assert unsaid is not None
+    assert (unsaid.altitude, unsaid.satellites) == (488.0, 0)
+    most = told(gps(satellites=254)).gps
+    assert most is not None
+    assert most.satellites == 254
+
+
+@pytest.mark.parametrize(("kind", "fixed"), [(0, False), (1, False), (2, True), (6, True)])
+def test_which_fixes_are_positions(kind: int, *, fixed: bool) -> None:
+    """From two dimensions on; a fix that is lost takes the position with it."""
+    telemetry = told(gps(), gps(kind))
+    assert (telemetry.gps is not None) is fixed
+
+
+def test_a_battery_in_volts_and_amperes() -> None:
+    """Of percent, millivolts and hundredths of an ampere; what is not measured is none."""
+    battery = told(status()).battery
+    assert (battery.fraction, battery.voltage, battery.current) == (0.87, 15.3, 12.34)
+    unknown = told(status(-1, 65535, -1)).battery
+    assert math.isnan(unknown.fraction)
+    assert (unknown.voltage, unknown.current) == (0.0, 0.0)
+    empty = told(status(0, 0, 0)).battery
+    assert (empty.fraction, empty.voltage, empty.current) == (0.0, 0.0, 0.0)
+    assert told(status()).sensors == Sensors(present=7, enabled=6, health=5)
+
+
+@pytest.mark.parametrize(
+    ("state", "on_ground"),
+    [
+        (mavlink.MAV_LANDED_STATE_UNDEFINED, None),
+        (mavlink.MAV_LANDED_STATE_ON_GROUND, True),
+        (mavlink.MAV_LANDED_STATE_IN_AIR, False),
+        (mavlink.MAV_LANDED_STATE_TAKEOFF, False),
+        (mavlink.MAV_LANDED_STATE_LANDING, False),
+    ],
+)
+def test_its_own_word_about_the_ground(state: int, *, on_ground: bool | None) -> None:
+    """It may not know; what still lands is not on the ground."""
+    assert told(mavlink.MAVLink_extended_sys_state_message(0, state)).on_ground is on_ground
+
+
+def test_home_is_a_place_in_its_frame() -> None:
+    """One with a figure that is no number is none."""
+
+    def home(*place: float) -> Any:  # noqa: ANN401
+        return mavlink.MAVLink_home_position_message(
+            1, 2, 3, *place, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0
+        )
+
+    known = told(home(1.0, 2.0, -3.0)).home
+    assert known is not None
+    assert known == pytest.approx([1.0, 2.0, -3.0])
+    assert told(home(1.0, 2.0, -3.0), home(1.0, math.nan, -3.0)).home is None
+
+
+def test_its_clock_and_its_version() -> None:
+    """Microseconds of the Unix epoch; bytes of the version from the highest on."""
+    clock = mavlink.MAVLink_system_time_message(1_700_000_000_250_000, 4000)
+    telemetry = told(clock)
+    assert (telemetry.clock, telemetry.boot_time) == (1_700_000_000.25, 4.0)
+    version = mavlink.MAVLink_autopilot_version_message(
+        0, 0x010F02FF, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0
+    )
+    assert told(version).software == "1.15.2"
+
+
+def test_its_words_are_kept_for_a_while() -> None:
+    """Texts, however they are encoded, and events that have words; each with its time."""
+    telemetry = told(mavlink.MAVLink_statustext_message(3, b"Motors \xff out", 0, 0))
+    assert telemetry.texts.recent(10.0, 1.0)
+    # pymavlink leaves bytes in a message that was made here, and text in one that came.
+    piece = mavlink.MAVLink_statustext_message(3, b"A" * 50, 4, 0)
+    rest = mavlink.MAVLink_statustext_message(3, b"and more", 4, 1)
+    telemetry = told(piece, rest, now=20.0)
+    assert telemetry.texts.recent(20.0, 1.0) == ["A" * 50 + "and more"]
+    number = event_number("commander_kill_sw_engaged")
+    telemetry = told(mavlink.mavlink_map[410](0, 0, number, 0, 7, 2, [0] * 40), now=30.0)
+    assert telemetry.texts.recent(30.0, 1.0) == ["the kill switch was used"]
+    assert telemetry.texts.recent(40.0, 1.0) == []
+
+
+def test_how_long_it_has_said_nothing_new() -> None:
+    """Since its latest message, or since the latest whose stamp moved on, if that was before."""
+    telemetry = told(local(1000), now=10.0)
+    assert telemetry.silence(10.5) == 0.5
+    telemetry.take(local(1000), 11.0)
+    telemetry.take(beat(4), 11.5)
+    assert telemetry.silence(12.0) == 2.0
+    telemetry.take(attitude(1001), 12.0)
+    assert telemetry.silence(12.25) == 0.25
+
+
+@pytest.mark.parametrize(("gap", "back_at"), [(1.0, 10.0), (1.01, 11.01)])
+def test_when_it_was_heard_again(gap: float, back_at: float) -> None:
+    """After more than a second of nothing; words of any kind count."""
+    telemetry = told(beat(4))
+    assert telemetry.back_at == 10.0
+    telemetry.take(status(), 10.0 + gap)
+    assert telemetry.back_at == pytest.approx(back_at)
+
+
+def test_of_one_kind_only_what_is_newer_is_taken() -> None:
+    """A packet that was overtaken, or comes twice, changes nothing; kinds count apart."""
+    telemetry = told(local(2000, 2.0, 0, 0, 0, 0, 0))
+    for stamp in (1999, 2000):
+        telemetry.take(local(stamp, 9.0, 0, 0, 0, 0, 0), 10.5)
+        assert telemetry.position is not None
+        assert telemetry.position[0] == 2.0
+        assert telemetry.position_at == 10.0
+    telemetry.take(attitude(1999, 0.5, 0, 0, 0, 0, 0), 10.5)
+    assert telemetry.attitude.roll == 0.5
+    assert telemetry.boot_time == 2.0
+    assert telemetry.ticked_at == 10.0
+    telemetry.take(local(2001, 3.0, 0, 0, 0, 0, 0), 10.6)
+    assert telemetry.position is not None
+    assert telemetry.position[0] == 3.0
+    assert telemetry.ticked_at == 10.6
+
+
+@pytest.mark.parametrize(("stamp", "reboots"), [(5000, 0), (4999, 1)])
+def test_a_clock_that_goes_back_by_more_than_five_seconds_began_anew(
+    stamp: int, reboots: int
+) -> None:
+    """By less, a packet was only late."""
+    telemetry = told(local(10000), local(stamp))
+    assert telemetry.reboots == reboots
+    assert telemetry.boot_time == (stamp / 1000 if reboots else 10.0)
+    assert telemetry.knows_place(10.0) is False
+
+
+def test_of_another_life_of_the_autopilot_nothing_is_left() -> None:
+    """Its places, its health and its stamps are forgotten; its charge and its mode are not."""
+    home = mavlink.MAVLink_home_position_message(
+        1, 2, 3, 1.0, 2.0, 3.0, [1.0, 0.0, 0.0, 0.0], 0.0, 0.0, 0.0
+    )
+    landed = mavlink.MAVLink_extended_sys_state_message(0, 1)
+    before = (local(90000), attitude(90000), globe(90000, 1, 1, 1), gps(), status(), landed, home)
+    telemetry = told(beat(4, ARMED, 0x60000), *before)
+    assert telemetry.knows_place(10.0)
+    health, events = telemetry.health, telemetry.events
+    telemetry.take(local(1000, 5.0, 0, 0, 0, 0, 0), 10.1)
+    assert telemetry.reboots == 1
+    assert not telemetry.armed
+    assert telemetry.home is telemetry.place is telemetry.altitude is telemetry.gps is None
+    assert telemetry.sensors is telemetry.on_ground is None
+    assert telemetry.attitude_at == -math.inf
+    assert telemetry.health is not health
+    assert telemetry.events is not events
+    assert telemetry.boot_time == 1.0
+    assert telemetry.position is not None
+    assert telemetry.position[0] == 5.0, "the first word of its new life counts"
+    assert not telemetry.knows_place(10.1)
+    telemetry.take(attitude(1000), 10.2)
+    assert telemetry.knows_place(10.2)
+    assert telemetry.battery.fraction == 0.87
+    assert telemetry.custom_mode == 0x60000
+
+
+def test_a_start_is_told_once_by_heartbeats() -> None:
+    """Of two HEARTBEATs that boot only the first, and only after one that did not."""
+    telemetry = told(beat(mavlink.MAV_STATE_ACTIVE))
+    telemetry.take(local(5000), 10.0)
+    for now in (11.0, 12.0):
+        telemetry.take(beat(mavlink.MAV_STATE_BOOT, ARMED), now)
+        assert telemetry.reboots == 1
+    assert telemetry.position_at == -math.inf
+    assert np.isnan(telemetry.boot_time)
