@@ -1,0 +1,138 @@
+"""The signing key, and whose packets pass: read in both forms, never shown, never half believed."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.settings import KEY_VARIABLE, MavlinkSettings
+from aerodaas.drivers.mavlink.signing import load_key, sign_with, signature_fits
+from aerodaas.errors import ConfigError
+
+KEY = bytes(range(32))
+BEAT = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)
+
+
+@pytest.fixture(autouse=True)
+def _no_key_of_the_host(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(KEY_VARIABLE, raising=False)
+
+
+def sender(key: bytes | None) -> Any:  # noqa: ANN401 - pymavlink has no types
+    """One end, which signs with `key`."""
+    mav = mavlink.MAVLink(None, 1, 1)
+    if key is not None:
+        sign_with(mav, key)
+    return mav
+
+
+def packet(key: bytes | None) -> bytearray:
+    """A heartbeat."""
+    return bytearray(BEAT.pack(sender(key)))
+
+
+@pytest.mark.parametrize(
+    "content",
+    [KEY, KEY.hex().encode(), KEY.hex().upper().encode(), b" " + KEY.hex().encode() + b"\n"],
+)
+def test_a_key_in_a_file(tmp_path: Path, content: bytes) -> None:
+    """32 bytes, or 64 hexadecimal digits with whatever blanks an editor left around them."""
+    path = tmp_path / "key"
+    path.write_bytes(content)
+    assert load_key(MavlinkSettings(signing_key=str(path)), "d") == KEY
+
+
+def test_a_key_of_spaces_is_a_key(tmp_path: Path) -> None:
+    """32 bytes are the key as they are, even if they look like digits: 32 of them are no 64."""
+    path = tmp_path / "key"
+    for content in (b" " * 32, b"0" * 32):
+        path.write_bytes(content)
+        assert load_key(MavlinkSettings(signing_key=str(path)), "d") == content
+
+
+def test_a_key_in_the_environment_takes_the_files_place(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Even one that is not there; an empty variable is none, and no key at all is unsigned."""
+    settings = MavlinkSettings(signing_key=str(tmp_path / "none"))
+    monkeypatch.setenv(KEY_VARIABLE, KEY.hex())
+    assert load_key(settings, "d") == KEY
+    assert load_key(MavlinkSettings(), "d") == KEY
+    monkeypatch.setenv(KEY_VARIABLE, "")
+    assert load_key(MavlinkSettings(), "d") is None
+    with pytest.raises(ConfigError, match=r"d: cannot read the signing key .*none: No such file"):
+        load_key(settings, "d")
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"", KEY[:31], KEY + b"\n", KEY.hex()[:62].encode(), KEY.hex().encode() + b"00", b"g" * 64],
+)
+def test_what_is_no_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content: bytes) -> None:
+    """Too short, too long, or no digits: named by its place, and never shown."""
+    path = tmp_path / "key"
+    path.write_bytes(content)
+    with pytest.raises(ConfigError, match="must be 32 bytes or 64 hexadecimal digits") as refused:
+        load_key(MavlinkSettings(signing_key=str(path)), "drone")
+    assert str(path) in str(refused.value)
+    assert "drone" in str(refused.value)
+    assert content.decode("latin-1")[:20] not in str(refused.value) or not content
+    monkeypatch.setenv(KEY_VARIABLE, "beef")
+    with pytest.raises(ConfigError, match=KEY_VARIABLE):
+        load_key(MavlinkSettings(), "drone")
+
+
+def test_a_signed_packet_passes_whoever_has_the_key() -> None:
+    """The other end believes it; one with another key, or an unsigned one, it does not."""
+    frame = packet(KEY)
+    assert signature_fits(KEY, frame)
+    assert not signature_fits(bytes(32), frame)
+    ear = sender(KEY)
+    heard = ear.decode(bytearray(packet(KEY)))
+    assert heard.get_type() == "HEARTBEAT"
+    for foreign in (packet(None), packet(bytes(32))):
+        with pytest.raises(mavlink.MAVError):
+            sender(KEY).decode(foreign)
+
+
+def test_a_signature_covers_every_byte() -> None:
+    """Header, payload, checksum, time and the signature itself: a bit in any of them spoils it."""
+    frame = packet(KEY)
+    for index in range(1, len(frame)):
+        spoilt = bytearray(frame)
+        spoilt[index] ^= 0x80
+        assert not signature_fits(KEY, spoilt), index
+
+
+def test_an_unsigned_packet_is_judged_elsewhere() -> None:
+    """It has no signature that could be wrong."""
+    assert signature_fits(KEY, packet(None))
+
+
+def test_a_radio_may_speak_unsigned() -> None:
+    """RADIO_STATUS is put into the stream by what has no key; nothing else is let through."""
+    radio = mavlink.MAVLink_radio_status_message(1, 2, 3, 4, 5, 6, 7)
+    assert sender(KEY).decode(bytearray(radio.pack(sender(None)))).get_type() == "RADIO_STATUS"
+
+
+def test_timestamps_count_hundred_thousandths_since_2015() -> None:
+    """1 January 2015 is 16436 days after the epoch of Unix."""
+    before = time.time()
+    stamp = sender(KEY).signing.timestamp
+    after = time.time()
+    epoch = 16436 * 86400
+    assert (before - epoch) * 1e5 - 1 <= stamp <= (after - epoch) * 1e5
+
+
+def test_two_runs_within_a_tick_are_no_replay_of_each_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Their link ids differ, as their process ids do; an id has one byte: 1000 is 3 * 256 + 232."""
+    for process, link in ((1000, 232), (1001, 233), (255, 255), (256, 0)):
+        monkeypatch.setattr("os.getpid", lambda process=process: process)
+        assert sender(KEY).signing.link_id == link
+        assert packet(KEY)[-13] == link
