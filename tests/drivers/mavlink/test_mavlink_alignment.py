@@ -226,8 +226,7 @@ def test_a_vehicle_that_stood_is_where_it_stood() -> None:
     """Whatever the new frame says, and however often it starts anew before it says anything."""
     flight = Flying()
     flight.alignment.restart(stands=True)
-    assert flight.alignment.frame is None
-    assert flight.alignment.fault == ""
+    assert (flight.alignment.frame, flight.alignment.fault) == (None, "")
     flight.alignment.restart(stands=True)
     flight.telemetry.position = vector(0.5, 0.25, 0.0)
     flight.telemetry.boot_time = 2.0

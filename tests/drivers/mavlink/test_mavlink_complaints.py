@@ -34,6 +34,11 @@ def ekf(
     return mavlink.MAVLink_ekf_status_report_message(flags, speed, along, up, compass, 9.0)
 
 
+def misfit(name: str, variance: float) -> Any:  # noqa: ANN401
+    """One of ArduPilot's variances."""
+    return ekf(**{"flags": WELL, name: variance})  # type: ignore[arg-type]
+
+
 def battery(charge: int, faults: int = 0, number: int = 0) -> Any:  # noqa: ANN401
     """A battery's word about itself."""
     return mavlink.MAVLink_battery_status_message(
@@ -48,9 +53,9 @@ def status(present: int, enabled: int, healthy: int) -> Any:  # noqa: ANN401
     )
 
 
-def shaking(x: float = 0, y: float = 0, z: float = 0, clipped: tuple[int, ...] = (0, 0, 0)) -> Any:  # noqa: ANN401
+def shaking(*axes: float, clipped: tuple[int, ...] = (0, 0, 0)) -> Any:  # noqa: ANN401
     """How it shakes along three axes, and samples that three accelerometers could not measure."""
-    return mavlink.MAVLink_vibration_message(0, x, y, z, *clipped)
+    return mavlink.MAVLink_vibration_message(0, *(axes or (0.0,) * 3), *clipped)
 
 
 def lasting(*messages: Any) -> list[str]:  # noqa: ANN401
@@ -107,10 +112,10 @@ def test_how_unsure_an_estimator_is(metres: float, told: str) -> None:
 def test_each_variance_by_its_name(variance: str, ill: str) -> None:
     """ArduPilot mistrusts what is above 0.8."""
     words = f"estimator: what is measured of its {ill} does not fit"
-    assert lasting(ekf(**{variance: 0.81})) == [words]
+    assert lasting(misfit(variance, 0.81)) == [words]
     # 0.8 becomes a little more on the wire: a single has seven digits.
-    assert lasting(ekf(**{variance: 0.79})) == []
-    assert lasting(ekf(**{variance: 0.81}), ekf()) == []
+    assert lasting(misfit(variance, 0.79)) == []
+    assert lasting(misfit(variance, 0.81), ekf()) == []
 
 
 def test_a_compass_may_be_off_by_its_whole_gate() -> None:
@@ -265,7 +270,7 @@ def test_vibration_is_the_worst_axis(axis: str) -> None:
     """More than 30 m/s² is told, and more than 60."""
     for shakes, told in ((30.0, ""), (30.5, "30"), (60.0, "30"), (60.5, "60")):
         words = [f"vibration: more than {told} m/s²"] if told else []
-        assert lasting(shaking(**{axis: shakes})) == words
+        assert lasting(shaking(*(shakes * (name == axis) for name in "xyz"))) == words
 
 
 @pytest.mark.parametrize("sensor", [0, 1, 2])

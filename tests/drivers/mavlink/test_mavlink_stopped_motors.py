@@ -66,11 +66,11 @@ def test_it_flies_from_half_a_metre_on(up: float, *, flew: bool) -> None:
 
 def test_its_own_word_that_it_flies_is_enough() -> None:
     """If its motors turn; that it does not know says nothing, nor does a word before."""
-    flight = Flight()
-    flight.say(on_ground=None)
-    assert not flight.touchdown.flew
-    flight.say(on_ground=False)
-    assert flight.touchdown.flew
+    flight, flew = Flight(), []
+    for on_ground in (None, False):
+        flight.say(on_ground=on_ground)
+        flew.append(flight.touchdown.flew)
+    assert flew == [False, True]
     standing = Touchdown()
     standing.observe(FlightMode.HOLD, 100.0, armed=False)
     standing.report(100.0, on_ground=False)
@@ -280,14 +280,13 @@ def test_an_autopilot_that_starts_anew_in_flight_falls() -> None:
     """And whatever its new frame says of standing still is not believed for ten seconds."""
     flight = airborne()
     flight.touchdown.restart(flight.now)
-    assert flight.touchdown.ended is FlightEnd.FELL
+    assert [flight.touchdown.ended] == [FlightEnd.FELL]
     assert flight.touchdown.fault == "motors: stopped in flight, 5 m above where they started"
     restarted = flight.now
     flight.fly(9.0)
-    flight.touchdown.turn(restarted + 10.0)
-    assert flight.touchdown.falling
-    flight.touchdown.turn(restarted + 10.1)
-    assert not flight.touchdown.falling
+    for seconds, falling in ((10.0, True), (10.1, False)):
+        flight.touchdown.turn(restarted + seconds)
+        assert flight.touchdown.falling is falling
     flight.touchdown.observe(flight.mode, flight.now, armed=True)
     assert (flight.touchdown.ended, flight.touchdown.fault) == (None, "")
     assert not flight.touchdown.flew, "it was seen on the ground"
