@@ -199,6 +199,12 @@ def test_waiting_ends_one_to_three_standard_deviations_early(
     assert (room - belief.mean) / belief.sigma == pytest.approx(deviations)
 
 
+def test_a_start_in_the_cloud_may_count_on_one_standard_deviation() -> None:
+    """A task of 200 ± 10.05 due at 1000 may start until 810.05."""
+    started = outlook(32).latest_start(Task(1, M, 0, M.deadline))
+    assert started / MS == pytest.approx(810.05, abs=0.01)
+
+
 def test_two_overdue_answers_make_a_silence_and_one_does_not() -> None:
     """Overdue is three standard deviations and 50 ms beyond the mean."""
     overdue = 200 * MS + 3 * (10**2 + 1) ** 0.5 * MS + 50 * MS

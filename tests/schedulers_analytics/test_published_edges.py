@@ -111,6 +111,21 @@ def test_dedas_drops_what_neither_place_can_finish() -> None:
     assert ends[2] == End("cloud", "done", 0, 300)
 
 
+def test_dedas_at_equality_is_late_with_a_newcomer_and_in_time_with_a_victim() -> None:
+    """Behind the block, 100 is done at 150: too late for a newcomer due then. 300 more is 450."""
+    long = model("long", deadline=450, edge=300)
+    assert play(Dedas(), [(0, BLOCK), (1, model("n", deadline=149, cloud=60))])[1].place == "cloud"
+    ends = play(Dedas(), [(0, BLOCK), (0, long), (1, model("n", deadline=150))])
+    assert [end.place for end in ends] == ["edge", "edge", "edge"]
+
+
+@pytest.mark.parametrize(("deadline", "place"), [(300, "cloud"), (299, "nowhere")])
+def test_the_cloud_may_end_at_the_deadline(deadline: float, place: str) -> None:
+    """A task of 300 there, that came at 0 and finds the edge busy."""
+    ends = play(EdgeCloudEdf(), [(0, model("long", edge=950)), (0, model("m", deadline=deadline))])
+    assert ends[1].place == place
+
+
 def test_dedas_says_of_its_victim_that_it_was_migrated() -> None:
     """The lab counts those."""
     dedas = Dedas()
