@@ -45,7 +45,8 @@ class Output:
             while remaining:
                 remaining = remaining[self._file.write(remaining) or 0 :]
         except OSError:
-            self._file.truncate(self._size)
+            self._file.seek(self._size)
+            self._file.truncate()
             raise
         self._size += len(data)
         return len(data)

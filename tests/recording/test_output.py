@@ -45,6 +45,54 @@ def test_a_torn_write_is_taken_back(tmp_path: Path) -> None:
     assert output.tell() == 5
 
 
+def test_after_a_torn_write_the_next_follows_the_last_whole_one(tmp_path: Path) -> None:
+    """No gap is left where the torn record was: what is written next begins at its place."""
+    path = tmp_path / "flight.mcap"
+    output = Output(path)
+    output.write(b"whole")
+    output._file.close()
+    disk = FullDisk(path, "r+b")
+    disk.seek(0, os.SEEK_END)
+    output._file = disk
+    with pytest.raises(OSError, match="No space"):
+        output.write(b"torn apart")
+    disk.room = 100
+    assert output.write(b", again") == 7
+    assert path.read_bytes() == b"whole, again"
+    assert output.tell() == 12
+
+
+def test_it_counts_its_bytes_from_none(tmp_path: Path) -> None:
+    """Nothing, then 5 bytes, then 8; each write has reached the file when it returns."""
+    path = tmp_path / "new" / "folders" / "flight.mcap"
+    output = Output(path)
+    assert output.tell() == 0
+    assert output.write(b"") == 0
+    for data, whole in ((b"12345", b"12345"), (b"678", b"12345678")):
+        assert output.write(data) == len(data)
+        assert path.read_bytes() == whole
+        assert output.tell() == len(whole)
+    output.sync()
+    output.close()
+    with pytest.raises(ValueError, match="closed"):
+        output.write(b"9")
+    assert path.read_bytes() == b"12345678"
+
+
+def test_where_no_file_can_be_the_path_and_the_remedy_are_named(tmp_path: Path) -> None:
+    """A folder that is a file, and a name that no file system takes; no file is left behind."""
+    (tmp_path / "text").write_text("mine")
+    with pytest.raises(RecordingError) as refused:
+        Output(tmp_path / "text" / "run.mcap")
+    assert str(refused.value) == (
+        f"cannot create {tmp_path}/text/run.mcap: {tmp_path}/text is not a folder; "
+        "choose another path"
+    )
+    with pytest.raises(RecordingError, match=r"cannot create .*: File name too long; choose a"):
+        Output(tmp_path / ("x" * 300))
+    assert [one.name for one in tmp_path.iterdir()] == ["text"]
+
+
 def test_short_writes_are_completed(tmp_path: Path) -> None:
     """A system that takes less than it was given is asked again."""
     path = tmp_path / "flight.mcap"
