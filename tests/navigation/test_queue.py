@@ -129,7 +129,8 @@ def test_a_plan_of_a_level_that_was_served_meanwhile_changes_nothing() -> None:
     queue.remove("b")
     queue.remove("a")
     assert queue.reorder(2, ["b"], []) == []
-    assert (queue.level, queue.head, len(queue)) == (None, None, 0)
+    assert not len(queue)
+    assert queue.head is None
 
 
 def test_an_interrupted_stop_keeps_its_remaining_hover() -> None:

@@ -73,7 +73,7 @@ def test_the_fourth_regular_arrival_is_the_first_to_be_forecast_from() -> None:
 def test_costs_that_cannot_be_are_refused(cost: str, value: float) -> None:
     """The message names the model and the cost."""
     with pytest.raises(SchedulerError, match=f"'m': {cost} must not be negative"):
-        Profile("m", 100, 10, 1, 1, **{cost: value})
+        Profile("m", 100, 10, 1, 1, *((value, 0) if cost == "edge_cost" else (0, value)))
 
 
 def test_a_small_gain_and_a_short_time_out_are_allowed() -> None:
