@@ -54,7 +54,12 @@ class LastWord:
         with contextlib.suppress(OSError):
             self._pipe.write(_GOODBYE)
             self._pipe.close()
-        self._process.wait(timeout=5.0)
+        try:
+            self._process.wait(timeout=5.0)
+        except subprocess.TimeoutExpired:
+            # Hanging, it would keep the Tello's port for ever.
+            self._process.kill()
+            self._process.wait()
 
 
 def _guard(link: socket.socket, peer: tuple[str, int]) -> None:
