@@ -73,7 +73,7 @@ class Parameters:
                         message = inbox.get(timeout=left)
                     except queue.Empty:
                         break
-                    if _text(message.param_id) == name:
+                    if message.param_id == name:
                         kind = message.param_type
                         yield _Value(self._autopilot.decode(message.param_value, kind), kind)
 
@@ -92,10 +92,6 @@ def _bytes(name: str) -> bytes:
     if len(encoded) > _LONGEST:
         raise VehicleError(f"no parameter's name is as long as {name!r}")
     return encoded
-
-
-def _text(name: str | bytes) -> str:
-    return name.decode("ascii", "replace") if isinstance(name, bytes) else name
 
 
 @dataclass(frozen=True)

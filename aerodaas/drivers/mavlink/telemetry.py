@@ -231,9 +231,7 @@ class Telemetry:
         self.software = ".".join(str(version >> shift & 0xFF) for shift in (24, 16, 8))
 
     def _text(self, message: Any, now: float) -> None:  # noqa: ANN401
-        text = message.text
-        words = text.decode("ascii", "replace") if isinstance(text, bytes) else str(text)
-        self.texts.take(words, message.severity, now, message.id, message.chunk_seq)
+        self.texts.take(message.text, message.severity, now, message.id, message.chunk_seq)
 
     def _event(self, message: Any, now: float) -> None:  # noqa: ANN401
         said = self.events.take(message.event, message.log_levels, message.sequence)

@@ -126,6 +126,18 @@ def test_a_target_begins_at_the_vehicle_and_moves_towards_the_place() -> None:
     assert all(one.yaw == pytest.approx(math.pi / 2 - 0.7) for one in seen)
 
 
+def test_a_target_turns_to_the_yaw_asked_for() -> None:
+    """90 degrees a second are 4.5 each 0.05 s; north is heading 0, east 90."""
+    flight = steering()
+    place = PositionSetpoint(vector(110.0, 200.0, 50.0), math.pi / 2, 2.0)
+    here = at(vector(100.0, 200.0, 50.0))
+    headings = [
+        flight.message(place, here, FRAME, (1, 1), 10.0 + turn / 20, waits=False)[0].yaw
+        for turn in range(3)
+    ]
+    assert np.diff(np.degrees(headings)) == pytest.approx([-4.5, -4.5])
+
+
 @pytest.mark.parametrize(("gap", "anew"), [(0.4, False), (0.5, False), (0.6, True)])
 def test_a_stream_that_paused_begins_anew_where_the_vehicle_is(gap: float, *, anew: bool) -> None:
     """After more than half a second the target of before is forgotten."""

@@ -238,6 +238,23 @@ def test_who_is_heard_falling_soon_after_fell(later: float, ended: FlightEnd) ->
     assert flight.touchdown.falling is (ended is FlightEnd.FELL)
 
 
+def test_sinking_fast_is_no_fall_while_motors_turn() -> None:
+    """A vehicle that is heard to descend at 3 m/s, armed, has not ended its flight."""
+    flight = airborne()
+    flight.fly(1.0, 4.0, rise=-3.0)
+    assert flight.touchdown.ended is None
+    assert flight.touchdown.falling is False
+    assert not flight.touchdown.fault
+
+
+def test_where_it_began_to_fall_is_told_to_the_end() -> None:
+    """The fall itself, heard on, changes nothing of it."""
+    flight = airborne()
+    assert flight.stop() is FlightEnd.FELL
+    flight.fly(0.5, 1.0, rise=-5.0)
+    assert flight.touchdown.fault == "motors: stopped in flight, 5 m above where they started"
+
+
 def test_a_fall_is_told_by_its_height() -> None:
     """Above where the motors started; without a place there, none is said."""
     flight = airborne()

@@ -237,10 +237,9 @@ def test_its_clock_and_its_version() -> None:
 
 
 def test_its_words_are_kept_for_a_while() -> None:
-    """Texts, however they are encoded, and events that have words; each with its time."""
-    telemetry = told(mavlink.MAVLink_statustext_message(3, b"Motors \xff out", 0, 0))
-    assert telemetry.texts.recent(10.0, 1.0)
-    # pymavlink leaves bytes in a message that was made here, and text in one that came.
+    """Texts, also in pieces or with bytes that are no letters, and events; each with its time."""
+    telemetry = told(mavlink.MAVLink_statustext_message(3, b"Motors \xff out\0..", 0, 0))
+    assert telemetry.texts.recent(10.0, 1.0) == ["Motors \N{REPLACEMENT CHARACTER} out"]
     piece = mavlink.MAVLink_statustext_message(3, b"A" * 50, 4, 0)
     rest = mavlink.MAVLink_statustext_message(3, b"and more", 4, 1)
     telemetry = told(piece, rest, now=20.0)
@@ -287,6 +286,13 @@ def test_of_one_kind_only_what_is_newer_is_taken() -> None:
     assert telemetry.position is not None
     assert telemetry.position[0] == 3.0
     assert telemetry.ticked_at == 10.6
+
+
+def test_every_new_life_is_counted() -> None:
+    """Three of them, each with a clock that begins anew."""
+    telemetry = told(*(local(stamp) for stamp in (30000, 20000, 10000, 4000)))
+    assert telemetry.reboots == 3
+    assert telemetry.armed is False
 
 
 @pytest.mark.parametrize(("stamp", "reboots"), [(5000, 0), (4999, 1)])
