@@ -1,0 +1,238 @@
+"""PX4 and ArduPilot apart: modes, take-offs, fences and parameters, each in its own numbers."""
+
+from __future__ import annotations
+
+import math
+import struct
+from types import SimpleNamespace
+
+import pytest
+
+from aerodaas.drivers.mavlink.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.autopilot import ANYWHERE, Autopilot
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.drivers.mavlink.events import event_number
+from aerodaas.drivers.mavlink.phase import FlightMode
+from aerodaas.drivers.mavlink.px4 import PX4
+from aerodaas.drivers.mavlink.telemetry import Sensors, Telemetry
+
+CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+INTEGERS = (1, 2, 3, 4, 5, 6)
+"""Kinds of parameters from UINT8 to INT32; 9 is REAL32."""
+
+
+def px4_mode(main: int, sub: int = 0) -> int:
+    """PX4's custom mode: the main one in its third byte, the sub mode in its fourth."""
+    return main << 16 | sub << 24
+
+
+@pytest.mark.parametrize(
+    ("main", "sub", "mode", "name"),
+    [
+        (6, 0, FlightMode.GUIDED, "offboard"),
+        (6, 9, FlightMode.GUIDED, "offboard"),
+        (4, 2, FlightMode.TAKE_OFF, "take-off"),
+        (4, 3, FlightMode.HOLD, "hold"),
+        (4, 4, FlightMode.OTHER, "mission"),
+        (4, 5, FlightMode.RETURN, "return"),
+        (4, 6, FlightMode.LAND, "land"),
+        (4, 99, FlightMode.OTHER, "mode 4/99"),
+        (3, 0, FlightMode.OTHER, "position"),
+        (3, 5, FlightMode.OTHER, "position"),
+        (1, 0, FlightMode.OTHER, "manual"),
+        (77, 3, FlightMode.OTHER, "mode 77/3"),
+    ],
+)
+def test_modes_of_px4(main: int, sub: int, mode: FlightMode, name: str) -> None:
+    """A sub mode counts in its automatic mode only; the two low bytes say nothing."""
+    for low in (0, 0xFFFF):
+        assert PX4().mode(px4_mode(main, sub) | low) is mode
+        assert PX4().mode_name(px4_mode(main, sub) | low) == name
+
+
+@pytest.mark.parametrize(
+    ("number", "mode", "name"),
+    [
+        (0, FlightMode.OTHER, "stabilize"),
+        (4, FlightMode.GUIDED, "guided"),
+        (5, FlightMode.OTHER, "loiter"),
+        (6, FlightMode.RETURN, "return"),
+        (21, FlightMode.RETURN, "smart return"),
+        (9, FlightMode.LAND, "land"),
+        (17, FlightMode.HOLD, "brake"),
+        (99, FlightMode.OTHER, "mode 99"),
+    ],
+)
+def test_modes_of_ardupilot(number: int, mode: FlightMode, name: str) -> None:
+    """By ArduCopter's numbers."""
+    assert ArduPilot().mode(number) is mode
+    assert ArduPilot().mode_name(number) == name
+
+
+@pytest.mark.parametrize(
+    ("mode", "px4", "ardupilot"),
+    [
+        (FlightMode.GUIDED, (6, 0), 4),
+        (FlightMode.TAKE_OFF, (4, 2), 4),
+        (FlightMode.HOLD, (4, 3), 17),
+        (FlightMode.RETURN, (4, 5), 6),
+        (FlightMode.LAND, (4, 6), 9),
+    ],
+)
+def test_asking_for_a_mode(mode: FlightMode, px4: tuple[int, int], ardupilot: int) -> None:
+    """The first parameter says that the custom mode counts; what was asked is shown then."""
+    order = PX4().ask_mode(mode)
+    assert order.number == mavlink.MAV_CMD_DO_SET_MODE
+    assert list(order.values) == [1.0, *px4, 0.0, 0.0, 0.0, 0.0]
+    assert (order.mode, order.what) == (mode, f"mode {mode.value}")
+    assert order.frame is None
+    assert PX4().mode(px4_mode(*px4)) is mode
+    order = ArduPilot().ask_mode(mode)
+    assert order.number == mavlink.MAV_CMD_DO_SET_MODE
+    assert list(order.values) == [1.0, ardupilot, 0.0, 0.0, 0.0, 0.0, 0.0]
+    assert (order.mode, order.what) == (mode, f"mode {mode.value}")
+    assert order.frame is None
+
+
+@pytest.mark.parametrize(("altitude", "goal"), [(488.5, 491.5), (None, 3.0), (-2.0, 1.0)])
+def test_px4_rises_to_an_altitude_above_the_sea(altitude: float | None, goal: float) -> None:
+    """From hold: armed, then 3 m above where it is; anywhere, and however it looks."""
+    telemetry = Telemetry()
+    telemetry.altitude = altitude
+    hold, arm, climb = PX4().take_off(3.0, telemetry)
+    assert hold.mode is FlightMode.HOLD
+    assert (arm.number, arm.values[0]) == (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+    assert climb.number == mavlink.MAV_CMD_NAV_TAKEOFF
+    assert climb.frame == mavlink.MAV_FRAME_GLOBAL
+    pitch, second, third, yaw, x, y, z = climb.values
+    assert math.isnan(pitch)
+    assert math.isnan(yaw)
+    assert (second, third) == (0.0, 0.0)
+    assert x == y == ANYWHERE == 2**31 - 1
+    assert z == goal
+    assert climb.mode is None
+
+
+def test_ardupilot_rises_to_a_height_above_home() -> None:
+    """From guided; it takes the height as it is, wherever it stands above the sea."""
+    telemetry = Telemetry()
+    telemetry.altitude = 488.0
+    guided, arm, climb = ArduPilot().take_off(3.0, telemetry)
+    assert guided.mode is FlightMode.GUIDED
+    assert (arm.number, arm.values[0]) == (mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+    assert climb.number == mavlink.MAV_CMD_NAV_TAKEOFF
+    assert climb.frame == mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    assert climb.values == (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0)
+
+
+def test_orders_that_both_know() -> None:
+    """Arm, disarm, checks, the version, and an interval in microseconds: 4 Hz are 250 000."""
+    arming = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+    arm, disarm = Autopilot.arm(), Autopilot.disarm()
+    assert (arm.number, list(arm.values), arm.insists) == (arming, [1.0, 0, 0, 0, 0, 0, 0], True)
+    assert (disarm.number, disarm.values, disarm.insists) == (arming, (0.0,) * 7, False)
+    assert (arm.what, disarm.what) == ("arm", "disarm")
+    check = Autopilot.check()
+    assert (check.number, check.values) == (mavlink.MAV_CMD_RUN_PREARM_CHECKS, (0.0,) * 7)
+    version = Autopilot.version()
+    assert version.number == mavlink.MAV_CMD_REQUEST_MESSAGE
+    assert list(version.values) == [148.0, 0, 0, 0, 0, 0, 0]
+    interval = Autopilot.interval(30, 4.0)
+    assert interval.number == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+    assert list(interval.values) == [30.0, 250_000.0, 0, 0, 0, 0, 0]
+    assert interval.what == "send message 30 at 4 Hz"
+
+
+@pytest.mark.parametrize(
+    ("action", "px4", "ardupilot"),
+    [("warn", 1.0, 0.0), ("hold", 2.0, 4.0), ("return", 3.0, 1.0), ("land", 5.0, 2.0)],
+)
+def test_what_a_fence_does(action: str, px4: float, ardupilot: float) -> None:
+    """Each action by its number, the ceiling in metres, and ArduPilot's fence switched on."""
+    assert PX4().fence(action, 40.0) == {  # type: ignore[arg-type]
+        "GF_ACTION": px4,
+        "GF_MAX_VER_DIST": 40.0,
+    }
+    assert ArduPilot().fence(action, 40.0) == {  # type: ignore[arg-type]
+        "FENCE_ACTION": ardupilot,
+        "FENCE_ALT_MAX": 40.0,
+        "FENCE_TYPE": 5.0,
+        "FENCE_ENABLE": 1.0,
+    }
+
+
+@pytest.mark.parametrize("kind", INTEGERS)
+@pytest.mark.parametrize("value", [0, 1, 2, 5, -1, 1_065_353_216, 123_456])
+def test_px4s_integers_on_the_wire(kind: int, value: int) -> None:
+    """Four bytes, the lowest first, in the place of a single: 0x3f800000 looks like 1."""
+    encoded = PX4().encode(value + 0.2, kind)
+    if not math.isnan(encoded):
+        assert struct.pack("<f", encoded) == value.to_bytes(4, "little", signed=True)
+        assert PX4().decode(encoded, kind) == value
+    assert PX4().decode(1.0, kind) == 1_065_353_216.0
+
+
+def test_reals_and_ardupilots_parameters_are_singles_as_they_are() -> None:
+    """Whatever their kind."""
+    for kind in (9, 10):
+        assert PX4().encode(2.5, kind) == PX4().decode(2.5, kind) == 2.5
+    for kind in (*INTEGERS, 9):
+        assert ArduPilot().encode(7.0, kind) == ArduPilot().decode(7.0, kind) == 7.0
+
+
+def telling(present: int, health: int) -> Telemetry:
+    """A vehicle whose sensors are present and healthy by these bits."""
+    telemetry = Telemetry()
+    telemetry.sensors = Sensors(present, present, health)
+    telemetry.altitude = 488.0
+    return telemetry
+
+
+def test_what_ardupilot_objects_to() -> None:
+    """Its texts before arming, at most 35 s old; none while its checks pass or nobody knows."""
+    for telemetry in (Telemetry(), telling(1, 0), telling(CHECK, CHECK)):
+        telemetry.texts.add("PreArm: compass", 3, 100.0)
+        assert ArduPilot().objections(telemetry, 100.0) == []
+    failing = telling(CHECK, 0)
+    assert ArduPilot().objections(failing, 100.0) == ["ArduPilot's arming checks fail"]
+    for text in ("PreArm: compass", "Arm: throttle", "GPS glitch", "PreArm: compass"):
+        failing.texts.add(text, 2, 100.0)
+    assert ArduPilot().objections(failing, 135.0) == ["PreArm: compass", "Arm: throttle"]
+    assert ArduPilot().objections(failing, 135.1) == ["ArduPilot's arming checks fail"]
+
+
+def test_what_px4_objects_to() -> None:
+    """Its altitude first; then its checks, of which none count for hold but those of hold."""
+    assert PX4().objections(Telemetry(), 0.0) == [
+        "PX4 does not know its altitude above the sea yet"
+    ]
+    assert PX4().objections(telling(0, 0), 0.0) == [
+        "PX4 has not told yet whether its arming checks pass"
+    ]
+    assert PX4().objections(telling(CHECK, CHECK), 0.0) == []
+    failing = telling(CHECK, 0)
+    for custom in (px4_mode(4, 3), px4_mode(1)):
+        failing.custom_mode = custom
+        assert PX4().objections(failing, 0.0) == ["PX4's arming checks fail"]
+    names = (
+        "commander_arming_check_summary",
+        "check_mag_missing",
+        "check_modes_mission",
+        "commander_health_summary",
+    )
+    for number, name in enumerate(names):
+        failing.events.take(event_number(name), 3, number)
+    assert PX4().objections(failing, 0.0) == ["compass: missing"]
+    failing.custom_mode = px4_mode(4, 3)
+    assert len(PX4().objections(failing, 0.0)) == 2
+
+
+def test_families_are_known_by_their_heartbeats() -> None:
+    """And what each of them needs beside the rest."""
+    assert (PX4.family, ArduPilot.family) == (12, 3)
+    assert PX4.rates[mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS] == 2.0
+    assert ArduPilot.rates[mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT] == 2.0
+    assert {PX4.rates[32], PX4.rates[30], ArduPilot.rates[32]} == {20.0}
+    assert SimpleNamespace(px4=PX4.stops_short, ardupilot=ArduPilot.stops_short) == (
+        SimpleNamespace(px4=True, ardupilot=False)
+    )
