@@ -281,7 +281,7 @@ def test_dems_a_probes_after_ten_seconds_and_again_after_a_late_probe() -> None:
     assert [type(each) for each in decided] == [Drop], "one probe at a time"
     (sent,) = one.scheduler.timer(10_030 * MILLISECOND)
     assert sent == SendToCloud(probe, "probe of the cloud", 10_040 * MILLISECOND)
-    late = Result(probe, Outcome.LATE, Place.CLOUD, sent.task.arrival, 11 * NANOSECONDS)
+    late = Result(probe, Outcome.LATE, Place.CLOUD, probe.arrival, 11 * NANOSECONDS)
     one.scheduler.task_finished(late, 11 * NANOSECONDS)
     _, decided = one.arrives(20_999, 340)
     assert [type(each) for each in decided] == [Drop]

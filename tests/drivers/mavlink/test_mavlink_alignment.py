@@ -161,6 +161,7 @@ def test_what_differs_by_little_is_averaged() -> None:
     flight = Flying()
     flight.jump(30.0, 0.0, 0.0)
     assert flight.telemetry.altitude is not None
+    found = False
     for turn in range(9):
         flight.telemetry.altitude = 500.0 + (1.0 if turn % 2 else -1.0)
         found = flight.look()
