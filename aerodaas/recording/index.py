@@ -7,6 +7,7 @@ inside compressed chunks.
 from __future__ import annotations
 
 import struct
+import zlib
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -38,6 +39,9 @@ BROKEN = (
 
 _MAGIC = 8
 _RECORD_HEAD = 9
+_CHECKSUM = 4
+_FOOTER_END = 8 + 8 + _CHECKSUM + _MAGIC
+"""Bytes from the footer's first figure, where the summary begins, to the end of the file."""
 _LOOSE = 1 << 20
 """Bytes up to which messages outside chunks are gathered into one block."""
 
@@ -54,7 +58,9 @@ class Block:
     end: int = 0
     """Latest log time."""
     channels: set[int] = field(default_factory=set)
-    """Ids of the channels with messages in it; empty where the file does not tell."""
+    """Ids of the channels with messages in it."""
+    damaged: bool = False
+    """It could not be read."""
 
 
 @dataclass(slots=True)
@@ -79,8 +85,9 @@ def read_index(file: BinaryIO, size: int) -> FileIndex:
     """Index a file of `size` bytes; raises one of `BROKEN` if it isn't MCAP at all."""
     read_magic(ReadDataStream(file))
     try:
+        file.seek(0)
         summary = make_reader(file).get_summary()
-        if summary is not None and summary.statistics is not None and summary.chunk_indexes:
+        if summary is not None and _tells_all(summary) and _intact(file, size):
             return _from_summary(file, summary)
     except (*BROKEN, OSError):
         pass
@@ -103,6 +110,29 @@ def load(file: BinaryIO, block: Block) -> list[McapRecord]:
             uncompressed_size=len(data),
         )
     return breakup_chunk(chunk, validate_crc=True)
+
+
+def _tells_all(summary: Summary) -> bool:
+    """Whether everything is found by a summary; its writer may leave out any part of it."""
+    told = summary.statistics
+    return (
+        told is not None
+        and bool(summary.chunk_indexes)
+        and all(chunk.message_index_offsets for chunk in summary.chunk_indexes)
+        and len(summary.chunk_indexes) == told.chunk_count
+        and len(summary.channels) == told.channel_count
+        and len(summary.schemas) == told.schema_count
+        and len(summary.metadata_indexes) == told.metadata_count
+        and len(summary.attachment_indexes) == told.attachment_count
+    )
+
+
+def _intact(file: BinaryIO, size: int) -> bool:
+    """Whether the summary is as it was written; true where its writer took no checksum."""
+    file.seek(size - _FOOTER_END)
+    start, _, checksum = struct.unpack("<QQI", file.read(_FOOTER_END - _MAGIC))
+    file.seek(start)
+    return checksum in {0, zlib.crc32(file.read(size - _MAGIC - _CHECKSUM - start))}
 
 
 def _from_summary(file: BinaryIO, summary: Summary) -> FileIndex:
@@ -132,6 +162,7 @@ def _from_summary(file: BinaryIO, summary: Summary) -> FileIndex:
 def _scan(file: BinaryIO, size: int) -> FileIndex:
     index = FileIndex(complete=False)
     offset = _MAGIC
+    over = False
     while offset + _RECORD_HEAD <= size:
         file.seek(offset)
         opcode, length = struct.unpack("<BQ", file.read(_RECORD_HEAD))
@@ -140,8 +171,11 @@ def _scan(file: BinaryIO, size: int) -> FileIndex:
         if end > size or opcode in {0, Opcode.FOOTER}:
             index.complete = opcode != 0 and end + _MAGIC == size
             break
+        # What follows the end of the data, the index, only repeats what was said.
+        over = over or opcode == Opcode.DATA_END
         try:
-            _enter(index, file, opcode, offset, end)
+            if not over:
+                _enter(index, file, opcode, offset, end)
         except BROKEN:
             index.damaged += 1
         offset = end

@@ -203,7 +203,7 @@ class Recording:
 
     def _messages(self, wanted: set[int]) -> Iterator[Message]:
         blocks = sorted(
-            (b for b in self._index.blocks if not b.channels or b.channels & wanted),
+            (block for block in self._index.blocks if block.channels & wanted),
             key=lambda block: block.start,
         )
         # Chunks may overlap in time: hold messages back until no later chunk can precede them.
@@ -222,7 +222,8 @@ class Recording:
         try:
             records = load(self._file, block)
         except BROKEN:
-            self._index.damaged += 1
+            self._index.damaged += not block.damaged
+            block.damaged = True
             return
         yield from (record for record in records if isinstance(record, Message))
 
