@@ -208,6 +208,15 @@ def test_a_gap_in_what_is_heard_counts_as_one_second() -> None:
         assert bool(health.faults(10.0 * gap)) is (gap == 5)
 
 
+def test_a_fix_that_is_lost() -> None:
+    """By what is left of it, if there ever was one; the attitude is a complaint of its own."""
+    assert lasting(gps(3), gps(2)) == ["GPS: a fix in the plane only"]
+    assert lasting(gps(3), gps(1)) == lasting(gps(4), gps(0)) == ["GPS: no fix"]
+    assert lasting(gps(2)) == lasting(gps(3), gps(1), gps(3)) == []
+    unknown = ["estimator: attitude unknown"]
+    assert lasting(estimator(WELL & ~1)) == lasting(ekf(WELL & ~1)) == unknown
+
+
 def test_silence_comes_first_and_nothing_twice() -> None:
     """A battery that both it and its autopilot call unhealthy is one complaint."""
     health = Health()

@@ -123,6 +123,7 @@ def test_ardupilot_rises_to_a_height_above_home() -> None:
     assert climb.number == mavlink.MAV_CMD_NAV_TAKEOFF
     assert climb.frame == mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
     assert climb.values == (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3.0)
+    assert climb.what == PX4().take_off(3.0, telemetry)[2].what == "take off"
 
 
 def test_orders_that_both_know() -> None:
@@ -140,6 +141,7 @@ def test_orders_that_both_know() -> None:
     interval = Autopilot.interval(30, 4.0)
     assert interval.number == mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
     assert list(interval.values) == [30.0, 250_000.0, 0, 0, 0, 0, 0]
+    assert (check.what, version.what) == ("run the arming checks", "tell the version")
     assert interval.what == "send message 30 at 4 Hz"
 
 

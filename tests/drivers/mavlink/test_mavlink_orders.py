@@ -281,11 +281,25 @@ def test_asking_again_for_the_same_buys_time_and_forgets_nothing() -> None:
     """It was seen there, the mode of before is still the one of before, and 2.5 s begin anew."""
     phase = seen_in(FlightMode.GUIDED, FlightMode.HOLD, FlightMode.GUIDED)
     phase.ask(FlightMode.GUIDED, 20.0)
-    assert phase.seen
+    assert phase.seen is True
     phase.observe(FlightMode.HOLD, 22.5, armed=True, critical=False)
     assert phase.taken is None
     phase.observe(FlightMode.HOLD, 22.6, armed=True, critical=False)
     assert phase.taken is VehicleMode.MANUAL
+
+
+def test_a_wish_is_not_seen_before_it_shows() -> None:
+    """However long the mode before goes on to show, it is no pilot's."""
+    phase = FlightPhase()
+    assert phase.seen is False
+    phase = seen_in(FlightMode.GUIDED, FlightMode.HOLD, FlightMode.GUIDED)
+    phase.ask(FlightMode.RETURN, 20.0)
+    seen = [phase.seen]
+    for now, shown in ((40.0, FlightMode.GUIDED), (41.0, FlightMode.RETURN)):
+        phase.observe(shown, now, armed=True, critical=False)
+        seen.append(phase.seen)
+    assert seen == [False, False, True]
+    assert phase.taken is None
 
 
 def test_all_that_belongs_to_the_wish_before_may_show_for_a_moment() -> None:

@@ -217,6 +217,15 @@ def test_a_name_has_sixteen_letters_at_most(
             autopilot.parameters.get("A" * letters)
 
 
+def test_a_name_with_letters_that_no_autopilot_has_is_not_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is asked for all the same."""
+    autopilot = Autopilot(monkeypatch, {})
+    assert autopilot.parameters.get("HÖHE") is None
+    assert autopilot.sent[0].param_id == "H?HE"
+
+
 def test_what_leaves_a_vehicle_unprotected(monkeypatch: pytest.MonkeyPatch) -> None:
     """By its value, and by whether the ground station is ours; what is not known is not told."""
     held = {"BATT_FS_LOW_ACT": 0.0, "FS_EKF_ACTION": 1.0, "FS_GCS_ENABLE": 0.0}

@@ -188,6 +188,28 @@ def test_an_item_that_gets_lost_is_said_again(meet: Callable[..., Any]) -> None:
     assert waits == pytest.approx([0.01, 1.0, 1.0, 1.0, 1.0, 1.0])
 
 
+def test_a_transfer_begins_anew_only_once_all_was_sent(meet: Callable[..., Any]) -> None:
+    """Asked for the second of three and never more, it says that one again.
+
+    Asked for the last, and for one before it then, it begins anew: all was there once.
+    """
+
+    def stuck(message: Any) -> list[Any]:  # noqa: ANN401
+        following = {"MISSION_COUNT": 0, "MISSION_ITEM_INT": 1}[message.get_type()]
+        return [wants(following)] if not following or message.seq == 0 else []
+
+    autopilot = meet(stuck)
+    with pytest.raises(VehicleError, match="stopped answering"):
+        upload(autopilot, ITEMS)
+    assert [one.seq for one in autopilot.sent[1:]] == [0] + [1] * 6
+    backwards = meet(
+        lambda message: [wants(2), wants(0)] if message.get_type() == "MISSION_COUNT" else []
+    )
+    with pytest.raises(VehicleError, match="stopped answering"):
+        upload(backwards, ITEMS)
+    assert backwards.kinds() == (["MISSION_COUNT"] + ["MISSION_ITEM_INT"] * 2) * 5
+
+
 def test_a_transfer_that_is_never_acknowledged_is_begun_five_times(
     meet: Callable[..., Any],
 ) -> None:

@@ -214,6 +214,23 @@ def test_after_a_silence_it_is_judged_once_it_was_heard_for_a_while(
     assert flight.stop() is ended
 
 
+def test_two_metres_a_second_are_no_fall_yet() -> None:
+    """Stood for a while after that, it has landed."""
+    flight = airborne()
+    flight.fly(0.25, 3.0, rise=-2.0)
+    flight.fly(0.75)
+    assert flight.stop() is FlightEnd.LANDED
+
+
+@pytest.mark.parametrize(("gap", "ended"), [(1.0, FlightEnd.LANDED), (1.125, FlightEnd.UNHEARD)])
+def test_a_second_between_two_positions_is_no_silence(gap: float, ended: FlightEnd) -> None:
+    """A bit more is: it was not heard while it may have come down."""
+    flight = airborne()
+    flight.now += gap - 0.125
+    flight.fly(0.75)
+    assert flight.stop() is ended
+
+
 def test_who_fell_before_the_silence_fell() -> None:
     """Seen falling, and then not heard for a second."""
     flight = airborne()

@@ -128,7 +128,7 @@ def test_what_shows_to_be_done_is_done() -> None:
         (2.69, 0.0, False),
         (2.71, 0.0, True),
         (3.5, 0.0, True),
-        (2.9, 0.31, False),
+        (2.9, 0.3, False),
         (2.9, -0.31, False),
         (2.9, 0.29, True),
         (2.9, -0.29, True),
@@ -225,6 +225,15 @@ def test_a_refusal_of_what_was_sent_twice_is_doubted() -> None:
         assert flight.departure.climbs is shows
         assert flight.orders[3:] == ([RISE] if shows else [MODE, ARM])
         assert ("arm: denied" in flight.departure.refusal) is not shows
+
+
+def test_an_order_that_another_one_replaced_has_not_failed() -> None:
+    """Whoever asked for another mode knows why; the take-off waits."""
+    flight = TakeOff()
+    flight.commander.give(PX4().ask_mode(FlightMode.LAND), now=flight.now)
+    assert flight.departure.climbs
+    assert flight.departure.refusal == ""
+    assert flight.orders == [MODE, MODE]
 
 
 def test_called_off_before_motors_it_is_over_at_once() -> None:
@@ -371,6 +380,9 @@ def test_motors_that_turn_are_stopped_again() -> None:
     assert len(taken.sent) == 2
     taken.answer(ACCEPTED, 102.1)
     assert taken.beats(103.0, 103.5, 103.6) == [False, False, True]
+    taken.beats(104.0, armed=True)
+    taken.answer(ACCEPTED, 104.1)
+    assert taken.beats(110.0, 110.1) == [False, True], "one HEARTBEAT is none"
 
 
 def test_a_vehicle_that_flies_is_landed_with_each_heartbeat() -> None:

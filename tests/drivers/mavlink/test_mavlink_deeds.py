@@ -1,0 +1,428 @@
+"""Each deed of the driver, in each mode of the vehicle: what it sends, and what it refuses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import numpy as np
+import pytest
+from handmade import HOLD, LAND, OFFBOARD, POSITION, RETURN, TAKE_OFF, Handmade
+
+from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.errors import InvalidWaypointError, VehicleError
+from aerodaas.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
+
+ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
+MODE = mavlink.MAV_CMD_DO_SET_MODE
+RISE = mavlink.MAV_CMD_NAV_TAKEOFF
+SETPOINT = "SET_POSITION_TARGET_LOCAL_NED"
+STILL = VelocitySetpoint(np.zeros(3))
+
+
+@pytest.fixture
+def world(monkeypatch: pytest.MonkeyPatch) -> Iterator[Handmade]:
+    """A vehicle that was met, on the ground in a pilot's mode."""
+    made = Handmade(monkeypatch)
+    made.connect()
+    yield made
+    made.speaks, made.result = False, None
+    made.vehicle.close()
+
+
+def guided(world: Handmade) -> None:
+    """Fly, and follow a stream."""
+    world.fly()
+    for _ in range(40):
+        world.vehicle.send(STILL)
+        world.turn()
+    world.custom_mode = OFFBOARD
+    for _ in range(4):
+        world.vehicle.send(STILL)
+        assert world.turn() in {VehicleMode.GUIDED, VehicleMode.HOLDING}
+    assert world.turn() is VehicleMode.GUIDED
+    world.heard.clear()
+
+
+def test_on_the_ground_nothing_is_flown(world: Handmade) -> None:
+    """No setpoint, no hold, no return; to land is to do nothing."""
+    assert world.vehicle.read().mode is VehicleMode.GROUNDED
+    for deed in (
+        lambda: world.vehicle.send(STILL),
+        world.vehicle.hold,
+        world.vehicle.return_home,
+    ):
+        with pytest.raises(VehicleError, match="on the ground; take off first"):
+            deed()
+    world.vehicle.land()
+    world.turn(1.0)
+    assert world.orders() == []
+    assert world.told(SETPOINT) == []
+
+
+def test_where_it_is_and_what_it_has_are_read(world: Handmade) -> None:
+    """At its start, heading north; its charge, and where it is on the globe."""
+    state = world.vehicle.read()
+    assert state.odometry.position == pytest.approx([0.0, 0.0, 0.0])
+    assert state.odometry.yaw == pytest.approx(math.pi / 2)
+    assert state.battery.fraction == 0.5
+    assert not state.armed
+    assert state.faults == ()
+    world.velocity = np.array([1.0, 2.0, -3.0])
+    world.turn()
+    world.turn()
+    assert world.vehicle.read().odometry.velocity == pytest.approx([2.0, 1.0, 3.0])
+
+
+@pytest.mark.parametrize("height", [0.0, -1.0, math.nan, math.inf])
+def test_a_take_off_needs_a_height(world: Handmade, height: float) -> None:
+    """Nothing is sent otherwise."""
+    with pytest.raises(InvalidWaypointError, match="must be a positive number of metres"):
+        world.vehicle.take_off(height)
+    assert world.orders() == []
+
+
+def test_a_take_off_by_its_orders(world: Handmade) -> None:
+    """Hold, motors, and 5 m above the sea level at which it stands; asked for twice it is one."""
+    world.vehicle.take_off(5.0)
+    world.vehicle.take_off(5.0)
+    assert world.turn() is VehicleMode.TAKING_OFF
+    assert world.modes() == [HOLD]
+    world.turn(0.5)
+    assert world.orders() == [MODE, ARM, RISE]
+    (climb,) = world.told("COMMAND_INT")
+    assert climb.z == 493.0
+    with pytest.raises(VehicleError, match="cannot hold while it is taking off"):
+        world.vehicle.hold()
+
+
+def test_what_speaks_against_a_take_off(world: Handmade) -> None:
+    """In the air already, checks that fail (asked for each four seconds), silence."""
+    assert world.vehicle.preflight() == []
+    world.well = 0
+    world.turn(0.2)
+    assert world.vehicle.preflight() == ["PX4's arming checks fail"]
+    with pytest.raises(VehicleError, match="refuses to take off: PX4's arming checks fail"):
+        world.vehicle.take_off(2.0)
+    for _ in range(20):
+        world.turn(0.25)
+        world.vehicle.preflight()
+    assert world.orders() == [mavlink.MAV_CMD_RUN_PREARM_CHECKS] * 2
+    world.well = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    world.armed, world.custom_mode = True, HOLD
+    world.turn(0.2)
+    assert world.vehicle.preflight() == ["already holding"]
+    world.speaks = False
+    world.advance(3.0)
+    assert world.vehicle.preflight() == ["no word from the vehicle for 3 s"]
+    with pytest.raises(VehicleError, match="no word from the vehicle"):
+        world.vehicle.take_off(2.0)
+
+
+def test_a_refusal_is_told_at_the_next_take_off_alone(world: Handmade) -> None:
+    """With its own words; the one after it is begun."""
+    world.result = mavlink.MAV_RESULT_DENIED
+    world.say(mavlink.MAVLink_statustext_message(3, b"Preflight Fail: compass", 0, 0))
+    world.turn(0.2)
+    world.vehicle.take_off(2.0)
+    world.turn(0.5)
+    assert world.orders() == [MODE]
+    with pytest.raises(VehicleError, match="mode hold: denied; Preflight Fail: compass"):
+        world.vehicle.take_off(2.0)
+    world.result = mavlink.MAV_RESULT_ACCEPTED
+    world.vehicle.take_off(2.0)
+    world.turn(0.2)
+    assert world.orders() == [MODE, MODE, ARM, RISE]
+
+
+def test_a_velocity_goes_out_as_it_is_and_the_mode_follows(world: Handmade) -> None:
+    """PX4 hears 1.2 s of setpoints before it is asked to follow them."""
+    world.fly()
+    for _ in range(30):
+        sent = world.vehicle.send(VelocitySetpoint(np.array([1.0, 0.5, 0.25]), 0.1))
+        world.turn()
+    assert isinstance(sent, VelocitySetpoint)
+    said = world.told(SETPOINT)
+    assert len(said) == 30
+    assert (said[-1].vx, said[-1].vy, said[-1].vz) == (0.5, 1.0, -0.25)
+    assert said[-1].yaw_rate == pytest.approx(-0.1)
+    assert (said[-1].target_system, said[-1].target_component) == (1, 1)
+    (at,) = [at for at, one in world.heard if getattr(one, "command", 0) == MODE]
+    assert world.modes() == [OFFBOARD]
+    assert 1.2 <= at - world.heard[0][0] <= 1.3
+
+
+def test_a_place_goes_out_in_its_own_frame(world: Handmade) -> None:
+    """The target leaves for a place 8 m east, from 10 m north and 20 m east of its zero."""
+    guided(world)
+    for _ in range(20):
+        world.vehicle.send(PositionSetpoint(np.array([8.0, 0.0, 5.0])))
+        world.turn()
+    last = world.told(SETPOINT)[-1]
+    assert last.x == pytest.approx(10.0)
+    assert 20.1 < last.y < 28.0
+    assert last.z == pytest.approx(-8.0)
+    assert last.vy > 0.0
+
+
+def test_numbers_that_are_none_are_not_sent(world: Handmade) -> None:
+    """Refused before anything else."""
+    guided(world)
+    with pytest.raises(InvalidWaypointError):
+        world.vehicle.send(VelocitySetpoint(np.array([math.nan, 0.0, 0.0])))
+    assert world.told(SETPOINT) == []
+
+
+def test_without_a_position_it_is_told_to_stand(world: Handmade) -> None:
+    """A second after its last one; it is said, too."""
+    guided(world)
+    world.position = np.full(3, math.nan)
+    world.turn(1.2)
+    sent = world.vehicle.send(PositionSetpoint(np.array([8.0, 0.0, 5.0])))
+    assert isinstance(sent, VelocitySetpoint)
+    assert sent.velocity.tolist() == [0.0, 0.0, 0.0]
+    assert "the autopilot does not know its position" in world.vehicle.preflight()
+    assert not np.isfinite(world.vehicle.read().odometry.position).any()
+
+
+DEEDS: list[tuple[str, int]] = [("hold", HOLD), ("return_home", RETURN), ("land", LAND)]
+
+
+@pytest.mark.parametrize(("deed", "mode"), DEEDS)
+def test_its_own_modes_are_asked_for_once_until_they_show(
+    world: Handmade, deed: str, mode: int
+) -> None:
+    """While an order is under way, or the mode shows, it is not asked for again."""
+    guided(world)
+    world.result = None
+    act: Callable[[], None] = getattr(world.vehicle, deed)
+    act()
+    world.turn(0.2)
+    act()
+    assert world.modes() == [mode]
+    world.turn(1.0)
+    assert world.modes() == [mode] * 2, "the first was not answered"
+    world.custom_mode = mode
+    world.turn(0.3)
+    expected = {HOLD: "holding", RETURN: "returning", LAND: "landing"}[mode]
+    assert world.turn(3.0).value == expected
+    act()
+    assert world.modes() == [mode] * 2
+
+
+def test_who_lands_is_not_steered(world: Handmade) -> None:
+    """Nor held, nor brought home; landing again is nothing new."""
+    guided(world)
+    world.vehicle.land()
+    world.custom_mode = LAND
+    assert world.turn(0.3) is VehicleMode.LANDING
+    for act in (lambda: world.vehicle.send(STILL), world.vehicle.hold, world.vehicle.return_home):
+        with pytest.raises(VehicleError, match="while it is landing"):
+            act()
+    world.vehicle.land()
+    assert world.modes() == [LAND]
+
+
+@pytest.mark.parametrize(
+    ("state", "mode", "words"),
+    [
+        (mavlink.MAV_STATE_ACTIVE, VehicleMode.MANUAL, "a pilot flies it"),
+        (mavlink.MAV_STATE_CRITICAL, VehicleMode.FAILSAFE, "its own protection flies it"),
+    ],
+)
+def test_who_flies_it_is_left_alone(
+    world: Handmade, caplog: pytest.LogCaptureFixture, state: int, mode: VehicleMode, words: str
+) -> None:
+    """Nothing that steers is sent any more, and it is told once who it is by the mode's name."""
+    guided(world)
+    world.custom_mode, world.state = POSITION, state
+    assert world.turn(0.2) is mode
+    for act in (
+        lambda: world.vehicle.send(STILL),
+        world.vehicle.hold,
+        world.vehicle.return_home,
+        world.vehicle.land,
+    ):
+        with pytest.raises(VehicleError, match=words):
+            act()
+    world.turn(30.0 / 20)
+    world.advance(25.0)
+    world.vehicle.close()
+    assert world.orders() == []
+    assert world.told(SETPOINT) == []
+    assert [text for text in caplog.messages if "not by us" in text] == [
+        "drone: the mode is 'position' now, not by us; "
+    ]
+
+
+def test_a_take_off_is_called_off_on_the_ground_by_land_and_by_return(world: Handmade) -> None:
+    """Hold, and motors off: there is no way home from where it stands."""
+    for act in (world.vehicle.land, world.vehicle.return_home):
+        world.vehicle.take_off(5.0)
+        world.turn(0.3)
+        world.heard.clear()
+        act()
+        assert world.vehicle.read().mode is VehicleMode.LANDING
+        assert world.modes() == [HOLD]
+        assert [one.param1 for one in world.told("COMMAND_LONG") if one.command == ARM] == [0.0]
+        assert world.turn(1.5) is VehicleMode.LANDING
+        assert "a take-off that was called off is not over yet" in world.vehicle.preflight()
+        assert world.turn(0.5) is VehicleMode.GROUNDED
+
+
+def test_a_climb_is_brought_home_from_the_air(world: Handmade) -> None:
+    """By its own mode; the take-off is forgotten."""
+    world.vehicle.take_off(20.0)
+    world.turn(0.3)
+    world.armed, world.custom_mode = True, TAKE_OFF
+    world.landed = mavlink.MAV_LANDED_STATE_IN_AIR
+    world.turn(0.3)
+    world.heard.clear()
+    world.vehicle.return_home()
+    assert world.modes() == [RETURN]
+    world.custom_mode = RETURN
+    assert world.turn(0.3) is VehicleMode.RETURNING
+
+
+def test_motors_that_turn_on_the_ground_are_stopped_by_land(world: Handmade) -> None:
+    """A landing mode would stop none that have never lifted it."""
+    world.armed, world.custom_mode = True, HOLD
+    world.turn(0.3)
+    world.vehicle.land()
+    assert world.orders() == [MODE, ARM]
+    assert world.modes() == [HOLD]
+    world.vehicle.land()
+    assert world.orders() == [MODE, ARM]
+    world.armed = False
+    assert world.turn(3.0) is VehicleMode.GROUNDED
+
+
+def test_a_loop_that_hangs_is_answered_by_hold_and_then_by_return(
+    world: Handmade, caplog: pytest.LogCaptureFixture
+) -> None:
+    """After a second, and after twenty; each said once. A loop that comes back begins anew."""
+    guided(world)
+    world.advance(0.9)
+    assert world.modes() == []
+    world.advance(0.2)
+    assert world.modes() == [HOLD]
+    world.custom_mode = HOLD
+    world.advance(18.7)
+    assert world.modes() == [HOLD]
+    world.advance(0.5)
+    assert world.modes() == [HOLD, RETURN]
+    world.custom_mode = RETURN
+    world.advance(20.0)
+    assert world.modes() == [HOLD, RETURN]
+    assert [text for text in caplog.messages if "silent" in text] == [
+        "drone: the control loop is silent: hold",
+        "drone: the control loop is silent: return",
+    ]
+
+
+def test_a_vehicle_that_holds_needs_no_loop_for_a_while(world: Handmade) -> None:
+    """It is brought home all the same if nobody comes back."""
+    guided(world)
+    world.vehicle.hold()
+    world.custom_mode = HOLD
+    world.turn(0.3)
+    world.heard.clear()
+    world.advance(19.5)
+    assert world.modes() == []
+    world.advance(1.0)
+    assert world.modes() == [RETURN]
+
+
+@pytest.mark.parametrize("mode", [RETURN, LAND])
+def test_whoever_comes_down_already_is_let_be(world: Handmade, mode: int) -> None:
+    """No loop is needed, and closing changes nothing."""
+    guided(world)
+    (world.vehicle.return_home if mode == RETURN else world.vehicle.land)()
+    world.custom_mode = mode
+    world.turn(0.3)
+    world.heard.clear()
+    world.advance(25.0)
+    world.vehicle.close()
+    assert world.orders() == []
+
+
+def test_letting_go_in_the_air_lands(world: Handmade) -> None:
+    """It waits until the landing shows, four seconds at most."""
+    guided(world)
+    began = world.now
+    world.vehicle.close()
+    assert set(world.modes()) == {LAND}
+    assert world.now - began == pytest.approx(4.0, abs=0.06)
+    assert not world.vehicle.connected
+    with pytest.raises(VehicleError, match="not connected"):
+        world.vehicle.read()
+
+
+def test_letting_go_on_the_ground_is_done_at_once(world: Handmade) -> None:
+    """Nothing is ordered, and nothing waited for; twice is once."""
+    began = world.now
+    world.vehicle.close()
+    world.vehicle.close()
+    assert world.now == began
+    assert world.orders() == []
+
+
+def test_what_px4_leaves_of_a_climb_is_flown(world: Handmade) -> None:
+    """It holds 0.8 m below 5 m: setpoints lead up from there, but not from more than 1.5 m."""
+    world.vehicle.take_off(5.0)
+    world.turn(0.3)
+    world.armed, world.custom_mode = True, TAKE_OFF
+    world.landed = mavlink.MAV_LANDED_STATE_IN_AIR
+    world.turn(0.5)
+    world.rise(3.4)
+    world.custom_mode = HOLD
+    world.turn(0.5)
+    assert world.told(SETPOINT) == []
+    world.rise(0.8)
+    assert world.turn(1.0) is VehicleMode.TAKING_OFF
+    said = world.told(SETPOINT)
+    assert len(said) >= 19
+    assert said[-1].x == pytest.approx(10.0)
+    assert said[-1].y == pytest.approx(20.0)
+    assert said[-1].z == pytest.approx(-7.2), "until it follows"
+    world.turn(0.4)
+    assert world.modes()[-1] == OFFBOARD
+    world.custom_mode = OFFBOARD
+    world.turn(1.0)
+    assert world.told(SETPOINT)[-1].z < -7.4
+    world.rise(0.8)
+    assert world.turn(0.3) is VehicleMode.GUIDED
+
+
+def test_a_mode_that_is_refused_is_told(world: Handmade, caplog: pytest.LogCaptureFixture) -> None:
+    """With its own words of the last moments."""
+    guided(world)
+    world.result = mavlink.MAV_RESULT_FAILED
+    world.say(mavlink.MAVLink_statustext_message(3, b"No home position", 0, 0))
+    world.vehicle.return_home()
+    world.turn(0.3)
+    assert caplog.messages[-1] == "drone: mode return: failed No home position"
+
+
+def test_who_starts_anew_on_the_ground_stands_where_it_stood(world: Handmade) -> None:
+    """Told until motors start; its zero lies elsewhere now."""
+    world.say(mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, mavlink.MAV_STATE_BOOT, 3))
+    world.position = np.array([0.5, 0.0, 0.0])
+    world.turn(0.5)
+    state = world.vehicle.read()
+    assert "autopilot: it started anew" in state.faults
+    assert state.odometry.position == pytest.approx([0.0, 0.0, 0.0])
+    world.armed = True
+    world.turn(0.3)
+    assert "autopilot: it started anew" not in world.vehicle.read().faults
+
+
+def test_nobody_there_is_said_in_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After the time that it was given, with the place; and then it is not connected."""
+    world = Handmade(monkeypatch)
+    world.speaks = False
+    with pytest.raises(VehicleError, match="drone: no HEARTBEAT on udpin"):
+        world.vehicle.connect(3.0)
+    assert world.now == pytest.approx(1003.0)
+    assert not world.vehicle.connected
+    assert world.vehicle.preflight() == ["not connected"]
