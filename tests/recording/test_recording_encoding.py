@@ -5,15 +5,20 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import dataclass
+from enum import Enum, Flag
+from pathlib import PurePosixPath
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
 from aerodaas.geometry import CameraModel, rotation_from_rpy
-from aerodaas.recording.encoding import json_bytes, plain, topic
+from aerodaas.recording.encoding import json_bytes, json_schema, plain, stream_of, topic
 from aerodaas.recording.rotation import OPTICAL, Rotation, compose, from_rpy
 
 ANGLES = st.floats(-math.pi, math.pi)
@@ -70,6 +75,221 @@ def test_topic_does_not_repeat_itself() -> None:
     """A stream named after what it carries is its own topic."""
     assert topic("tello/@state", "state") == "/tello/state"
     assert topic("tello/cam.1", "image") == "/tello/cam_1/image"
+
+
+@pytest.mark.parametrize(
+    ("stream", "kind", "name"),
+    [
+        ("tello/cam", "image", "/tello/cam/image"),
+        ("/tello/cam/", "image", "/tello/cam/image"),
+        ("tello/a b..c", "image", "/tello/a_b_c/image"),
+        ("tello/image", "image", "/tello/image"),
+        ("tello/@state", "state", "/tello/state"),
+        ("tello/@state", "odometry", "/tello/state/odometry"),
+        ("tello/state", "state", "/tello/own.state/state"),
+        ("tello/setpoints", "value", "/tello/own.setpoints/value"),
+        ("tello/statement", "value", "/tello/statement/value"),
+        ("state", "state", "/state"),
+        ("state", "value", "/state/value"),
+    ],
+)
+def test_topics_keep_the_projects_own_streams_apart(stream: str, kind: str, name: str) -> None:
+    """A robot's sensor may be called as its states are; it is recorded beside them."""
+    assert topic(stream, kind) == name
+    if "@" not in stream and "." not in stream and stream.rpartition("/")[2] != kind:
+        assert stream_of(name.removesuffix(f"/{kind}")) == stream.strip("/").replace(" ", "_")
+
+
+def test_streams_of_topics() -> None:
+    """The sign of a name that is the project's own is taken off the last part alone."""
+    assert stream_of("/tello/own.state") == "tello/state"
+    assert stream_of("cam") == "cam"
+    assert stream_of("own.it/own.cam") == "own.it/cam"
+
+
+def test_schemas_say_what_they_describe() -> None:
+    """A word is a type; anything else is taken as it is."""
+    schema = json_schema("Thing", label="string", parts={"type": "array"}, rest={})
+    assert (schema.name, schema.encoding) == ("aerodaas.Thing", "jsonschema")
+    assert json.loads(schema.data) == {
+        "type": "object",
+        "properties": {"label": {"type": "string"}, "parts": {"type": "array"}, "rest": {}},
+    }
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        ({"a": 1, "b": [1.5, True]}, '{"a":1,"b":[1.5,true]}'),
+        ({"a": math.nan, "b": [-math.inf, 1]}, '{"a":null,"b":[null,1]}'),
+        ({"a": {(1, 2): 3}}, '{"a":{"(1, 2)":3}}'),
+        ({"a": np.arange(3)}, '{"a":[0,1,2]}'),
+    ],
+)
+def test_json_has_no_blanks_and_no_nan(value: dict[str, object], text: str) -> None:
+    """Whether or not there is something in it that JSON does not know."""
+    assert json_bytes(value) == text.encode()
+
+
+def test_integers_of_any_size_and_texts_of_any_length_stay() -> None:
+    """A stamp in nanoseconds, a truth value and a long text are exact."""
+    long = "x" * 5000
+    value = {"stamp": 2**62 + 1, "text": long, "on": True, "none": None}
+    assert plain(value) == value
+    assert json.loads(json_bytes(value)) == value
+    assert type(plain(value)["on"]) is bool
+
+
+class Colour(Enum):
+    """An enumeration."""
+
+    RED = 1
+
+
+class Mark(Flag):
+    """Flags."""
+
+    ONE = 1
+    TWO = 2
+
+
+class Pair(NamedTuple):
+    """A named tuple."""
+
+    left: int
+    right: float
+
+
+@dataclass
+class Record:
+    """A dataclass."""
+
+    name: str
+    inner: object = None
+
+
+class Slots:
+    """An object without a dictionary; one of its fields was never set."""
+
+    __slots__ = ("absent", "at")
+
+    def __init__(self) -> None:
+        self.at = 3
+
+
+class OneSlot:
+    """An object whose only field is named by a text."""
+
+    __slots__ = "speed"  # noqa: PLC0205 - as some write it
+
+    def __init__(self) -> None:
+        self.speed = 2.5
+
+
+class Open:
+    """An object with a dictionary."""
+
+    def __init__(self) -> None:
+        self.speed = 2.5
+        self.__dict__["__hidden__"] = 1
+
+
+class Dumps:
+    """An object that says itself what it consists of."""
+
+    def __init__(self, data: object) -> None:
+        self.data = data
+
+    def get_data(self) -> object:
+        """Say it."""
+        return self.data
+
+
+class Refuses:
+    """An object that fails when asked."""
+
+    @property
+    def __dict__(self) -> dict[str, object]:  # type: ignore[override]
+        """Fail."""
+        raise RuntimeError
+
+    def __str__(self) -> str:
+        raise RuntimeError
+
+
+class Model(BaseModel):
+    """A model of pydantic's."""
+
+    speed: float = 1.5
+
+
+@pytest.mark.parametrize(
+    ("value", "found"),
+    [
+        (np.bool_(1), True),
+        (np.int64(-3), -3),
+        (np.float32(0.5), 0.5),
+        (np.float64("nan"), None),
+        (math.inf, None),
+        (Colour.RED, "RED"),
+        (Mark.ONE | Mark.TWO, "ONE|TWO"),
+        (Pair(1, math.nan), {"left": 1, "right": None}),
+        (Record("a", Pair(1, 2)), {"name": "a", "inner": {"left": 1, "right": 2}}),
+        (Slots(), {"at": 3}),
+        (OneSlot(), {"speed": 2.5}),
+        (Open(), {"speed": 2.5}),
+        (Dumps({"a": 1}), {"a": 1}),
+        (Dumps([1, 2]), {"data": [1, 2]}),
+        (Model(), {"speed": 1.5}),
+        (Refuses(), "<Refuses>"),
+        (Colour, "<Colour>"),
+        (object(), "<object>"),
+        (PurePosixPath("/a/b"), "/a/b"),
+        ({1: "a", None: "b"}, {"1": "a", "None": "b"}),
+        ({3}, [3]),
+        (frozenset(), []),
+        ((1, (2,)), [1, [2]]),
+        (np.array([True, False]), [True, False]),
+        (np.array([1.0, np.nan]), [1.0, None]),
+        (np.zeros(0), []),
+        (np.array(["a"]), {"shape": [1], "dtype": "<U1"}),
+    ],
+)
+def test_what_objects_become(value: object, found: object) -> None:
+    """Fields where there are any, names of members and classes, or else the words for it."""
+    back = plain(value)
+    assert back == found
+    assert type(back) is type(found)
+
+
+def test_arrays_up_to_4096_numbers_are_whole() -> None:
+    """One more, and their shape and type stand for them."""
+    assert plain(np.ones((64, 64), np.int16)) == [[1] * 64] * 64
+    assert plain(np.ones(4097, np.int16)) == {"shape": [4097], "dtype": "int16"}
+
+
+def test_words_up_to_1000_letters_are_whole() -> None:
+    """An object's words are cut after a thousand, and a dot for the rest is put."""
+    assert plain(PurePosixPath("x" * 1000)) == "x" * 1000
+    assert plain(PurePosixPath("x" * 1001)) == "x" * 1000 + "…"
+
+
+def test_lists_go_12_deep_and_objects_4() -> None:
+    """What lies deeper is told by its name."""
+    lists: object = 7
+    for _ in range(12):
+        lists = [lists]
+    assert plain(lists) == lists
+    found = plain([lists])
+    for _ in range(12):
+        (found,) = found
+    assert found == "<list>"
+    objects: object = Open()
+    for name in "dcb":
+        objects = Record(name, objects)
+    assert plain(objects)["inner"]["inner"]["inner"] == {"speed": 2.5}
+    inner = plain(Record("a", objects))["inner"]["inner"]["inner"]
+    assert inner == {"name": "d", "inner": "<Open>"}
 
 
 def matrix(rotation: Rotation) -> NDArray[np.float64]:

@@ -1,0 +1,213 @@
+"""When a recording's pictures are due, which are passed over, and what is told of each."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+from foxglove.messages import CompressedImage
+from mcap.writer import Writer
+
+from aerodaas.cameras.base import Picture
+from aerodaas.cameras.mcap import McapCamera
+from aerodaas.config import EnvironmentConfig, RecordingConfig, SensorConfig
+from aerodaas.data import Frame, Header, Odometry
+from aerodaas.errors import ConfigError, SourceError
+from aerodaas.geometry import CameraModel
+from aerodaas.recording.provenance import Provenance
+from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.status import Message
+
+ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
+SECOND = 1_000_000_000
+BEGIN = 70 * SECOND
+"""Mission time at which the first picture is asked for."""
+
+
+def jpeg(number: int, width: int = 32) -> bytes:
+    """A picture that tells its number by its brightness."""
+    image = np.full((24, width, 3), 20 * number, np.uint8)
+    return cv2.imencode(".jpg", image)[1].tobytes()
+
+
+def write(path: Path, *pictures: tuple[float, bytes], topic: str = "/cam") -> Path:
+    """Record pictures, each taken at a second, one after the other."""
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        described = CompressedImage.get_schema()
+        schema = writer.register_schema(described.name, described.encoding, described.data)
+        channel = writer.register_channel(topic, "protobuf", schema)
+        for number, (second, data) in enumerate(pictures):
+            message = CompressedImage(data=data, format="jpeg").encode()
+            captured = 5 * SECOND + round(second * SECOND)
+            writer.add_message(channel, 5 * SECOND + number, message, captured, number)
+        writer.finish()
+    return path
+
+
+def pictures(*seconds: float) -> list[tuple[float, bytes]]:
+    """Pictures numbered from 0."""
+    return [(second, jpeg(number)) for number, second in enumerate(seconds)]
+
+
+def camera(path: Path, **settings: object) -> McapCamera:
+    """An open camera."""
+    sensor = SensorConfig(id="cam", driver="mcap", settings={"path": str(path), **settings})
+    made = McapCamera(sensor, ENVIRONMENT)
+    assert made.model is None
+    made.open()
+    return made
+
+
+def shown(picture: Picture | None) -> int | None:
+    """Which picture it is."""
+    return None if picture is None else round(float(picture.image.mean()) / 20)
+
+
+def asked(source: McapCamera, *seconds: float) -> list[int | None]:
+    """What it shows, asked at these seconds after the beginning."""
+    return [shown(source.capture(BEGIN + round(at * SECOND), None)) for at in seconds]
+
+
+def test_a_picture_is_due_as_long_after_the_first_as_it_was_taken(tmp_path: Path) -> None:
+    """Taken half a second and a second after it: not a nanosecond sooner; each is given once."""
+    source = camera(write(tmp_path / "a.mcap", *pictures(0, 0.5, 1.0)))
+    assert asked(source, 0, 0, 0.499_999_999, 0.5, 0.6) == [0, None, None, 1, None]
+    assert not source.finished
+    assert asked(source, 0.999_999_999, 1.0, 1.0, 5) == [None, 2, None, None]
+    assert source.finished
+    assert source.skipped == 0
+
+
+def test_a_picture_is_of_the_time_at_which_it_is_shown(tmp_path: Path) -> None:
+    """It bears the mission's stamp and its topic; of others' recordings, no place and no depth."""
+    source = camera(write(tmp_path / "a.mcap", *pictures(0, 0.5)))
+    source.capture(BEGIN, None)
+    late = source.capture(BEGIN + SECOND, None)
+    assert late is not None
+    assert (late.stamp, late.label, late.odometry, late.depth) == (
+        BEGIN + SECOND,
+        "/cam",
+        None,
+        None,
+    )
+
+
+def test_a_loop_begins_again_a_nanosecond_after_its_end(tmp_path: Path) -> None:
+    """Two pictures a tenth of a second apart; the second round keeps their distance."""
+    source = camera(write(tmp_path / "a.mcap", *pictures(0, 0.1)), loop=True)
+    assert asked(source, 0, 0.1, 0.1, 0.100_000_001) == [0, 1, None, 0]
+    assert asked(source, 0.2, 0.200_000_001, 0.200_000_002) == [None, 1, 0]
+    assert not source.finished
+    assert source.skipped == 0
+
+
+@pytest.mark.timeout(20)  # one that were for ever due would never be done
+def test_a_loop_of_one_picture_gives_it_once_each_time(tmp_path: Path) -> None:
+    """Asked ten times, even after long whiles."""
+    source = camera(write(tmp_path / "a.mcap", *pictures(0)), loop=True)
+    assert asked(source, *range(0, 100, 10)) == [0] * 10
+    assert asked(source, 90) == [None]
+
+
+def test_pictures_older_than_the_one_before_are_passed_over_and_counted(tmp_path: Path) -> None:
+    """Two of them come too late; one of the very same time does not, and is the newer."""
+    path = write(tmp_path / "a.mcap", *pictures(0, 0.5, 0.2, 0.4, 0.5, 0.9))
+    source = camera(path)
+    assert asked(source, 0) == [0]
+    assert source.skipped == 0
+    assert asked(source, 0.5) == [4]
+    assert source.skipped == 2
+    assert asked(source, 0.9) == [5]
+    assert source.finished
+
+
+def test_the_lens_is_of_the_newest_picture(tmp_path: Path) -> None:
+    """Opened, of the first that can be decoded; then of each that is shown."""
+    path = write(tmp_path / "a.mcap", (0, b"broken"), (1, jpeg(1)), (2, jpeg(2, width=64)))
+    source = camera(path, horizontal_fov=60, pitch=30, yaw=90, mount=(0.1, 0.2, 0.3))
+
+    def lens(width: int) -> CameraModel:
+        return CameraModel.from_fov(
+            width,
+            24,
+            math.radians(60),
+            mount=(0.1, 0.2, 0.3),
+            pitch=math.radians(30),
+            yaw=math.radians(90),
+        )
+
+    assert source.model == lens(32)
+    assert asked(source, 0, 1) == [None, 1]
+    assert source.skipped == 1
+    assert source.model == lens(32)
+    assert asked(source, 2) == [2]
+    assert source.model == lens(64)
+
+
+def test_pictures_none_of_which_can_be_decoded_are_refused(tmp_path: Path) -> None:
+    """Their topic and the file are named."""
+    path = write(tmp_path / "a.mcap", (0, b"broken"), (1, b""))
+    with pytest.raises(SourceError) as refused:
+        camera(path)
+    assert str(refused.value) == f"none of the pictures on /cam of {path} can be decoded"
+
+
+def test_a_recording_without_pictures_says_so(tmp_path: Path) -> None:
+    """With a topic asked for and without one."""
+    path = tmp_path / "a.mcap"
+    FlightRecorder(path, config=RecordingConfig(), provenance=Provenance(0)).close()
+    with pytest.raises(SourceError) as refused:
+        camera(path)
+    assert str(refused.value) == f'{path}: name the pictures\' "topic"; it has: none'
+    with pytest.raises(SourceError) as refused:
+        camera(path, topic="/cam")
+    assert str(refused.value) == f"{path} has no pictures on /cam; it has: none"
+
+
+def test_a_path_that_is_missing_or_wrong_is_named(tmp_path: Path) -> None:
+    """Before anything is opened, or when it is."""
+    sensor = SensorConfig(id="cam", driver="mcap", settings={})
+    with pytest.raises(ConfigError, match='give the MCAP recording as "path"'):
+        McapCamera(sensor, ENVIRONMENT)
+    with pytest.raises(SourceError, match=r"cannot open the recording .*nowhere\.mcap: No such"):
+        camera(tmp_path / "nowhere.mcap")
+
+
+def test_it_may_be_closed_twice_and_before_it_was_opened(tmp_path: Path) -> None:
+    """The file is given back."""
+    path = write(tmp_path / "a.mcap", *pictures(0, 1))
+    sensor = SensorConfig(id="cam", driver="mcap", settings={"path": str(path)})
+    source = McapCamera(sensor, ENVIRONMENT)
+    source.close()
+    source.open()
+    recording = source._recording
+    assert recording is not None
+    source.close()
+    source.close()
+    assert recording._file.closed
+
+
+def test_of_our_own_recordings_place_and_depth_are_given(tmp_path: Path) -> None:
+    """The odometry and the millimetres recorded with each picture, at the mission's own stamps."""
+    path = tmp_path / "a.mcap"
+    depth = np.full((24, 32), 1234, np.uint16)
+    with FlightRecorder(path, config=RecordingConfig(), provenance=Provenance(0)) as recorder:
+        for number in range(2):
+            header = Header(number, number * SECOND, "drone/cam")
+            odometry = Odometry(np.array([number, 0.0, 2.0]), np.zeros(3), yaw=0.0)
+            frame = Frame(header, np.zeros((24, 32, 3), np.uint8), None, odometry, depth=depth)
+            recorder.write(Message("drone/cam", number, number * SECOND, header, 0, (), frame))
+    source = camera(path)
+    for number in range(2):
+        found = source.capture(BEGIN + number * SECOND, None)
+        assert found is not None
+        assert found.stamp == BEGIN + number * SECOND
+        assert found.odometry is not None
+        assert found.odometry.position.tolist() == [number, 0.0, 2.0]
+        assert found.depth is not None
+        assert np.array_equal(found.depth, depth)

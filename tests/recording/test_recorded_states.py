@@ -1,0 +1,106 @@
+"""Vehicle states come out of a recording as they went in."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic_flight import PROVENANCE
+
+from aerodaas.config import RecordingConfig
+from aerodaas.data import Battery, GpsFix, Header, Odometry
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.recording.states import odometry_of, vehicle_states
+from aerodaas.status import Message
+from aerodaas.vehicle import FlightEnd, VehicleMode, VehicleState
+
+ODOMETRY = Odometry(np.array([1, 2, 3.5]), np.array([-0.1, 0.2, 1 / 3]), 0.1, 0.2, 0.3, 0.4, 0.5)
+TRUTH = Odometry(np.array([1.5, 2.5, 3.0]), np.zeros(3), -1.0, 0.0, 0.1, -0.2)
+FULL = VehicleState(
+    5_000_000_000,
+    ODOMETRY,
+    Battery(0.75, 7.5, 2.5),
+    VehicleMode.GUIDED,
+    armed=True,
+    gps=GpsFix(12.5, 77.5, 900.0, 1.5, 2.5, 9),
+    truth=TRUTH,
+    faults=("compass", "link weak"),
+    extra={"temperature": 60.5, "link": 0.25},
+    ended=FlightEnd.FELL,
+)
+SPARE = VehicleState(6_000_000_000, TRUTH, Battery(0.5), VehicleMode.MANUAL, armed=False)
+
+
+def played(path: Path, *states: tuple[str, VehicleState]) -> dict[str, list[VehicleState]]:
+    """Record states, each 20 ms after its own stamp, and read them back by robot."""
+    with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
+        for seq, (robot, state) in enumerate(states):
+            stream = f"{robot}/@state"
+            header = Header(seq, state.stamp, stream)
+            stamp = state.stamp + 20_000_000
+            recorder.write(Message(stream, seq, stamp, header, 0, (), state))
+    found: dict[str, list[VehicleState]] = {}
+    with Recording.open(path) as recording:
+        for robot in ("a", "b", "c"):
+            told = list(vehicle_states(recording, robot))
+            assert [stamp for stamp, _ in told] == [it.stamp + 20_000_000 for _, it in told]
+            found[robot] = [state for _, state in told]
+    return found
+
+
+def test_states_come_back_whole_for_each_robot(tmp_path: Path) -> None:
+    """With everything or with next to nothing in them; the robot asked for, and no other."""
+    found = played(tmp_path / "a.mcap", ("a", FULL), ("b", SPARE), ("a", SPARE))
+    assert found == {"a": [FULL, SPARE], "b": [SPARE], "c": []}
+    assert found["a"][0].ended is FlightEnd.FELL
+    assert found["a"][0].mode is VehicleMode.GUIDED
+    assert found["a"][1].gps is None
+    assert found["a"][1].truth is None
+    assert found["a"][1].ended is None
+
+
+def test_what_was_not_a_number_is_none_again(tmp_path: Path) -> None:
+    """Unknown volts, a velocity and a height that were not measured; a position that was."""
+    odometry = Odometry(np.array([1.0, 2.0, np.nan]), np.full(3, np.nan), 0.5)
+    state = VehicleState(
+        1,
+        odometry,
+        Battery(0.5, math.nan, math.nan),
+        VehicleMode.MANUAL,
+        armed=False,
+        gps=GpsFix(1.0, 2.0, math.nan, 1.0, math.nan),
+    )
+    ((back,),) = (states for states in played(tmp_path / "a.mcap", ("a", state)).values() if states)
+    assert np.array_equal(back.odometry.position, [1.0, 2.0, np.nan], equal_nan=True)
+    assert np.isnan(back.odometry.velocity).all()
+    assert back.odometry.yaw == 0.5
+    assert (back.battery.fraction, math.isnan(back.battery.voltage)) == (0.5, True)
+    assert math.isnan(back.battery.current)
+    assert back.gps is not None
+    assert (back.gps.latitude, back.gps.longitude) == (1.0, 2.0)
+    assert math.isnan(back.gps.altitude)
+    assert math.isnan(back.gps.vertical_sigma)
+
+
+def test_no_odometry_is_none() -> None:
+    """Pictures of others have none."""
+    assert odometry_of(None) is None
+
+
+@pytest.mark.parametrize("missing", ["position", "velocity", "yaw", "position_sigma"])
+def test_part_of_an_odometry_is_none_to_rely_on(missing: str) -> None:
+    """What a damaged message lacks is not made up."""
+    value = dict.fromkeys(("yaw", "roll", "pitch", "yaw_rate", "position_sigma"), 1.0) | {
+        "position": {"x": 1.0, "y": 2.0, "z": 3.0},
+        "velocity": {"x": 4.0, "y": 5.0, "z": 6.0},
+    }
+    whole = odometry_of(value)
+    assert whole is not None
+    assert whole.position.tolist() == [1.0, 2.0, 3.0]
+    assert whole.velocity.tolist() == [4.0, 5.0, 6.0]
+    del value[missing]
+    with pytest.raises(KeyError):
+        odometry_of(value)
