@@ -103,8 +103,12 @@ def meeting(monkeypatch: pytest.MonkeyPatch) -> Meeting:
     return Meeting(monkeypatch)
 
 
-def test_a_vehicle_that_is_ready_is_met_at_once(meeting: Meeting) -> None:
+def test_a_vehicle_that_is_ready_is_met_at_once(
+    meeting: Meeting, caplog: pytest.LogCaptureFixture
+) -> None:
     """Asked for its version; what was put together is what flies it."""
+    caplog.set_level("INFO", "aerodaas.drivers.mavlink.connecting")
+    meeting.telemetry.software = "4.5.7"
     connection: Any = meeting.establish()
     assert meeting.now == 100.0
     assert meeting.orders(VERSION) == [100.0]
@@ -113,6 +117,7 @@ def test_a_vehicle_that_is_ready_is_met_at_once(meeting: Meeting) -> None:
     assert connection.commander is meeting.commander
     assert connection.departure is meeting.departure
     assert connection.target == (7, 1)
+    assert caplog.messages[-1] == "d: ArduPilot 4.5.7, system 7"
     assert meeting.fences == []
 
 

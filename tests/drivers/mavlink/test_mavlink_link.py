@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -319,3 +321,85 @@ def test_without_a_station_nothing_is_passed_on(world: World) -> None:
     world.link.close()
     assert world.wire.closed
     assert not world.station.closed
+
+
+class _Over(Exception):  # noqa: N818 - no error
+    """The time that the test has given is over."""
+
+
+class Thread:
+    """The link's thread, run by the test: what it waits for, how long, and what it finds then."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, start: Callable[[Any], None]) -> None:
+        self.now, self.end = 100.0, 101.0
+        self.waits: list[tuple[list[int], float]] = []
+        self.how: dict[str, object] = {}
+        self.joined: list[float] = []
+        self.broken = False
+        self.run: Callable[[], None] = lambda: None
+        quiet = SimpleNamespace(Thread=self._made, Lock=threading.Lock, Event=threading.Event)
+        monkeypatch.setattr(module, "threading", quiet)
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: self.now))
+        monkeypatch.setattr(module, "select", SimpleNamespace(select=self._select))
+        monkeypatch.setattr(MavlinkLink, "_start", start)
+
+    def _made(self, target: Callable[[], None], **how: object) -> Any:  # noqa: ANN401
+        self.run, self.how = target, how
+        return SimpleNamespace(start=lambda: None, join=self._join)
+
+    def _join(self, timeout: float) -> None:
+        self.joined.append(timeout)
+
+    def _select(self, wires: list[int], out: list[int], odd: list[int], longest: float) -> None:
+        assert out == odd == []
+        self.waits.append((wires, longest))
+        if self.now >= self.end:
+            raise _Over
+        self.now += max(longest, 0.001)
+        if self.broken:
+            raise OSError
+
+
+START = MavlinkLink._start
+
+
+@pytest.mark.parametrize("broken", [False, True])
+def test_its_thread_waits_for_the_wire_and_the_next_turn(
+    monkeypatch: pytest.MonkeyPatch, *, broken: bool
+) -> None:
+    """20 turns a second, whatever comes; a wire that is cut is not waited for."""
+    world = World(monkeypatch, forward="udpout:127.0.0.1:14550")
+    thread = Thread(monkeypatch, START)
+    thread.broken = broken
+    monkeypatch.setattr(world.station, "fileno", lambda: 77)
+    world.link._start()
+    assert thread.how == {"name": "d-link", "daemon": True}
+    with pytest.raises(_Over):
+        thread.run()
+    assert 19 <= len(world.turns) <= 21
+    assert all(0.0 <= longest <= 0.05 for _, longest in thread.waits)
+    wires = thread.waits[0][0]
+    assert len(wires) == 2
+    assert wires[-1] == 77
+    assert -1 not in wires
+    monkeypatch.setattr(world.wire, "fileno", lambda: 66)
+    thread.end = 102.0
+    with pytest.raises(_Over):
+        thread.run()
+    assert thread.waits[-1][0] == [66, *wires]
+    world.link.close()
+    assert thread.joined == [2.0]
+    turns = len(world.turns)
+    thread.end = 200.0
+    thread.run()
+    assert len(world.turns) == turns, "it has ended"
+
+
+def test_packets_without_a_name_are_nothing(world: World, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A message of a dialect that is not ours is damaged, not the vehicle's."""
+    unknown = SimpleNamespace(get_type=lambda: "UNKNOWN_30")
+    monkeypatch.setattr(world.link._mav, "decode", lambda _: unknown)
+    world.says(LOOK)
+    world.link.turn(100.0)
+    assert world.heard == []
+    assert world.link.counts.damaged > 0
