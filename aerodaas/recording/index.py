@@ -117,7 +117,7 @@ def _tells_all(summary: Summary) -> bool:
     told = summary.statistics
     return (
         told is not None
-        and bool(summary.chunk_indexes)
+        and (bool(summary.chunk_indexes) or not told.message_count)
         and all(chunk.message_index_offsets for chunk in summary.chunk_indexes)
         and len(summary.chunk_indexes) == told.chunk_count
         and len(summary.channels) == told.channel_count

@@ -157,6 +157,33 @@ def test_pictures_none_of_which_can_be_decoded_are_refused(tmp_path: Path) -> No
     assert str(refused.value) == f"none of the pictures on /cam of {path} can be decoded"
 
 
+def test_a_topic_on_which_nothing_was_said_is_refused_as_well(tmp_path: Path) -> None:
+    """A camera that was there and gave no picture."""
+    path = write(tmp_path / "a.mcap")
+    with pytest.raises(SourceError, match=r"none of the pictures on /cam of .*a\.mcap can be"):
+        camera(path)
+
+
+@pytest.mark.parametrize("loop", [False, True])
+def test_of_two_cameras_only_the_one_asked_for_is_played(tmp_path: Path, *, loop: bool) -> None:
+    """The left one's pictures are bright, the right one's dark; they alternate."""
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        described = CompressedImage.get_schema()
+        schema = writer.register_schema(described.name, described.encoding, described.data)
+        channels = [writer.register_channel(name, "protobuf", schema) for name in ("/l", "/r")]
+        for second in range(4):
+            data = CompressedImage(data=jpeg(9 - 8 * (second % 2)), format="jpeg").encode()
+            writer.add_message(channels[second % 2], second * SECOND, data, second * SECOND)
+        writer.finish()
+    source = camera(path, topic="/r", loop=loop)
+    assert asked(source, 0, 1, 2) == [1, None, 1]
+    source = camera(path, topic="/l", loop=loop)
+    assert asked(source, 0, 1, 2) == [9, None, 9]
+
+
 def test_a_recording_without_pictures_says_so(tmp_path: Path) -> None:
     """With a topic asked for and without one."""
     path = tmp_path / "a.mcap"

@@ -9,7 +9,7 @@ from mcap.writer import CompressionType, Writer
 from mcap_files import END, Said, write_file
 
 from aerodaas.recording.index import load, read_index
-from aerodaas.recording.reader import Recording
+from aerodaas.recording.reader import Recording, Topic
 
 FLIGHT = [Said("/a", 1_100, 0), Said("/b", 1_200, 1), Said("/a", 1_300, 2), Said("/a", 1_400, 3)]
 
@@ -81,3 +81,18 @@ def test_a_file_with_an_index_is_opened_without_reading_its_messages(tmp_path: P
     assert [index.complete for index in found] == [True, False]
     assert [index.counts for index in found] == [{1: 100}, {1: 100}]
     assert found[0].blocks == found[1].blocks
+
+
+def test_a_topic_on_which_nothing_was_said_is_known(tmp_path: Path) -> None:
+    """It is in a closed file's index alone, with no message."""
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        writer.register_channel("/raw", "own", 0)
+        writer.finish()
+    with Recording.open(path) as recording:
+        assert recording.topics == {"/raw": Topic("/raw", "", "own", 0)}
+        assert recording.complete
+        assert (recording.duration, recording.epoch_ns) == (0.0, 0)
+        assert list(recording.records()) == []

@@ -94,12 +94,13 @@ def test_no_odometry_is_none() -> None:
 def test_part_of_an_odometry_is_none_to_rely_on(missing: str) -> None:
     """What a damaged message lacks is not made up."""
     value = dict.fromkeys(("yaw", "roll", "pitch", "yaw_rate", "position_sigma"), 1.0) | {
-        "position": {"x": 1.0, "y": 2.0, "z": 3.0},
+        "position": {"x": 1, "y": 2, "z": 3},
         "velocity": {"x": 4.0, "y": 5.0, "z": 6.0},
     }
     whole = odometry_of(value)
     assert whole is not None
     assert whole.position.tolist() == [1.0, 2.0, 3.0]
+    assert whole.position.dtype == whole.velocity.dtype == np.float64
     assert whole.velocity.tolist() == [4.0, 5.0, 6.0]
     del value[missing]
     with pytest.raises(KeyError):
