@@ -160,6 +160,17 @@ def test_a_damaged_chunk_costs_its_own_messages(
         assert recording.damaged == 1
 
 
+@pytest.mark.parametrize("finish", [True, False], ids=["closed", "cut off"])
+def test_every_damaged_chunk_is_counted(tmp_path: Path, *, finish: bool) -> None:
+    """Two of four are damaged, whether the file has its index or not."""
+    path = write_file(tmp_path / "a.mcap", FLIGHT, "small chunks", finish=finish)
+    data = path.read_bytes().replace(b'{"number": 2}', b'{"number":!2}')
+    path.write_bytes(data.replace(b'{"number": 1}', b'{"number":!1}'))
+    with Recording.open(path) as recording:
+        assert [it.value["number"] for it in recording.records()] == [0, 3]
+        assert recording.damaged == 2
+
+
 def test_damage_in_what_nobody_asks_for_is_not_looked_at(tmp_path: Path) -> None:
     """Chunks without a message of the topics wanted are left alone."""
     path = write_file(tmp_path / "a.mcap", FLIGHT, "small chunks")
