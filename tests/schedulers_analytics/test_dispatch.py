@@ -311,3 +311,70 @@ def test_every_scheduler_can_take_over_in_flight(name: str) -> None:
     ends = {result.task.id: result.outcome for result in host.results}
     assert (ends[0], ends[1]) == (Outcome.DONE, Outcome.FAILED)
     assert dispatch.running is not tasks[1]
+
+
+class _Noting(_Scripted):
+    """Notes each event with its time."""
+
+    def __init__(self, *answers: object) -> None:
+        super().__init__(*answers)
+        self.told: list[tuple[str, int]] = []
+
+    def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
+        self.told.append(("arrived", now))
+        return super().task_arrived(task, now)
+
+    def executor_idle(self, now: int) -> Iterable[Decision]:
+        self.told.append(("idle", now))
+        return ()
+
+    def timer(self, now: int) -> Iterable[Decision]:
+        self.told.append(("timer", now))
+        return ()
+
+    def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
+        self.told.append((f"finished {result.task.id}", now))
+        return ()
+
+
+def test_a_scheduler_is_told_the_time_of_each_event_and_of_idleness_only_with_work_left() -> None:
+    """Nothing is undecided until 2; the edge runs task 1 from 4 on."""
+    scheduler = _Noting(lambda t, _: SendToCloud(t), None, lambda t, _: RunOnEdge(t))
+    dispatch, host = _dispatch_of(scheduler)
+    in_cloud, waiting, on_edge = _task(0), _task(1), _task(2)
+    dispatch.arrived(in_cloud, 1)
+    dispatch.arrived(waiting, 2)
+    dispatch.timer(3)
+    dispatch.arrived(on_edge, 4)
+    dispatch.timer(5)
+    dispatch.finished(in_cloud, 6)
+    dispatch.finished(on_edge, 7)
+    assert scheduler.told == [
+        *[("arrived", 1), ("arrived", 2), ("idle", 2), ("timer", 3), ("idle", 3)],
+        *[("arrived", 4), ("timer", 5), ("finished 0", 6), ("finished 2", 7), ("idle", 7)],
+    ]
+    assert [(r.task.id, r.started, r.finished) for r in host.results] == [(0, 1, 6), (2, 4, 7)]
+
+
+def test_a_dropped_task_ran_nowhere() -> None:
+    """Neither place is to blame, and it ended when it was given up."""
+    dispatch, host = _dispatch_of(_Scripted(lambda t, _: Drop(t)))
+    dispatch.arrived(_task(0), 3)
+    (end,) = host.results
+    assert (end.outcome, end.place) == (Outcome.DROPPED, Place.NOWHERE)
+    assert (end.started, end.finished) == (3, 3)
+
+
+@pytest.mark.parametrize(("at", "place"), [(80, "cloud"), (81, "nowhere")])
+def test_an_executor_that_is_down_leaves_the_cloud_until_the_last_moment(
+    at: int, place: str
+) -> None:
+    """A task due at 100 that takes 20 there and gains half a unit may go until 80."""
+    small = Profile("m", 2.5, MODEL.deadline, MODEL.edge_time, MODEL.cloud_time, 1, 2)
+    dispatch, host = _dispatch_of(_Scripted(lambda t, _: RunOnEdge(t)))
+    dispatch.down.add("m")
+    dispatch.arrived(Task(0, small, 0, small.deadline), at * MILLISECOND)
+    if place == "cloud":
+        assert host.asked == [("cloud", 0, at * MILLISECOND)]
+    else:
+        assert [end.place for end in host.results] == [Place.NOWHERE]
