@@ -49,6 +49,21 @@ def test_the_profile_counts_for_five_observations() -> None:
     assert means == pytest.approx([200, 210, 210 + 50 / 7])
 
 
+def test_a_late_answer_is_shared_out_between_the_network_and_the_model() -> None:
+    """After 1 s the network's delay may be off by 15, a model of 200 by 10: 225 to 100 in squares.
+
+    Of 60 too many, 9/13 are the network's, for every model; a sixth of the rest is the model's.
+    """
+    beliefs = ExecutionBeliefs(shared=True)
+    other = Profile("other", 100, 1000 * MS, 200 * MS, 400 * MS, 1, 20)
+    assert beliefs.belief(M).mean == 200 * MS
+    assert beliefs.belief(other).mean == 400 * MS
+    beliefs.observe(M, 260 * MS, 1000 * MS)
+    assert beliefs.delay / MS == pytest.approx(60 * 9 / 13)
+    assert beliefs.belief(other).mean / MS == pytest.approx(400 + 60 * 9 / 13)
+    assert beliefs.belief(M).mean / MS == pytest.approx(200 + 60 * 9 / 13 + 60 * 4 / 13 / 6)
+
+
 def test_estimates_never_stop_following() -> None:
     """After a thousand of 200, one of 300 still moves the mean by 2."""
     beliefs = ExecutionBeliefs(shared=False)
