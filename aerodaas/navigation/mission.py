@@ -250,6 +250,8 @@ class Mission:
         if self._motors_stopped(state):
             return Wait()
         self._protect(state)
+        if self.state in _LEAVING and self._lost_for_good():
+            return Wait()
         turns = {
             MissionState.TAKING_OFF: self._take_off,
             MissionState.PAUSED: self._hover,
@@ -308,6 +310,16 @@ class Mission:
         self._to(MissionState.ABORTED, text)
         self._log.alert(self._now, kind, text)
         return True
+
+    def _lost_for_good(self) -> bool:
+        """Whether nothing has been heard for so long that nothing will be; ends the mission."""
+        silent = self._supervisor.silent_for(self._now)
+        lost = silent >= self.limits.return_timeout
+        if lost:
+            reason = f"the vehicle is lost: no word from it for {silent:.0f} s"
+            self._to(MissionState.ABORTED, reason)
+            self._log.alert(self._now, "vehicle_lost", reason)
+        return lost
 
     def _preflight(self, state: VehicleState, objections: Sequence[str]) -> Action:
         self._plan(state)
@@ -496,11 +508,8 @@ class Mission:
         return Fly(setpoint_towards(place, position, None, self.limits.cruise_speed))
 
     def _land(self, state: VehicleState) -> Action:
+        del state
         self._leg = None
-        waited = seconds(self._now - self._machine.since)
-        if state.mode is VehicleMode.LOST and waited > self.limits.return_timeout:
-            self._to(MissionState.ABORTED, "the vehicle is lost")
-            return Wait()
         return Land()
 
     @staticmethod

@@ -93,6 +93,10 @@ class Supervisor:
             return CALM
         return Assessment(max(findings, key=lambda finding: finding.demand), tuple(findings))
 
+    def silent_for(self, now: int) -> float:
+        """Seconds without a word from the vehicle, as last assessed; 0 while it is heard."""
+        return 0.0 if self._lost_since is None else seconds(now - self._lost_since)
+
     def objections(self, state: VehicleState) -> list[str]:
         """Reasons against taking off now that will not go away by waiting."""
         limits, fence = self._limits, self._fence

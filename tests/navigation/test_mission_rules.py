@@ -13,7 +13,7 @@ from flights import Flight, KinematicVehicle, add, flight, live, square
 from aerodaas.clock import NANOSECONDS
 from aerodaas.config import GeofenceConfig, LimitsConfig
 from aerodaas.data import Odometry
-from aerodaas.navigation.commands import ClearNavigation, ReturnHome, StreamItem
+from aerodaas.navigation.commands import ClearNavigation, Command, End, ReturnHome, StreamItem
 from aerodaas.navigation.planner import BackgroundPlanner
 from aerodaas.navigation.queue import WaypointQueue
 from aerodaas.navigation.safety import Neighbour, SetpointGuard
@@ -92,6 +92,41 @@ def test_two_short_losses_do_not_add_up(lost: str) -> None:
         setattr(one.vehicle, lost, False)
         one.run(0.5)
         one.expect(S.ENROUTE)
+
+
+@pytest.mark.parametrize("leave", [None, ReturnHome(), End()])
+def test_a_vehicle_that_is_never_heard_again_ends_the_mission(leave: Command | None) -> None:
+    """After the time of a return, whether it was on its way out, home or down; people are told."""
+    limits = LimitsConfig(return_timeout=60.0)
+    one = flight(add(Waypoint("far", 60, 0, 30.0)), limits=limits)
+    one.run(40.0)
+    if leave is not None:
+        one.tell(leave)
+    one.turn()
+    one.vehicle.lost = True
+    began = one.seconds
+    one.run(60.0)
+    one.expect(S.RETURNING if leave is None or isinstance(leave, ReturnHome) else S.LANDING)
+    one.run()
+    one.expect(S.ABORTED)
+    assert one.seconds - began == pytest.approx(60.0, abs=0.11)
+    assert one.status.reason == "the vehicle is lost: no word from it for 60 s"
+    assert alerts(one, "vehicle_lost") == [one.status.reason]
+
+
+def test_a_short_silence_late_in_a_long_descent_does_not_end_the_mission() -> None:
+    """What counts is how long nothing was heard, not for how long the drone has been landing."""
+    one = flight(add(Waypoint("high", 0, 0, 30.0)), limits=LimitsConfig(return_timeout=10.0))
+    one.run(40.0)
+    one.tell(End())
+    one.run(15.0)
+    one.expect(S.LANDING)
+    one.vehicle.lost = True
+    one.run(2.0)
+    one.expect(S.LANDING)
+    one.vehicle.lost = False
+    one.run()
+    one.expect(S.LANDED)
 
 
 def test_a_lost_link_is_not_a_lost_position() -> None:
