@@ -113,7 +113,7 @@ class LimitsConfig(_Strict):
     link_timeout: Positive = 3.0
     """Loss of the vehicle's word or of its position after which the flight is cut short."""
     return_timeout: Positive = 300.0
-    """A return that takes longer ends in a landing on the spot; a vehicle unheard so long is lost."""
+    """A return that takes longer ends in a landing there; a vehicle unheard for so long is lost."""
     endurance: Positive = 900.0
     """Seconds that a full battery hovers; the energy model's scale."""
     battery_return: Annotated[float, Field(ge=0, le=1)] = 0.25

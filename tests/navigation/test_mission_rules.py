@@ -79,6 +79,14 @@ def test_telemetry_that_stands_still_counts_as_loss() -> None:
     assert "no word from the vehicle" in one.status.reason
 
 
+def test_a_take_off_ends_within_a_tenth_of_its_height() -> None:
+    """Of 5 m, and no lower: until then nothing else is flown."""
+    one = flight(add(Waypoint("far", 40, 0, 5.0)), limits=LimitsConfig(takeoff_height=5.0))
+    one.run(until=lambda: one.mission.state is S.ENROUTE)
+    assert one.vehicle.position[2] >= 4.5
+    assert abs(one.vehicle.position[0]) < 0.1
+
+
 @pytest.mark.parametrize("lost", ["lost", "blind"])
 def test_two_short_losses_do_not_add_up(lost: str) -> None:
     """Of the link or of the position, each counts from its own beginning."""
