@@ -138,9 +138,12 @@ def test_a_refusal_is_told_at_the_next_take_off_alone(world: Handmade) -> None:
 def test_a_velocity_goes_out_as_it_is_and_the_mode_follows(world: Handmade) -> None:
     """PX4 hears 1.2 s of setpoints before it is asked to follow them."""
     world.fly()
-    for _ in range(30):
-        sent = world.vehicle.send(VelocitySetpoint(np.array([1.0, 0.5, 0.25]), 0.1))
+    asked = VelocitySetpoint(np.array([1.0, 0.5, 0.25]), 0.1)
+    sent = world.vehicle.send(asked)
+    for _ in range(29):
         world.turn()
+        sent = world.vehicle.send(asked)
+    world.turn()
     assert isinstance(sent, VelocitySetpoint)
     said = world.told(SETPOINT)
     assert len(said) == 30

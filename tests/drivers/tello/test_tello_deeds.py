@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aerodaas.clock import NANOSECONDS
+from aerodaas.clock import NANOSECONDS, LockstepClock
 from aerodaas.config import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello import vehicle as module
 from aerodaas.drivers.tello.commands import STILL, Command, Sticks
@@ -143,9 +143,16 @@ def test_before_it_is_met_nothing_is_done(monkeypatch: pytest.MonkeyPatch) -> No
     assert world.greeted[0][-1] == 103.0
 
 
+def _standing(seconds: float) -> LockstepClock:
+    """A mission clock that shows `seconds`."""
+    clock = LockstepClock()
+    clock.advance_to(round(seconds * NANOSECONDS))
+    return clock
+
+
 def test_what_is_read(world: World) -> None:
     """Its start, its charge, its clock less the age of its packet, and what its link counted."""
-    world.vehicle.use_clock(SimpleNamespace(now=lambda: 50 * NANOSECONDS))
+    world.vehicle.use_clock(_standing(50.0))
     world.advance(1.0)
     state = world.vehicle.read()
     assert state.odometry.position == pytest.approx([1.0, 2.0, 0.0])
@@ -173,7 +180,7 @@ def test_what_is_read(world: World) -> None:
 def test_silence_is_a_loss_after_a_second(world: World) -> None:
     """It is told with its age; in flight its place is carried on no further."""
     world.fly()
-    world.vehicle.use_clock(SimpleNamespace(now=lambda: 50 * NANOSECONDS))
+    world.vehicle.use_clock(_standing(50.0))
     world.speaks = False
     world.now += 1.0
     assert world.mode() is VehicleMode.HOLDING
