@@ -55,6 +55,8 @@ def test_a_battery_at_its_limit_is_beyond_it(charge: float, demand: Demand, kind
     """At 25 % the drone returns, at 12.5 % it lands; a gauge that says nothing is told of."""
     found = supervisor().assess(state(charge), 0)
     assert (found.demand, found.gravest.kind) == (demand, kind)
+    word = {"battery_low": "low", "battery_critical": "critical"}.get(kind)
+    assert word is None or found.gravest.text == f"the battery is {word} at {charge:.0%}"
 
 
 def test_the_way_home_is_kept_in_the_battery() -> None:
@@ -101,6 +103,16 @@ def test_a_link_that_is_lost_for_its_time_out_sends_the_drone_home(lost: str) ->
 def test_a_state_is_stale_after_a_second(age: float, demand: Demand) -> None:
     """One that is a second old still tells where the drone is."""
     assert supervisor().assess(state(stamp=10 - age), 10 * NANOSECONDS).demand is demand
+
+
+def test_a_silence_is_counted_from_its_beginning() -> None:
+    """Nothing while the vehicle is heard, whatever was before."""
+    watching = supervisor()
+    assert watching.silent_for(9 * NANOSECONDS) == 0.0
+    watching.assess(state(mode=VehicleMode.LOST), 10 * NANOSECONDS)
+    assert watching.silent_for(14 * NANOSECONDS) == 4.0
+    watching.assess(state(stamp=15.0), 15 * NANOSECONDS)
+    assert watching.silent_for(16 * NANOSECONDS) == 0.0
 
 
 def test_a_position_that_is_gone_for_its_time_out_lands_the_drone() -> None:
@@ -184,13 +196,15 @@ def test_a_take_off_is_refused_for_what_waiting_does_not_mend(
     assert objection is None or objection in reasons[0]
 
 
-@pytest.mark.parametrize(("ceiling", "floor", "ready"), [(3, 0, True), (2.9, 0, False)])
+@pytest.mark.parametrize(
+    ("ceiling", "floor", "ready"), [(3, 0, True), (2.9, 0, False), (50, 3, True), (50, 3.1, False)]
+)
 def test_the_height_of_a_take_off_is_within_the_fence(
     ceiling: float,
     floor: float,
     ready: bool,  # noqa: FBT001
 ) -> None:
-    """3 m under a ceiling of 3 m, and no higher."""
+    """3 m are under a ceiling and over a floor of 3 m, and no farther."""
     limits = replace_limits(takeoff_height=3.0)
     fence = Geofence(GeofenceConfig(ceiling=ceiling, floor=floor))
     meter = EnergyMeter(EnergyModel(limits.endurance, np.zeros(3)))
