@@ -149,6 +149,69 @@ def test_without_a_position_the_drone_does_not_move() -> None:
     lost = at(math.nan, 0.0, 0.0)
     clamped = guard.clamp(VelocitySetpoint(np.array([1.0, 0, 0])), lost, 0.05)
     assert clamped.clipped_by == ("no_position",)
+    assert isinstance(clamped.setpoint, VelocitySetpoint)
+    assert clamped.setpoint.velocity.tolist() == [0.0, 0.0, 0.0]
+    somewhere = guard.clamp(PositionSetpoint(np.zeros(3)), lost, 0.05)
+    assert somewhere.clipped_by == ("no_position",)
+    assert isinstance(somewhere.setpoint, VelocitySetpoint)
+    assert somewhere.setpoint.velocity.tolist() == [0.0, 0.0, 0.0]
+    standing = guard.clamp(VelocitySetpoint(np.zeros(3), 0.3), lost, 0.05)
+    assert standing.clipped_by == ()
+
+
+WIDE = LimitsConfig(max_speed=4.0, max_climb=1.5, max_range=1000.0, max_yaw_rate=60.0)
+
+
+@pytest.mark.parametrize(
+    ("place", "speed", "names"),
+    [
+        ((50.0, 0.0, 5.0), 3.0, ()),
+        ((50.0, 0.0, 5.0), 5.0, ("max_speed",)),
+        ((0.0, 0.0, 50.0), 3.0, ("max_climb",)),
+        ((0.0, 2000.0, 5.0), 3.0, ("max_range",)),
+        ((0.0, 0.0, 200.0), 1.0, ("geofence",)),
+    ],
+)
+def test_what_is_changed_of_a_place_is_named(
+    place: tuple[float, float, float], speed: float, names: tuple[str, ...]
+) -> None:
+    """By the limit that changed it, of range, height or speed."""
+    guard = SetpointGuard(WIDE, np.zeros(3))
+    clamped = guard.clamp(PositionSetpoint(np.array(place), None, speed), at(0, 0, 5.0), 0.05)
+    assert clamped.clipped_by == names
+    assert isinstance(clamped.setpoint, PositionSetpoint)
+
+
+@pytest.mark.parametrize(
+    ("asked", "sent"), [(0.5, 0.5), (-0.5, -0.5), (2.0, 1.047), (-2.0, -1.047)]
+)
+def test_a_turn_is_passed_on_up_to_its_limit(asked: float, sent: float) -> None:
+    """60 degrees a second, either way, while the drone flies on."""
+    guard = SetpointGuard(WIDE, np.zeros(3))
+    clamped = guard.clamp(VelocitySetpoint(np.array([1.0, 0, 0]), asked), at(0, 0, 5.0), 10.0)
+    assert isinstance(clamped.setpoint, VelocitySetpoint)
+    assert clamped.setpoint.yaw_rate == pytest.approx(sent, abs=1e-3)
+    assert clamped.setpoint.velocity == pytest.approx([1.0, 0.0, 0.0])
+    assert clamped.clipped_by == (("max_yaw_rate",) if asked != sent else ())
+
+
+@pytest.mark.parametrize(
+    ("separation", "other", "free"),
+    [(0.5, 0.4, False), (0.5, 40.0, True), (0.0, 0.4, True), (0.5, 0.0, True)],
+)
+def test_a_neighbour_within_the_separation_is_not_come_nearer(
+    separation: float,
+    other: float,
+    free: bool,  # noqa: FBT001
+) -> None:
+    """Half a metre counts as well as three; none at all, or the very same place, bounds nothing."""
+    limits = WIDE.model_copy(update={"separation": separation})
+    guard = SetpointGuard(limits, np.zeros(3))
+    near = Neighbour(np.array([other, 0.0, 5.0]), np.zeros(3))
+    clamped = guard.clamp(VelocitySetpoint(np.array([1.0, 0, 0])), at(0, 0, 5.0), 10.0, [near])
+    assert isinstance(clamped.setpoint, VelocitySetpoint)
+    assert clamped.setpoint.velocity[0] == pytest.approx(1.0 if free else 0.0)
+    assert clamped.clipped_by == (() if free else ("separation",))
 
 
 def test_two_drones_keep_their_distance() -> None:
