@@ -75,10 +75,17 @@ class MissionStatus:
     """What the safety layer complains about at present."""
 
     @property
+    def waypoint_counts(self) -> tuple[int, int]:
+        """How many waypoints were visited, and how many are known; one visited twice is one."""
+        visited = set(self.visited)
+        ahead = {waypoint.id for waypoint in (self.target, *self.pending) if waypoint is not None}
+        return len(visited), len(visited | ahead)
+
+    @property
     def progress(self) -> float:
         """Share of the known waypoints that have been visited, 0 to 1."""
-        known = len(self.visited) + len(self.pending) + (self.target is not None)
-        return len(self.visited) / known if known else 0.0
+        visited, known = self.waypoint_counts
+        return visited / known if known else 0.0
 
 
 class Heard(NamedTuple):

@@ -151,13 +151,14 @@ def _say(context: typer.Context, command: str, done: str) -> None:
 
 
 def _line(status: dict[str, Any]) -> str:
-    visited, ahead = len(status["visited"]), len(status["pending"]) + bool(status["target"])
+    visited = set(status["visited"])
+    known = visited.union(status["pending"], [status["target"]] if status["target"] else [])
     parts = [f"{status['time']:7.1f} s", status["state"]]
     if status["position"] is not None:
         east, north, up = ("?" if axis is None else f"{axis:.1f}" for axis in status["position"])
         parts.append(f"E {east}  N {north}  up {up} m")
     if status["battery"] is not None:
         parts.append(f"battery {status['battery']:.0%}")
-    if visited + ahead:
-        parts.append(f"{visited} of {visited + ahead} waypoints")
+    if known:
+        parts.append(f"{len(visited)} of {len(known)} waypoints")
     return "  ".join([*parts, *(text for text in (status["reason"], *status["faults"]) if text)])

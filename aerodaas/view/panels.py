@@ -55,13 +55,8 @@ def place_text(vehicle: VehicleState) -> str:
 
 def waypoints_text(mission: MissionStatus) -> tuple[float, str]:
     """Share of the waypoints visited, 0 to 1, and the same in words."""
-    visited, ahead = len(mission.visited), len(mission.pending)
-    if mission.target is not None and mission.target.id not in mission.visited:
-        ahead += 1
-    known = visited + ahead
-    if not known:
-        return 0.0, "no waypoints"
-    return visited / known, f"{visited} of {known} waypoints"
+    visited, known = mission.waypoint_counts
+    return mission.progress, f"{visited} of {known} waypoints" if known else "no waypoints"
 
 
 def robot_panel(

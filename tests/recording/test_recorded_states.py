@@ -13,9 +13,11 @@ from aerodaas.config import RecordingConfig
 from aerodaas.data import Battery, GpsFix, Header, Odometry
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.recording.report import read_report
 from aerodaas.recording.states import odometry_of, vehicle_states
-from aerodaas.status import Message
+from aerodaas.status import Message, MissionState, MissionStatus
 from aerodaas.vehicle import FlightEnd, VehicleMode, VehicleState
+from aerodaas.waypoints import Waypoint
 
 ODOMETRY = Odometry(np.array([1, 2, 3.5]), np.array([-0.1, 0.2, 1 / 3]), 0.1, 0.2, 0.3, 0.4, 0.5)
 TRUTH = Odometry(np.array([1.5, 2.5, 3.0]), np.zeros(3), -1.0, 0.0, 0.1, -0.2)
@@ -105,3 +107,20 @@ def test_part_of_an_odometry_is_none_to_rely_on(missing: str) -> None:
     del value[missing]
     with pytest.raises(KeyError):
         odometry_of(value)
+
+
+def test_a_report_counts_a_waypoint_once(tmp_path: Path) -> None:
+    """One that an application sends again after it was visited is visited again, and is one."""
+    late = Waypoint("late", 1, 1, 2)
+    statuses = [
+        MissionStatus(0, MissionState.ENROUTE, "", late, (Waypoint("a", 2, 2, 2),)),
+        MissionStatus(1, MissionState.ENROUTE, "", late, (), ("late",)),
+        MissionStatus(2, MissionState.LANDED, "", None, (), ("late", "late")),
+    ]
+    path = tmp_path / "a.mcap"
+    with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
+        for seq, status in enumerate(statuses):
+            header = Header(seq, status.stamp, "a/@mission")
+            recorder.write(Message("a/@mission", seq, status.stamp, header, 0, (), status))
+    robot = read_report(path).summary.robots["a"]
+    assert (robot.waypoints_visited, robot.waypoints_planned) == (1, 2)

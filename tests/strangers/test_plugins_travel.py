@@ -9,6 +9,8 @@ from typing import Any
 import pytest
 from stranger import CAMERA, ENVIRONMENT, FLY, HEAD, Flown, fly, write
 
+pytestmark = pytest.mark.slow
+
 APPLICATION = """
 import importlib
 import sys
@@ -201,8 +203,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from .results import Shade
-
-pytestmark = pytest.mark.slow
 
 if TYPE_CHECKING:
     from .app import main

@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 from stranger import COMMAND, FLY, HEAD, Flown, fly, run, write
 
+pytestmark = pytest.mark.slow
+
 BAD = """
 import threading
 
@@ -131,7 +133,6 @@ Global().deploy(edge).analyse(camera)
 CONDITION = """
 import threading
 
-pytestmark = pytest.mark.slow
 lock = threading.Lock()
 class Fine(Analytics[float]):
     pass
