@@ -9,12 +9,12 @@ fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
 
 # One worker for each of two cores, with a Ray of its own. Slow tests run where CI is set, as
-# continuous integration does; those that go by the wall clock one after the other, for flights in
-# real time need the machine. There one that met a busy machine is run once more, named, and counted
-# as a rerun.
+# continuous integration does; those that go by the wall clock afterwards, in two halves that leave
+# each other time (tests/conftest.py). There one that met a busy machine is run once more, named, and
+# counted as a rerun.
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --numprocesses 2 -m "$(if $(CI),not (slow and wall_clock),not slow)"
-	$(if $(CI),$(BIN)/python -m pytest -m "slow and wall_clock")
+	$(if $(CI),$(BIN)/python -m pytest --numprocesses 2 --dist=loadgroup -m "slow and wall_clock")
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -25,11 +25,13 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:  # noqa: ANN401
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object | None:  # noqa: ANN401
     """A file is one worker's, so that its fixtures are made once; so are all of tests/cluster.
 
-    Those make network namespaces with the same addresses.
+    Those make network namespaces with the same addresses. With `--dist=loadgroup`, its own goes.
     """
+    if config.getoption("dist") != "loadfile":
+        return None
     from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415 - not every run has workers
 
     scheduler = LoadScopeScheduling(config, log)
@@ -41,6 +43,18 @@ def _worker_share(nodeid: str) -> str:
     """What goes to one worker together with this test."""
     file = nodeid.partition("::")[0]
     return "tests/cluster" if file.startswith("tests/cluster/") else file
+
+
+def pytest_itemcollected(item: pytest.Item) -> None:
+    """Put a test into one of two halves that may run at once without keeping each other waiting.
+
+    Emulated vehicles fly in real time and take a tenth of a core; what starts many processes or
+    runs models goes one after the other, last of all the flights that need the whole machine.
+    """
+    file = item.nodeid.partition("::")[0]
+    light = file.startswith(("tests/drivers/", "tests/testing/", "tests/missions/"))
+    vehicles = light and not file.endswith("_applications.py")
+    item.add_marker(pytest.mark.xdist_group("vehicles" if vehicles else "machines"))
 
 
 @pytest.hookimpl(trylast=True)
