@@ -115,7 +115,7 @@ def test_a_tenth_of_the_bandwidth_and_400_ms_more(watched: Watched) -> None:
 
 
 def test_a_link_too_slow_for_any_frame(watched: Watched) -> None:
-    """What must be late is not sent: at 80 kbit/s a frame takes 2 s as JPEG; its deadline is 0.9 s."""
+    """What must be late is not sent: a JPEG takes 2 s at 80 kbit/s, and its deadline is 0.9 s."""
     with watched.flying():
         watched.broke()
         on_clouds(watched.cluster, lambda name: watched.cluster.shape(name, Shape(0.04, 8e4)))
