@@ -14,11 +14,12 @@ fly: $(VENV)/.installed
 # counted as a rerun.
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest --numprocesses 2 -m "$(if $(CI),not (slow and wall_clock),not slow)"
-	$(if $(CI),$(BIN)/python -m pytest --numprocesses 2 --dist=loadgroup -m "slow and wall_clock")
+	$(if $(CI),$(BIN)/python -m pytest --numprocesses 2 -m "slow and wall_clock")
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+	$(BIN)/lint-imports --no-logo
 	$(BIN)/mypy
 	$(BIN)/pyright
 

@@ -1,4 +1,4 @@
-"""The analytics' actor: runs one or several analyses, each in a thread with an inbox of its own.
+"""The analytics' actor: runs one or several analyses, each in a thread of its own.
 
 Light analyses share an actor, for an actor costs 70 MB; one that is `isolated`, such as a
 neural network, has its own.
@@ -14,19 +14,19 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Any
 
-from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount, failure_line
-from aerodaas.actors._link import StreamLink
-from aerodaas.actors._names import ACKS
-from aerodaas.actors._triggers import Triggers, TriggerSpec
-from aerodaas.actors.replayed import RecordedWork
+from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount, failure_line
+from aerodaas.actors.drone.mission_link import StreamLink
+from aerodaas.actors.run.replayed import RecordedWork
 from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
-from aerodaas.actors.streams import Outlet
+from aerodaas.actors.stream_names import ACKS
+from aerodaas.actors.streams import Publisher
+from aerodaas.actors.triggers import Triggers, TriggerSpec
 from aerodaas.analytics.base import Analytics, ComputeKind
 from aerodaas.analytics.commanding import CommandingAnalytics
-from aerodaas.clock import host_time_ns
-from aerodaas.data import Alert, Header
-from aerodaas.status import Message
-from aerodaas.vehicle import VehicleState
+from aerodaas.types.clock import host_time_ns
+from aerodaas.types.data import Alert, Header
+from aerodaas.types.status import Message
+from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["AnalyticsActor", "NodeSpec", "TriggerSpec", "Wake"]
 
@@ -86,15 +86,15 @@ class AnalyticsActor(StreamActor):
     def join(self, *nodes: NodeSpec) -> ActorInfo:
         """Run further analyses in flight; raises what their `open` raises, and runs none then."""
         fresh = [_Worker(self, node) for node in nodes]
-        before = set(self.outlets)
+        before = set(self.publishers)
         try:
             for worker in fresh:
                 worker.open()
         except BaseException:
             for worker in fresh:
                 worker.close()
-            for stream in set(self.outlets) - before:
-                self.outlets.pop(stream).close()
+            for stream in set(self.publishers) - before:
+                self.publishers.pop(stream).close()
             raise
         self._workers += fresh
         for worker in fresh:
@@ -135,8 +135,8 @@ class AnalyticsActor(StreamActor):
     def deliver(self, stream: str, data: bytes) -> None:
         """Take a message from another node for every analysis that reads it."""
         for worker in self._workers:
-            if stream in worker.inbox.received:
-                worker.inbox.deliver(stream, data)
+            if stream in worker.subscriber.received:
+                worker.subscriber.deliver(stream, data)
 
     def stop(self) -> Any:  # noqa: ANN401 - the base's report
         """Finish what is under way, close everything, and report for the last time."""
@@ -153,7 +153,7 @@ class AnalyticsActor(StreamActor):
         """What each analysis received and dropped of its inputs, as `stream>analysis`."""
         return {
             f"{stream}>{worker.node.stream}": StreamCount(
-                worker.inbox.received[stream], worker.inbox.dropped[stream]
+                worker.subscriber.received[stream], worker.subscriber.dropped[stream]
             )
             for worker in self._workers
             if worker.opened
@@ -203,10 +203,10 @@ class _Worker:
     def open(self) -> None:
         session = self._actor.session
         name = type(self.node.work).__name__
-        self.inbox = self._actor.reader(f"analytics/{self.node.stream}", self.depths, name)
-        self._results = self._actor.outlet(self.node.stream, f"{name}'s result")
-        self._triggers = Triggers(self.node.triggers, self._actor.outlet)
-        self._acks: Outlet | None = None
+        self.subscriber = self._actor.reader(f"analytics/{self.node.stream}", self.depths, name)
+        self._results = self._actor.publisher(self.node.stream, f"{name}'s result")
+        self._triggers = Triggers(self.node.triggers, self._actor.publisher)
+        self._acks: Publisher | None = None
         if session.lockstep:
             self.acknowledge(wanted=self.node.acknowledges)
         if self._link is not None:
@@ -217,8 +217,8 @@ class _Worker:
     def acknowledge(self, *, wanted: bool) -> None:
         """Say, or say no longer, when an item has been worked through."""
         stream = f"{ACKS}/{self.node.stream}"
-        known = self._actor.outlets.get(stream)
-        self._acks = (known or self._actor.outlet(stream)) if wanted else None
+        known = self._actor.publishers.get(stream)
+        self._acks = (known or self._actor.publisher(stream)) if wanted else None
 
     def run(self) -> None:
         self._begin()
@@ -272,10 +272,10 @@ class _Worker:
 
     def _receive(self, timeout: float) -> list[Message[Any]]:
         """Take note of what has arrived, and return it."""
-        messages = self.inbox.receive(timeout)
+        messages = self.subscriber.receive(timeout)
         if messages and self._actor.session.lockstep:
             # A state is published before what was measured in it, but may arrive in between.
-            messages += self.inbox.receive(0.0)
+            messages += self.subscriber.receive(0.0)
         for message in messages:
             self._actor.follow(message.stamp)
             if self._link is not None:
@@ -344,13 +344,13 @@ class _Worker:
 
     def wake(self) -> None:
         if self.opened:
-            self.inbox.wake()
+            self.subscriber.wake()
 
     def close(self) -> None:
         if self.opened:
             with contextlib.suppress(Exception):
                 self.node.work.close()
-            self.inbox.close()
+            self.subscriber.close()
 
     @property
     def kind(self) -> ComputeKind:

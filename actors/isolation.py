@@ -20,9 +20,9 @@ from typing import Any, cast
 import ray
 from ray.exceptions import GetTimeoutError, RayError
 
-from aerodaas.actors.cluster import Place, nodes_at, pinned
-from aerodaas.config import RuntimeEnvConfig
-from aerodaas.errors import ConfigError
+from aerodaas.actors.cluster.ray_cluster import Placement, nodes_at, pinned
+from aerodaas.config.model import RuntimeEnvConfig
+from aerodaas.types.errors import ConfigError
 
 __all__ = ["isolation_options"]
 
@@ -39,7 +39,7 @@ class _Installed:
     problem: str = ""
 
 
-def isolation_options(env: RuntimeEnvConfig | None, place: Place, name: str) -> dict[str, Any]:
+def isolation_options(env: RuntimeEnvConfig | None, place: Placement, name: str) -> dict[str, Any]:
     """Ray's options for the process of the analysis `name`, once everything is in its place.
 
     Raises ConfigError, with the node's own words, where a node cannot provide it.
@@ -64,7 +64,12 @@ def isolation_options(env: RuntimeEnvConfig | None, place: Place, name: str) -> 
     return {"runtime_env": runtime_env} if runtime_env else {}
 
 
-def _ask_all(place: Place, name: str, question: Any, about: Iterable[str]) -> list[tuple[str, ...]]:  # noqa: ANN401
+def _ask_all(
+    place: Placement,
+    name: str,
+    question: Any,  # noqa: ANN401
+    about: Iterable[str],
+) -> list[tuple[str, ...]]:
     """Put a question to every node where the analysis may run; raises ConfigError."""
     ask: Any = ray.remote(question)
     answers = {}

@@ -8,19 +8,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from aerodaas.actors._base import StreamActor
-from aerodaas.actors._names import ACKS, vitals_stream
+from aerodaas.actors.base import StreamActor
 from aerodaas.actors.session import Session
-from aerodaas.clock import host_time_ns
-from aerodaas.data import Header
-from aerodaas.errors import RecordingError
-from aerodaas.geometry import GeodeticOrigin
+from aerodaas.actors.stream_names import ACKS, vitals_stream
 from aerodaas.recording.provenance import Provenance
-from aerodaas.status import Message
-from aerodaas.vitals import Vitals
+from aerodaas.types.clock import host_time_ns
+from aerodaas.types.data import Header
+from aerodaas.types.errors import RecordingError
+from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.status import Message
+from aerodaas.types.vitals import Vitals
 
 if TYPE_CHECKING:
-    from aerodaas.recording.camera_page import CameraPage
+    from aerodaas.recording.report.camera_page import CameraPage
 
 __all__ = ["RecorderActor"]
 
@@ -73,7 +73,7 @@ class RecorderActor(StreamActor):
             fences={robot.id: robot.limits.geofence for robot in environment.robots},
             live=self._live,
         )
-        self._acks = self.outlet(f"{ACKS}/recorder") if self.session.lockstep else None
+        self._acks = self.publisher(f"{ACKS}/recorder") if self.session.lockstep else None
 
     def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
         """Tell the people who watch, and write it down at once: nobody else reads our alerts."""
@@ -96,9 +96,9 @@ class RecorderActor(StreamActor):
             self._write(message)
 
     def _run(self) -> None:
-        assert self.inbox is not None  # noqa: S101 - prepare came first
+        assert self.subscriber is not None  # noqa: S101 - prepare came first
         while True:
-            messages = deque(self.inbox.receive(0.2))
+            messages = deque(self.subscriber.receive(0.2))
             if self.stopping and not messages:
                 return
             done = tuple((one.header.source, one.header.stamp) for one in messages)
@@ -127,8 +127,8 @@ class RecorderActor(StreamActor):
 
     def _note_drops(self) -> None:
         """Record what was lost on its way here as it happens: the run may be killed."""
-        assert self.inbox is not None  # noqa: S101 - prepare came first
-        for stream, dropped in self.inbox.dropped.items():
+        assert self.subscriber is not None  # noqa: S101 - prepare came first
+        for stream, dropped in self.subscriber.dropped.items():
             if dropped > self._lost[stream]:
                 self._recorder.drops(stream, dropped - self._lost[stream])
                 self._lost[stream] = dropped
@@ -157,6 +157,6 @@ def _camera_page(address: str | None) -> CameraPage | None:
     if address is None:
         return None
     # The web server takes its time to load, and memory, which only who watches should pay.
-    from aerodaas.recording.camera_page import CameraPage  # noqa: PLC0415
+    from aerodaas.recording.report.camera_page import CameraPage  # noqa: PLC0415
 
     return CameraPage(address)

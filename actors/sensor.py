@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerodaas.actors._base import ActorInfo, StreamActor, StreamCount
-from aerodaas.actors._names import end_stream
+from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount
 from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
+from aerodaas.actors.stream_names import end_stream
 from aerodaas.cameras.base import Camera, Picture
-from aerodaas.clock import host_time_ns
-from aerodaas.config import SensorConfig
-from aerodaas.data import Frame, Header
-from aerodaas.navigation.commands import End
-from aerodaas.plugins import load_plugin
-from aerodaas.status import Message
-from aerodaas.vehicle import VehicleState
+from aerodaas.config.model import SensorConfig
+from aerodaas.config.plugins import load_plugin
+from aerodaas.mission.commands import End
+from aerodaas.types.clock import host_time_ns
+from aerodaas.types.data import Frame, Header
+from aerodaas.types.status import Message
+from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["SensorActor"]
 
@@ -48,14 +48,14 @@ class SensorActor(StreamActor):
         plugin = load_plugin("cameras", environment.camera_driver(self._sensor))
         self._camera: Camera = plugin(self._sensor, environment)
         self._camera.open()
-        self._frames = self.outlet(self._stream)
-        self._commands = self.outlet(end_stream(self._stream))
+        self._frames = self.publisher(self._stream)
+        self._commands = self.publisher(end_stream(self._stream))
 
     def _run(self) -> None:
-        assert self.inbox is not None  # noqa: S101 - prepare came first
+        assert self.subscriber is not None  # noqa: S101 - prepare came first
         if self.session.lockstep:
             while not self.stopping:
-                for message in self.inbox.receive(0.5):
+                for message in self.subscriber.receive(0.5):
                     self._take(message)
                     if self.session.is_due(self._stream, self._sensor.rate, message.stamp):
                         self._capture(message.stamp, lockstep=True)
@@ -63,7 +63,7 @@ class SensorActor(StreamActor):
         due = next_due(self._sensor.rate, self.clock.now())
         while not self.stopping:
             self.clock.sleep_until(due)
-            for message in self.inbox.receive(0.0):
+            for message in self.subscriber.receive(0.0):
                 self._take(message)
             now = self.clock.now()
             self._capture(now, lockstep=False)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import uuid
 from dataclasses import dataclass, field, replace
 
-from aerodaas.actors.application import Application
-from aerodaas.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
-from aerodaas.config import EnvironmentConfig
-from aerodaas.recording.pace import Pace, later
+from aerodaas.actors.run.application import Application
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.recording.replay.timeline import ReplayTimeline, later
+from aerodaas.types.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
 
 __all__ = [
     "CONTROL_PERIOD_NS",
@@ -40,19 +40,19 @@ class Session:
     """Prefix of the run's stream names; unique on a host."""
     origin_ns: int = field(default_factory=host_time_ns)
     """Host time at which mission time is zero."""
-    pace: Pace = field(default_factory=Pace)
+    replay_timeline: ReplayTimeline = field(default_factory=ReplayTimeline)
     """In a replay, what the recorded flight did when."""
     application: Application = field(default_factory=Application)
     """What the application's own files define."""
 
     def next_due(self, source: str, rate: float, after: int) -> int:
         """The first stamp later than `after` at which `source`, of `rate` Hz, is due."""
-        stamps = self.pace.readings.get(source)
+        stamps = self.replay_timeline.readings.get(source)
         return next_due(rate, after) if stamps is None else later(stamps, after)
 
     def next_turn(self, robot: str, after: int) -> int:
         """The first stamp later than `after` at which the setpoint loop of `robot` turns."""
-        turns = self.pace.turns.get(robot)
+        turns = self.replay_timeline.turns.get(robot)
         return next_due(CONTROL_RATE, after) if turns is None else later(turns, after)
 
     def is_due(self, source: str, rate: float, stamp: int) -> bool:

@@ -1,105 +1,43 @@
 from .analytics.base import Analytics as Analytics
 from .analytics.base import NavigableAnalytics as NavigableAnalytics
-from .analytics.monitoring import MonitoringAnalytics as MonitoringAnalytics
-from .data import (
-    AeroData as AeroData,
-)
-from .data import (
-    AeroListData as AeroListData,
-)
-from .data import (
-    Alert as Alert,
-)
-from .data import (
-    Battery as Battery,
-)
-from .data import (
-    Bbox as Bbox,
-)
-from .data import (
-    Detection as Detection,
-)
-from .data import (
-    Detections as Detections,
-)
-from .data import (
-    Frame as Frame,
-)
-from .data import (
-    GpsFix as GpsFix,
-)
-from .data import (
-    Header as Header,
-)
-from .data import (
-    Image as Image,
-)
-from .data import (
-    Odom as Odom,
-)
-from .data import (
-    Odometry as Odometry,
-)
-from .environment import Environment as Environment
-from .environment import Robot as Robot
-from .errors import AeroDaaSError as AeroDaaSError
-from .graph import AeroStreamData as AeroStreamData
-from .interfaces import (
-    IAeroData as IAeroData,
-)
-from .interfaces import (
-    IAnalyse as IAnalyse,
-)
-from .interfaces import (
-    ICompute as ICompute,
-)
-from .interfaces import (
-    IDeployable as IDeployable,
-)
-from .interfaces import (
-    IEnvironment as IEnvironment,
-)
-from .interfaces import (
-    INavigableAnalyse as INavigableAnalyse,
-)
-from .interfaces import (
-    INavigate as INavigate,
-)
-from .interfaces import (
-    IPullSensor as IPullSensor,
-)
-from .interfaces import (
-    IPushSensor as IPushSensor,
-)
-from .interfaces import (
-    IRobot as IRobot,
-)
-from .interfaces import (
-    ISensor as ISensor,
-)
-from .schedulers.waypoint.base import TrajectoryScheduler as TrajectoryScheduler
-from .schedulers.waypoint.nearest_neighbor import (
+from .analytics.monitoring.analytics import MonitoringAnalytics as MonitoringAnalytics
+from .dataflow.containers import AeroData as AeroData
+from .dataflow.containers import AeroListData as AeroListData
+from .dataflow.graph import AeroStreamData as AeroStreamData
+from .dataflow.interfaces import IAeroData as IAeroData
+from .dataflow.interfaces import IAnalyse as IAnalyse
+from .dataflow.interfaces import ICompute as ICompute
+from .dataflow.interfaces import IDeployable as IDeployable
+from .dataflow.interfaces import IEnvironment as IEnvironment
+from .dataflow.interfaces import INavigableAnalyse as INavigableAnalyse
+from .dataflow.interfaces import INavigate as INavigate
+from .dataflow.interfaces import IPullSensor as IPullSensor
+from .dataflow.interfaces import IPushSensor as IPushSensor
+from .dataflow.interfaces import IRobot as IRobot
+from .dataflow.interfaces import ISensor as ISensor
+from .dataflow.navigation import AeroNavigation as AeroNavigation
+from .dataflow.navigation import PriorityQueue as PriorityQueue
+from .environment.environment import Environment as Environment
+from .environment.environment import Robot as Robot
+from .schedulers.trajectory.base import TrajectoryScheduler as TrajectoryScheduler
+from .schedulers.trajectory.nearest_neighbor import (
     NearestNeighborScheduler as NearestNeighborScheduler,
 )
-from .schedulers.waypoint.ordered import OrderedScheduler as OrderedScheduler
-from .waypoints import (
-    AeroNavigation as AeroNavigation,
-)
-from .waypoints import (
-    NavigationType as NavigationType,
-)
-from .waypoints import (
-    PriorityQueue as PriorityQueue,
-)
-from .waypoints import (
-    SchedulingType as SchedulingType,
-)
-from .waypoints import (
-    VelocityCommand as VelocityCommand,
-)
-from .waypoints import (
-    Waypoint as Waypoint,
-)
-from .waypoints import (
-    WaypointType as WaypointType,
-)
+from .schedulers.trajectory.ordered import OrderedScheduler as OrderedScheduler
+from .types.data import Alert as Alert
+from .types.data import Battery as Battery
+from .types.data import Bbox as Bbox
+from .types.data import Detection as Detection
+from .types.data import Detections as Detections
+from .types.data import Frame as Frame
+from .types.data import GpsFix as GpsFix
+from .types.data import Header as Header
+from .types.data import Image as Image
+from .types.data import Odom as Odom
+from .types.data import Odometry as Odometry
+from .types.errors import AeroDaaSError as AeroDaaSError
+from .types.waypoints import NavigationType as NavigationType
+from .types.waypoints import SchedulingType as SchedulingType
+from .types.waypoints import VelocityCommand as VelocityCommand
+from .types.waypoints import Waypoint as Waypoint
+from .types.waypoints import WaypointType as WaypointType

@@ -1,5 +1,5 @@
 """`python -m aerodaas` is the command line."""
 
-from aerodaas.cli import main
+from aerodaas.cli.app import main
 
 main()

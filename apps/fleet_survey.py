@@ -3,8 +3,8 @@
 import numpy as np
 
 from aerodaas import AeroNavigation, Environment, Waypoint
-from aerodaas.schedulers.waypoint.base import Situation
-from aerodaas.schedulers.waypoint.fleet import share_out
+from aerodaas.schedulers.trajectory.base import PlanningContext
+from aerodaas.schedulers.trajectory.fleet import share_out
 
 
 def main() -> None:
@@ -15,7 +15,7 @@ def main() -> None:
     field = [Waypoint(f"{x},{y}", x, y, 3, waypoint_type="local") for x, y in places]
 
     starts = {drone.robot_id: np.array(drone.config.start) for drone in drones}
-    fleet = {name: Situation(0.0, start, start) for name, start in starts.items()}
+    fleet = {name: PlanningContext(0.0, start, start) for name, start in starts.items()}
     shares = share_out(field, fleet, objective="time")
     for drone in drones:
         drone.navigate(AeroNavigation(data=shares[drone.robot_id]))

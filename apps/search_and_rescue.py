@@ -4,7 +4,7 @@ from math import dist
 
 from aerodaas import AeroNavigation, Environment, MonitoringAnalytics, Waypoint
 from aerodaas.analytics import VipDetectionAnalytics, VipFollowAnalytics
-from aerodaas.data import Readings
+from aerodaas.types.data import Readings
 
 SAFE, NEAR = (57, 6), 3
 

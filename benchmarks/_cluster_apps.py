@@ -24,9 +24,9 @@ from aerodaas import (
 )
 from aerodaas.analytics.base import Context
 from aerodaas.cameras.base import Picture
-from aerodaas.config import EnvironmentConfig, SensorConfig
-from aerodaas.geometry import CameraModel
-from aerodaas.options import RunOptions, current_options
+from aerodaas.config.model import EnvironmentConfig, SensorConfig
+from aerodaas.config.options import RunOptions, current_options
+from aerodaas.types.geometry import CameraModel
 
 __all__ = ["NoiseCamera", "Steer", "Work", "environment", "flying", "hover"]
 

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from _cluster_apps import Work, environment, flying, hover
 
-from aerodaas.cluster import EdgeCloud, Shape
-from aerodaas.recording.flight import Flight
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
-from aerodaas.run import Run
+from aerodaas.recording.report.flight import RecordedFlight
+from tools.namespaces import EdgeCloud, Shape
 
 __all__ = ["Recovery", "measure_recoveries"]
 
@@ -61,7 +61,7 @@ def measure_recoveries(cluster: EdgeCloud, folder: Path, plain: Shape) -> list[R
             time.sleep(_SETTLE)
     assert run.recording is not None  # noqa: S101 - asked for
     with Recording.open(run.recording) as recording:
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     return [_recovery(flight, what, at) for what, at in moments]
 
 
@@ -100,7 +100,7 @@ def _failures(
     ]
 
 
-def _recovery(flight: Flight, what: str, at: float) -> Recovery:
+def _recovery(flight: RecordedFlight, what: str, at: float) -> Recovery:
     seen = [one for one in flight.outcomes if at < one.time < at + _LOOK]
     done = [one.time for one in seen if one.action == "done"]
     states = flight.robots["drone0"].time

@@ -20,12 +20,6 @@ KILLED = frozenset({1, 3, 36, -24, 24, 152, 255, -9, -11})
 """Exit codes of pytest and mutmut for a failed test, a timeout and a crash."""
 UNTESTED = 33
 """mutmut's own code for a mutant that no test reaches."""
-RENAMED = {
-    "schedulers/analytics": "schedulers_analytics",
-    "schedulers/waypoint": "schedulers",
-    "schedulers/lab": "lab",
-}
-"""Folders of tests which are not called as the folder that they test."""
 _NOT_COPIED = shutil.ignore_patterns(
     ".git", ".venv*", "__pycache__", "*.pyc", ".*_cache", ".hypothesis", "runs", "shared", "mutants"
 )
@@ -113,10 +107,10 @@ def package_path(root: Path, source: Path) -> Path:
 
 
 def matching_tests(root: Path, module: Path) -> list[str]:
-    """Test files in the folder that mirrors the module's, and those that import it by name."""
+    """Test files in the nearest folder that mirrors the module's, and those that import it."""
     inside = Path(*module.parts[1:])
-    folder = RENAMED.get(inside.parent.as_posix(), inside.parent.as_posix())
-    pattern = f"test_{inside.stem}*.py" if folder == "." else "test_*.py"
+    folder = next(place for place in inside.parents if (root / "tests" / place).is_dir())
+    pattern = f"test_{inside.stem}*.py" if folder == Path() else "test_*.py"
     found = set((root / "tests" / folder).glob(pattern))
     dotted = ".".join(module.with_suffix("").parts)
     found |= {

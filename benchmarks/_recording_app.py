@@ -11,9 +11,9 @@ import numpy as np
 from aerodaas import AeroNavigation, Analytics, Environment, Frame, NavigationType, Waypoint
 from aerodaas.analytics.base import Context
 from aerodaas.cameras.base import Picture
-from aerodaas.config import EnvironmentConfig, SensorConfig
-from aerodaas.data import Odometry
-from aerodaas.geometry import CameraModel
+from aerodaas.config.model import EnvironmentConfig, SensorConfig
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import CameraModel
 
 __all__ = ["RATE", "SIZE", "ReadyCamera", "build", "draw_pictures", "environment"]
 

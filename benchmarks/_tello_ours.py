@@ -6,10 +6,10 @@ import json
 import sys
 import time
 
-from aerodaas.cameras.tello import TelloCamera
-from aerodaas.clock import NANOSECONDS
-from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.drivers.tello.camera import TelloCamera
 from aerodaas.testing.tello.stamp import read_age
+from aerodaas.types.clock import NANOSECONDS
 
 _WARM_UP = 2.0
 """Seconds, as for the other reader."""

@@ -25,10 +25,10 @@ from _cluster_apps import Steer, Work, environment, flying
 from _cluster_failures import measure_recoveries
 from _report import Report
 
-from aerodaas.actors import cluster as ray_cluster
-from aerodaas.cluster import EdgeCloud, Shape
-from aerodaas.cluster.network import Far
-from aerodaas.cluster.shape import parse_bandwidth
+from aerodaas.actors.cluster import ray_cluster
+from tools.namespaces import EdgeCloud, Shape
+from tools.namespaces.network import RemoteMachine
+from tools.namespaces.shape import parse_bandwidth
 
 _RATE = 5.0
 _WARM_UP = 4.0
@@ -53,7 +53,7 @@ with socket.create_server(("", port)) as server:
 
 
 @contextlib.contextmanager
-def _echo(far: Far, size: int) -> Iterator[socket.socket]:
+def _echo(far: RemoteMachine, size: int) -> Iterator[socket.socket]:
     words = far.machine.words(sys.executable, "-c", _ECHO, str(_PORT), str(size))
     with subprocess.Popen(words, stdout=subprocess.PIPE) as server:  # noqa: S603 - our own words
         assert server.stdout is not None  # noqa: S101 - asked for
@@ -63,7 +63,7 @@ def _echo(far: Far, size: int) -> Iterator[socket.socket]:
             yield link
 
 
-def measure_link(far: Far, size: int, count: int = 20) -> float:
+def measure_link(far: RemoteMachine, size: int, count: int = 20) -> float:
     """Median milliseconds of `size` bytes there and one back, at the camera's rate."""
     data, times = bytes(size), []
     with _echo(far, size) as link:

@@ -13,20 +13,20 @@ from typing import Annotated
 import typer
 from _report import Report
 
-from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     AnalyticsScheduler,
-    Outcome,
-    Place,
     Profile,
     Resources,
     Result,
     RunOnEdge,
     Task,
+    TaskOutcome,
+    TaskPlace,
 )
-from aerodaas.schedulers.analytics.profiles import PUBLISHED
+from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
+from aerodaas.types.clock import NANOSECONDS
 
 UNITS = {
     "mean": "us",
@@ -102,7 +102,7 @@ def _measure(scheduler: AnalyticsScheduler, count: int, rounds: int) -> dict[str
         if running is not None:
             ended, running = running, None
             started = now - ended.profile.edge_time
-            tell("finish", Result(ended, Outcome.DONE, Place.EDGE, started, now))
+            tell("finish", Result(ended, TaskOutcome.DONE, TaskPlace.EDGE, started, now))
         tell("idle")
         tell("timer")
     nothing = [0.0, 0.0]

@@ -16,18 +16,18 @@ import typer
 from _report import Report
 
 from aerodaas.analytics.base import ComputeKind, Context
-from aerodaas.analytics.body_pose import BodyPoseEmergencyAnalytics
-from aerodaas.analytics.followers import VipFollowAnalytics
-from aerodaas.analytics.pose import PoseAnalytics
-from aerodaas.clock import seconds
-from aerodaas.data import Alert, Detections, Header, Odometry
-from aerodaas.geometry import CameraModel
+from aerodaas.analytics.follow.followers import VipFollowAnalytics
+from aerodaas.analytics.people.body_pose import BodyPoseEmergencyAnalytics
+from aerodaas.analytics.people.pose import PoseAnalytics
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
-from aerodaas.tuning.chase import Chase
-from aerodaas.tuning.eyes import DetectorEyes, TruthEyes
-from aerodaas.tuning.walk import PERSON, walk
-from aerodaas.vehicle import VehicleState
+from aerodaas.types.clock import seconds
+from aerodaas.types.data import Alert, Detections, Header, Odometry
+from aerodaas.types.geometry import CameraModel
+from aerodaas.types.vehicle import VehicleState
+from tools.tuning.chase import Chase
+from tools.tuning.perception import DetectorPerception, TruthPerception
+from tools.tuning.walk import PERSON, walk
 
 TILT = math.radians(12)
 STARTS, FALLS, ENDS = 9.0, 14.0, 20.0
@@ -75,13 +75,13 @@ class Onlooker:
         self.alerts.append(alert)
 
 
-class Watching(DetectorEyes):
+class Watching(DetectorPerception):
     """Follows by true boxes, while the shipped models watch the body on renders."""
 
     def __init__(self, world: World, camera: CameraModel, seed: int, begin: float) -> None:
         """Watch from `begin` seconds on."""
         super().__init__(world, camera, PoseAnalytics())
-        self._follow_by = TruthEyes(world.thing(PERSON), "vest", camera, seed=seed)
+        self._follow_by = TruthPerception(world.thing(PERSON), "vest", camera, seed=seed)
         self._begin = begin
         self._body = BodyPoseEmergencyAnalytics()
         self._body.open()

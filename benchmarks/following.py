@@ -13,12 +13,12 @@ import numpy as np
 import typer
 from _report import Report
 
-from aerodaas.analytics.followers import VipFollowAnalytics
-from aerodaas.analytics.vip_detection import VipDetectionAnalytics
-from aerodaas.errors import AeroDaaSError
-from aerodaas.tuning.chase import TELLO, Chase, ChaseResult
-from aerodaas.tuning.eyes import DetectorEyes, TruthEyes
-from aerodaas.tuning.walk import PERSON, walk
+from aerodaas.analytics.detection.vip_detection import VipDetectionAnalytics
+from aerodaas.analytics.follow.followers import VipFollowAnalytics
+from aerodaas.types.errors import AeroDaaSError
+from tools.tuning.chase import TELLO, Chase, ChaseResult
+from tools.tuning.perception import DetectorPerception, TruthPerception
+from tools.tuning.walk import PERSON, walk
 
 SETTLED = 12.0
 """Seconds from the start: take-off, and the person's first steps."""
@@ -76,11 +76,13 @@ def main(
                 chase = Chase(person, "vest", rate, latency, wind=air, gust=gust, seed=seed)
                 follow = VipFollowAnalytics()
                 if eyes is Sight.TRUTH:
-                    sight = TruthEyes(person, "vest", TELLO, seed=seed)
+                    sight = TruthPerception(person, "vest", TELLO, seed=seed)
                     flown.append(chase.fly(follow, sight, duration).after(SETTLED))
                     continue
                 measured = DEPTH_RANGE if eyes is Sight.DEPTH else None
-                detector = DetectorEyes(world, TELLO, VipDetectionAnalytics(), depth_range=measured)
+                detector = DetectorPerception(
+                    world, TELLO, VipDetectionAnalytics(), depth_range=measured
+                )
                 flown.append(chase.fly(follow, detector, duration).after(SETTLED))
                 detector.close()
             report.row(f"{text} m/s", _figures(flown))

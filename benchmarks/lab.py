@@ -13,9 +13,9 @@ import typer
 from _report import Report
 from rich.progress import track
 
-from aerodaas.actors.spread import spread_over
-from aerodaas.clock import NANOSECONDS
+from aerodaas.actors.cluster.ray_map import spread_over
 from aerodaas.schedulers.lab import Workload, run_lab
+from aerodaas.types.clock import NANOSECONDS
 
 UNITS = {"time": "s", "CPU": "s", "tasks": "k", "rate": "k tasks/s", "per task": "us"}
 

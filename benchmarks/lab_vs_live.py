@@ -5,7 +5,7 @@ wall clock, and `SyntheticAnalytics` take the published models' times on the edg
 cloud. What this machine takes on the way to an executor and back is measured first and taken off
 the synthetic times, as the table's times include it. The lab then simulates the recorded flight:
 each task arrives when it did, and takes the time that was observed where it ran, or what it
-would have taken there at that time (`aerodaas.commands.flown_workload`). So both see the same
+would have taken there at that time (`aerodaas.cli.flown_workload`). So both see the same
 machine, busy as it may be.
 """
 
@@ -24,18 +24,18 @@ from rich.progress import track
 
 from aerodaas import AeroNavigation, Environment, Waypoint
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.clock import NANOSECONDS
-from aerodaas.commands.flown_tasks import Flown
-from aerodaas.commands.flown_workload import flown_trace, flown_workload
-from aerodaas.options import RunOptions, current_options
-from aerodaas.schedulers.analytics.base import MILLISECOND, Place, Profile
-from aerodaas.schedulers.analytics.profiles import ACTIVE, PASSIVE, PUBLISHED
+from aerodaas.cli.flown_tasks import Flown
+from aerodaas.cli.flown_workload import flown_trace, flown_workload
+from aerodaas.config.options import RunOptions, current_options
+from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, TaskPlace
+from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.metrics import Score, score
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
 from aerodaas.schedulers.lab.times import ExecutionTimes
+from aerodaas.types.clock import NANOSECONDS
 
 UNITS = {
     "completion": "%",
@@ -119,13 +119,13 @@ def fly(
     return folder / "run" / "flight.mcap"
 
 
-def beyond(flown: Flown, place: Place) -> list[float]:
+def beyond(flown: Flown, place: TaskPlace) -> list[float]:
     """Milliseconds beyond its nominal time that each execution took."""
     found = []
     for task in flown.tasks:
         if task.place is place and task.took is not None:
             profile = flown.models[task.model]
-            nominal = profile.edge_time if place is Place.EDGE else profile.cloud_time
+            nominal = profile.edge_time if place is TaskPlace.EDGE else profile.cloud_time
             found.append((task.took - nominal) / MILLISECOND)
     return found
 
@@ -179,7 +179,7 @@ def main(
         before = Flown.read(fly("ec_edf", drones, profiles, 15.0, {}, folder / "calibration"))
         overhead = {
             place.value: float(np.median(measured))
-            for place in (Place.EDGE, Place.CLOUD)
+            for place in (TaskPlace.EDGE, TaskPlace.CLOUD)
             if (measured := beyond(before, place))
         }
         taken = ", ".join(f"{place} {took:.1f} ms" for place, took in overhead.items())
@@ -189,7 +189,7 @@ def main(
             seen = Flown.read(path)
             flown, studied = compared(seen, scheduler)
             length = (seen.tasks[-1].arrival - _TAIL - seen.tasks[0].arrival) / NANOSECONDS
-            report.row(f"{scheduler}, live", _figures(flown, length, beyond(seen, Place.EDGE)))
+            report.row(f"{scheduler}, live", _figures(flown, length, beyond(seen, TaskPlace.EDGE)))
             report.row(f"{scheduler}, lab", _figures(studied, length, []))
             points = 100 * abs(studied.completion - flown.completion)
             share = 100 * abs(flown.qos / studied.qos - 1)

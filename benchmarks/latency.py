@@ -30,7 +30,7 @@ from ray.cluster_utils import Cluster
 from rich.progress import Progress
 
 from aerodaas import Environment
-from aerodaas.options import RunOptions, current_options
+from aerodaas.config.options import RunOptions, current_options
 
 _DORA_NODE = Path(__file__).parent / "_latency_dora.py"
 _WARM_UP = 3.0

@@ -1,6 +1,6 @@
 """Which changes to a file no test notices: mutants killed and survived, each survivor shown.
 
-python benchmarks/mutation.py schedulers/analytics/dems.py --sample 60
+python benchmarks/mutation.py schedulers/analytics/published/dems.py --sample 60
 """
 
 from __future__ import annotations

@@ -32,10 +32,10 @@ from aerodaas import (
     VelocityCommand,
     Waypoint,
 )
-from aerodaas.actors.live import LiveReader
+from aerodaas.actors.run.live import LiveReader
 from aerodaas.actors.session import CONTROL_PERIOD_NS
 from aerodaas.analytics.base import Context
-from aerodaas.options import RunOptions, current_options
+from aerodaas.config.options import RunOptions, current_options
 
 RATE = 13
 """Frames per second; no divisor of the loop's 20, so that events fall anywhere in its period."""

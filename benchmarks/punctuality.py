@@ -25,10 +25,10 @@ from rich.console import Console
 from rich.table import Table
 
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
-from aerodaas.actors import cluster
-from aerodaas.actors.ray_variables import VARIABLES
-from aerodaas.options import RunOptions, current_options
-from aerodaas.priority import SWITCH
+from aerodaas.actors.cluster import ray_cluster as cluster
+from aerodaas.actors.cluster.ray_variables import VARIABLES
+from aerodaas.actors.priority import SWITCH
+from aerodaas.config.options import RunOptions, current_options
 from aerodaas.recording.reader import Recording
 
 _PERIOD = 50.0

@@ -19,10 +19,10 @@ from _recording_app import RATE, SIZE, build, draw_pictures, environment
 from _report import Report
 
 from aerodaas import Environment
-from aerodaas.options import RunOptions, current_options
-from aerodaas.recording.flight import Flight
+from aerodaas.config.options import RunOptions, current_options
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
-from aerodaas.run import Run
+from aerodaas.recording.report.flight import RecordedFlight
 
 UNITS = {
     "published": "frames",
@@ -89,7 +89,7 @@ def _measure(
         latencies[recorded] = statistics.median(seen)
     path = folder / "recorded" / "flight.mcap"
     with Recording.open(path) as recording:
-        flight, duration = Flight.read(recording), recording.duration
+        flight, duration = RecordedFlight.read(recording), recording.duration
     cameras = {f"drone{number}/camera{number}" for number in range(drones)}
     load = flight.loads["recorder"]
     machine = next(iter(flight.machines.values()))
@@ -133,7 +133,7 @@ def _fly(
     options = RunOptions(record=folder / "recorded", view=False, **words)  # type: ignore[arg-type]
     token = current_options.set(options)
     try:
-        with patch("aerodaas.console.show_results"):
+        with patch("aerodaas.terminal.console.show_results"):
             env = Environment(path)
             app(env)
             run = env.launch()

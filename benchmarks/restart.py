@@ -19,9 +19,9 @@ import typer
 from _cluster_apps import Work, environment, flying, hover
 from _report import Report
 
-from aerodaas.recording.flight import Flight
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
-from aerodaas.run import Run
+from aerodaas.recording.report.flight import RecordedFlight
 
 UNITS = {"after": "s", "computed": "s"}
 _RATE = 10.0
@@ -102,7 +102,7 @@ def main(
             origin = run._flight._origin / 1e9  # noqa: SLF001
         assert run.recording is not None  # noqa: S101 - asked for
         with Recording.open(run.recording) as recording:
-            flight = Flight.read(recording)
+            flight = RecordedFlight.read(recording)
     for died, computed, moments in rounds:
         at = died - origin
         known = {kind: t for t, kind, _ in reversed(flight.alerts) if t > at}

@@ -15,11 +15,11 @@ import numpy as np
 import typer
 from _report import Report
 
-from aerodaas.plugins import load_plugin
-from aerodaas.schedulers.waypoint.base import Situation, TrajectoryScheduler
-from aerodaas.schedulers.waypoint.optimal import OptimalScheduler
-from aerodaas.schedulers.waypoint.travel import tour_length
-from aerodaas.waypoints import Waypoint
+from aerodaas.config.plugins import load_plugin
+from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
+from aerodaas.schedulers.trajectory.optimal import OptimalScheduler
+from aerodaas.schedulers.trajectory.travel import tour_length
+from aerodaas.types.waypoints import Waypoint
 
 SCHEDULERS = ("ordered", "nearest_neighbor", "deadline", "optimal")
 AIMS = {10: 0.1, 50: 0.5, 200: 2.0}
@@ -35,9 +35,9 @@ def scatter(count: int, seed: int) -> list[Waypoint]:
     return [Waypoint(f"w{i}", x, y, 20.0, waypoint_type="local") for i, (x, y) in enumerate(places)]
 
 
-def situation(position: tuple[float, float, float] = (0.0, 0.0, 20.0)) -> Situation:
+def situation(position: tuple[float, float, float] = (0.0, 0.0, 20.0)) -> PlanningContext:
     """A drone at `position` whose home is the origin, at the same height."""
-    return Situation(0.0, np.array(position), np.array([0.0, 0.0, position[2]]), speed=5.0)
+    return PlanningContext(0.0, np.array(position), np.array([0.0, 0.0, position[2]]), speed=5.0)
 
 
 def measure(count: int, seeds: int, long_run: float) -> list[Row]:
@@ -47,7 +47,7 @@ def measure(count: int, seeds: int, long_run: float) -> list[Row]:
     known = [tour_length(OptimalScheduler(budget=long_run).plan(i, here), here) for i in instances]
     rows: list[Row] = []
     for name in SCHEDULERS:
-        scheduler: TrajectoryScheduler = load_plugin("waypoint_schedulers", name)()
+        scheduler: TrajectoryScheduler = load_plugin("trajectory_schedulers", name)()
         scheduler.plan(instances[0][:3], here)
         lengths, times = [], []
         for instance in instances:
@@ -88,11 +88,11 @@ def disaster_survey() -> list[Row]:
 
     rows: list[Row] = []
     for name in ("ordered", "nearest_neighbor", "optimal"):
-        scheduler: TrajectoryScheduler = load_plugin("waypoint_schedulers", name)()
+        scheduler: TrajectoryScheduler = load_plugin("trajectory_schedulers", name)()
         pending, position = waypoints(first, "wp"), np.array([0.0, 0.0, height])
         home, flown, visited = position.copy(), 0.0, list[str]()
         while pending:
-            now = Situation(0.0, position, home, speed=1.5)
+            now = PlanningContext(0.0, position, home, speed=1.5)
             pending = list(scheduler.plan(pending, now))
             target = pending.pop(0)
             flown += float(np.linalg.norm(target.position - position))

@@ -19,8 +19,8 @@ from typing import Annotated, Any
 import typer
 from _report import Report
 
-from aerodaas.cluster import EdgeCloud, Shape
-from aerodaas.cluster.ray_node import environment
+from tools.namespaces import EdgeCloud, Shape
+from tools.namespaces.ray_node import environment
 
 _APP = Path(__file__).with_name("_scale_app.py")
 _LATE = 0.01

@@ -21,9 +21,9 @@ import typer
 from _ports import free_port
 from _report import Report
 
-from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.tello.vehicle import TelloVehicle
-from aerodaas.errors import AeroDaaSError
+from aerodaas.types.errors import AeroDaaSError
 
 UNITS = {"median": "ms", "p99": "ms", "largest": "ms", "cpu": "% of a core", "frames": "asked for"}
 _HERE = Path(__file__).resolve().parent

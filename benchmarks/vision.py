@@ -17,10 +17,10 @@ import onnxruntime as ort
 import typer
 from _report import Report
 
-from aerodaas.analytics.onnx.detector import OnnxDetector
-from aerodaas.analytics.onnx.providers import default_threads
-from aerodaas.data import Frame, Header
-from aerodaas.errors import AeroDaaSError
+from aerodaas.analytics.detection.detector import OnnxDetector
+from aerodaas.analytics.detection.providers import default_threads
+from aerodaas.types.data import Frame, Header
+from aerodaas.types.errors import AeroDaaSError
 
 UNITS = {
     "pre": "ms",

@@ -12,7 +12,7 @@ import pytest
 import required
 from flying import Flyer
 
-from aerodaas.options import RunOptions, current_options
+from aerodaas.config.options import RunOptions, current_options
 
 _ROOT = Path(__file__).resolve().parents[1]
 
@@ -25,36 +25,34 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 @pytest.hookimpl(optionalhook=True)
-def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> Any:  # noqa: ANN401
-    """A file is one worker's, so that its fixtures are made once; so are all of tests/cluster.
-
-    Those make network namespaces with the same addresses. With `--dist=loadgroup`, its own goes.
-    """
-    if config.getoption("dist") != "loadfile":
-        return None
+def pytest_xdist_make_scheduler(config: pytest.Config, log: Any) -> object:  # noqa: ANN401
+    """Share tests out by file, so that fixtures are made once; slow wall-clock tests by halves."""
     from xdist.scheduler import LoadScopeScheduling  # noqa: PLC0415 - not every run has workers
 
     scheduler = LoadScopeScheduling(config, log)
-    scheduler._split_scope = _worker_share  # as its own subclasses do
+    by_halves = config.getoption("markexpr") == "slow and wall_clock"
+    scheduler._split_scope = _half if by_halves else _worker_share  # as its own subclasses do
     return scheduler
 
 
 def _worker_share(nodeid: str) -> str:
-    """What goes to one worker together with this test."""
+    """What goes to one worker together with this test: its file, or all of tests/cluster.
+
+    Those make network namespaces with the same addresses.
+    """
     file = nodeid.partition("::")[0]
     return "tests/cluster" if file.startswith("tests/cluster/") else file
 
 
-def pytest_itemcollected(item: pytest.Item) -> None:
-    """Put a test into one of two halves that may run at once without keeping each other waiting.
+def _half(nodeid: str) -> str:
+    """Name one of two halves that may run at once without keeping each other waiting.
 
     Emulated vehicles fly in real time and take a tenth of a core; what starts many processes or
     runs models goes one after the other, last of all the flights that need the whole machine.
     """
-    file = item.nodeid.partition("::")[0]
+    file = nodeid.partition("::")[0]
     light = file.startswith(("tests/drivers/", "tests/testing/", "tests/missions/"))
-    vehicles = light and not file.endswith("_applications.py")
-    item.add_marker(pytest.mark.xdist_group("vehicles" if vehicles else "machines"))
+    return "vehicles" if light and not file.endswith("_applications.py") else "machines"
 
 
 @pytest.hookimpl(trylast=True)
@@ -101,7 +99,9 @@ def plugin_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 @pytest.fixture(scope="session")
 def runtime(plugin_folder: Path) -> Iterator[None]:
     """Ray on this machine, as a run of an application starts it."""
-    from aerodaas.actors import cluster  # noqa: PLC0415 - only where actors are tested
+    from aerodaas.actors.cluster import (  # noqa: PLC0415 - only where actors are tested
+        ray_cluster as cluster,
+    )
 
     # Actors import the project and the tests' own analyses from where this process does.
     ours = [path for path in sys.path if path and Path(path).resolve().is_relative_to(_ROOT)]

@@ -9,18 +9,19 @@ from itertools import pairwise
 
 import numpy as np
 
-from aerodaas.clock import NANOSECONDS
-from aerodaas.config import LimitsConfig, MissionConfig, RobotConfig
-from aerodaas.data import Battery, Odometry
-from aerodaas.geometry import GeodeticOrigin, Vector, wrap_angle
-from aerodaas.navigation.commands import AddNavigation, Answer, Command, OpenStream, Start
-from aerodaas.navigation.loop import SetpointLoop
-from aerodaas.navigation.mission import Mission
-from aerodaas.navigation.planner import InlinePlanner, Planner
-from aerodaas.schedulers.waypoint.base import TrajectoryScheduler
-from aerodaas.schedulers.waypoint.ordered import OrderedScheduler
-from aerodaas.status import MissionState, MissionStatus, SetpointRecord
-from aerodaas.vehicle import (
+from aerodaas.config.model import LimitsConfig, MissionConfig, RobotConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.mission.commands import AddNavigation, Answer, Command, OpenStream, Start
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner, Planner
+from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Battery, Odometry
+from aerodaas.types.geometry import GeodeticOrigin, Vector, wrap_angle
+from aerodaas.types.status import MissionState, MissionStatus, SetpointRecord
+from aerodaas.types.vehicle import (
     Capabilities,
     PositionSetpoint,
     Setpoint,
@@ -28,7 +29,7 @@ from aerodaas.vehicle import (
     VehicleState,
     VelocitySetpoint,
 )
-from aerodaas.waypoints import AeroNavigation, NavigationType, SchedulingType, Waypoint
+from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
 
 PERIOD = NANOSECONDS // 20
 

@@ -10,10 +10,10 @@ from typing import Any
 from unittest.mock import patch
 
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
-from aerodaas.options import RunOptions, current_options
-from aerodaas.recording.flight import Flight
+from aerodaas.config.options import RunOptions, current_options
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
-from aerodaas.run import Run
+from aerodaas.recording.report.flight import RecordedFlight
 
 __all__ = ["FLAT", "Flyer", "hop", "recorded", "robot"]
 
@@ -59,7 +59,10 @@ class Flyer:
         record = self.folder / "flight"
         token = current_options.set(RunOptions(**{"view": False, "record": record, **words}))
         try:
-            with patch("aerodaas.console.show_results"), patch("aerodaas.console.show_speed"):
+            with (
+                patch("aerodaas.terminal.console.show_results"),
+                patch("aerodaas.terminal.console.show_speed"),
+            ):
                 yield
         finally:
             current_options.reset(token)
@@ -98,9 +101,9 @@ class Flyer:
             run.wait()
 
 
-def recorded(run: Run) -> Flight:
+def recorded(run: Run) -> RecordedFlight:
     """What the recording of a finished run holds; it must have been closed properly."""
     assert run.recording is not None
     with Recording.open(run.recording) as recording:
         assert recording.complete
-        return Flight.read(recording)
+        return RecordedFlight.read(recording)

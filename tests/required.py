@@ -56,7 +56,7 @@ PEERS = {
         ("ssh", "ssh-keygen", "rsync"),
     ),
     "AERODAAS_TEST_DATA": Peer(
-        "a folder of real pictures and models: tests/analytics/onnx/test_real_models.py"
+        "a folder of real pictures and models: tests/analytics/detection/test_real_models.py"
     ),
 }
 """All that may be missing in continuous integration, by the variable that names it."""

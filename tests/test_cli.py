@@ -17,10 +17,10 @@ import numpy as np
 import pytest
 from flying import FLAT, robot
 
-from aerodaas.cli import main
-from aerodaas.doctor import examine
-from aerodaas.recording.flight import Flight
+from aerodaas.cli.app import main
+from aerodaas.cli.doctor import examine
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 5, "settings": {"width": 64, "height": 36}}
 CONTENT: dict[str, Any] = {
@@ -224,7 +224,7 @@ BAD_SETTINGS = {
     "camera": ("cam.driver=eye", "no camera is called 'eye'; known: "),
     "trajectory scheduler": (
         "schedulers.trajectory=nearset",
-        "no waypoint scheduler is called 'nearset'; known: deadline, ",
+        "no trajectory scheduler is called 'nearset'; known: deadline, ",
     ),
     "module that there is not": (
         "schedulers.trajectory=nowhere:Scheduler",
@@ -351,7 +351,7 @@ def test_a_broken_picture_is_skipped_and_told(aerodaas: Commands) -> None:
     ended = aerodaas.run(HOP + FLY, "--set", "cam.driver=folder", "--set", f"cam.path={pictures}")
     assert ended.code == 0, ended.said
     with Recording.open(aerodaas.folder / "out" / "flight.mcap") as recording:
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     assert flight.frames["drone/cam"] == 2
     ((when, _, text),) = flight.alerts
     assert "b.png" in text
@@ -384,11 +384,13 @@ def test_the_doctor_names_a_port_that_is_taken(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Who holds the port can be found out with the command shown."""
-    monkeypatch.setattr("aerodaas.actors.cluster.disconnect", lambda: None)  # others use it, too
+    monkeypatch.setattr(
+        "aerodaas.actors.cluster.ray_cluster.disconnect", lambda: None
+    )  # others use it, too
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as held:
         held.bind(("127.0.0.1", 0))
         port = held.getsockname()[1]
-        monkeypatch.setattr("aerodaas.doctor._PORTS", {port: "a vehicle"})
+        monkeypatch.setattr("aerodaas.cli.doctor._PORTS", {port: "a vehicle"})
         assert not examine()
     shown = " ".join(capsys.readouterr().out.split())
     assert f"UDP {port} Address already in use (a vehicle)" in shown

@@ -15,10 +15,10 @@ import pytest
 from flying import Flyer
 from pydantic import BaseModel
 
-from aerodaas import config as module
-from aerodaas.config import EnvironmentConfig
-from aerodaas.recording.flight import Flight
+from aerodaas.config import model as module
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
 
 pytestmark = pytest.mark.wall_clock
 
@@ -43,11 +43,11 @@ def files(folder: Path, **contents: str) -> Iterator[None]:
         yield
 
 
-def flight_of(flyer: Flyer) -> Flight:
+def flight_of(flyer: Flyer) -> RecordedFlight:
     """What was recorded."""
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
         assert recording.complete
-        return Flight.read(recording)
+        return RecordedFlight.read(recording)
 
 
 def test_the_first_application_flies(flyer: Flyer) -> None:

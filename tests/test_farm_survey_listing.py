@@ -10,9 +10,9 @@ import pytest
 from flying import Flyer
 
 from aerodaas import Robot
-from aerodaas.recording.flight import Flight
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
-from aerodaas.run import Run
+from aerodaas.recording.report.flight import RecordedFlight
 
 LISTINGS = Path(__file__).parent / "listings"
 
@@ -42,7 +42,7 @@ def test_the_farm_survey_flies_as_printed(flyer: Flyer) -> None:
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
         assert recording.complete
         readings = [record for record in recording.records() if "monitoring" in record.topic]
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     drone = flight.robots["quadrotor_base"]
     assert drone.outcome.startswith("landed")
     assert drone.visited == ("wp1", "wp4", "wp3", "wp2")

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from flying import Flyer
 
-from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
 
@@ -68,7 +68,7 @@ def test_situation_awareness_flies_as_printed(flyer: Flyer) -> None:
         runpy.run_path(str(LISTING), run_name="__main__")
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
         assert recording.complete
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     drone = flight.robots["tello"]
     assert drone.outcome.startswith("landed")
     vip = World(Scenario.model_validate(SCENARIO), seed=3).thing("vip")

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from hypothesis import strategies as st
 
-from aerodaas.schedulers.waypoint.base import Situation
-from aerodaas.waypoints import Waypoint
+from aerodaas.schedulers.trajectory.base import PlanningContext
+from aerodaas.types.waypoints import Waypoint
 
-HOME = Situation(0.0, np.zeros(3), np.zeros(3), speed=2.0)
+HOME = PlanningContext(0.0, np.zeros(3), np.zeros(3), speed=2.0)
 
 places = st.lists(
     st.tuples(*[st.integers(-50, 50)] * 2, st.integers(1, 20)), max_size=9, unique=True

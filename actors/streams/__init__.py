@@ -4,20 +4,20 @@ Between actors of one node a message travels in shared memory (`_shared.py`, ice
 another node as a Ray ObjectRef (`_remote.py`). Placement decides; nobody else sees which.
 """
 
-from aerodaas.actors.streams._codec import UnreadableError
-from aerodaas.actors.streams._codec import decode as decode_message
-from aerodaas.actors.streams._codec import encode as encode_message
-from aerodaas.actors.streams._inbox import Inbox
-from aerodaas.actors.streams._outlet import Outlet, RemoteReader
-from aerodaas.actors.streams._remote import UNDER_WAY
-from aerodaas.actors.streams._shared import MAX_DEPTH, shared_memory_available
+from aerodaas.actors.streams.codec import UnreadableError
+from aerodaas.actors.streams.codec import decode as decode_message
+from aerodaas.actors.streams.codec import encode as encode_message
+from aerodaas.actors.streams.publisher import Publisher, RemoteReader
+from aerodaas.actors.streams.remote import UNDER_WAY
+from aerodaas.actors.streams.shared_memory import MAX_DEPTH, shared_memory_available
+from aerodaas.actors.streams.subscriber import Subscriber
 
 __all__ = [
     "MAX_DEPTH",
     "UNDER_WAY",
-    "Inbox",
-    "Outlet",
+    "Publisher",
     "RemoteReader",
+    "Subscriber",
     "UnreadableError",
     "decode_message",
     "encode_message",

@@ -30,16 +30,16 @@ from typing import (
 
 from typing_extensions import Self
 
-from aerodaas.config import RuntimeEnvConfig, TaskConfig, as_runtime_env
-from aerodaas.data import Alert
-from aerodaas.errors import GraphError
-from aerodaas.graph import AeroStreamData, Graph, Node, Trigger, refusal
-from aerodaas.identifiers import require_name
-from aerodaas.interfaces import IAeroData, IAnalyse, ICompute, INavigableAnalyse
-from aerodaas.names import PaperNames, snake_case
-from aerodaas.navigation.commands import TRIGGERED
-from aerodaas.vehicle import VehicleState
-from aerodaas.waypoints import AeroNavigation
+from aerodaas.config.model import RuntimeEnvConfig, TaskConfig, as_runtime_env
+from aerodaas.dataflow.graph import AeroStreamData, Graph, Node, Trigger, refusal
+from aerodaas.dataflow.interfaces import IAeroData, IAnalyse, ICompute, INavigableAnalyse
+from aerodaas.dataflow.names import PaperNames, snake_case
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.mission.commands import TRIGGERED
+from aerodaas.types.data import Alert
+from aerodaas.types.errors import GraphError
+from aerodaas.types.identifiers import require_name
+from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["Analytics", "ComputeKind", "Context", "NavigableAnalytics", "TimedContext"]
 

@@ -7,10 +7,10 @@ from typing import Any, ClassVar, TypeAlias, TypeVar
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.models import DETECTOR_CLASSES
-from aerodaas.data import Alert, Detections, Frame
-from aerodaas.errors import GraphError
-from aerodaas.graph import AeroStreamData
-from aerodaas.interfaces import IAeroData
+from aerodaas.dataflow.graph import AeroStreamData
+from aerodaas.dataflow.interfaces import IAeroData
+from aerodaas.types.data import Alert, Detections, Frame
+from aerodaas.types.errors import GraphError
 
 __all__ = ["BoxAnalytics", "shipped_detector"]
 
@@ -32,7 +32,7 @@ def shipped_detector(owner: str, labels: Sequence[str]) -> Analytics[Detections]
         )
         raise GraphError(message)
     # onnxruntime takes its time to load.
-    from aerodaas.analytics.onnx.detector import OnnxDetector  # noqa: PLC0415
+    from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415
 
     return OnnxDetector(classes=known)
 

@@ -6,11 +6,11 @@ from concurrent.futures import Future
 from typing import Protocol
 
 from aerodaas.analytics.base import NavigableAnalytics
-from aerodaas.data import Alert
-from aerodaas.navigation.commands import Answer, Command
-from aerodaas.status import MissionStatus
-from aerodaas.vehicle import VehicleState
-from aerodaas.waypoints import AeroNavigation
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.mission.commands import Answer, Command
+from aerodaas.types.data import Alert
+from aerodaas.types.status import MissionStatus
+from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["CommandingAnalytics", "MissionLink"]
 

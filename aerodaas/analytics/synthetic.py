@@ -6,8 +6,8 @@ import time
 from typing import ClassVar
 
 from aerodaas.analytics.base import Analytics, Context
-from aerodaas.data import Frame, Readings
-from aerodaas.errors import ConfigError
+from aerodaas.types.data import Frame, Readings
+from aerodaas.types.errors import ConfigError
 
 __all__ = ["SyntheticAnalytics"]
 

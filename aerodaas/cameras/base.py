@@ -8,9 +8,9 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.data import Odometry
-from aerodaas.geometry import CameraModel
-from aerodaas.records import valued
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import CameraModel
+from aerodaas.types.records import valued
 
 __all__ = ["Camera", "Picture"]
 

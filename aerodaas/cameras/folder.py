@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from aerodaas.cameras.base import Picture
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
-from aerodaas.clock import seconds
-from aerodaas.config import CameraConfig, EnvironmentConfig, SensorConfig
-from aerodaas.data import Odometry
-from aerodaas.errors import SourceError
-from aerodaas.geometry import CameraModel
+from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
+from aerodaas.types.clock import seconds
+from aerodaas.types.data import Odometry
+from aerodaas.types.errors import SourceError
+from aerodaas.types.geometry import CameraModel
 
 __all__ = ["FolderCamera"]
 

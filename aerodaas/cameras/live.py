@@ -16,8 +16,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.clock import host_time_ns
-from aerodaas.errors import SourceError
+from aerodaas.types.clock import host_time_ns
+from aerodaas.types.errors import SourceError
 
 __all__ = ["LiveSource"]
 

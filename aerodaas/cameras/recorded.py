@@ -8,7 +8,7 @@ from aerodaas.cameras.base import Camera
 from aerodaas.cameras.folder import FolderCamera
 from aerodaas.cameras.settings import camera_settings
 from aerodaas.cameras.video import VideoCamera
-from aerodaas.config import CameraConfig, EnvironmentConfig, SensorConfig
+from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
 
 __all__ = ["recorded_camera"]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from aerodaas.checked import checked
-from aerodaas.config import CameraConfig, SensorConfig
-from aerodaas.errors import ConfigError
-from aerodaas.geometry import CameraModel
+from aerodaas.config.checked import checked
+from aerodaas.config.model import CameraConfig, SensorConfig
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import CameraModel
 
 __all__ = ["camera_model", "camera_settings", "required_path"]
 

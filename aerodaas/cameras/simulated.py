@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 from aerodaas.cameras.base import Picture
 from aerodaas.cameras.settings import camera_settings
-from aerodaas.clock import seconds
-from aerodaas.config import CameraConfig, EnvironmentConfig, SensorConfig
-from aerodaas.data import Odometry
-from aerodaas.errors import SourceError
-from aerodaas.geometry import CameraModel
+from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
 from aerodaas.simulation.world import World
+from aerodaas.types.clock import seconds
+from aerodaas.types.data import Odometry
+from aerodaas.types.errors import SourceError
+from aerodaas.types.geometry import CameraModel
 
 if TYPE_CHECKING:
     from aerodaas.simulation.renderer import Renderer

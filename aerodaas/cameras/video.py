@@ -8,9 +8,9 @@ from aerodaas.cameras.base import Picture
 from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
 from aerodaas.cameras.video_file import VideoFile
-from aerodaas.config import CameraConfig, EnvironmentConfig, SensorConfig
-from aerodaas.data import Odometry
-from aerodaas.geometry import CameraModel
+from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import CameraModel
 
 __all__ = ["VideoCamera"]
 

@@ -9,8 +9,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.clock import seconds
-from aerodaas.errors import SourceError
+from aerodaas.types.clock import seconds
+from aerodaas.types.errors import SourceError
 
 __all__ = ["VideoFile"]
 

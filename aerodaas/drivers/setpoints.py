@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from aerodaas.errors import InvalidWaypointError
-from aerodaas.geometry import Vector
-from aerodaas.vehicle import Setpoint, VelocitySetpoint
+from aerodaas.types.errors import InvalidWaypointError
+from aerodaas.types.geometry import Vector
+from aerodaas.types.vehicle import Setpoint, VelocitySetpoint
 
 __all__ = ["require_finite"]
 

@@ -9,18 +9,18 @@ import math
 
 import numpy as np
 
-from aerodaas.checked import checked
-from aerodaas.clock import NANOSECONDS
-from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.config.checked import checked
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.setpoints import require_finite
-from aerodaas.errors import ClockError, InvalidWaypointError, VehicleError
-from aerodaas.geometry import GeodeticOrigin
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import Autopilot, FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, STEP_NS, Multirotor
 from aerodaas.simulation.noise import SensorNoise
 from aerodaas.simulation.wind import Wind
-from aerodaas.vehicle import (
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.errors import ClockError, InvalidWaypointError, VehicleError
+from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.vehicle import (
     Capabilities,
     PositionSetpoint,
     Setpoint,
@@ -33,7 +33,7 @@ __all__ = ["SimulatedVehicle"]
 
 
 class SimulatedVehicle:
-    """A quadrotor in the embedded simulator; implements `aerodaas.vehicle.SteppedVehicle`.
+    """A quadrotor in the embedded simulator; implements `aerodaas.types.vehicle.SteppedVehicle`.
 
     Time moves only in `advance_to`, on a fixed grid, so that the trajectory depends on the seed
     and the commands alone, not on how the caller slices time. One thread at a time may use it.

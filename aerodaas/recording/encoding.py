@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from foxglove import Schema
 
-from aerodaas.identifiers import INTERNAL, is_internal
+from aerodaas.types.identifiers import INTERNAL, is_internal
 
 __all__ = ["Entry", "json_bytes", "json_schema", "plain", "stream_of", "topic"]
 

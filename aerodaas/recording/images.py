@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.errors import SourceError
+from aerodaas.types.errors import SourceError
 
 __all__ = [
     "IMAGE_SCHEMAS",

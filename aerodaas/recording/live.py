@@ -9,9 +9,9 @@ from foxglove import Channel, Context
 from foxglove.websocket import ChannelView, Client, ServerListener
 from typing_extensions import Self
 
-from aerodaas.errors import ConfigError
 from aerodaas.recording.encoding import Entry
 from aerodaas.recording.images import VIDEO_SCHEMAS
+from aerodaas.types.errors import ConfigError
 
 __all__ = ["LiveServer"]
 

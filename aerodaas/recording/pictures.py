@@ -12,8 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.data import Detection, Detections, Frame, Header, Odometry
-from aerodaas.errors import SourceError
 from aerodaas.recording.h264 import H264Decoder, is_key_frame
 from aerodaas.recording.images import (
     IMAGE_SCHEMAS,
@@ -25,6 +23,8 @@ from aerodaas.recording.images import (
 )
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.states import odometry_of
+from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry
+from aerodaas.types.errors import SourceError
 
 __all__ = [
     "Shot",

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from typing_extensions import Self
 
-from aerodaas.config import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig
 
 __all__ = ["Provenance"]
 

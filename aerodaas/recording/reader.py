@@ -16,9 +16,9 @@ from mcap.records import Attachment, Channel, Message
 from mcap_protobuf.decoder import DecoderFactory
 from typing_extensions import Self
 
-from aerodaas.clock import seconds
-from aerodaas.errors import RecordingError
 from aerodaas.recording.index import BROKEN, Block, FileIndex, load, read_index
+from aerodaas.types.clock import seconds
+from aerodaas.types.errors import RecordingError
 
 __all__ = ["Record", "Recording", "Topic"]
 

@@ -19,10 +19,7 @@ from foxglove.messages import LogLevel
 from mcap.writer import Writer
 from typing_extensions import Self
 
-from aerodaas.clock import seconds
-from aerodaas.config import GeofenceConfig, RecordingConfig
-from aerodaas.errors import RecordingError
-from aerodaas.geometry import GeodeticOrigin
+from aerodaas.config.model import GeofenceConfig, RecordingConfig
 from aerodaas.recording.converters import Session, convert
 from aerodaas.recording.converters.notes import log_entry
 from aerodaas.recording.converters.plan import fence_entries
@@ -32,7 +29,10 @@ from aerodaas.recording.live import LiveServer
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.output import Output
 from aerodaas.recording.provenance import Provenance
-from aerodaas.status import Message
+from aerodaas.types.clock import seconds
+from aerodaas.types.errors import RecordingError
+from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.status import Message
 
 __all__ = ["FLUSH_SECONDS", "FlightRecorder"]
 
@@ -189,8 +189,8 @@ class FlightRecorder:
                 entries = [
                     log_entry(self._session, message.stamp, LogLevel.Error, message.stream, text)
                 ]
-        # Of one hop, only what is recorded nowhere else: that an analysis had nothing to say.
-        if len(message.hops) > (message.item is not None):
+        # Of one span, only what is recorded nowhere else: that an analysis had nothing to say.
+        if len(message.spans) > (message.item is not None):
             entries.append(_latency(message))
         return entries
 
@@ -270,24 +270,24 @@ class FlightRecorder:
 
 
 def _latency(message: Message[Any]) -> Entry:
-    hops = []
+    spans = []
     before = message.captured
-    for hop in message.hops:
+    for span in message.spans:
         entry: dict[str, Any] = {
-            "node": hop.node,
-            "wait_ms": (hop.received - before) / _MILLISECOND,
-            "work_ms": (hop.published - hop.received) / _MILLISECOND,
+            "node": span.node,
+            "wait_ms": (span.received - before) / _MILLISECOND,
+            "work_ms": (span.published - span.received) / _MILLISECOND,
         }
-        if hop.state is not None:
-            entry["state"] = hop.state
-        hops.append(entry)
-        before = hop.published
+        if span.state is not None:
+            entry["state"] = span.state
+        spans.append(entry)
+        before = span.published
     value = {
         "stream": message.stream,
         "seq": message.seq,
         "id": message.header.id,
         "source": message.header.source,
         "total_ms": message.latency_ns / _MILLISECOND,
-        "hops": hops,
+        "hops": spans,
     }
     return Entry("/latency", LATENCY, json_bytes(value))

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.data import Battery, GpsFix, Odometry
 from aerodaas.recording.reader import Recording
-from aerodaas.vehicle import FlightEnd, VehicleMode, VehicleState
+from aerodaas.types.data import Battery, GpsFix, Odometry
+from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
 
 __all__ = ["odometry_of", "vehicle_states"]
 

@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 import typer
 
-from aerodaas.config import SimulationConfig
-from aerodaas.data import Odometry
-from aerodaas.errors import AeroDaaSError
-from aerodaas.geometry import CameraModel
+from aerodaas.config.model import SimulationConfig
 from aerodaas.simulation.renderer import Renderer
 from aerodaas.simulation.world import World
+from aerodaas.types.data import Odometry
+from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.geometry import CameraModel
 
 __all__ = ["preview"]
 

@@ -10,7 +10,7 @@ from aerodaas.simulation.battery import FlightBattery, flight_power
 from aerodaas.simulation.dynamics import STEP, Multirotor, Triple
 from aerodaas.simulation.guidance import velocity_towards, yaw_rate_towards
 from aerodaas.simulation.noise import SensorNoise
-from aerodaas.vehicle import FlightEnd, VehicleMode
+from aerodaas.types.vehicle import FlightEnd, VehicleMode
 
 __all__ = ["Autopilot", "FlightLimits", "Goto", "Steer"]
 

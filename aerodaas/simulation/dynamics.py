@@ -21,7 +21,7 @@ from typing import TypeAlias
 from aerodaas.simulation.airframe import GRAVITY, Airframe
 from aerodaas.simulation.wind import Wind
 
-__all__ = ["STEP", "STEP_NS", "Motion", "Multirotor", "Triple"]
+__all__ = ["STEP", "STEP_NS", "KinematicState", "Multirotor", "Triple"]
 
 Triple: TypeAlias = tuple[float, float, float]
 
@@ -57,7 +57,7 @@ _YAW_RATE_SHARE = _share(_YAW_RATE_LAG)
 
 
 @dataclass(frozen=True, slots=True)
-class Motion:
+class KinematicState:
     """Exact state of motion at one moment; ENU metres, m/s, radians, rad/s."""
 
     position: Triple
@@ -210,7 +210,7 @@ class Multirotor:
             self.yaw_rate = 0.0
             self.on_ground = True
 
-    def motion(self, ahead: float = 0.0) -> Motion:
+    def motion(self, ahead: float = 0.0) -> KinematicState:
         """State of motion, carried on by `ahead` seconds (less than a step) for reading.
 
         Reading between two steps of the grid does not change the simulation.
@@ -220,7 +220,7 @@ class Multirotor:
         ax, ay, az = self.acceleration
         half = 0.5 * ahead * ahead
         roll, pitch = self._tilt()
-        return Motion(
+        return KinematicState(
             (
                 x + vx * ahead + ax * half,
                 y + vy * ahead + ay * half,

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerodaas.data import GpsFix, Odometry
-from aerodaas.geometry import GeodeticOrigin, wrap_angle
-from aerodaas.simulation.dynamics import STEP, Motion, Triple
+from aerodaas.simulation.dynamics import STEP, KinematicState, Triple
+from aerodaas.types.data import GpsFix, Odometry
+from aerodaas.types.geometry import GeodeticOrigin, wrap_angle
 
 __all__ = ["NoiseLevels", "SensorNoise"]
 
@@ -90,7 +90,7 @@ class SensorNoise:
         self._velocity = self._white(levels.velocity, levels.velocity, levels.velocity)
         self._angles = self._white(levels.angle, levels.angle, levels.angle)
 
-    def odometry(self, motion: Motion) -> Odometry:
+    def odometry(self, motion: KinematicState) -> Odometry:
         """What the drone believes of its `motion`."""
         levels, angles = self._levels, self._angles
         return Odometry(
@@ -103,7 +103,7 @@ class SensorNoise:
             self._scale * math.hypot(levels.drift, levels.position),
         )
 
-    def gps(self, motion: Motion, origin: GeodeticOrigin) -> GpsFix:
+    def gps(self, motion: KinematicState, origin: GeodeticOrigin) -> GpsFix:
         """Return the fix that a receiver gives at this `motion`."""
         levels = self._levels
         latitude, longitude, altitude = origin.to_geodetic(np.array(motion.position) + self._gps)

@@ -11,10 +11,10 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from aerodaas.config import SimulationConfig
-from aerodaas.errors import AeroDaaSError
-from aerodaas.geometry import GeodeticOrigin
+from aerodaas.config.model import SimulationConfig
 from aerodaas.simulation.world import World
+from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.geometry import GeodeticOrigin
 
 __all__ = ["write_log"]
 

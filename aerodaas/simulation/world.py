@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.config import SimulationConfig
+from aerodaas.config.model import SimulationConfig
 from aerodaas.simulation.boxes import Box
 from aerodaas.simulation.scenario import (
     Building,

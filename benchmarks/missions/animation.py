@@ -15,11 +15,11 @@ import typer
 from numpy.typing import NDArray
 from PIL import Image
 
-from aerodaas.clock import NANOSECONDS
-from aerodaas.recording.flight import Flight
-from aerodaas.recording.overlay import draw_detections, draw_line
 from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.recording.report.overlay import draw_detections, draw_line
+from aerodaas.types.clock import NANOSECONDS
 
 
 def main(
@@ -32,7 +32,7 @@ def main(
 ) -> None:
     """Write an animated WebP of the flight's first camera, from take-off to landing."""
     with Recording.open(recording) as opened:
-        flight = Flight.read(opened)
+        flight = RecordedFlight.read(opened)
         source, stamps = next(iter(flight.frame_stamps.items()))
         robot = flight.robots[source.partition("/")[0]]
         start, end = robot.bands[0].start * NANOSECONDS, robot.bands[-1].start * NANOSECONDS

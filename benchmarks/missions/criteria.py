@@ -10,7 +10,7 @@ from typing import TypeAlias
 import numpy as np
 import shapely
 
-from aerodaas.recording.flight import Band
+from aerodaas.recording.report.flight import Band
 from missions.evidence import Evidence
 
 __all__ = [

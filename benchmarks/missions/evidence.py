@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.clock import seconds
-from aerodaas.config import EnvironmentConfig, RobotConfig
-from aerodaas.recording.flight import Band, Flight, RobotFlight
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import Band, RecordedFlight, RobotFlight
 from aerodaas.recording.states import vehicle_states
 from aerodaas.simulation.scenario import Car, Gesture
 from aerodaas.simulation.world import CAR_SIZE, World
+from aerodaas.types.clock import seconds
 
 __all__ = ["Evidence"]
 
@@ -26,7 +26,7 @@ _AIRBORNE = 0.3
 class Evidence:
     """A recorded flight of one simulated robot, and the world in which it took place."""
 
-    flight: Flight
+    flight: RecordedFlight
     robot: RobotFlight
     config: RobotConfig
     world: World
@@ -41,7 +41,7 @@ class Evidence:
     def read(cls, path: Path, robot: str | None = None) -> Evidence:
         """Read a recording; `robot` where it has several. Raises RecordingError."""
         with Recording.open(path) as recording:
-            flight = Flight.read(recording)
+            flight = RecordedFlight.read(recording)
             content = recording.attachment("environment.json").decode()
             environment = EnvironmentConfig.model_validate_json(content)
             config = next(one for one in environment.robots if robot in {None, one.id})

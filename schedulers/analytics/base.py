@@ -30,8 +30,8 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from aerodaas.clock import NANOSECONDS
-from aerodaas.errors import SchedulerError
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.errors import SchedulerError
 
 __all__ = [
     "MIGRATED",
@@ -40,8 +40,6 @@ __all__ = [
     "AnalyticsScheduler",
     "Decision",
     "Drop",
-    "Outcome",
-    "Place",
     "Profile",
     "QoeGoal",
     "Resources",
@@ -49,6 +47,8 @@ __all__ = [
     "RunOnEdge",
     "SendToCloud",
     "Task",
+    "TaskOutcome",
+    "TaskPlace",
     "WakeAt",
 ]
 
@@ -134,7 +134,7 @@ class Task:
     is judged by `deadline + reserve`."""
 
 
-class Place(str, enum.Enum):
+class TaskPlace(str, enum.Enum):
     """Where a task ran."""
 
     EDGE = "edge"
@@ -142,7 +142,7 @@ class Place(str, enum.Enum):
     NOWHERE = "nowhere"
 
 
-class Outcome(str, enum.Enum):
+class TaskOutcome(str, enum.Enum):
     """How a task ended."""
 
     DONE = "done"
@@ -162,8 +162,8 @@ class Result:
     """The end of one task."""
 
     task: Task
-    outcome: Outcome
-    place: Place
+    outcome: TaskOutcome
+    place: TaskPlace
     started: int
     """When its execution began; for a task never started, when it was given up."""
     finished: int
@@ -171,11 +171,11 @@ class Result:
     @property
     def utility(self) -> float:
         """QoS utility: the gain if in time, minus the cost if it ran in vain, 0 if it never ran."""
-        if self.place is Place.NOWHERE:
+        if self.place is TaskPlace.NOWHERE:
             return 0.0
         profile = self.task.profile
-        cost = profile.edge_cost if self.place is Place.EDGE else profile.cloud_cost
-        return profile.benefit - cost if self.outcome is Outcome.DONE else -cost
+        cost = profile.edge_cost if self.place is TaskPlace.EDGE else profile.cloud_cost
+        return profile.benefit - cost if self.outcome is TaskOutcome.DONE else -cost
 
 
 @dataclass(frozen=True, slots=True)

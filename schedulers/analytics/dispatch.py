@@ -6,20 +6,20 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
-from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
     Decision,
     Drop,
-    Outcome,
-    Place,
     Resources,
     Result,
     RunOnEdge,
     SendToCloud,
     Task,
+    TaskOutcome,
+    TaskPlace,
     WakeAt,
 )
+from aerodaas.types.errors import SchedulerError
 
 __all__ = ["EXECUTOR_DOWN", "Dispatch", "Host"]
 
@@ -106,17 +106,17 @@ class Dispatch:
         if self.running is None:
             self._offer_edge(now)
 
-    def finished(self, task: Task, now: int, failure: Outcome | None = None) -> None:
+    def finished(self, task: Task, now: int, failure: TaskOutcome | None = None) -> None:
         """An execution has ended: with a result, or with TIMEOUT or FAILED as its `failure`."""
         in_time = now <= task.deadline + task.reserve
-        outcome = failure or (Outcome.DONE if in_time else Outcome.LATE)
+        outcome = failure or (TaskOutcome.DONE if in_time else TaskOutcome.LATE)
         if task is self.running:
             self.running = None
-            result = Result(task, outcome, Place.EDGE, self._edge_started, now)
+            result = Result(task, outcome, TaskPlace.EDGE, self._edge_started, now)
         else:
             started = self._cloud_started.pop(task.id)
             self.in_cloud -= 1
-            result = Result(task, outcome, Place.CLOUD, started, now)
+            result = Result(task, outcome, TaskPlace.CLOUD, started, now)
         self._host.closed(result)
         if self._cloud_queue:
             self._fill_cloud(now)
@@ -186,7 +186,7 @@ class Dispatch:
             else:
                 del undecided[task.id]
                 self._host.decided(decision, now)
-                self._host.closed(Result(task, Outcome.DROPPED, Place.NOWHERE, now, now))
+                self._host.closed(Result(task, TaskOutcome.DROPPED, TaskPlace.NOWHERE, now, now))
 
     def _run_edge(self, decision: RunOnEdge, now: int) -> None:
         task = decision.task
@@ -241,7 +241,7 @@ class Dispatch:
 
     def _give_up(self, task: Task, now: int) -> None:
         """End a task that the scheduler believes to have started; it is told as soon as may be."""
-        result = Result(task, Outcome.DROPPED, Place.NOWHERE, now, now)
+        result = Result(task, TaskOutcome.DROPPED, TaskPlace.NOWHERE, now, now)
         self._host.closed(result)
         self._ended.append(result)
 

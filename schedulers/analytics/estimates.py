@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import erf, sqrt
 
-from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
+from aerodaas.types.clock import NANOSECONDS
 
-__all__ = ["Belief", "ExecutionBeliefs", "chance"]
+__all__ = ["TimeEstimate", "TimeEstimates", "chance"]
 
 _PRIOR_VARIATION = 0.05
 _PRIOR_WEIGHT = 5
@@ -21,14 +21,14 @@ _CERTAIN = 4.0
 
 
 @dataclass(slots=True)
-class Belief:
+class TimeEstimate:
     """One model's execution time in one place: normal, nanoseconds."""
 
     mean: float
     sigma: float
 
 
-class ExecutionBeliefs:
+class TimeEstimates:
     """Per model a normal distribution around the profile's time, plus a delay shared by all.
 
     A model's own offset and variance are running averages of what was observed. The shared delay
@@ -43,7 +43,7 @@ class ExecutionBeliefs:
         self._uncertainty = 0.0
         self._at = 0
         self._models: dict[str, list[float]] = {}
-        self._cache: dict[str, Belief] = {}
+        self._cache: dict[str, TimeEstimate] = {}
 
     def observe(self, profile: Profile, taken: int, now: int) -> None:
         """Learn from one execution."""
@@ -66,14 +66,14 @@ class ExecutionBeliefs:
         model[1] += weight * (error * error - variance)
         model[2] += 1
 
-    def belief(self, profile: Profile) -> Belief:
+    def belief(self, profile: Profile) -> TimeEstimate:
         """The present belief about a model's execution time."""
         found = self._cache.get(profile.model)
         if found is None:
             offset, variance, _ = self._models.get(profile.model) or self._model(profile)
             mean = self._nominal(profile) + offset + self.delay
             spread = variance + self._uncertainty + _LEAST_VARIANCE
-            found = self._cache[profile.model] = Belief(mean, sqrt(spread))
+            found = self._cache[profile.model] = TimeEstimate(mean, sqrt(spread))
         return found
 
     def _nominal(self, profile: Profile) -> int:
@@ -87,7 +87,7 @@ class ExecutionBeliefs:
         return found
 
 
-def chance(belief: Belief, room: float) -> float:
+def chance(belief: TimeEstimate, room: float) -> float:
     """Probability that an execution takes at most `room` nanoseconds."""
     z = (room - belief.mean) / belief.sigma
     if z > _CERTAIN:

@@ -28,15 +28,12 @@ from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from math import exp
 
-from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     STOLEN,
     AnalyticsScheduler,
     Decision,
     Drop,
-    Outcome,
-    Place,
     Profile,
     QoeGoal,
     Resources,
@@ -44,13 +41,16 @@ from aerodaas.schedulers.analytics.base import (
     RunOnEdge,
     SendToCloud,
     Task,
+    TaskOutcome,
+    TaskPlace,
     WakeAt,
 )
-from aerodaas.schedulers.analytics.estimates import ExecutionBeliefs
+from aerodaas.schedulers.analytics.estimates import TimeEstimates
 from aerodaas.schedulers.analytics.forecast import LATENESS, Forecast
 from aerodaas.schedulers.analytics.outlook import CloudOutlook
 from aerodaas.schedulers.analytics.planner import Job, Lane, plan
 from aerodaas.schedulers.analytics.quality import QualityWatch
+from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["Margin"]
 
@@ -88,7 +88,7 @@ class Margin(AnalyticsScheduler):
 
     def __init__(self) -> None:
         self.cloud = CloudOutlook()
-        self.edge = ExecutionBeliefs(shared=False)
+        self.edge = TimeEstimates(shared=False)
         self._models: dict[str, _Model] = {}
         self._due: list[tuple[int, int, Task]] = []
         """When each waiting task needs a decision, a heap; entries of others are stale."""
@@ -196,11 +196,11 @@ class Margin(AnalyticsScheduler):
         """Learn from the result."""
         task = result.task
         model = self._model(task.profile)
-        model.quality.ended(task.arrival, in_time=result.outcome is Outcome.DONE)
-        if result.place is Place.EDGE:
+        model.quality.ended(task.arrival, in_time=result.outcome is TaskOutcome.DONE)
+        if result.place is TaskPlace.EDGE:
             self._stale |= abs(self._free_at - now) > SURPRISE
             self._free_at = now
-            if result.outcome is not Outcome.FAILED:
+            if result.outcome is not TaskOutcome.FAILED:
                 self.edge.observe(task.profile, result.finished - result.started, now)
         else:
             self.cloud.finished(result, now)

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable
 from math import log, pi, sqrt
 
-from aerodaas.clock import NANOSECONDS
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
-    Outcome,
-    Place,
     Profile,
     Resources,
     Result,
     Task,
+    TaskOutcome,
+    TaskPlace,
 )
-from aerodaas.schedulers.analytics.estimates import ExecutionBeliefs, chance
+from aerodaas.schedulers.analytics.estimates import TimeEstimates, chance
+from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["CloudOutlook"]
 
@@ -31,7 +31,7 @@ _GRACE = 50 * MILLISECOND
 """... and this much more."""
 _SILENT = 2
 """Overdue answers in a row after which the cloud counts as silent."""
-_UNANSWERED = (Outcome.FAILED, Outcome.TIMEOUT)
+_UNANSWERED = (TaskOutcome.FAILED, TaskOutcome.TIMEOUT)
 
 
 class CloudOutlook:
@@ -39,7 +39,7 @@ class CloudOutlook:
 
     def __init__(self) -> None:
         self.resources = Resources()
-        self.beliefs = ExecutionBeliefs(shared=True)
+        self.beliefs = TimeEstimates(shared=True)
         self.silent_since: int | None = None
         self.slot_price = 0.0
         """Value of a slot's time per nanosecond, charged while few slots are free."""
@@ -110,7 +110,7 @@ class CloudOutlook:
         """Learn from a task that came back, was lost or never started."""
         sent = self._sent.pop(result.task, now)
         self._listen_at = 0.0
-        if result.place is not Place.CLOUD or result.outcome in _UNANSWERED:
+        if result.place is not TaskPlace.CLOUD or result.outcome in _UNANSWERED:
             return
         self._answered = max(self._answered, sent)
         if self.silent_since is not None and sent >= self.silent_since:

@@ -9,7 +9,7 @@ from math import inf
 from operator import itemgetter
 from typing import Any
 
-from aerodaas.schedulers.analytics.estimates import Belief, chance
+from aerodaas.schedulers.analytics.estimates import TimeEstimate, chance
 
 __all__ = ["Job", "Lane", "plan"]
 
@@ -31,7 +31,7 @@ class Job:
 class Lane:
     """Jobs of one model in order of release; one is only taken after those before it."""
 
-    time: Belief
+    time: TimeEstimate
     jobs: list[Job]
 
 

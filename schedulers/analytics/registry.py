@@ -12,9 +12,9 @@ from importlib.machinery import ModuleSpec, SourceFileLoader
 from pathlib import Path
 from typing import Any, cast
 
-from aerodaas.errors import SchedulerError, UnknownIdError
-from aerodaas.plugins import load_plugin, plugin_names
+from aerodaas.config.plugins import load_plugin, plugin_names
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
+from aerodaas.types.errors import SchedulerError, UnknownIdError
 
 __all__ = ["load_scheduler", "scheduler_names"]
 

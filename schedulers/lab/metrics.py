@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from statistics import fmean, stdev
 
-from aerodaas.schedulers.analytics.base import MIGRATED, STOLEN, Outcome, Place, Task
+from aerodaas.schedulers.analytics.base import MIGRATED, STOLEN, Task, TaskOutcome, TaskPlace
 from aerodaas.schedulers.analytics.windows import QoeWindows
 from aerodaas.schedulers.lab.simulator import Trace
 
@@ -69,7 +69,7 @@ def score(tasks: Sequence[Task], trace: Trace) -> Score:
         stolen=trace.reasons[STOLEN],
         tasks_by_model=dict(Counter(task.profile.model for task in tasks)),
     )
-    edge, cloud, in_time = Place.EDGE, Place.CLOUD, Outcome.DONE
+    edge, cloud, in_time = TaskPlace.EDGE, TaskPlace.CLOUD, TaskOutcome.DONE
     on_edge = [result for result in trace.results if result.place is edge]
     in_cloud = [result for result in trace.results if result.place is cloud]
     done: Counter[str] = Counter()
@@ -94,7 +94,7 @@ def _bonuses(tasks: Sequence[Task], trace: Trace) -> float:
     for task in tasks:
         windows.arrived(task)
     for result in trace.results:
-        if result.outcome is Outcome.DONE:
+        if result.outcome is TaskOutcome.DONE:
             windows.done(result.task)
     return windows.utility
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
-from aerodaas.clock import NANOSECONDS
-from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import MILLISECOND
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.errors import SchedulerError, UnknownIdError
 
 __all__ = ["Network"]
 

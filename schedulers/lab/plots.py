@@ -14,11 +14,11 @@ from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
-from aerodaas.clock import NANOSECONDS
-from aerodaas.schedulers.analytics.base import Outcome, Place, Result
+from aerodaas.schedulers.analytics.base import Result, TaskOutcome, TaskPlace
 from aerodaas.schedulers.lab.run import LabResult
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import Trace
+from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["plot_bars", "plot_observations", "plot_timeline"]
 
@@ -85,17 +85,17 @@ def plot_timeline(trace: Trace, path: Path, title: str, begin: float, end: float
     shown = [r for r in trace.results if r.finished / 1e9 >= begin and r.started / 1e9 <= end]
     models = sorted({result.task.profile.model for result in trace.results})
     colours = dict(zip(models, PALETTE, strict=False))
-    cloud = _rows([r for r in shown if r.place is Place.CLOUD])
+    cloud = _rows([r for r in shown if r.place is TaskPlace.CLOUD])
     height = max((row for _, row in cloud), default=0) + 1
     with plt.style.context(_STYLE):
         fig, axis = plt.subplots(figsize=(11, 1.8 + 0.14 * height))
         for result in shown:
-            if result.place is Place.EDGE:
+            if result.place is TaskPlace.EDGE:
                 _bar(axis, result, -2.2, 1.8, colours)
         for result, row in cloud:
             _bar(axis, result, row, 0.85, colours)
         for result in shown:
-            if result.place is Place.NOWHERE:
+            if result.place is TaskPlace.NOWHERE:
                 colour = colours[result.task.profile.model]
                 axis.plot(result.finished / 1e9, -3.2, "x", color=colour, markersize=6)
         axis.set_yticks([-3.2, -1.3, height / 2], ["dropped", "edge", "cloud"])
@@ -171,9 +171,9 @@ def _bar(axis: Axes, result: Result, row: float, height: float, colours: Mapping
         result.started / 1e9,
         align="edge",
         color=colours[result.task.profile.model],
-        edgecolor="white" if result.outcome is Outcome.DONE else "black",
+        edgecolor="white" if result.outcome is TaskOutcome.DONE else "black",
         linewidth=0.5,
-        hatch=None if result.outcome is Outcome.DONE else "////",
+        hatch=None if result.outcome is TaskOutcome.DONE else "////",
     )
 
 

@@ -11,7 +11,6 @@ from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
 
-from aerodaas.errors import SchedulerError
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.bound import clairvoyant_bound
@@ -21,13 +20,14 @@ from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
+from aerodaas.types.errors import SchedulerError
 
 __all__ = ["LabResult", "Spread", "run_lab"]
 
 Wanted = str | type[AnalyticsScheduler] | AnalyticsScheduler
 Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
 """Something like `map`, such as `Pool.imap` of multiprocessing, or
-`aerodaas.actors.spread.spread_over(address)` for a Ray cluster."""
+`aerodaas.actors.cluster.ray_map.spread_over(address)` for a Ray cluster."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,23 +11,23 @@ from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     AnalyticsScheduler,
     Decision,
-    Outcome,
     Resources,
     Result,
     Task,
+    TaskOutcome,
     WakeAt,
 )
 from aerodaas.schedulers.analytics.dispatch import Dispatch
 from aerodaas.schedulers.lab.sample import SamplePath
 
-__all__ = ["Observation", "Trace", "simulate"]
+__all__ = ["SchedulerObservation", "Trace", "simulate"]
 
 _FINISH, _LOST, _TIMER = range(3)
 _EVERY = 50 * MILLISECOND
 
 
 @dataclass(slots=True)
-class Observation:
+class SchedulerObservation:
     """What a scheduler let see of itself at one moment."""
 
     at: int
@@ -47,7 +47,7 @@ class Trace:
     """When the last event happened, nanoseconds."""
     decisions: list[tuple[int, Decision]] = field(default_factory=list)
     """Filled on request, as are the observations."""
-    observations: list[Observation] = field(default_factory=list)
+    observations: list[SchedulerObservation] = field(default_factory=list)
 
 
 class _SimulatedHost:
@@ -116,7 +116,7 @@ def simulate(
         now = arrival
         dispatch.arrived(task, now)
         if record and now >= look_at:
-            trace.observations.append(Observation(now, dict(dispatch.scheduler.observe())))
+            trace.observations.append(SchedulerObservation(now, dict(dispatch.scheduler.observe())))
             look_at = now + _EVERY
     while heap:
         now, kind, _, ended = heappop(heap)
@@ -132,4 +132,4 @@ def _deliver(dispatch: Dispatch, kind: int, task: Task | None, now: int) -> None
     elif kind == _FINISH:
         dispatch.finished(task, now)
     else:
-        dispatch.finished(task, now, Outcome.TIMEOUT)
+        dispatch.finished(task, now, TaskOutcome.TIMEOUT)

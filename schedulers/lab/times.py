@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Literal, cast
 
-from aerodaas.errors import SchedulerError
+from aerodaas.types.errors import SchedulerError
 
 __all__ = ["ExecutionTimes"]
 

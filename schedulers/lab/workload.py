@@ -7,10 +7,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from aerodaas.clock import NANOSECONDS
-from aerodaas.errors import SchedulerError, UnknownIdError
 from aerodaas.schedulers.analytics.base import Profile, Task
-from aerodaas.schedulers.analytics.profiles import ACTIVE, PASSIVE, PUBLISHED
+from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.errors import SchedulerError, UnknownIdError
 
 __all__ = ["SIX", "Arrival", "Workload"]
 

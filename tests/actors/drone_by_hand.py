@@ -7,14 +7,14 @@ from typing import Any
 
 from flying import robot
 
-from aerodaas.actors._names import state_stream
-from aerodaas.actors.drone import Conduct, DroneActor
-from aerodaas.actors.pilot import RobotSpec
+from aerodaas.actors.drone.actor import DroneActor, LockstepSchedule
+from aerodaas.actors.drone.vehicle_controller import RobotSpec
 from aerodaas.actors.session import Session
-from aerodaas.actors.streams import Inbox
-from aerodaas.config import EnvironmentConfig
-from aerodaas.navigation.commands import Command
-from aerodaas.schedulers.waypoint.nearest_neighbor import NearestNeighborScheduler
+from aerodaas.actors.stream_names import state_stream
+from aerodaas.actors.streams import Subscriber
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.mission.commands import Command
+from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 
 __all__ = ["DroneByHand", "drone_by_hand"]
 
@@ -29,8 +29,8 @@ class DroneByHand(DroneActor):
 
     def open_here(self) -> None:
         """What `prepare` does on a node of Ray's."""
-        self.inbox = Inbox(self.scope, self.name, self._reads)
-        self.alerts = self.outlet(f"alerts/{self.name}")
+        self.subscriber = Subscriber(self.scope, self.name, self._reads)
+        self.alerts = self.publisher(f"alerts/{self.name}")
         self._open()
         self._phase = "ready"
 
@@ -62,7 +62,7 @@ def drone_by_hand(
         initial=tuple(initial),
         scheduler=_InThisProcess(),
     )
-    conduct = Conduct(windows={state_stream("drone"): 0})
+    conduct = LockstepSchedule(windows={state_stream("drone"): 0})
     actor = DroneByHand(Session(environment, speed), "drone/drone", (spec,), conduct)
     actor.open_here()
     return actor

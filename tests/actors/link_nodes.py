@@ -22,11 +22,11 @@ import ray  # noqa: E402
 from ray.cluster_utils import Cluster  # noqa: E402
 from test_sites import Desk, Mean  # noqa: E402
 
-from aerodaas.actors._cloud import Executor  # noqa: E402
-from aerodaas.actors.cluster import Place, options_for  # noqa: E402
-from aerodaas.actors.executor import CloudExecutor  # noqa: E402
-from aerodaas.data import Frame, Header  # noqa: E402
-from aerodaas.status import Message  # noqa: E402
+from aerodaas.actors.cluster.ray_cluster import Placement, options_for  # noqa: E402
+from aerodaas.actors.dispatch.executor import CloudExecutor  # noqa: E402
+from aerodaas.actors.dispatch.remote_executor import Executor  # noqa: E402
+from aerodaas.types.data import Frame, Header  # noqa: E402
+from aerodaas.types.status import Message  # noqa: E402
 
 FRAMES = 12
 
@@ -34,7 +34,7 @@ FRAMES = 12
 def executor(*models: str) -> Executor:
     """A process on the cloud node with an analysis for each of the models."""
     remote: Any = ray.remote(CloudExecutor)
-    options = options_for(Place("cloud"), restarts=0)
+    options = options_for(Placement("cloud"), restarts=0)
     handle = remote.options(**options, max_concurrency=6).remote()
     works = ray.put({model: Mean() for model in models})
     ray.get(handle.prepare.remote(works), timeout=200)
@@ -46,7 +46,7 @@ def noise(message: Message[Frame]) -> Message[Frame]:
     random = np.random.default_rng(message.seq)
     item = Frame(Header(*message.header), random.integers(0, 255, (360, 640, 3), np.uint8))
     fields = (message.stream, message.seq, message.stamp, message.header, message.captured)
-    return Message(*fields, message.hops, item)
+    return Message(*fields, message.spans, item)
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from aerodaas.schedulers.analytics.base import Decision, RunOnEdge, Task
-from aerodaas.schedulers.analytics.edge_only import Fifo
+from aerodaas.schedulers.analytics.published.edge_only import Fifo
 
 __all__ = ["Forgetful", "Hanging", "Raising", "Silent", "Slow", "Twice"]
 

@@ -6,9 +6,9 @@ import hashlib
 from dataclasses import dataclass
 from typing import Any
 
-from aerodaas.actors.streams import Inbox
-from aerodaas.data import Frame
-from aerodaas.status import Message
+from aerodaas.actors.streams import Subscriber
+from aerodaas.types.data import Frame
+from aerodaas.types.status import Message
 
 __all__ = ["Reader", "Seen", "digest"]
 
@@ -30,25 +30,25 @@ class Seen:
 
 
 class Reader:
-    """One inbox by stream; also takes what comes from other nodes."""
+    """One subscriber by stream; also takes what comes from other nodes."""
 
     def __init__(self) -> None:
         """Read nothing yet."""
-        self._inboxes: dict[str, Inbox] = {}
+        self._subscribers: dict[str, Subscriber] = {}
         self._kept: dict[str, list[Message[Any]]] = {}
 
     def open(self, scope: str, stream: str, depth: int) -> None:
         """Join a stream."""
-        self._inboxes[stream] = Inbox(scope, f"reader/{stream}", {stream: depth})
+        self._subscribers[stream] = Subscriber(scope, f"reader/{stream}", {stream: depth})
         self._kept[stream] = []
 
     def deliver(self, stream: str, data: bytes) -> None:
         """Take a message from another node."""
-        self._inboxes[stream].deliver(stream, data)
+        self._subscribers[stream].deliver(stream, data)
 
     def take(self, stream: str, timeout: float = 0.0, *, keep: bool = False) -> list[Seen]:
         """What has arrived since the last call; with `keep`, hold on to the messages."""
-        messages = self._inboxes[stream].receive(timeout)
+        messages = self._subscribers[stream].receive(timeout)
         if keep:
             self._kept[stream] += messages
         return [Seen(m.seq, m.stamp, m.captured, digest(m.item)) for m in messages]
@@ -59,10 +59,10 @@ class Reader:
 
     def counts(self, stream: str) -> tuple[int, int]:
         """Messages received and dropped."""
-        inbox = self._inboxes[stream]
-        return inbox.received[stream], inbox.dropped[stream]
+        subscriber = self._subscribers[stream]
+        return subscriber.received[stream], subscriber.dropped[stream]
 
     def close(self, stream: str) -> list[str]:
         """Leave a stream; returns what the messages held on to say after that."""
-        self._inboxes.pop(stream).close()
+        self._subscribers.pop(stream).close()
         return [digest(message.item) for message in self._kept.pop(stream)]

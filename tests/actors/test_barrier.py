@@ -7,8 +7,8 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.actors._barrier import Barrier, paths, widest
-from aerodaas.graph import Graph, Node
+from aerodaas.actors.lockstep.barrier import Barrier, paths, widest
+from aerodaas.dataflow.graph import Graph, Node
 
 measurements = st.lists(
     st.tuples(st.sampled_from(["camera", "odometry"]), st.integers(0, 3)), max_size=20

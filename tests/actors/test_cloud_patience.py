@@ -10,15 +10,15 @@ from typing import Any
 
 import pytest
 
-from aerodaas.actors._cloud import Cloud, CloudAnswer, Executor
-from aerodaas.actors._parcels import Parcels
-from aerodaas.actors._sites import Sites
-from aerodaas.actors.executor import Executed
+from aerodaas.actors.dispatch.executor import Executed
+from aerodaas.actors.dispatch.executor_pool import ExecutorPool
+from aerodaas.actors.dispatch.frame_uplink import FrameUplink
+from aerodaas.actors.dispatch.remote_executor import Executor, RemoteExecutor, RemoteResult
 from aerodaas.actors.streams import encode_message
-from aerodaas.clock import NANOSECONDS
-from aerodaas.data import Header
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
-from aerodaas.status import Hop, Message
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Header
+from aerodaas.types.status import Message, TraceSpan
 
 
 class _Frozen:
@@ -34,10 +34,10 @@ class _Frozen:
 
 
 @pytest.fixture
-def cloud() -> Cloud:
+def cloud() -> RemoteExecutor:
     """One that may take 10 s by its resources."""
     executor = Executor("site", _Frozen(), [], frozenset({"m"}), 2, "none")
-    return Cloud(executor, Parcels("none"), 10 * NANOSECONDS, lambda: None)
+    return RemoteExecutor(executor, FrameUplink("none"), 10 * NANOSECONDS, lambda: None)
 
 
 def _task(number: int, deadline: float) -> Task:
@@ -45,12 +45,12 @@ def _task(number: int, deadline: float) -> Task:
     return Task(number, profile, 0, round(deadline * NANOSECONDS))
 
 
-def _send(cloud: Cloud, task: Task) -> None:
+def _send(cloud: RemoteExecutor, task: Task) -> None:
     message: Message[Any] = Message("camera", task.id, 0, Header(0, 0, "camera"), 0, (), b"x")
     cloud.send(task, message, 0, 5.0)
 
 
-def _given_up(cloud: Cloud) -> tuple[float, CloudAnswer]:
+def _given_up(cloud: RemoteExecutor) -> tuple[float, RemoteResult]:
     for tenths in range(200):
         for answer in cloud.answers(tenths * NANOSECONDS // 10):
             return tenths / 10, answer
@@ -61,7 +61,7 @@ def _given_up(cloud: Cloud) -> tuple[float, CloudAnswer]:
     ("expected", "seconds"), [(None, 10.0), (0.05, 2.0), (1.0, 4.0), (30.0, 10.0)]
 )
 def test_a_silent_executor_is_lost_by_what_was_expected_of_it(
-    cloud: Cloud, expected: float | None, seconds: float
+    cloud: RemoteExecutor, expected: float | None, seconds: float
 ) -> None:
     """Four times as long, by what is told or was seen; while nothing was seen, as resources say."""
     if expected is not None:
@@ -74,7 +74,7 @@ def test_a_silent_executor_is_lost_by_what_was_expected_of_it(
     assert not answer.timed_out
 
 
-def test_a_task_that_was_late_anyhow_has_timed_out(cloud: Cloud) -> None:
+def test_a_task_that_was_late_anyhow_has_timed_out(cloud: RemoteExecutor) -> None:
     """It is not tried again."""
     cloud.executions.observe("m", 0.1)
     _send(cloud, _task(1, 1.5))
@@ -83,17 +83,17 @@ def test_a_task_that_was_late_anyhow_has_timed_out(cloud: Cloud) -> None:
     assert not answer.lost
 
 
-def test_what_waits_for_the_link_is_part_of_what_is_expected(cloud: Cloud) -> None:
+def test_what_waits_for_the_link_is_part_of_what_is_expected(cloud: RemoteExecutor) -> None:
     """Four frames of 50 kB under way over 25 kB/s: the next one is there after ten seconds."""
-    cloud.parcels.link.observe(50_000, 2.0)
+    cloud.frame_uplink.link.observe(50_000, 2.0)
     cloud.executions.observe("m", 0.1)
     for number in range(4):
-        cloud.parcels.uplink.depart(number, 50_000, time.perf_counter())
-    cloud.parcels._size = 50_000
+        cloud.frame_uplink.uplink.depart(number, 50_000, time.perf_counter())
+    cloud.frame_uplink._size = 50_000
     assert cloud.expected("m") == pytest.approx(10.1)
 
 
-def test_frames_that_were_given_up_are_still_on_the_link(cloud: Cloud) -> None:
+def test_frames_that_were_given_up_are_still_on_the_link(cloud: RemoteExecutor) -> None:
     """Until they are answered, late, or what was sent after them is: nothing overtakes them."""
     cloud.executions.observe("m", 0.05)
     _send(cloud, _task(1, 20.0))
@@ -102,12 +102,12 @@ def test_frames_that_were_given_up_are_still_on_the_link(cloud: Cloud) -> None:
     _given_up(cloud)
     assert cloud.gone
     cloud.probe(30 * NANOSECONDS)
-    assert cloud.parcels.uplink.waiting > 0
+    assert cloud.frame_uplink.uplink.waiting > 0
     cloud.executor.handle.asked[-1].set_result(result=True)
     cloud.probe(31 * NANOSECONDS)
-    assert cloud.parcels.uplink.waiting > 0
+    assert cloud.frame_uplink.uplink.waiting > 0
     cloud.probe(33 * NANOSECONDS)
-    assert cloud.parcels.uplink.waiting == 0
+    assert cloud.frame_uplink.uplink.waiting == 0
 
 
 @pytest.mark.parametrize(("budget", "sent"), [(1.9, False), (2.1, True)])
@@ -115,22 +115,22 @@ def test_a_frame_that_has_to_be_late_is_not_sent(budget: float, *, sent: bool) -
     """50 kB over 25 kB/s take two seconds; the task ends at once where that is too long."""
     handle = _Frozen()
     executor = Executor("site", handle, [], frozenset({"m"}), 2, "none")
-    sites = Sites((executor,), 10 * NANOSECONDS, lambda: None)
-    parcels = sites._parcels["site"]
-    parcels.link.observe(50_000, 2.0)
-    parcels._size = 50_000
+    sites = ExecutorPool((executor,), 10 * NANOSECONDS, lambda: None)
+    frame_uplink = sites._frame_uplinks["site"]
+    frame_uplink.link.observe(50_000, 2.0)
+    frame_uplink._size = 50_000
     message: Message[Any] = Message("camera", 1, 0, Header(0, 0, "camera"), 0, (), b"x")
     sites.send(_task(1, 20.0), message, 0, budget)
     answers = list(sites.answers(0))
-    parcels._packer.shutdown(wait=True)
+    frame_uplink._packer.shutdown(wait=True)
     assert len(handle.asked) == sent
     assert [answer.timed_out for answer in answers] == [True] * (not sent)
     assert all("too late" in answer.error for answer in answers)
 
 
-def test_a_late_answer_tells_of_the_link(cloud: Cloud) -> None:
+def test_a_late_answer_tells_of_the_link(cloud: RemoteExecutor) -> None:
     """At once, though all that was known before said something else."""
-    link = cloud.parcels.link
+    link = cloud.frame_uplink.link
     for _ in range(9):
         link.observe(50_000, 0.02)
     cloud.executions.observe("m", 0.05)
@@ -141,9 +141,9 @@ def test_a_late_answer_tells_of_the_link(cloud: Cloud) -> None:
     assert cloud.expected("m") == pytest.approx(0.15, abs=0.1)
     _given_up(cloud)
     time.sleep(0.3)
-    hops = (Hop("camera", 0, 0), Hop("m", 0, 10_000_000))
-    answered = encode_message(replace(message, hops=hops, item=b""))
+    spans = (TraceSpan("camera", 0, 0), TraceSpan("m", 0, 10_000_000))
+    answered = encode_message(replace(message, spans=spans, item=b""))
     cloud.executor.handle.asked[0].set_result(Executed(answered, 0.0))
     assert list(cloud.answers(20 * NANOSECONDS)) == [], "its task has ended already"
     assert link.bandwidth < 50_000 / 0.28
-    assert cloud.parcels.uplink.waiting == 0
+    assert cloud.frame_uplink.uplink.waiting == 0

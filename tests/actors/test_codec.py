@@ -11,13 +11,13 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 from numpy.typing import NDArray
 
-from aerodaas.actors.streams._codec import Encoded, decode
-from aerodaas.data import Frame, Header
-from aerodaas.status import Hop, Message
+from aerodaas.actors.streams.codec import Encoded, decode
+from aerodaas.types.data import Frame, Header
+from aerodaas.types.status import Message, TraceSpan
 
 
 def _message(item: object) -> Message[object]:
-    return Message("s", 3, 5, Header(1, 2, "cam"), 7, (Hop("a", 1, 2),), item)
+    return Message("s", 3, 5, Header(1, 2, "cam"), 7, (TraceSpan("a", 1, 2),), item)
 
 
 @given(
@@ -32,7 +32,7 @@ def _message(item: object) -> Message[object]:
 def test_arrays_of_any_shape_come_back_equal(items: list[NDArray[Any]]) -> None:
     """Encoding and decoding is the identity."""
     restored = decode(memoryview(Encoded(_message(items)).to_bytes()))
-    assert restored.hops == (Hop("a", 1, 2),)
+    assert restored.spans == (TraceSpan("a", 1, 2),)
     assert isinstance(restored.item, list)
     for before, after in zip(items, restored.item, strict=True):
         np.testing.assert_array_equal(before, after)

@@ -11,9 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from aerodaas.actors._coding import CODINGS, CodedFrame, Coder, Coding, CodingCost, decoded, fastest
-from aerodaas.data import Frame, Header
-from aerodaas.errors import SourceError
+from aerodaas.actors.dispatch.frame_codec import (
+    CODINGS,
+    CodedFrame,
+    Coder,
+    Coding,
+    CodingCost,
+    decoded,
+    fastest,
+)
+from aerodaas.types.data import Frame, Header
+from aerodaas.types.errors import SourceError
 
 SECONDS = st.floats(0, 10)
 COSTS = st.dictionaries(

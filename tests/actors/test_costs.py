@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.actors._costs import Executions, Link, Uplink, quantile
-from aerodaas.actors._estimates import Estimates
+from aerodaas.actors.dispatch.costs import ExecutionEstimates, LinkEstimate, Uplink, quantile
+from aerodaas.actors.dispatch.estimates import Estimates
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
 
 TIMES = frozenset({"edge_time", "cloud_time"})
@@ -30,7 +30,7 @@ def test_a_link_is_known_by_what_it_carried(
     latency: float, bandwidth: float, sizes: list[int]
 ) -> None:
     """Latency and bandwidth are recovered, and predict any other size."""
-    link = Link()
+    link = LinkEstimate()
     link.observe(0, latency)
     for size in sizes:
         link.observe(size, latency + size / bandwidth)
@@ -40,12 +40,12 @@ def test_a_link_is_known_by_what_it_carried(
 
 def test_a_link_of_which_nothing_is_known_is_taken_for_free() -> None:
     """So that the first frame goes, and tells."""
-    assert Link().seconds(1e6) == 0.0
+    assert LinkEstimate().seconds(1e6) == 0.0
 
 
 def test_a_link_is_not_misled_by_one_stall_but_follows_a_change() -> None:
     """The median of a few."""
-    link = Link()
+    link = LinkEstimate()
     for _ in range(10):
         link.observe(0, 0.02)
         link.observe(100_000, 0.03)
@@ -61,7 +61,7 @@ def test_a_link_is_not_misled_by_one_stall_but_follows_a_change() -> None:
 
 def test_an_execution_time_is_one_to_count_on() -> None:
     """High, but not the worst that was ever seen."""
-    seen = Executions()
+    seen = ExecutionEstimates()
     assert seen.seconds("model") is None
     for milliseconds in (10, 10, 10, 11, 12, 10, 10, 10, 11, 12, 500):
         seen.observe("model", milliseconds / 1e3)
@@ -109,7 +109,7 @@ def test_a_queue_on_a_link_is_waited_for_and_not_taken_for_slowness(
     latency: float, bandwidth: float, sizes: list[int]
 ) -> None:
     """All sent at once: each waits for those before it, and the bandwidth is still recovered."""
-    link = Link()
+    link = LinkEstimate()
     link.observe(0, latency)
     now = 0.0
     uplink = Uplink(link, lambda: now)
@@ -135,7 +135,7 @@ def test_a_link_that_has_become_slow_is_known_before_anything_has_crossed_it(
 ) -> None:
     """What has been under way for so long will take as long again, for each of its size."""
     now = 0.0
-    link = Link()
+    link = LinkEstimate()
     link.observe(0, 0.02)
     link.observe(50_000, 0.03)
     uplink = Uplink(link, lambda: now)
@@ -151,7 +151,7 @@ def test_a_link_that_has_become_slow_is_known_before_anything_has_crossed_it(
 
 def test_what_is_lost_on_a_link_is_waited_for_no_longer() -> None:
     """And what arrives twice, or never left, tells nothing."""
-    link = Link()
+    link = LinkEstimate()
     uplink = Uplink(link)
     uplink.depart("a", 100_000, 0.0)
     uplink.lose("a")

@@ -16,15 +16,15 @@ import schedulers_at_fault
 from flying import Flyer, hop, robot
 
 from aerodaas import AeroStreamData, Environment
-from aerodaas.actors.dispatcher import DispatcherActor
+from aerodaas.actors.dispatch.dispatcher import DispatcherActor
 from aerodaas.actors.session import Session
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.clock import NANOSECONDS
-from aerodaas.config import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
-from aerodaas.run import Run
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Resources
-from aerodaas.schedulers.analytics.dems import Dems
+from aerodaas.schedulers.analytics.published.dems import Dems
+from aerodaas.types.clock import NANOSECONDS
 
 pytestmark = pytest.mark.wall_clock
 
@@ -185,7 +185,7 @@ def test_a_dispatcher_that_dies_comes_back_without_being_asked(
     flyer: Flyer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Though the application never asks how it fares; no task ends twice, one stretch is lost."""
-    monkeypatch.setattr("aerodaas.run._BEAT_SECONDS", 3600.0)
+    monkeypatch.setattr("aerodaas.environment.run._BEAT_SECONDS", 3600.0)
     results: list[AeroStreamData[Any]] = []
 
     def build(env: Environment) -> None:

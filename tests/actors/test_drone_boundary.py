@@ -11,10 +11,10 @@ from drone_by_hand import DroneByHand, drone_by_hand
 from flying import hop
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
-from aerodaas.clock import host_time_ns
-from aerodaas.data import Header
-from aerodaas.navigation.commands import AddNavigation, End, OpenStream, Request, StreamItem
-from aerodaas.status import MissionState
+from aerodaas.mission.commands import AddNavigation, End, OpenStream, Request, StreamItem
+from aerodaas.types.clock import host_time_ns
+from aerodaas.types.data import Header
+from aerodaas.types.status import MissionState
 
 _STREAM = "drone/evil"
 _FLYING = {MissionState.HOLDING, MissionState.ENROUTE, MissionState.LOITERING}
@@ -79,9 +79,9 @@ def _flying(**words: Any) -> DroneByHand:  # noqa: ANN401
 
 
 def _send(actor: DroneByHand, stream: str, item: object) -> None:
-    if stream not in actor.outlets:
-        actor.outlet(stream)
-    actor.outlets[stream].measure(item, Header(1, actor.clock.now(), stream), host_time_ns())
+    if stream not in actor.publishers:
+        actor.publisher(stream)
+    actor.publishers[stream].measure(item, Header(1, actor.clock.now(), stream), host_time_ns())
 
 
 def _eventually(holds: Any) -> None:  # noqa: ANN401
@@ -156,8 +156,8 @@ def test_a_mission_whose_every_turn_raises_leaves_the_vehicle_to_itself() -> Non
     actor = _flying()
     actor.start(host_time_ns())
     _eventually(lambda: actor.robots()["drone"].status.state is MissionState.LOITERING)
-    pilot = actor._pilots["drone"]
-    mission: Any = pilot.mission
+    controller = actor._controllers["drone"]
+    mission: Any = controller.mission
     mission.update = None
     _eventually(lambda: actor.report().phase == "failed")
     assert "TypeError" in str(actor.report().error)

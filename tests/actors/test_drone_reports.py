@@ -13,11 +13,11 @@ from drone_by_hand import DroneByHand, drone_by_hand
 from flying import hop
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
-from aerodaas.actors._loop_calls import LoopCalls, LoopOverError
-from aerodaas.actors._robot_report import Latencies
-from aerodaas.errors import MissionError
-from aerodaas.navigation.commands import AddNavigation, ClearNavigation, End
-from aerodaas.status import MissionState
+from aerodaas.actors.drone.loop_calls import LoopCalls, LoopOverError
+from aerodaas.actors.drone.robot_report import Latencies
+from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
+from aerodaas.types.errors import MissionError
+from aerodaas.types.status import MissionState
 
 _READS = 100_000
 _ON_GROUND = {MissionState.IDLE, MissionState.PREFLIGHT, MissionState.TAKING_OFF}

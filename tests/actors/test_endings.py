@@ -17,8 +17,8 @@ import psutil
 import pytest
 from flying import FLAT
 
-from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
@@ -45,7 +45,7 @@ def running(folder: Path, ending: str, *more: str) -> Iterator[subprocess.Popen[
     (folder / "app.py").write_text(_APP + ending)
     words = ["run", str(folder / "app.py"), "--speed", "1", "--record", str(folder / "out"), *more]
     with subprocess.Popen(
-        [sys.executable, "-c", "from aerodaas.cli import main; main()", *words],
+        [sys.executable, "-c", "from aerodaas.cli.app import main; main()", *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -57,11 +57,11 @@ def running(folder: Path, ending: str, *more: str) -> Iterator[subprocess.Popen[
         process.kill()
 
 
-def landed(folder: Path) -> Flight:
+def landed(folder: Path) -> RecordedFlight:
     """What was recorded, closed properly, of a drone that came down."""
     with Recording.open(folder / "out" / "flight.mcap") as recording:
         assert recording.complete
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     robot = flight.robots["drone"]
     assert robot.outcome.startswith("landed")
     assert robot.position[:, 2].max() > 1.0

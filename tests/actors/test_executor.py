@@ -10,18 +10,18 @@ import numpy as np
 import pytest
 
 from aerodaas import Analytics, Frame
-from aerodaas.actors._coding import Coder
-from aerodaas.actors.executor import (
+from aerodaas.actors.dispatch.executor import (
     FRAMES_KEPT,
     CloudExecutor,
     Executed,
     MissingFrameError,
     UnpreparedError,
 )
+from aerodaas.actors.dispatch.frame_codec import Coder
 from aerodaas.actors.streams import decode_message, encode_message
 from aerodaas.analytics.base import Context
-from aerodaas.data import Header
-from aerodaas.status import Message
+from aerodaas.types.data import Header
+from aerodaas.types.status import Message
 
 pytestmark = pytest.mark.wall_clock
 
@@ -69,8 +69,8 @@ def test_a_frame_is_carried_once_and_then_named(executor: CloudExecutor) -> None
     assert result(first) == result(second) == pytest.approx(200, abs=2)
     assert first.decoding > 0
     assert second.decoding == 0
-    hops = decode_message(memoryview(second.message)).hops
-    assert [hop.node for hop in hops] == ["two"], "not what was done for the other"
+    spans = decode_message(memoryview(second.message)).spans
+    assert [span.node for span in spans] == ["two"], "not what was done for the other"
 
 
 def test_a_call_that_names_a_frame_waits_for_the_thread_that_unpacks_it(
@@ -95,7 +95,7 @@ def test_of_frames_the_newest_are_kept(
     executor: CloudExecutor, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The oldest gives way; who names it, or one that never came, is told so."""
-    monkeypatch.setattr("aerodaas.actors.executor._UNPACKING", 0.0)
+    monkeypatch.setattr("aerodaas.actors.dispatch.executor._UNPACKING", 0.0)
     for number in range(FRAMES_KEPT + 1):
         executor.execute("one", ("camera", number), encoded())
     executor.execute("one", ("camera", 1), b"")

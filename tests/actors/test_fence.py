@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from aerodaas.actors._fence import FencedDispatch
-from aerodaas.errors import SchedulerError
+from aerodaas.actors.dispatch.guarded_scheduler import GuardedDispatch
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     AnalyticsScheduler,
@@ -20,7 +19,8 @@ from aerodaas.schedulers.analytics.base import (
     RunOnEdge,
     Task,
 )
-from aerodaas.schedulers.analytics.edge_cloud import EdgeCloudEdf
+from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf
+from aerodaas.types.errors import SchedulerError
 
 MODEL = Profile("m", 10, 100 * MILLISECOND, 10 * MILLISECOND, 20 * MILLISECOND)
 
@@ -76,7 +76,7 @@ def test_nonsense_is_named_and_another_goes_on(
 ) -> None:
     """The task is still undecided afterwards, and edge-first EDF runs it."""
     host = _Host()
-    dispatch = FencedDispatch(_Nonsense(answer), Resources(), host)
+    dispatch = GuardedDispatch(_Nonsense(answer), Resources(), host)
     dispatch.start(0)
     task = Task(0, MODEL, 0, MODEL.deadline)
     with pytest.raises(error, match=words):

@@ -14,9 +14,9 @@ from analyses import Above, Broken, Jitter, ProcessId, Ticker
 from flying import FLAT, Flyer, hop, recorded, robot
 
 from aerodaas import AeroListData, Environment, Odometry, Robot, Waypoint
-from aerodaas.errors import GraphError, MissionError
-from aerodaas.graph import AeroStreamData
-from aerodaas.status import MissionState
+from aerodaas.dataflow.graph import AeroStreamData
+from aerodaas.types.errors import GraphError, MissionError
+from aerodaas.types.status import MissionState
 
 pytestmark = pytest.mark.wall_clock
 
@@ -71,7 +71,7 @@ def test_a_slow_start_is_not_taken_for_a_dead_application(
     flyer: Flyer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The drone listens for the application from its start on, not from its making."""
-    from aerodaas.actors import flight as module  # noqa: PLC0415 - loads ray
+    from aerodaas.actors.run import flight as module  # noqa: PLC0415 - loads ray
 
     prepare = module.Flight._prepare
 
@@ -89,7 +89,7 @@ def test_a_slow_start_is_not_taken_for_a_dead_application(
 def reads(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
     """How the application reads: as beside the drone, or as from another node."""
     if request.param == "by asking":
-        monkeypatch.setattr("aerodaas.actors.live.shared_memory_available", lambda: False)
+        monkeypatch.setattr("aerodaas.actors.run.live.shared_memory_available", lambda: False)
 
 
 @pytest.mark.usefixtures("reads")
@@ -186,12 +186,12 @@ def test_an_analysis_that_raises_does_not_end_the_mission(flyer: Flyer) -> None:
     assert error.value.exit_code == 1
     said = str(error.value)
     assert "drone/broken: ZeroDivisionError: a bug of the user's own at analyses.py:" in said
-    from aerodaas.recording.flight import Flight  # noqa: PLC0415
     from aerodaas.recording.reader import Recording  # noqa: PLC0415
+    from aerodaas.recording.report.flight import RecordedFlight  # noqa: PLC0415
 
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
         assert recording.complete
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     assert flight.robots["drone"].visited == ("wp0",)
     assert [kind for _, kind, _ in flight.alerts] == ["analysis_failed"]
 

@@ -20,10 +20,10 @@ from aerodaas import (
     Waypoint,
 )
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.errors import GraphError, MissionError
-from aerodaas.graph import AeroStreamData
-from aerodaas.schedulers.waypoint.base import Situation
-from aerodaas.status import MissionState
+from aerodaas.dataflow.graph import AeroStreamData
+from aerodaas.schedulers.trajectory.base import PlanningContext
+from aerodaas.types.errors import GraphError, MissionError
+from aerodaas.types.status import MissionState
 
 pytestmark = pytest.mark.wall_clock
 
@@ -38,7 +38,7 @@ class Backwards(TrajectoryScheduler):
 
     isolated = False
 
-    def plan(self, pending: Sequence[Waypoint], situation: Situation) -> Sequence[Waypoint]:  # noqa: ARG002
+    def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:  # noqa: ARG002
         """Turn the order round."""
         return sorted(pending, key=lambda waypoint: waypoint.id, reverse=True)
 

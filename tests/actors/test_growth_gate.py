@@ -5,8 +5,8 @@ from __future__ import annotations
 import threading
 import time
 
-from aerodaas.actors._growth_gate import GrowthGate
-from aerodaas.actors._loop_calls import LoopCalls
+from aerodaas.actors.drone.loop_calls import LoopCalls
+from aerodaas.actors.lockstep.growth_gate import GrowthGate
 
 
 class Loop:

@@ -16,11 +16,11 @@ import psutil
 import pytest
 from flying import FLAT
 
-from aerodaas.actors.local_ray import LocalRay
-from aerodaas.actors.ray_variables import VARIABLES
-from aerodaas.actors.supervisor import VARIABLE
-from aerodaas.recording.flight import Flight
+from aerodaas.actors.cluster.local_ray import LocalRay
+from aerodaas.actors.cluster.ray_process import VARIABLE
+from aerodaas.actors.cluster.ray_variables import VARIABLES
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
@@ -103,10 +103,10 @@ def folders(processes: set[psutil.Process]) -> set[Path]:
 
 
 def under_way(pid: int) -> bool:
-    """Whether the run of an application has begun: its caretaker is there."""
+    """Whether the run of an application has begun: its orphan reaper is there."""
     for one in psutil.Process(pid).children(recursive=True):
         with contextlib.suppress(psutil.Error):
-            if " ".join(one.cmdline()).startswith("ray::Caretaker"):
+            if " ".join(one.cmdline()).startswith("ray::OrphanReaper"):
                 return True
     return False
 
@@ -165,12 +165,12 @@ def test_several_applications_at_once(tmp_path: Path) -> None:
     for name, path in recordings.items():
         with Recording.open(path) as recording:
             assert recording.complete
-            flight = Flight.read(recording)
+            flight = RecordedFlight.read(recording)
         assert flight.robots["drone"].outcome.startswith("landed")
         assert (flight.robots["drone"].visited == ("there",)) is (name != "one")
 
 
-def test_what_a_killed_supervisor_left_is_pruned(tmp_path: Path) -> None:
+def test_what_a_killed_keeper_left_is_pruned(tmp_path: Path) -> None:
     """The flight ends well; the next run's removes processes, folder and the sessions in it."""
     write(tmp_path, hover=8)
     words = ("app.py", "--no-view", "--speed", "1", "--record", "out")
@@ -179,7 +179,7 @@ def test_what_a_killed_supervisor_left_is_pruned(tmp_path: Path) -> None:
         (keeper,) = (
             one
             for one in psutil.Process(process.pid).children()
-            if any("supervisor.py" in word for word in one.cmdline())
+            if any("ray_process.py" in word for word in one.cmdline())
         )
         left = {one for one in keeper.children(recursive=True) if VARIABLE in one.environ()}
         (folder,) = folders(left)
@@ -189,7 +189,7 @@ def test_what_a_killed_supervisor_left_is_pruned(tmp_path: Path) -> None:
         assert process.returncode == 0, said
     with Recording.open(tmp_path / "out" / "flight.mcap") as recording:
         assert recording.complete
-        assert Flight.read(recording).robots["drone"].visited == ("there",)
+        assert RecordedFlight.read(recording).robots["drone"].visited == ("there",)
     assert any(one.is_running() for one in left)
     ray = LocalRay(VARIABLES)
     try:

@@ -11,12 +11,14 @@ from analyses import Above, Jitter, Ticker, Weave, Wish
 from flying import FLAT, Flyer, hop, recorded, robot
 
 from aerodaas import Environment
-from aerodaas.recording.flight import Flight
+from aerodaas.recording.report.flight import RecordedFlight
 
 Build = Callable[[Environment], object]
 
 
-def fly(flyer: Flyer, build: Build, content: dict[str, Any] | None = None, seed: int = 3) -> Flight:
+def fly(
+    flyer: Flyer, build: Build, content: dict[str, Any] | None = None, seed: int = 3
+) -> RecordedFlight:
     """Fly once more, into a folder of its own."""
     count = len(list(flyer.folder.glob("flight-*")))
     run = flyer.fly(build, content, seed=seed, record=flyer.folder / f"flight-{count}")
@@ -24,7 +26,7 @@ def fly(flyer: Flyer, build: Build, content: dict[str, Any] | None = None, seed:
     return recorded(run)
 
 
-def same(one: Flight, other: Flight) -> bool:
+def same(one: RecordedFlight, other: RecordedFlight) -> bool:
     """Whether two flights are equal to the last bit, for all robots."""
     return all(
         np.array_equal(robot._columns, other.robots[name]._columns)

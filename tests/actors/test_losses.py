@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import pytest
 
-from aerodaas.actors._application_process import ApplicationProcess
-from aerodaas.actors._losses import Pulse
+from aerodaas.actors.run.application_process import ApplicationProcess
+from aerodaas.actors.run.losses import SuspensionMonitor
 
 
 def test_an_application_in_another_container_is_not_looked_for_here(runtime: None) -> None:  # noqa: ARG001
@@ -37,8 +37,8 @@ def test_a_process_that_has_the_number_of_an_earlier_one_is_another(runtime: Non
 def test_only_a_pause_between_two_beats_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Not what came before the first one: a start may take long."""
     now = 100.0
-    monkeypatch.setattr("aerodaas.actors._losses.time.monotonic", lambda: now)
-    pulse = Pulse()
+    monkeypatch.setattr("aerodaas.actors.run.losses.time.monotonic", lambda: now)
+    pulse = SuspensionMonitor()
     now += 60.0
     pulse.beat()
     assert pulse.frozen == 0.0

@@ -13,15 +13,15 @@ from flying import Flyer, hop, robot
 from inference_server import Serving, serving
 
 from aerodaas import Analytics, Environment, Frame
-from aerodaas.actors._offload import allowed, cloud_processes, priced
+from aerodaas.actors.dispatch.offload import allowed, cloud_processes, priced
 from aerodaas.analytics.base import Context
-from aerodaas.config import ComputeConfig, RuntimeEnvConfig
-from aerodaas.data import Detection, Detections
-from aerodaas.errors import GraphError
-from aerodaas.graph import Node
+from aerodaas.config.model import ComputeConfig, RuntimeEnvConfig
+from aerodaas.dataflow.graph import Node
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
-from aerodaas.run import Run
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile
+from aerodaas.types.data import Detection, Detections
+from aerodaas.types.errors import GraphError
 
 pytestmark = pytest.mark.wall_clock
 

@@ -10,13 +10,13 @@ from analyses import Above, Broken, Jitter, ProcessId, Ticker, Weave
 from flying import FLAT, Flyer, hop, robot
 
 from aerodaas import Environment
-from aerodaas.actors.cluster import Place
-from aerodaas.actors.plan import FlightPlan, make_plan
+from aerodaas.actors.cluster.ray_cluster import Placement
+from aerodaas.actors.run.plan import FlightPlan, make_plan
 from aerodaas.actors.session import Session
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.errors import GraphError, SchedulerError
-from aerodaas.graph import AeroStreamData
+from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.schedulers.analytics.registry import load_scheduler
+from aerodaas.types.errors import GraphError, SchedulerError
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 10, "settings": {"width": 64, "height": 36}}
 ODOMETRY = {"id": "odom", "type": "odometry", "rate": 10}
@@ -98,8 +98,8 @@ def test_light_analyses_share_an_actor_by_place(environment: Environment) -> Non
         "analytics/cloud": ["drone/b"],
         "analytics/10.0.0.7": ["drone/c"],
     }
-    assert actors["analytics/cloud"].place == Place("cloud")
-    assert actors["analytics/10.0.0.7"].place == Place("edge", "10.0.0.7")
+    assert actors["analytics/cloud"].place == Placement("cloud")
+    assert actors["analytics/10.0.0.7"].place == Placement("edge", "10.0.0.7")
 
 
 def test_unread_sensors_of_a_flying_robot_run_all_the_same(environment: Environment) -> None:

@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from aerodaas.actors.planner import PlannerExecutor
+from aerodaas.actors.drone.planner import PlannerExecutor
 
 pytestmark = pytest.mark.wall_clock
 

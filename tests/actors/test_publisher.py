@@ -8,7 +8,7 @@ import time
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.actors._publisher import _MOST_WAITING, Publisher
+from aerodaas.actors.drone.background_publisher import _MOST_WAITING, BackgroundPublisher
 
 
 @settings(max_examples=20, deadline=None)
@@ -18,7 +18,7 @@ def test_what_is_dropped_is_counted_and_told_once_it_has_caught_up(extra: int) -
     told: list[int] = []
     done: list[int] = []
     busy, go = threading.Event(), threading.Event()
-    publisher = Publisher(told.append)
+    publisher = BackgroundPublisher(told.append)
     publisher.start()
 
     def occupy() -> None:
@@ -42,7 +42,7 @@ def test_what_is_dropped_is_counted_and_told_once_it_has_caught_up(extra: int) -
 def test_each_loss_is_told_by_itself_and_one_failure_is_no_others() -> None:
     """Numbers are of what was lost since the last time."""
     told: list[int] = []
-    publisher = Publisher(told.append)
+    publisher = BackgroundPublisher(told.append)
     publisher.start()
     for lost in (3, 5):
         busy, go = threading.Event(), threading.Event()

@@ -30,14 +30,14 @@ from aerodaas import (
     Waypoint,
 )
 from aerodaas.analytics.base import Context
-from aerodaas.analytics.onnx.detector import OnnxDetector
-from aerodaas.data import Detection
-from aerodaas.errors import RecordingError
-from aerodaas.recording.difference import difference
-from aerodaas.recording.pace_reader import read_pace
+from aerodaas.analytics.detection.detector import OnnxDetector
+from aerodaas.environment.run import Run
 from aerodaas.recording.pictures import detections, frames, picture_topics
 from aerodaas.recording.reader import Recording
-from aerodaas.run import Run
+from aerodaas.recording.replay.timeline_reader import read_replay_timeline
+from aerodaas.recording.report.difference import difference
+from aerodaas.types.data import Detection
+from aerodaas.types.errors import RecordingError
 
 CAMERA = {"id": "cam", "type": "camera", "rate": 7, "settings": {"width": 64, "height": 36}}
 
@@ -188,9 +188,11 @@ def test_a_flight_by_the_clock_repeats_every_decision(flyer: Flyer) -> None:
     # The mission may end between a result and the command made of it.
     assert 0 <= counted["drone/tardy detections"] - counted["drone/chase navigation"] <= 1
     assert counted["drone/chase navigation"] > 10
-    pace = read_pace(first.recording)
-    assert len(pace.work["drone/tardy"]["drone/cam"]) < len(pace.readings["drone/cam"])
-    assert pace.plans["drone"]
+    replay_timeline = read_replay_timeline(first.recording)
+    assert len(replay_timeline.work["drone/tardy"]["drone/cam"]) < len(
+        replay_timeline.readings["drone/cam"]
+    )
+    assert replay_timeline.plans["drone"]
 
 
 def detector(path: Path, score: float) -> Path:

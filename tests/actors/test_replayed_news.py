@@ -7,12 +7,12 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.actors.replayed import Arrivals, WatchedPlanner, as_planned
-from aerodaas.data import Header
-from aerodaas.navigation.planner import PlanRequest
-from aerodaas.recording.pace import NEVER, later
-from aerodaas.schedulers.waypoint.ordered import OrderedScheduler
-from aerodaas.status import Heard, Message
+from aerodaas.actors.run.replayed import ReplayedArrivals, WatchedPlanner, as_planned
+from aerodaas.mission.planner import PlanRequest
+from aerodaas.recording.replay.timeline import NEVER, later
+from aerodaas.schedulers.trajectory.ordered import OrderedScheduler
+from aerodaas.types.data import Header
+from aerodaas.types.status import Message, ReceivedMessage
 
 NEWS, ORDERS = "drone/follow", "drone/@commands/ticker"
 
@@ -22,14 +22,14 @@ def message(stream: str, stamp: int) -> Message[Any]:
     return Message(stream, 0, stamp, Header(0, stamp, "drone/cam"), 0, (), f"{stream}@{stamp}")
 
 
-def heard(arrivals: Arrivals, now: int) -> list[tuple[str, int]]:
+def heard(arrivals: ReplayedArrivals, now: int) -> list[tuple[str, int]]:
     """What counts before `now`, and when."""
     return [(str(one.item), at) for one, at in arrivals.before(now)]
 
 
 def test_without_a_recording_everything_counts_when_it_comes() -> None:
     """In the order of coming, but not before time has gone on."""
-    arrivals = Arrivals((), (ORDERS,))
+    arrivals = ReplayedArrivals((), (ORDERS,))
     for stamp in (20, 10):
         arrivals.add(message(NEWS, stamp), now=30)
     assert heard(arrivals, 30) == []
@@ -38,8 +38,8 @@ def test_without_a_recording_everything_counts_when_it_comes() -> None:
 
 def test_recorded_news_count_when_they_did() -> None:
     """Late as in flight, in the order of the flight; what is new counts at once."""
-    known = (Heard(NEWS, "drone/cam", 20, 50), Heard(NEWS, "drone/cam", 10, 70))
-    arrivals = Arrivals(known, (ORDERS,))
+    known = (ReceivedMessage(NEWS, "drone/cam", 20, 50), ReceivedMessage(NEWS, "drone/cam", 10, 70))
+    arrivals = ReplayedArrivals(known, (ORDERS,))
     for stamp in (10, 20, 30):
         arrivals.add(message(NEWS, stamp), now=stamp)
     assert heard(arrivals, 50) == [(f"{NEWS}@30", 30)]
@@ -48,8 +48,11 @@ def test_recorded_news_count_when_they_did() -> None:
 
 def test_a_command_made_from_something_else_takes_the_next_place() -> None:
     """Each recorded place is taken once."""
-    known = (Heard(ORDERS, "drone/cam", 10, 40), Heard(ORDERS, "drone/cam", 20, 60))
-    arrivals = Arrivals(known, (ORDERS,))
+    known = (
+        ReceivedMessage(ORDERS, "drone/cam", 10, 40),
+        ReceivedMessage(ORDERS, "drone/cam", 20, 60),
+    )
+    arrivals = ReplayedArrivals(known, (ORDERS,))
     for stamp in (11, 20, 21):
         arrivals.add(message(ORDERS, stamp), now=25)
     assert heard(arrivals, 100) == [

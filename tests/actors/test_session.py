@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.actors.session import CONTROL_PERIOD_NS, Session, is_due, next_due
-from aerodaas.clock import NANOSECONDS, LockstepClock, ScaledClock
-from aerodaas.config import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.types.clock import NANOSECONDS, LockstepClock, ScaledClock
 
 rates = st.floats(0.1, 240.0) | st.integers(1, 240).map(float)
 stamps = st.integers(-1, 10_000 * NANOSECONDS)

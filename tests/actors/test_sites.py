@@ -16,14 +16,14 @@ import ray
 from ray.exceptions import RayActorError
 
 from aerodaas import Analytics, Frame
-from aerodaas.actors._cloud import CloudAnswer, Executor
-from aerodaas.actors._sites import Sites
-from aerodaas.actors.executor import FRAMES_KEPT, CloudExecutor
+from aerodaas.actors.dispatch.executor import FRAMES_KEPT, CloudExecutor
+from aerodaas.actors.dispatch.executor_pool import ExecutorPool
+from aerodaas.actors.dispatch.remote_executor import Executor, RemoteResult
 from aerodaas.analytics.base import Context, TimedContext
-from aerodaas.clock import NANOSECONDS, host_time_ns
-from aerodaas.data import Header
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
-from aerodaas.status import Message
+from aerodaas.types.clock import NANOSECONDS, host_time_ns
+from aerodaas.types.data import Header
+from aerodaas.types.status import Message
 
 pytestmark = pytest.mark.wall_clock
 
@@ -77,7 +77,7 @@ class Desk:
 
     def __init__(self, *executors: Executor, timeout: float = 60.0) -> None:
         self._called = threading.Event()
-        self.sites = Sites(executors, int(timeout * NANOSECONDS), self._called.set)
+        self.sites = ExecutorPool(executors, int(timeout * NANOSECONDS), self._called.set)
         self._numbers = iter(range(10**6))
         self._stream = f"drone/{uuid.uuid4().hex}"
 
@@ -96,9 +96,9 @@ class Desk:
         self.sites.send(task, message, host_time_ns(), budget)
         return task
 
-    def answers(self, count: int) -> list[CloudAnswer]:
+    def answers(self, count: int) -> list[RemoteResult]:
         """Wait for so many answers."""
-        found: list[CloudAnswer] = []
+        found: list[RemoteResult] = []
         end = time.monotonic() + 120
         while len(found) < count:
             assert time.monotonic() < end, f"only {found}"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from required import needs
 
-from aerodaas.actors.streams import Inbox, Outlet
-from aerodaas.actors.streams._shared import MAX_DEPTH, shared_memory_available
-from aerodaas.data import Header
+from aerodaas.actors.streams import Publisher, Subscriber
+from aerodaas.actors.streams.shared_memory import MAX_DEPTH, shared_memory_available
+from aerodaas.types.data import Header
 
 pytestmark = [
     needs(shared_memory_available(), "needs iceoryx2 and shared memory: `aerodaas doctor`"),
@@ -21,36 +21,36 @@ pytestmark = [
 def test_a_slow_recorder_starves_nobody() -> None:
     """With several readers that never read, a quick one gets every message."""
     scope = f"test/{uuid.uuid4().hex}"
-    outlet = Outlet(scope, "camera")
-    slow = [Inbox(scope, f"slow{i}", {"camera": MAX_DEPTH}) for i in range(3)]
-    quick = Inbox(scope, "quick", {"camera": 1})
+    publisher = Publisher(scope, "camera")
+    slow = [Subscriber(scope, f"slow{i}", {"camera": MAX_DEPTH}) for i in range(3)]
+    quick = Subscriber(scope, "quick", {"camera": 1})
     received = 0
     for number in range(3 * MAX_DEPTH):
         picture = np.full(1000, number % 256, np.uint8)
-        outlet.measure(picture, Header(number, number, "camera"), 0)
+        publisher.measure(picture, Header(number, number, "camera"), 0)
         received += len(quick.receive(0.0))
     assert received == 3 * MAX_DEPTH
-    for inbox in slow:
-        first = inbox.receive(0.0)[0]
+    for subscriber in slow:
+        first = subscriber.receive(0.0)[0]
         assert first.seq == 2 * MAX_DEPTH
-    for inbox in (*slow, quick):
-        inbox.close()
-    outlet.close()
+    for subscriber in (*slow, quick):
+        subscriber.close()
+    publisher.close()
 
 
 def test_what_a_slow_reader_lost_is_counted() -> None:
     """Gaps in the numbering are drops."""
     scope = f"test/{uuid.uuid4().hex}"
-    outlet = Outlet(scope, "camera")
-    inbox = Inbox(scope, "recorder", {"camera": 8})
+    publisher = Publisher(scope, "camera")
+    subscriber = Subscriber(scope, "recorder", {"camera": 8})
     received = 0
     for number in range(50):
-        outlet.measure(number, Header(number, number, "camera"), 0)
+        publisher.measure(number, Header(number, number, "camera"), 0)
         if number % 20 == 0:
-            received += len(inbox.receive(0.0))
-    while messages := inbox.receive(0.0):
+            received += len(subscriber.receive(0.0))
+    while messages := subscriber.receive(0.0):
         received += len(messages)
-    assert inbox.received["camera"] == received
-    assert inbox.dropped["camera"] == 50 - received
-    inbox.close()
-    outlet.close()
+    assert subscriber.received["camera"] == received
+    assert subscriber.dropped["camera"] == 50 - received
+    subscriber.close()
+    publisher.close()

@@ -21,14 +21,14 @@ from stream_reader import Reader, Seen, digest
 from aerodaas.actors.streams import (
     MAX_DEPTH,
     UNDER_WAY,
-    Inbox,
-    Outlet,
+    Publisher,
     RemoteReader,
+    Subscriber,
     decode_message,
     shared_memory_available,
 )
-from aerodaas.data import Frame, Header
-from aerodaas.status import Message
+from aerodaas.types.data import Frame, Header
+from aerodaas.types.status import Message
 
 pytestmark = [
     needs(shared_memory_available(), "needs iceoryx2 and shared memory: `aerodaas doctor`"),
@@ -58,18 +58,18 @@ def ask(reference: Any) -> Any:  # noqa: ANN401
 class Link:
     """A stream from this process to the reader's."""
 
-    outlet: Outlet
+    publisher: Publisher
     reader: Any
     stream: str
 
     def publish(self, stamp: int, item: object) -> Message[Any]:
         """Publish a measurement."""
-        return self.outlet.measure(item, Header(stamp, stamp, "camera"), 7 * stamp)
+        return self.publisher.measure(item, Header(stamp, stamp, "camera"), 7 * stamp)
 
     def settle(self) -> None:
         """Wait until whatever was sent has arrived."""
         deadline = time.monotonic() + 20
-        while any(remote._under_way for remote in self.outlet.remote):
+        while any(remote._under_way for remote in self.publisher.remote):
             assert time.monotonic() < deadline
             time.sleep(0.002)
 
@@ -95,16 +95,16 @@ def connect(request: pytest.FixtureRequest, reader: Any) -> Iterator[Connect]:  
         scope, stream = f"test/{uuid.uuid4().hex[:8]}", f"s{uuid.uuid4().hex[:8]}"
         remote = request.param == "another node"
         ask(reader.open.remote(f"{scope}/other" if remote else scope, stream, depth))
-        outlet = Outlet(scope, stream)
+        publisher = Publisher(scope, stream)
         if remote:
-            outlet.remote = [RemoteReader(reader, under_way)]
-        links.append(Link(outlet, reader, stream))
+            publisher.remote = [RemoteReader(reader, under_way)]
+        links.append(Link(publisher, reader, stream))
         return links[-1]
 
     yield make
     for link in links:
         link.settle()
-        link.outlet.close()
+        link.publisher.close()
 
 
 def test_items_arrive_in_order_with_their_stamps(connect: Connect) -> None:
@@ -149,9 +149,9 @@ def test_the_last_word_arrives_though_the_link_was_busy(connect: Connect) -> Non
 
 
 def test_a_reader_that_never_reads_harms_nobody(connect: Connect) -> None:
-    """A reader that is stuck, however deep its inbox, does not hold up the others."""
+    """A reader that is stuck, however deep its queue, does not hold up the others."""
     link = connect(depth=MAX_DEPTH)
-    with_local = Inbox(link.outlet.scope, "quick", {link.stream: 1})
+    with_local = Subscriber(link.publisher.scope, "quick", {link.stream: 1})
     for stamp in range(4 * MAX_DEPTH):
         link.publish(stamp, stamp)
         assert [message.seq for message in with_local.receive(0)] == [stamp]
@@ -189,9 +189,9 @@ def test_frames_of_any_size_pass(connect: Connect, shape: tuple[int, int, int]) 
 
 
 def test_a_reader_that_leaves_harms_nobody(connect: Connect) -> None:
-    """The publisher goes on after a reader has closed its inbox."""
+    """The publisher goes on after a reader has closed its subscriber."""
     link = connect(depth=2)
-    leaving = Inbox(link.outlet.scope, "leaving", {link.stream: 2})
+    leaving = Subscriber(link.publisher.scope, "leaving", {link.stream: 2})
     link.publish(0, "a")
     leaving.close()
     link.publish(1, "b")
@@ -201,48 +201,55 @@ def test_a_reader_that_leaves_harms_nobody(connect: Connect) -> None:
 def test_many_readers_see_the_same() -> None:
     """Every reader gets every message."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
-    outlet = Outlet(scope, "s")
-    readers = [Inbox(scope, f"r{i}", {"s": 8}) for i in range(12)]
+    publisher = Publisher(scope, "s")
+    readers = [Subscriber(scope, f"r{i}", {"s": 8}) for i in range(12)]
     for stamp in range(5):
-        outlet.measure(stamp, Header(stamp, stamp, "c"), 0)
-    for inbox in readers:
-        assert [message.item for message in inbox.receive(0)] == list(range(5))
-        inbox.close()
-    outlet.close()
+        publisher.measure(stamp, Header(stamp, stamp, "c"), 0)
+    for subscriber in readers:
+        assert [message.item for message in subscriber.receive(0)] == list(range(5))
+        subscriber.close()
+    publisher.close()
 
 
-def test_one_inbox_keeps_the_order_in_which_its_streams_were_named() -> None:
+def test_one_subscriber_keeps_the_order_in_which_its_streams_were_named() -> None:
     """Messages that wait together come stream by stream, whatever their order of arrival."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
-    outlets = {name: Outlet(scope, name) for name in ("b", "a")}
-    inbox = Inbox(scope, "r", {"a": 4, "b": 4})
+    publishers = {name: Publisher(scope, name) for name in ("b", "a")}
+    subscriber = Subscriber(scope, "r", {"a": 4, "b": 4})
     for stamp in range(3):
-        for name, outlet in outlets.items():
-            outlet.measure(f"{name}{stamp}", Header(stamp, stamp, name), 0)
-    assert [message.item for message in inbox.receive(0)] == ["a0", "a1", "a2", "b0", "b1", "b2"]
-    assert inbox.receive(0) == []
-    inbox.close()
+        for name, publisher in publishers.items():
+            publisher.measure(f"{name}{stamp}", Header(stamp, stamp, name), 0)
+    assert [message.item for message in subscriber.receive(0)] == [
+        "a0",
+        "a1",
+        "a2",
+        "b0",
+        "b1",
+        "b2",
+    ]
+    assert subscriber.receive(0) == []
+    subscriber.close()
 
 
 def test_a_waiting_reader_wakes_for_a_message_and_for_a_call() -> None:
     """`receive` sleeps, and returns as soon as there is a reason to."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
-    outlet, inbox = Outlet(scope, "s"), Inbox(scope, "r", {"s": 1})
-    outlet.measure("x", Header(0, 0, "c"), 0)
-    assert [message.item for message in inbox.receive(60.0)] == ["x"]
-    inbox.wake()
-    assert inbox.receive(60.0) == []
-    inbox.close()
+    publisher, subscriber = Publisher(scope, "s"), Subscriber(scope, "r", {"s": 1})
+    publisher.measure("x", Header(0, 0, "c"), 0)
+    assert [message.item for message in subscriber.receive(60.0)] == ["x"]
+    subscriber.wake()
+    assert subscriber.receive(60.0) == []
+    subscriber.close()
 
 
 _VICTIM = """
 import sys, time
-from aerodaas.actors.streams import Inbox
-inbox = Inbox(sys.argv[1], f"victim{sys.argv[2]}", {"s": 64})
+from aerodaas.actors.streams import Subscriber
+subscriber = Subscriber(sys.argv[1], f"victim{sys.argv[2]}", {"s": 64})
 print("ready", flush=True)
 kept = []
 while True:
-    kept += inbox.receive(1.0)
+    kept += subscriber.receive(1.0)
     if len(kept) > 3:
         print("full", flush=True)
         time.sleep(600)
@@ -252,7 +259,7 @@ while True:
 def test_a_reader_that_is_killed_harms_nobody() -> None:
     """SIGKILL of readers that hold messages: the publisher and the other readers go on."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
-    outlet, inbox = Outlet(scope, "s"), Inbox(scope, "survivor", {"s": 4})
+    publisher, subscriber = Publisher(scope, "s"), Subscriber(scope, "survivor", {"s": 4})
     root = Path(__file__).resolve().parents[2]
     image = np.zeros((360, 640, 3), np.uint8)
     stamp = 0
@@ -260,9 +267,9 @@ def test_a_reader_that_is_killed_harms_nobody() -> None:
     def publish(times: int) -> None:
         nonlocal stamp
         for _ in range(times):
-            outlet.measure(Frame(Header(stamp, stamp, "c"), image), Header(stamp, stamp, "c"), 0)
+            publisher.measure(Frame(Header(stamp, stamp, "c"), image), Header(stamp, stamp, "c"), 0)
             stamp += 1
-            assert [message.seq for message in inbox.receive(0)] == [stamp - 1]
+            assert [message.seq for message in subscriber.receive(0)] == [stamp - 1]
 
     for round_ in range(3):
         command = [sys.executable, "-c", _VICTIM, scope, str(round_)]
@@ -274,19 +281,19 @@ def test_a_reader_that_is_killed_harms_nobody() -> None:
             victim.send_signal(signal.SIGKILL)
             victim.wait()
         publish(100)
-    assert inbox.dropped == {"s": 0}
-    inbox.close()
-    outlet.close()
+    assert subscriber.dropped == {"s": 0}
+    subscriber.close()
+    publisher.close()
 
 
 _PUBLISHER = """
 import sys, time
-from aerodaas.actors.streams import Outlet
-from aerodaas.data import Header
-outlet = Outlet(sys.argv[1], "s")
+from aerodaas.actors.streams import Publisher
+from aerodaas.types.data import Header
+publisher = Publisher(sys.argv[1], "s")
 sys.stdin.readline()
 for stamp in range(5):
-    outlet.measure(stamp, Header(stamp, stamp, "c"), 0)
+    publisher.measure(stamp, Header(stamp, stamp, "c"), 0)
 print("sent", flush=True)
 time.sleep(600)
 """
@@ -295,23 +302,23 @@ time.sleep(600)
 def test_a_publisher_that_is_killed_and_returns_is_read_again() -> None:
     """A restarted actor's stream goes on for those who read the one that died."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
-    inbox = Inbox(scope, "r", {"s": 8})
+    subscriber = Subscriber(scope, "r", {"s": 8})
     root = Path(__file__).resolve().parents[2]
     for _ in range(2):
         command = [sys.executable, "-c", _PUBLISHER, scope]
         with subprocess.Popen(
             command, text=True, cwd=root, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        ) as publisher:
-            assert publisher.stdin is not None
-            assert publisher.stdout is not None
-            publisher.stdin.write("go\n")
-            publisher.stdin.flush()
-            assert publisher.stdout.readline() == "sent\n"
-            assert [message.item for message in inbox.receive(5.0)] == list(range(5))
-            publisher.kill()
-            publisher.wait()
-    assert inbox.dropped == {"s": 0}
-    inbox.close()
+        ) as process:
+            assert process.stdin is not None
+            assert process.stdout is not None
+            process.stdin.write("go\n")
+            process.stdin.flush()
+            assert process.stdout.readline() == "sent\n"
+            assert [message.item for message in subscriber.receive(5.0)] == list(range(5))
+            process.kill()
+            process.wait()
+    assert subscriber.dropped == {"s": 0}
+    subscriber.close()
 
 
 def test_a_dead_reader_on_another_node_does_not_stop_the_publisher(runtime: None) -> None:  # noqa: ARG001
@@ -320,9 +327,9 @@ def test_a_dead_reader_on_another_node_does_not_stop_the_publisher(runtime: None
     dead, alive = start_reader(), start_reader()
     for one in (dead, alive):
         ask(one.open.remote(f"{scope}/other", "s", 64))
-    outlet = Outlet(scope, "s")
-    outlet.remote = [RemoteReader(dead), RemoteReader(alive)]
-    link = Link(outlet, alive, "s")
+    publisher = Publisher(scope, "s")
+    publisher.remote = [RemoteReader(dead), RemoteReader(alive)]
+    link = Link(publisher, alive, "s")
     link.publish(0, 0)
     assert [one.seq for one in link.take()] == [0]
     ray.kill(dead)
@@ -333,18 +340,18 @@ def test_a_dead_reader_on_another_node_does_not_stop_the_publisher(runtime: None
 
 
 def test_who_asks_is_given_the_newest_once() -> None:
-    """From the first question on; whoever knew an outlet that has died is given all again."""
-    outlet = Outlet(f"test/{uuid.uuid4().hex[:8]}", "s")
+    """From the first question on; whoever knew a publisher that has died is given all again."""
+    publisher = Publisher(f"test/{uuid.uuid4().hex[:8]}", "s")
 
     def numbers(first: int) -> list[int]:
-        return [decode_message(memoryview(data)).seq for data in outlet.since(first)]
+        return [decode_message(memoryview(data)).seq for data in publisher.since(first)]
 
-    outlet.measure(0, Header(0, 0, "camera"), 0)
+    publisher.measure(0, Header(0, 0, "camera"), 0)
     assert numbers(0) == []
     for stamp in range(1, 8):
-        outlet.measure(stamp, Header(stamp, stamp, "camera"), stamp)
+        publisher.measure(stamp, Header(stamp, stamp, "camera"), stamp)
     assert numbers(0) == [4, 5, 6, 7]
     assert numbers(7) == [7]
     assert numbers(8) == []
     assert numbers(99) == [4, 5, 6, 7]
-    outlet.close()
+    publisher.close()

@@ -9,12 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from aerodaas.analytics.base import ComputeKind
-from aerodaas.analytics.follow import FollowAnalytics
-from aerodaas.clock import NANOSECONDS
-from aerodaas.data import Alert, Battery, Detection, Detections, Header, Odometry
-from aerodaas.geometry import CameraModel, Vector, body_to_enu, enu_to_body
-from aerodaas.vehicle import VehicleMode, VehicleState
-from aerodaas.waypoints import VelocityCommand
+from aerodaas.analytics.follow.analytics import FollowAnalytics
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Alert, Battery, Detection, Detections, Header, Odometry
+from aerodaas.types.geometry import CameraModel, Vector, body_to_enu, enu_to_body
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.types.waypoints import VelocityCommand
 
 TELLO = CameraModel.from_fov(1280, 720, math.radians(82.6), mount=(0.1, 0.0, 0.0))
 Path = Callable[[float], tuple[float, float]]

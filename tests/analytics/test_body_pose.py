@@ -13,15 +13,15 @@ from follow_world import TELLO, Snapshot
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from aerodaas.analytics.body_pose import BodyPoseEmergencyAnalytics, fallen, hand_raised
-from aerodaas.analytics.debounce import Debounce
-from aerodaas.analytics.gestures import GESTURES, GestureClassifier, normalised
-from aerodaas.clock import NANOSECONDS
-from aerodaas.data import Alert, Detection, Detections, Header, Odometry
-from aerodaas.errors import ConfigError, GraphError, ModelError
-from aerodaas.geometry import enu_to_body
-from aerodaas.graph import AeroStreamData, Graph, Node
+from aerodaas.analytics.people.body_pose import BodyPoseEmergencyAnalytics, fallen, hand_raised
+from aerodaas.analytics.people.debounce import Debounce
+from aerodaas.analytics.people.gestures import GESTURES, GestureClassifier, normalised
+from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
 from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Alert, Detection, Detections, Header, Odometry
+from aerodaas.types.errors import ConfigError, GraphError, ModelError
+from aerodaas.types.geometry import enu_to_body
 
 RATE = 10
 
@@ -268,7 +268,7 @@ def test_features_do_not_depend_on_place_and_size(
 
 def test_the_shipped_model_is_as_good_as_its_card_says() -> None:
     """On bodies of a seed of its own: above 90 % right, and next to no upright body lands."""
-    from aerodaas.training.gestures import sample_keypoints  # noqa: PLC0415 - slow to draw
+    from tools.training.gestures import sample_keypoints  # noqa: PLC0415 - slow to draw
 
     random = np.random.default_rng(424242)
     classifier = GestureClassifier()

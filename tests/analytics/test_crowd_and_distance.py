@@ -11,13 +11,13 @@ from follow_world import TELLO, Snapshot
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.analytics.crowd_density import CrowdDensityAnalytics
-from aerodaas.analytics.distance import DistanceAnalytics
-from aerodaas.clock import NANOSECONDS
-from aerodaas.data import Alert, Detection, Detections, Header, Odometry
-from aerodaas.errors import ConfigError
-from aerodaas.geometry import CameraModel, Vector, rotation_from_rpy
-from aerodaas.navigation.ground import GroundView
+from aerodaas.analytics.monitoring.distance import DistanceAnalytics
+from aerodaas.analytics.people.crowd_density import CrowdDensityAnalytics
+from aerodaas.following.ground import GroundView
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Alert, Detection, Detections, Header, Odometry
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import CameraModel, Vector, rotation_from_rpy
 
 DOWN = replace(TELLO, pitch=math.radians(40))
 

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.analytics.downfall import Downfall
-from aerodaas.clock import NANOSECONDS
-from aerodaas.data import Detection, Detections, Header, Odometry
-from aerodaas.geometry import CameraModel, enu_to_body, rotation_from_rpy
+from aerodaas.analytics.people.downfall import Downfall
 from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Detection, Detections, Header, Odometry
+from aerodaas.types.geometry import CameraModel, enu_to_body, rotation_from_rpy
 
 TELLO = CameraModel.from_fov(640, 480, math.radians(55.2), pitch=math.radians(12))
 WIDE = CameraModel.from_fov(640, 360, math.radians(82.6), pitch=math.radians(12))

@@ -13,20 +13,20 @@ from follow_world import TELLO, Path, Snapshot, World
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
-from aerodaas.analytics.follow import FollowAnalytics
-from aerodaas.analytics.followers import (
+from aerodaas.analytics.follow.analytics import FollowAnalytics
+from aerodaas.analytics.follow.followers import (
     CarFollowAnalytics,
     PersonFollowAnalytics,
     VipFollowAnalytics,
 )
-from aerodaas.clock import NANOSECONDS
-from aerodaas.data import Alert, Detection, Detections, Frame, Header, Odometry
-from aerodaas.errors import ConfigError, GraphError
-from aerodaas.geometry import CameraModel
-from aerodaas.graph import AeroStreamData, Graph, Node
-from aerodaas.navigation.follow_controller import FollowPhase
-from aerodaas.navigation.sighting import sight
-from aerodaas.waypoints import AeroNavigation
+from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.following.follow_controller import FollowPhase
+from aerodaas.following.relative_target import sight
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Alert, Detection, Detections, Frame, Header, Odometry
+from aerodaas.types.errors import ConfigError, GraphError
+from aerodaas.types.geometry import CameraModel
 
 
 def circle(speed: float, radius: float = 6.0) -> Path:

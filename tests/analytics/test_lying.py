@@ -9,10 +9,10 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from aerodaas.analytics.lying import lies
-from aerodaas.data import Detections, Header, Odometry
-from aerodaas.geometry import CameraModel, enu_to_body
+from aerodaas.analytics.people.lying import lies
 from aerodaas.simulation.skeleton import KEYPOINTS, Posture, joints
+from aerodaas.types.data import Detections, Header, Odometry
+from aerodaas.types.geometry import CameraModel, enu_to_body
 
 CAMERA = CameraModel.from_fov(640, 360, math.radians(75), pitch=math.radians(12))
 LEGS_ONLY = slice(0, 11)

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from aerodaas.analytics.base import ComputeKind
-from aerodaas.analytics.monitoring import MonitoringAnalytics
-from aerodaas.clock import NANOSECONDS
-from aerodaas.data import Alert, Battery, Frame, GpsFix, Header, Odometry
-from aerodaas.errors import UnknownIdError
-from aerodaas.geometry import GeodeticOrigin
-from aerodaas.status import MissionState, MissionStatus
-from aerodaas.vehicle import VehicleMode, VehicleState
-from aerodaas.waypoints import Waypoint
+from aerodaas.analytics.monitoring.analytics import MonitoringAnalytics
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Alert, Battery, Frame, GpsFix, Header, Odometry
+from aerodaas.types.errors import UnknownIdError
+from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.types.waypoints import Waypoint
 
 
 class Desk:

@@ -9,20 +9,20 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.analytics.body_cut import CUT, GREY, cut_out, square_around
-from aerodaas.analytics.body_pose import BodyPoseEmergencyAnalytics
+from aerodaas.analytics.detection.detector import OnnxDetector
+from aerodaas.analytics.detection.keypoints import KeypointModel
 from aerodaas.analytics.models import DETECTOR, POSE
-from aerodaas.analytics.onnx.detector import OnnxDetector
-from aerodaas.analytics.onnx.keypoints import KeypointModel
-from aerodaas.analytics.pose import PoseAnalytics, body_around
-from aerodaas.data import Detection, Detections, Frame, Header
-from aerodaas.errors import ConfigError, GraphError, ModelError
-from aerodaas.graph import AeroStreamData, Graph, Node
-from aerodaas.training.labelling import LabellingRenderer
-from aerodaas.training.looks import VariousLooks
-from aerodaas.training.pose_evaluate import PARTS
-from aerodaas.training.rendering import HELD_OUT
-from aerodaas.training.scenes import draw_camera, draw_view, draw_world
+from aerodaas.analytics.people.body_pose import BodyPoseEmergencyAnalytics
+from aerodaas.analytics.people.crop import CUT, GREY, cut_out, square_around
+from aerodaas.analytics.people.pose import PoseAnalytics, body_around
+from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
+from aerodaas.types.data import Detection, Detections, Frame, Header
+from aerodaas.types.errors import ConfigError, GraphError, ModelError
+from tools.training.labelling import LabellingRenderer
+from tools.training.looks import VariousLooks
+from tools.training.pose_evaluate import PARTS
+from tools.training.rendering import HELD_OUT
+from tools.training.scenes import draw_camera, draw_view, draw_world
 
 FRESH = HELD_OUT + 700
 """Seeds from here on were neither trained on nor measured with."""

@@ -21,15 +21,16 @@ from typer.testing import CliRunner
 from aerodaas.analytics.remote.analytics import TOKEN_VARIABLE, RemoteAnalytics
 from aerodaas.analytics.remote.client import RemoteClient
 from aerodaas.analytics.remote.guard import is_loopback
-from aerodaas.cli import app as cli
-from aerodaas.config import EnvironmentConfig, LimitsConfig
-from aerodaas.data import Alert
-from aerodaas.errors import ConfigError, MissionError, SourceError
-from aerodaas.navigation.commands import Answer, Command, StreamItem
+from aerodaas.cli.app import app as cli
+from aerodaas.config.model import EnvironmentConfig, LimitsConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.mission.commands import Answer, Command, StreamItem
 from aerodaas.recording.provenance import Provenance
-from aerodaas.status import MissionState, MissionStatus
-from aerodaas.vehicle import VehicleState
-from aerodaas.waypoints import AeroNavigation, Waypoint
+from aerodaas.types.data import Alert
+from aerodaas.types.errors import ConfigError, MissionError, SourceError
+from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.vehicle import VehicleState
+from aerodaas.types.waypoints import Waypoint
 
 pytestmark = pytest.mark.wall_clock
 

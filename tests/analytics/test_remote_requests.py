@@ -16,12 +16,13 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.analytics.remote.app import build_app
-from aerodaas.config import GeofenceConfig, LimitsConfig
-from aerodaas.data import Alert
-from aerodaas.navigation.commands import Answer, Command, StreamItem
-from aerodaas.status import MissionState, MissionStatus
-from aerodaas.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
-from aerodaas.waypoints import AeroNavigation, NavigationType, VelocityCommand, Waypoint
+from aerodaas.config.model import GeofenceConfig, LimitsConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.mission.commands import Answer, Command, StreamItem
+from aerodaas.types.data import Alert
+from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.vehicle import PositionSetpoint, VehicleState, VelocitySetpoint
+from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 STREAM = "drone/remote"
 LIMITS = LimitsConfig(

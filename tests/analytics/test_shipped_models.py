@@ -9,11 +9,11 @@ import onnxruntime as ort
 import pytest
 from required import needs_peer, peer
 
+from aerodaas.analytics.detection.detector import OnnxDetector
+from aerodaas.analytics.detection.vip_detection import VipDetectionAnalytics
 from aerodaas.analytics.models import DETECTOR, DETECTOR_CLASSES, POSE
-from aerodaas.analytics.onnx.detector import OnnxDetector
-from aerodaas.analytics.vip_detection import VipDetectionAnalytics
-from aerodaas.training.evaluate import rankings, sightings
-from aerodaas.training.rendering import HELD_OUT, render_world
+from tools.training.evaluate import rankings, sightings
+from tools.training.rendering import HELD_OUT, render_world
 
 PICTURES = Path(__file__).parents[1] / "pictures"
 """Rendered once, and kept: `labels.json` tells where what is."""

@@ -13,14 +13,14 @@ from follow_world import TELLO, Snapshot
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
-from aerodaas.analytics.tower_inspection import TowerInspectionAnalytics, inspection_over
-from aerodaas.clock import NANOSECONDS
-from aerodaas.data import Alert, Detection, Detections, Frame, Header, Odometry
-from aerodaas.errors import ConfigError, GraphError
-from aerodaas.geometry import Vector, body_to_enu, enu_to_body
-from aerodaas.graph import AeroStreamData, Graph, Node
-from aerodaas.navigation.inspection import InspectionPhase
-from aerodaas.waypoints import VelocityCommand
+from aerodaas.analytics.inspection.tower_inspection import TowerInspectionAnalytics, inspection_over
+from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
+from aerodaas.following.inspection import InspectionPhase
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Alert, Detection, Detections, Frame, Header, Odometry
+from aerodaas.types.errors import ConfigError, GraphError
+from aerodaas.types.geometry import Vector, body_to_enu, enu_to_body
+from aerodaas.types.waypoints import VelocityCommand
 
 HALF = 1.5
 

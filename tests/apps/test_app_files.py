@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from aerodaas.config import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.simulation.scenario import load_scenario
 from aerodaas.simulation.world import World
 

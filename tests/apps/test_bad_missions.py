@@ -13,10 +13,10 @@ import pytest
 from flying import Flyer
 from onnx import TensorProto, helper, numpy_helper, save
 
-from aerodaas.errors import AeroDaaSError, ConfigError, MissionError
-from aerodaas.recording.flight import Flight, RobotFlight
 from aerodaas.recording.reader import Recording
-from aerodaas.recording.report import write_report
+from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
+from aerodaas.recording.report.report import write_report
+from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError
 
 ROOT = Path(__file__).parents[2]
 sys.path.append(str(ROOT / "benchmarks"))
@@ -38,7 +38,7 @@ def outcome(flyer: Flyer) -> tuple[RobotFlight, str]:
     path = flyer.folder / "flight" / "flight.mcap"
     with Recording.open(path) as recording:
         assert recording.complete
-        (robot,) = Flight.read(recording).robots.values()
+        (robot,) = RecordedFlight.read(recording).robots.values()
     report = write_report(path, flyer.folder / "report")
     return robot, report.summary_text.read_text()
 

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aerodaas.config import GeofenceConfig, LimitsConfig, RobotConfig
-from aerodaas.recording.flight import Band, Flight, RobotFlight
+from aerodaas.config.model import GeofenceConfig, LimitsConfig, RobotConfig
+from aerodaas.recording.report.flight import Band, RecordedFlight, RobotFlight
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
 
@@ -71,7 +71,7 @@ def flight(offset: float = 0.0, *, height: float = 1.5) -> Evidence:
     )
     fence = GeofenceConfig(polygon=[(-5, -5), (40, -5), (40, 5), (-5, 5)], ceiling=10)
     config = RobotConfig(id="drone", limits=LimitsConfig(geofence=fence))
-    log = Flight(alerts=[(60.0, "hand_raised", "The person raises a hand.")])
+    log = RecordedFlight(alerts=[(60.0, "hand_raised", "The person raises a hand.")])
     return Evidence(log, robot, config, WORLD, time, position, velocity)
 
 
@@ -144,7 +144,7 @@ def test_alarms_must_neither_fail_nor_be_false() -> None:
         [(64.0, "hand_raised", "")],
         [(20.0, "hand_raised", ""), (60.0, "hand", "")],
     ):
-        log = Flight(alerts=alerts)
+        log = RecordedFlight(alerts=alerts)
         assert not GOOD["alerted"](replace(evidence, flight=log)).holds
 
 

@@ -15,10 +15,10 @@ from mcap_ros2.writer import Writer as RosWriter
 from numpy.typing import NDArray
 
 from aerodaas.cameras.base import Camera
-from aerodaas.cameras.mcap import McapCamera
-from aerodaas.config import EnvironmentConfig, SensorConfig
-from aerodaas.errors import SourceError
-from aerodaas.plugins import load_plugin
+from aerodaas.config.model import EnvironmentConfig, SensorConfig
+from aerodaas.config.plugins import load_plugin
+from aerodaas.recording.replay.mcap_camera import McapCamera
+from aerodaas.types.errors import SourceError
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 SECOND = 1_000_000_000

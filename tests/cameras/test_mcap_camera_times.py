@@ -12,14 +12,14 @@ from foxglove.messages import CompressedImage
 from mcap.writer import Writer
 
 from aerodaas.cameras.base import Picture
-from aerodaas.cameras.mcap import McapCamera
-from aerodaas.config import EnvironmentConfig, RecordingConfig, SensorConfig
-from aerodaas.data import Frame, Header, Odometry
-from aerodaas.errors import ConfigError, SourceError
-from aerodaas.geometry import CameraModel
+from aerodaas.config.model import EnvironmentConfig, RecordingConfig, SensorConfig
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.status import Message
+from aerodaas.recording.replay.mcap_camera import McapCamera
+from aerodaas.types.data import Frame, Header, Odometry
+from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.types.geometry import CameraModel
+from aerodaas.types.status import Message
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 SECOND = 1_000_000_000

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from aerodaas.cameras.base import Camera, Picture
-from aerodaas.config import EnvironmentConfig, RecordingConfig, SensorConfig
-from aerodaas.data import Frame, Header, Odometry
-from aerodaas.plugins import load_plugin
+from aerodaas.config.model import EnvironmentConfig, RecordingConfig, SensorConfig
+from aerodaas.config.plugins import load_plugin
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.status import Message
+from aerodaas.types.data import Frame, Header, Odometry
+from aerodaas.types.status import Message
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 SECOND = 1_000_000_000

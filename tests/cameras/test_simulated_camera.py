@@ -11,9 +11,9 @@ import pytest
 
 from aerodaas.cameras.base import Camera
 from aerodaas.cameras.simulated import SimulatedCamera
-from aerodaas.config import EnvironmentConfig, RobotConfig, SensorConfig, SimulationConfig
-from aerodaas.data import Odometry
-from aerodaas.errors import ConfigError, SourceError
+from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig, SimulationConfig
+from aerodaas.types.data import Odometry
+from aerodaas.types.errors import ConfigError, SourceError
 
 POSE = Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), 0.8)
 

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 
 from aerodaas.cameras.base import Camera
 from aerodaas.cameras.h264 import FrameAssembler, FrameDecoder
-from aerodaas.cameras.tello import TelloCamera
-from aerodaas.config import EnvironmentConfig, RobotConfig, SensorConfig
-from aerodaas.errors import ConfigError, SourceError
+from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
+from aerodaas.drivers.tello.camera import TelloCamera
 from aerodaas.testing.tello.video import packets
+from aerodaas.types.errors import ConfigError, SourceError
 
 pytestmark = pytest.mark.wall_clock
 

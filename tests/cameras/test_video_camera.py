@@ -16,9 +16,9 @@ import pytest
 from aerodaas.cameras.base import Camera
 from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.video import VideoCamera
-from aerodaas.clock import NANOSECONDS
-from aerodaas.config import EnvironmentConfig, RobotConfig, SensorConfig
-from aerodaas.errors import ConfigError, SourceError
+from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.errors import ConfigError, SourceError
 
 pytestmark = pytest.mark.wall_clock
 

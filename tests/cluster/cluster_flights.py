@@ -16,10 +16,10 @@ from flying import FLAT, Flyer, hop, robot
 from glances import Glance
 
 from aerodaas import Environment
-from aerodaas.cluster import EdgeCloud
-from aerodaas.recording.flight import Flight
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
-from aerodaas.run import Run
+from aerodaas.recording.report.flight import RecordedFlight
+from tools.namespaces import EdgeCloud
 
 __all__ = ["Watched", "eventually"]
 
@@ -119,7 +119,7 @@ class Watched:
 class Told:
     """What the recordings of a flight tell."""
 
-    flight: Flight
+    flight: RecordedFlight
     ends: dict[str, list[tuple[float, str, str]]]
     """Mission seconds, outcome and reason of each end, by task."""
     sent: dict[str, float]
@@ -133,7 +133,7 @@ class Told:
         ends: dict[str, list[tuple[float, str, str]]] = defaultdict(list)
         sent: dict[str, float] = {}
         with Recording.open(path) as recording:
-            flight = Flight.read(recording)
+            flight = RecordedFlight.read(recording)
             for record in recording.records(schemas={"aerodaas.Decision"}):
                 value = record.value
                 if value["action"] == "cloud":

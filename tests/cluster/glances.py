@@ -11,8 +11,8 @@ import numpy as np
 from aerodaas import Analytics, Frame, Odometry
 from aerodaas.analytics.base import Context
 from aerodaas.cameras.base import Picture
-from aerodaas.config import EnvironmentConfig, SensorConfig
-from aerodaas.geometry import CameraModel
+from aerodaas.config.model import EnvironmentConfig, SensorConfig
+from aerodaas.types.geometry import CameraModel
 
 __all__ = ["Glance", "NoiseCamera"]
 

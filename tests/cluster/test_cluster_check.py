@@ -15,12 +15,12 @@ import psutil
 import pytest
 from required import needs, needs_root
 
-from aerodaas.cluster import EdgeCloud, Shape
-from aerodaas.cluster.probe import clock_offset
-from aerodaas.cluster.ray_node import environment
-from aerodaas.cluster.trace import TracePlayer
-from aerodaas.errors import ConfigError
+from aerodaas.actors.cluster.probe import clock_offset
 from aerodaas.schedulers.lab.network import Network
+from aerodaas.types.errors import ConfigError
+from tools.namespaces import EdgeCloud, Shape
+from tools.namespaces.ray_node import environment
+from tools.namespaces.trace import TracePlayer
 
 pytestmark = pytest.mark.wall_clock
 
@@ -244,9 +244,9 @@ def test_the_join_script(tmp_path: Path) -> None:
 def test_nothing_is_left() -> None:
     """Neither a process nor a device, even if the command is killed."""
     devices = _devices()
-    words = ["cluster", "local", "--cloud", "1", "--rtt", "5ms"]
+    words = ["--cloud", "1", "--rtt", "5ms"]
     with subprocess.Popen(
-        [sys.executable, "-m", "aerodaas", *words],
+        [sys.executable, "-m", "tools.namespaces", *words],
         env={**os.environ, "PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE,
         text=True,
@@ -282,9 +282,9 @@ def _devices() -> set[str]:
 
 _PRETEND = """
 import json, sys
-from aerodaas.actors import greeting
+from aerodaas.actors.cluster import handshake
 from ray._raylet import GcsClient
-greeting.take_up_token()
+handshake.take_up_token()
 client = GcsClient(address=sys.argv[1])
 told = json.loads(client.internal_kv_get(b"CLUSTER_METADATA", b"cluster"))
 import platform, ray

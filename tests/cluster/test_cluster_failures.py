@@ -15,9 +15,9 @@ from cluster_flights import ENVIRONMENT, Told, Watched, eventually
 from flying import Flyer
 from required import needs_root
 
-from aerodaas.actors import cluster
-from aerodaas.cluster import EdgeCloud, Shape
-from aerodaas.status import MissionState
+from aerodaas.actors.cluster import ray_cluster as cluster
+from aerodaas.types.status import MissionState
+from tools.namespaces import EdgeCloud, Shape
 
 pytestmark = [
     pytest.mark.slow,

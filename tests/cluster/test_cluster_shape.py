@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.cluster.relay import Wire
-from aerodaas.cluster.shape import Shape, parse_bandwidth, parse_time
-from aerodaas.errors import ConfigError
+from aerodaas.types.errors import ConfigError
+from tools.namespaces.relay import RelayDirection
+from tools.namespaces.shape import Shape, parse_bandwidth, parse_time
 
 pytestmark = pytest.mark.wall_clock
 
@@ -47,14 +47,14 @@ def test_impossible_shapes(words: dict[str, float]) -> None:
 
 
 @pytest.fixture
-def ends() -> Iterator[tuple[Wire, socket.socket, socket.socket]]:
+def ends() -> Iterator[tuple[RelayDirection, socket.socket, socket.socket]]:
     """A wire between two sockets that keep packets apart, as network devices do."""
     pairs = [socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET) for _ in range(2)]
     for pair in pairs:
         for end in pair:
             end.setblocking(False)  # noqa: FBT003
     (near, source), (sink, far) = pairs
-    yield Wire(source.fileno(), sink.fileno()), near, far
+    yield RelayDirection(source.fileno(), sink.fileno()), near, far
     for pair in pairs:
         for end in pair:
             end.close()
@@ -69,7 +69,9 @@ def arrived(far: socket.socket) -> list[bytes]:
     return packets
 
 
-def test_a_packet_waits_its_delay(ends: tuple[Wire, socket.socket, socket.socket]) -> None:
+def test_a_packet_waits_its_delay(
+    ends: tuple[RelayDirection, socket.socket, socket.socket],
+) -> None:
     """Not a moment less, and `due` says when."""
     wire, near, far = ends
     wire.delay = 0.02
@@ -84,7 +86,7 @@ def test_a_packet_waits_its_delay(ends: tuple[Wire, socket.socket, socket.socket
 
 
 def test_order_is_kept_when_the_delay_shrinks(
-    ends: tuple[Wire, socket.socket, socket.socket],
+    ends: tuple[RelayDirection, socket.socket, socket.socket],
 ) -> None:
     """A later packet never overtakes."""
     wire, near, far = ends
@@ -107,7 +109,7 @@ def test_the_share_that_is_lost(loss: float, seed: int) -> None:
     try:
         for end in (near, source, sink, far):
             end.setblocking(False)  # noqa: FBT003
-        wire = Wire(source.fileno(), sink.fileno(), seed)
+        wire = RelayDirection(source.fileno(), sink.fileno(), seed)
         wire.loss = loss
         came = 0
         for _ in range(count):

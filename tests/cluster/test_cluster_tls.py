@@ -19,11 +19,11 @@ from certificates import make_certificates, tls_variables
 from flying import FLAT, robot
 from required import needs, needs_root
 
-from aerodaas.cluster.machine import run
-from aerodaas.cluster.network import LocalNetwork
-from aerodaas.cluster.ray_node import environment, start_head, start_worker
-from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
+from tools.namespaces.machine import run
+from tools.namespaces.network import LocalNetwork
+from tools.namespaces.ray_node import environment, start_head, start_worker
 
 pytestmark = [
     pytest.mark.slow,
@@ -154,7 +154,7 @@ def test_an_application_flies_over_an_encrypted_cluster(secured: Secured) -> Non
     assert f"in the call: {len(MARK) * 10_000}" in flown.stdout
     assert f"in the store: {len(MARK) * 500_000}" in flown.stdout
     with Recording.open(secured.folder / "out/flight.mcap") as recording:
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     assert flight.robots["drone"].outcome == "landed: an analysis asked to land"
     assert len(flight.latencies["drone/glance"].total) >= 15
 

@@ -17,11 +17,11 @@ import pytest
 from flying import FLAT
 from required import needs_root
 
-from aerodaas.cluster.machine import Machine
-from aerodaas.cluster.network import Far, LocalNetwork
-from aerodaas.cluster.ray_node import environment, start_head
-from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
+from tools.namespaces.machine import Machine
+from tools.namespaces.network import LocalNetwork, RemoteMachine
+from tools.namespaces.ray_node import environment, start_head
 
 pytestmark = [
     pytest.mark.slow,
@@ -32,7 +32,7 @@ pytestmark = [
 ]
 _ROOT = Path(__file__).resolve().parents[2]
 _PORT = 6379
-_ACTORS = ["ray::AnalyticsActor", "ray::Caretaker", "ray::DroneActor", "ray::RecorderActor"]
+_ACTORS = ["ray::AnalyticsActor", "ray::DroneActor", "ray::OrphanReaper", "ray::RecorderActor"]
 """The first has joined in flight."""
 _NODES_OWN = ("ray::IDLE", "ray::DashboardAgent", "ray::RuntimeEnvAgent")
 _APPLICATION = """
@@ -64,7 +64,7 @@ class Field:
     """An edge beside the drone, and a head elsewhere."""
 
     edge: Machine
-    head: Far
+    head: RemoteMachine
     folder: Path
 
     def application(self, *words: str) -> subprocess.Popen[str]:
@@ -97,7 +97,7 @@ class Field:
         """How the flight ended, by its recording, which is closed."""
         with Recording.open(self.folder / "out" / "flight.mcap") as recording:
             assert recording.complete
-            return Flight.read(recording).robots["drone"].outcome
+            return RecordedFlight.read(recording).robots["drone"].outcome
 
 
 @pytest.fixture
@@ -162,7 +162,7 @@ def test_the_application_returns_and_nothing_is_left(field: Field) -> None:
 
 
 def test_the_application_is_killed_as_well(field: Field) -> None:
-    """The drone comes home, and the caretaker ends what it can reach: all that is on the edge."""
+    """The drone comes home, and the orphan reaper ends what it can reach: all on the edge."""
     application = field.application()
     _until_airborne(application)
     assert sorted(field.actors()) == _ACTORS

@@ -14,8 +14,8 @@ import pytest
 import yaml  # type: ignore[import-untyped]
 from required import needs_peer, needs_root, peer
 
-from aerodaas.cluster.machine import run
-from aerodaas.cluster.network import Far, LocalNetwork
+from tools.namespaces.machine import run
+from tools.namespaces.network import LocalNetwork, RemoteMachine
 
 pytestmark = [
     pytest.mark.slow,
@@ -41,7 +41,7 @@ exec {sys.executable} -m ray.scripts.scripts "$@"
 """
 
 
-def start_sshd(far: Far, folder: Path) -> subprocess.Popen[bytes]:
+def start_sshd(far: RemoteMachine, folder: Path) -> subprocess.Popen[bytes]:
     """An SSH server on a machine whose root has a home of his own."""
     home = folder / far.name
     (home / "aerodaas/bin").mkdir(parents=True)
@@ -60,7 +60,7 @@ def start_sshd(far: Far, folder: Path) -> subprocess.Popen[bytes]:
 
 
 @pytest.fixture
-def hosts(tmp_path: Path) -> Iterator[list[Far]]:
+def hosts(tmp_path: Path) -> Iterator[list[RemoteMachine]]:
     """A head and two servers that take SSH."""
     Path("/run/sshd").mkdir(exist_ok=True)
     own_ray = Path("/tmp/ray")  # noqa: S108 - each machine has its own
@@ -76,7 +76,7 @@ def hosts(tmp_path: Path) -> Iterator[list[Far]]:
         server.wait()
 
 
-def written(hosts: list[Far], folder: Path) -> Path:
+def written(hosts: list[RemoteMachine], folder: Path) -> Path:
     """The file as a user would have changed it: every line marked CHANGE, and nothing else."""
     content = yaml.safe_load((CLUSTERS / "onprem.yaml").read_text())
     content["provider"]["head_ip"] = hosts[0].address
@@ -102,7 +102,7 @@ def ray_up(path: Path, env: dict[str, str]) -> subprocess.CompletedProcess[str]:
     )
 
 
-def test_workers_start_as_well_as_the_head(hosts: list[Far], tmp_path: Path) -> None:
+def test_workers_start_as_well_as_the_head(hosts: list[RemoteMachine], tmp_path: Path) -> None:
     """After `ray up`, all three nodes are there, each with its resource, and the token is asked."""
     path = written(hosts, tmp_path)
     env = {**os.environ, "HOME": str(tmp_path), "RAY_AUTH_MODE": "token"}
@@ -146,5 +146,5 @@ def _failed(ended: subprocess.CompletedProcess[str]) -> bool:
     return ended.returncode != 0
 
 
-def _monitor_log(head: Far) -> str:
+def _monitor_log(head: RemoteMachine) -> str:
     return head.machine.run("sh", "-c", "tail -n 60 /tmp/ray/session_latest/logs/monitor*")

@@ -7,15 +7,21 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aerodaas.config import EnvironmentConfig, RecordingConfig, RobotConfig
-from aerodaas.data import Battery, GpsFix, Header, Odometry
-from aerodaas.drivers.replayed import ReplayedVehicle
-from aerodaas.errors import ConfigError, RecordingError, VehicleError
-from aerodaas.plugins import load_plugin
+from aerodaas.config.model import EnvironmentConfig, RecordingConfig, RobotConfig
+from aerodaas.config.plugins import load_plugin
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.status import Message, MissionState, MissionStatus
-from aerodaas.vehicle import FlightEnd, PlayedVehicle, VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.recording.replay.vehicle import ReplayedVehicle
+from aerodaas.types.data import Battery, GpsFix, Header, Odometry
+from aerodaas.types.errors import ConfigError, RecordingError, VehicleError
+from aerodaas.types.status import Message, MissionState, MissionStatus
+from aerodaas.types.vehicle import (
+    FlightEnd,
+    PlayedVehicle,
+    VehicleMode,
+    VehicleState,
+    VelocitySetpoint,
+)
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
 STEP = 50_000_000

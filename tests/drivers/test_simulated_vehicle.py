@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.config import EnvironmentConfig, HomeConfig, RobotConfig, SimulationConfig
+from aerodaas.config.model import EnvironmentConfig, HomeConfig, RobotConfig, SimulationConfig
 from aerodaas.drivers.simulated import SimulatedVehicle
-from aerodaas.errors import ClockError, ConfigError, InvalidWaypointError, VehicleError
-from aerodaas.vehicle import (
+from aerodaas.types.errors import ClockError, ConfigError, InvalidWaypointError, VehicleError
+from aerodaas.types.vehicle import (
     FlightEnd,
     PositionSetpoint,
     SteppedVehicle,

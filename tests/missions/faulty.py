@@ -19,8 +19,8 @@ from aerodaas import (
     Waypoint,
 )
 from aerodaas.analytics.base import Context
-from aerodaas.clock import seconds
-from aerodaas.schedulers.waypoint.base import Situation
+from aerodaas.schedulers.trajectory.base import PlanningContext
+from aerodaas.types.clock import seconds
 
 __all__ = ["DyingScheduler", "Forward", "HangingScheduler", "Mortal", "RaisingScheduler", "Stuck"]
 
@@ -78,7 +78,7 @@ class Forward(NavigableAnalytics):
 class RaisingScheduler(TrajectoryScheduler):
     """Raises."""
 
-    def plan(self, pending: Sequence[Waypoint], situation: Situation) -> Sequence[Waypoint]:  # noqa: ARG002
+    def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:  # noqa: ARG002
         """Fail."""
         raise ZeroDivisionError("a bug of the user's own")
 
@@ -86,7 +86,7 @@ class RaisingScheduler(TrajectoryScheduler):
 class HangingScheduler(TrajectoryScheduler):
     """Never answers, and holds the interpreter."""
 
-    def plan(self, pending: Sequence[Waypoint], situation: Situation) -> Sequence[Waypoint]:
+    def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:
         """Wait in vain."""
         while True:
             sorted(pending, key=lambda waypoint: (waypoint.x - situation.now) ** 2)
@@ -95,6 +95,6 @@ class HangingScheduler(TrajectoryScheduler):
 class DyingScheduler(TrajectoryScheduler):
     """Takes its process with it."""
 
-    def plan(self, pending: Sequence[Waypoint], situation: Situation) -> Sequence[Waypoint]:  # noqa: ARG002
+    def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:  # noqa: ARG002
         """Die."""
         os._exit(1)

@@ -23,11 +23,11 @@ from ray.cluster_utils import Cluster
 from scripted import RemoteUser, free_port
 
 from aerodaas import AeroNavigation, Environment, NavigationType, TrajectoryScheduler
-from aerodaas.actors.supervisor import VARIABLE
+from aerodaas.actors.cluster.ray_process import VARIABLE
 from aerodaas.analytics import RemoteAnalytics
-from aerodaas.errors import MissionError
-from aerodaas.recording.flight import Flight
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.types.errors import MissionError
 
 pytestmark = pytest.mark.wall_clock
 
@@ -43,19 +43,19 @@ def environment(silence_return: float = 40.0, **more: Any) -> dict[str, Any]:  #
     return {**FLAT, "robots": [drone], **more}
 
 
-def states(flight: Flight) -> list[str]:
+def states(flight: RecordedFlight) -> list[str]:
     """The states that the mission went through."""
     return [state for state, _ in groupby(band.state for band in flight.robots["drone"].bands)]
 
 
-def landed_at_home(flight: Flight) -> bool:
+def landed_at_home(flight: RecordedFlight) -> bool:
     """Whether the drone ended on the ground within two metres of its take-off."""
     mission = flight.robots["drone"]
     near = bool(np.linalg.norm(mission.position[-1]) < 2.0)
     return mission.outcome.startswith("landed") and near
 
 
-def alerts(flight: Flight) -> dict[str, str]:
+def alerts(flight: RecordedFlight) -> dict[str, str]:
     """The alerts recorded, by kind, one a line."""
     found: dict[str, str] = defaultdict(str)
     for _, kind, text in flight.alerts:
@@ -228,8 +228,8 @@ def start_application(
 
 
 def actors_below(pid: int) -> set[psutil.Process]:
-    """The drone's, recorder's, analytics' and caretaker's actors among a process' descendants."""
-    names = ("ray::DroneActor", "ray::RecorderActor", "ray::Caretaker", "ray::AnalyticsActor")
+    """Actors of the drone, recorder, analytics and orphan reaper among a process' descendants."""
+    names = ("ray::DroneActor", "ray::RecorderActor", "ray::OrphanReaper", "ray::AnalyticsActor")
     found = set()
     for process in psutil.Process(pid).children(recursive=True):
         with contextlib.suppress(psutil.Error):
@@ -273,7 +273,7 @@ def test_application_killed_in_a_cluster(flyer: Flyer, cluster: Cluster) -> None
     assert wait_for(lambda: gone(actors), 60.0)
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
         assert recording.complete
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     assert landed_at_home(flight)
     assert "the application's process is gone" in alerts(flight)["application_lost"]
 
@@ -297,7 +297,7 @@ def test_application_killed_on_one_machine(flyer: Flyer) -> None:
     assert not any(folder.exists() for folder in folders)
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
         assert recording.complete
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     assert landed_at_home(flight)
     assert "the application's process is gone" in alerts(flight)["application_lost"]
 
@@ -318,7 +318,9 @@ def test_application_suspended_on_one_machine(flyer: Flyer) -> None:
     said = application.communicate(timeout=60)[1].decode()
     assert application.returncode not in {0, None}
     assert "this application did not run for" in said
-    assert "so the drone came home by itself" in said
+    assert "after which a drone comes home by itself" in said
     assert "ray.kill" not in said
     assert "Traceback" not in said
-    assert landed_at_home(Flight.read(Recording.open(flyer.folder / "flight" / "flight.mcap")))
+    assert landed_at_home(
+        RecordedFlight.read(Recording.open(flyer.folder / "flight" / "flight.mcap"))
+    )

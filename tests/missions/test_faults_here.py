@@ -22,11 +22,11 @@ from required import needs_root
 
 from aerodaas import AeroNavigation, Environment, NavigationType
 from aerodaas.analytics import SyntheticAnalytics
-from aerodaas.cluster.machine import run
-from aerodaas.recording.flight import Flight
+from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
-from aerodaas.run import Run
-from aerodaas.status import MissionState
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.types.status import MissionState
+from tools.namespaces.machine import run
 
 pytestmark = pytest.mark.wall_clock
 
@@ -66,7 +66,7 @@ def state_of(run: Run) -> MissionState:
     return run.look().robots["drone"].status.state
 
 
-def alerts(flight: Flight) -> dict[str, list[str]]:
+def alerts(flight: RecordedFlight) -> dict[str, list[str]]:
     """Texts of the alerts recorded, by kind."""
     found: dict[str, list[str]] = defaultdict(list)
     for _, kind, text in flight.alerts:
@@ -99,10 +99,10 @@ def test_the_recorder_dies(flyer: Flyer) -> None:
     first = flyer.folder / "flight" / "flight.mcap"
     with Recording.open(first) as recording:
         assert not recording.complete
-        assert Flight.read(recording).robots["drone"].position[:, 2].max() > 0.5
+        assert RecordedFlight.read(recording).robots["drone"].position[:, 2].max() > 0.5
     with Recording.open(first.with_name("flight.2.mcap")) as recording:
         assert recording.complete
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     assert flight.robots["drone"].outcome.startswith("landed")
     assert any("recorder is back after" in text for text in alerts(flight)["actor_back"])
 
@@ -260,7 +260,7 @@ def test_a_full_disk_is_told_without_a_view(tmp_path: Path) -> None:
             check=False,
         )
         with Recording.open(disk / "out" / "flight.mcap") as recording:
-            flight = Flight.read(recording)
+            flight = RecordedFlight.read(recording)
     finally:
         run("umount", str(disk))
     assert "recorder: " in flown.stderr

@@ -42,8 +42,8 @@ from aerodaas import (
     Waypoint,
 )
 from aerodaas.analytics import CarFollowAnalytics, RemoteAnalytics, VipFollowAnalytics
-from aerodaas.recording.flight import RobotFlight
-from aerodaas.run import Run
+from aerodaas.environment.run import Run
+from aerodaas.recording.report.flight import RobotFlight
 
 pytestmark = pytest.mark.slow
 

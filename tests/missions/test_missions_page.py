@@ -10,11 +10,11 @@ from scripted import ScriptedDetector
 
 from aerodaas import Environment, Robot
 from aerodaas.analytics.remote.app import _COMMANDS
-from aerodaas.config import LimitsConfig
-from aerodaas.navigation.state_machine import mermaid
-from aerodaas.plugins import plugin_names
-from aerodaas.run import Run
-from aerodaas.status import MissionState
+from aerodaas.config.model import LimitsConfig
+from aerodaas.config.plugins import plugin_names
+from aerodaas.environment.run import Run
+from aerodaas.mission.state_machine import mermaid
+from aerodaas.types.status import MissionState
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "missions.md").read_text(encoding="utf-8")
@@ -37,7 +37,7 @@ def test_every_state_limit_scheduler_and_command_is_explained() -> None:
     limits = LimitsConfig()
     for name, value in re.findall(r"`limits\.(\w+)` ([0-9.]+)", PAGE):
         assert getattr(limits, name) == float(value), name
-    for name in plugin_names("waypoint_schedulers"):
+    for name in plugin_names("trajectory_schedulers"):
         assert f"| `{name}` |" in PAGE
     for name in _COMMANDS:
         assert f"/{name}`" in PAGE

@@ -20,8 +20,8 @@ from aerodaas import (
     VelocityCommand,
 )
 from aerodaas.analytics import RemoteAnalytics
-from aerodaas.recording.flight import RobotFlight
-from aerodaas.run import Run
+from aerodaas.environment.run import Run
+from aerodaas.recording.report.flight import RobotFlight
 
 pytestmark = pytest.mark.wall_clock
 

@@ -9,7 +9,7 @@ import pytest
 from flying import FLAT, Flyer, hop, recorded, robot
 
 from aerodaas import AeroNavigation, Environment, VelocityCommand, Waypoint
-from aerodaas.errors import MissionError
+from aerodaas.types.errors import MissionError
 
 
 def test_two_drones_keep_their_distance(flyer: Flyer) -> None:

@@ -13,10 +13,10 @@ import cv2
 import numpy as np
 
 from aerodaas.analytics.models import DETECTOR_CLASSES
-from aerodaas.training.labelling import Label, LabellingRenderer
-from aerodaas.training.looks import VariousLooks
-from aerodaas.training.rendering import HELD_OUT
-from aerodaas.training.scenes import draw_camera, draw_view, draw_world
+from tools.training.labelling import Label, LabellingRenderer
+from tools.training.looks import VariousLooks
+from tools.training.rendering import HELD_OUT
+from tools.training.scenes import draw_camera, draw_view, draw_world
 
 HERE = Path(__file__).parent
 PICTURES = 16

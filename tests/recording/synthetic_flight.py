@@ -10,15 +10,32 @@ from typing import Any
 import cv2
 import numpy as np
 
-from aerodaas.config import GeofenceConfig, RecordingConfig
-from aerodaas.data import Alert, Battery, Detection, Detections, Frame, GpsFix, Header, Odometry
-from aerodaas.geometry import CameraModel, GeodeticOrigin
+from aerodaas.config.model import GeofenceConfig, RecordingConfig
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.status import Decision, Hop, Message, MissionState, MissionStatus, SetpointRecord
-from aerodaas.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.waypoints import AeroNavigation, NavigationType, VelocityCommand, Waypoint
+from aerodaas.types.data import (
+    Alert,
+    Battery,
+    Detection,
+    Detections,
+    Frame,
+    GpsFix,
+    Header,
+    Odometry,
+)
+from aerodaas.types.geometry import CameraModel, GeodeticOrigin
+from aerodaas.types.status import (
+    Decision,
+    Message,
+    MissionState,
+    MissionStatus,
+    SetpointRecord,
+    TraceSpan,
+)
+from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 MILLISECOND = 1_000_000
 HOME = GeodeticOrigin(12.97, 77.59, 900.0)
@@ -132,13 +149,18 @@ class SyntheticFlight:
                 yield self.message("monitor", stamp, alert)
 
     def message(
-        self, stream: str, stamp: int, item: object, hops: tuple[Hop, ...] = (), captured: int = 0
+        self,
+        stream: str,
+        stamp: int,
+        item: object,
+        spans: tuple[TraceSpan, ...] = (),
+        captured: int = 0,
     ) -> Message[Any]:
         """Wrap an item."""
         name = f"{self.robot}/{stream}"
         seq = self._seq.get(name, 0)
         self._seq[name] = seq + 1
-        return Message(name, seq, stamp, Header(seq, stamp, name), captured, hops, item)
+        return Message(name, seq, stamp, Header(seq, stamp, name), captured, spans, item)
 
     def _state(self, stamp: int, seen: Odometry, truth: Odometry, charge: float) -> VehicleState:
         latitude, longitude, altitude = HOME.to_geodetic(seen.position)
@@ -163,7 +185,7 @@ class SyntheticFlight:
         header = Header(number, stamp, f"{self.robot}/camera")
         frame = Frame(header, _picture(odometry), CAMERA, odometry)
         begin = round(stamp + 1e12)
-        camera = Hop("camera", begin + MILLISECOND, begin + 2 * MILLISECOND)
+        camera = TraceSpan("camera", begin + MILLISECOND, begin + 2 * MILLISECOND)
         yield self.message("camera", stamp, frame, (camera,), begin)
         keypoints = rng.uniform(20, 160, (17, 3)).astype(np.float32)
         keypoints[:, 2] = 0.9
@@ -172,13 +194,13 @@ class SyntheticFlight:
         waited = round(rng.gamma(2.0, 0.4) * MILLISECOND)
         worked = round((14 + rng.gamma(3.0, 1.0)) * MILLISECOND)
         at = camera.published + waited
-        detector = Hop("detector", at, at + worked)
+        detector = TraceSpan("detector", at, at + worked)
         later = stamp + 20 * MILLISECOND
         yield self.message("detector", later, found, (camera, detector), begin)
         command = AeroNavigation(
             NavigationType.ANALYTICS_DRIVEN, [VelocityCommand(forward=0.2, yaw_rate=0.1)]
         )
-        follow = Hop("follow", detector.published + 300_000, detector.published + 600_000)
+        follow = TraceSpan("follow", detector.published + 300_000, detector.published + 600_000)
         yield self.message("follow", later, command, (camera, detector, follow), begin)
         decision = Decision(later, f"detector#{number}", "edge", "in time", {"slack": 0.1})
         yield self.message("dispatcher", later, decision)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from aerodaas.data import Detection, Detections, Frame, Header
-from aerodaas.errors import ConfigError
-from aerodaas.recording.camera_page import CameraPage
-from aerodaas.status import Message, MissionState, MissionStatus
+from aerodaas.recording.report.camera_page import CameraPage
+from aerodaas.types.data import Detection, Detections, Frame, Header
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.status import Message, MissionState, MissionStatus
 
 GREY = 90
 

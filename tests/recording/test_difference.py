@@ -11,12 +11,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from synthetic_flight import PROVENANCE, SyntheticFlight
 
-from aerodaas.config import RecordingConfig
-from aerodaas.data import Detections
-from aerodaas.recording.box_shift import box_shift
-from aerodaas.recording.difference import difference
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.status import Decision, Message
+from aerodaas.recording.report.detection_diff import box_shift
+from aerodaas.recording.report.difference import difference
+from aerodaas.types.data import Detections
+from aerodaas.types.status import Decision, Message
 
 
 def write(path: Path, messages: list[Message[Any]]) -> Path:

@@ -10,14 +10,14 @@ from types import SimpleNamespace
 import pytest
 from synthetic_flight import PROVENANCE
 
-from aerodaas.config import RecordingConfig
-from aerodaas.data import Header
-from aerodaas.gpu import _nvml
-from aerodaas.recording.flight import Flight
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.status import Message
-from aerodaas.vitals import read_vitals
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.types.data import Header
+from aerodaas.types.gpu import _nvml
+from aerodaas.types.status import Message
+from aerodaas.types.vitals import read_vitals
 
 
 class Nvml:
@@ -77,7 +77,7 @@ def test_graphics_processors_are_recorded(
             message = Message("@vitals/a", number, header.stamp, header, 0, (), read_vitals())
             recorder.write(message)
     with Recording.open(path) as recording:
-        (load,) = Flight.read(recording).gpus.values()
+        (load,) = RecordedFlight.read(recording).gpus.values()
     assert (load.cpu, load.memory) == ([0.75, 0.75], [0.25, 0.25])
 
 

@@ -8,28 +8,28 @@ import numpy as np
 import pytest
 from synthetic_flight import PROVENANCE
 
-from aerodaas.config import RecordingConfig
-from aerodaas.data import Detection, Detections, Frame, Header
-from aerodaas.recording.flight import Band, Flight, RobotFlight, Sighting
-from aerodaas.recording.moments import Moment, MomentPicture, key_moments, picture_moments
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.status import Message
+from aerodaas.recording.report.flight import Band, RecordedDetection, RecordedFlight, RobotFlight
+from aerodaas.recording.report.moments import Moment, MomentPicture, key_moments, picture_moments
+from aerodaas.types.data import Detection, Detections, Frame, Header
+from aerodaas.types.status import Message
 
 SECOND = 1_000_000_000
 CAMERA = "tello/cam"
 
 
-def flight(*seconds: float, camera: str = CAMERA) -> Flight:
+def flight(*seconds: float, camera: str = CAMERA) -> RecordedFlight:
     """A flight with a frame at each of these seconds."""
-    made = Flight()
+    made = RecordedFlight()
     made.frame_stamps[camera] = [round(second * SECOND) for second in seconds]
     return made
 
 
-def seen(second: float, label: str, score: float, source: str = CAMERA) -> Sighting:
+def seen(second: float, label: str, score: float, source: str = CAMERA) -> RecordedDetection:
     """An object found."""
-    return Sighting(round(second * SECOND), source, label, score)
+    return RecordedDetection(round(second * SECOND), source, label, score)
 
 
 def told(found: list[Moment]) -> list[tuple[float, str]]:
@@ -39,7 +39,7 @@ def told(found: list[Moment]) -> list[tuple[float, str]]:
 
 def test_a_flight_without_frames_has_no_moments() -> None:
     """Whatever happened in it."""
-    made = Flight(sightings=[seen(1, "dog", 0.5)], alerts=[(1.0, "low", "battery low")])
+    made = RecordedFlight(sightings=[seen(1, "dog", 0.5)], alerts=[(1.0, "low", "battery low")])
     made.robots["tello"] = RobotFlight(bands=[Band("landed", 0.0, 1.0)])
     assert key_moments(made) == []
 

@@ -9,17 +9,17 @@ from typing import Any
 import pytest
 from synthetic_flight import PROVENANCE, SyntheticFlight
 
-from aerodaas.config import RecordingConfig
-from aerodaas.errors import RecordingError
-from aerodaas.recording.comparison import write_comparison
-from aerodaas.recording.difference import difference
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.export.track import write_gpx
-from aerodaas.recording.pace_reader import read_pace
 from aerodaas.recording.pictures import frames
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.report import write_report
-from aerodaas.status import Message
+from aerodaas.recording.replay.timeline_reader import read_replay_timeline
+from aerodaas.recording.report.comparison import write_comparison
+from aerodaas.recording.report.difference import difference
+from aerodaas.recording.report.report import write_report
+from aerodaas.types.errors import RecordingError
+from aerodaas.types.status import Message
 
 Messages = list[Message[Any]]
 
@@ -54,9 +54,9 @@ def test_a_missing_channel_costs_what_it_held(tmp_path: Path, missing: str) -> N
     assert write_comparison(whole, path, tmp_path / "both.html").stat().st_size > 10_000
     found = difference(whole, path)
     assert found.agrees == (missing in {"state", "camera"})
-    pace = read_pace(path)
-    assert bool(pace.turns) == (missing != "setpoints")
-    assert bool(pace.readings.get("tello/camera")) == (missing != "camera")
+    replay_timeline = read_replay_timeline(path)
+    assert bool(replay_timeline.turns) == (missing != "setpoints")
+    assert bool(replay_timeline.readings.get("tello/camera")) == (missing != "camera")
 
 
 def test_pictures_alone_are_no_flight(tmp_path: Path) -> None:

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from synthetic_flight import PROVENANCE, SyntheticFlight
 
-from aerodaas.config import RecordingConfig
-from aerodaas.errors import RecordingError
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording import recorder
 from aerodaas.recording.output import Output
 from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.types.errors import RecordingError
 
 
 class FullDisk(io.FileIO):

@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from synthetic_flight import PROVENANCE
 
-from aerodaas.config import RecordingConfig
-from aerodaas.data import Battery, GpsFix, Header, Odometry
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.report import read_report
+from aerodaas.recording.report.report import read_report
 from aerodaas.recording.states import odometry_of, vehicle_states
-from aerodaas.status import Message, MissionState, MissionStatus
-from aerodaas.vehicle import FlightEnd, VehicleMode, VehicleState
-from aerodaas.waypoints import Waypoint
+from aerodaas.types.data import Battery, GpsFix, Header, Odometry
+from aerodaas.types.status import Message, MissionState, MissionStatus
+from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
+from aerodaas.types.waypoints import Waypoint
 
 ODOMETRY = Odometry(np.array([1, 2, 3.5]), np.array([-0.1, 0.2, 1 / 3]), 0.1, 0.2, 0.3, 0.4, 0.5)
 TRUTH = Odometry(np.array([1.5, 2.5, 3.0]), np.zeros(3), -1.0, 0.0, 0.1, -0.2)

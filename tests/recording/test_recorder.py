@@ -14,15 +14,32 @@ from mcap.reader import NonSeekingReader, make_reader
 from mcap_protobuf.decoder import DecoderFactory
 from synthetic_flight import CAMERA, FENCE, HOME, PROVENANCE, SyntheticFlight, record
 
-from aerodaas.config import RecordingConfig
-from aerodaas.data import Alert, Battery, Detection, Detections, Frame, GpsFix, Header, Odometry
-from aerodaas.errors import RecordingError
+from aerodaas.config.model import RecordingConfig
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.recording.pictures import detections, frames
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.status import Decision, Hop, Message, MissionState, MissionStatus, SetpointRecord
-from aerodaas.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.waypoints import AeroNavigation, VelocityCommand, Waypoint
+from aerodaas.types.data import (
+    Alert,
+    Battery,
+    Detection,
+    Detections,
+    Frame,
+    GpsFix,
+    Header,
+    Odometry,
+)
+from aerodaas.types.errors import RecordingError
+from aerodaas.types.status import (
+    Decision,
+    Message,
+    MissionState,
+    MissionStatus,
+    SetpointRecord,
+    TraceSpan,
+)
+from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.types.waypoints import VelocityCommand, Waypoint
 
 HEADER = Header(41, 2_000_000_000, "tello/camera")
 ODOMETRY = Odometry(
@@ -337,15 +354,21 @@ def test_item_that_cannot_be_written_costs_only_itself(tmp_path: Path) -> None:
 
 def test_latency_of_each_hop(tmp_path: Path) -> None:
     """Waiting and working times add up to the whole; a message without an item has them too."""
-    hops = (Hop("camera", 2_000_000, 5_000_000), Hop("detector", 6_000_000, 26_000_000))
+    spans = (
+        TraceSpan("camera", 2_000_000, 5_000_000),
+        TraceSpan("detector", 6_000_000, 26_000_000),
+    )
     path = tmp_path / "latency.mcap"
     with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
-        recorder.write(Message("tello/x", 0, 5, HEADER, 1_000_000, hops, None))
+        recorder.write(Message("tello/x", 0, 5, HEADER, 1_000_000, spans, None))
     with Recording.open(path) as recording:
         (found,) = recording.records()
     assert found.topic == "/latency"
     assert found.value["total_ms"] == 25.0
-    assert [(hop["wait_ms"], hop["work_ms"]) for hop in found.value["hops"]] == [(1, 3), (1, 20)]
+    assert [(span["wait_ms"], span["work_ms"]) for span in found.value["hops"]] == [
+        (1, 3),
+        (1, 20),
+    ]
 
 
 def test_drops_are_told_and_kept(tmp_path: Path) -> None:

@@ -9,15 +9,15 @@ import pytest
 from mcap.reader import make_reader
 from synthetic_flight import FENCE, PROVENANCE
 
-from aerodaas.config import RecordingConfig
-from aerodaas.data import Battery, Detection, Detections, Header
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.encoding import Entry
 from aerodaas.recording.live import LiveServer
 from aerodaas.recording.outcome import RecordingSummary
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.status import Hop, Message
+from aerodaas.types.data import Battery, Detection, Detections, Header
+from aerodaas.types.status import Message, TraceSpan
 
 SECOND = 1_000_000_000
 EPOCH = PROVENANCE.started_ns
@@ -27,13 +27,13 @@ def message(
     second: float,
     item: object = "note",
     seq: int = 0,
-    hops: tuple[Hop, ...] = (),
+    spans: tuple[TraceSpan, ...] = (),
     stream: str = "nav/it",
 ) -> Message[Any]:
     """Something measured a tenth of a second before it was published, captured at 1 ms."""
     stamp = round(second * SECOND)
     header = Header(17, stamp - SECOND // 10, "nav/cam")
-    return Message(stream, seq, stamp, header, 1_000_000, hops, item)
+    return Message(stream, seq, stamp, header, 1_000_000, spans, item)
 
 
 def written(path: Path, *messages: Message[Any]) -> RecordingSummary:
@@ -112,12 +112,12 @@ def test_without_drops_nothing_is_said_of_them(tmp_path: Path) -> None:
         assert list(recording.topics) == ["/log"]
 
 
-HOP = Hop("cam", 2_000_000, 5_000_000)
-SECOND_HOP = Hop("find", 6_000_000, 8_500_000, 5)
+HOP = TraceSpan("cam", 2_000_000, 5_000_000)
+SECOND_HOP = TraceSpan("find", 6_000_000, 8_500_000, 5)
 
 
 @pytest.mark.parametrize(
-    ("item", "hops", "told"),
+    ("item", "spans", "told"),
     [
         (None, (), 0),
         (None, (HOP,), 1),
@@ -127,19 +127,19 @@ SECOND_HOP = Hop("find", 6_000_000, 8_500_000, 5)
     ],
 )
 def test_the_way_is_told_where_nothing_else_tells_it(
-    tmp_path: Path, item: object, hops: tuple[Hop, ...], told: int
+    tmp_path: Path, item: object, spans: tuple[TraceSpan, ...], told: int
 ) -> None:
-    """One hop of an item is in the item's own record; a lone hop without an item is nowhere."""
+    """One span of an item is in the item's own record; a lone span without an item is nowhere."""
     path = tmp_path / "a.mcap"
-    written(path, message(1, item, hops=hops))
+    written(path, message(1, item, spans=spans))
     assert len(read(path, "/latency")) == told
     assert len(read(path, "/log")) == (item is not None)
 
 
 def test_the_way_of_a_message_in_full(tmp_path: Path) -> None:
-    """Captured at 1 ms, each hop's wait and work after that; a state only where there is one."""
+    """Captured at 1 ms, each span's wait and work after that; a state only where there is one."""
     path = tmp_path / "a.mcap"
-    written(path, message(3, "note", seq=6, hops=(HOP, SECOND_HOP)))
+    written(path, message(3, "note", seq=6, spans=(HOP, SECOND_HOP)))
     (found,) = read(path, "/latency")
     assert found.value == {
         "stream": "nav/it",

@@ -20,10 +20,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from synthetic_flight import SyntheticFlight, record
 
-from aerodaas.errors import RecordingError
-from aerodaas.recording.flight import Flight
 from aerodaas.recording.pictures import frames
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.types.errors import RecordingError
 
 pytestmark = pytest.mark.wall_clock
 
@@ -35,8 +35,8 @@ ROOT = HERE.parents[1]
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from aerodaas.config import RecordingConfig
-from aerodaas.errors import RecordingError
+from aerodaas.config.model import RecordingConfig
+from aerodaas.types.errors import RecordingError
 from aerodaas.recording.recorder import FlightRecorder
 from synthetic_flight import PROVENANCE, SyntheticFlight
 recorder = FlightRecorder(Path(sys.argv[1]), config=RecordingConfig(), provenance=PROVENANCE)
@@ -112,7 +112,7 @@ def test_killed_process_leaves_everything_flushed(tmp_path: Path) -> None:
         assert not recording.complete
         assert recording.provenance["seed"] == "7"
         assert recording.attachments == ["environment.json", "farm_survey.py"]
-        assert Flight.read(recording).robots["tello"].outcome == "landed: mission complete"
+        assert RecordedFlight.read(recording).robots["tello"].outcome == "landed: mission complete"
 
 
 def states(path: Path) -> int:
@@ -161,7 +161,7 @@ def test_damaged_anywhere_reads_the_rest(flight: Path, changes: list[tuple[float
     damaged.write_bytes(data)
     # RecordingError where not even the first bytes are MCAP's; anything else is a bug.
     with suppress(RecordingError), Recording.open(damaged) as recording:
-        Flight.read(recording)
+        RecordedFlight.read(recording)
         list(frames(recording))
 
 

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from pydantic import BaseModel
 
-from aerodaas.geometry import CameraModel, rotation_from_rpy
 from aerodaas.recording.encoding import json_bytes, json_schema, plain, stream_of, topic
 from aerodaas.recording.rotation import OPTICAL, Rotation, compose, from_rpy
+from aerodaas.types.geometry import CameraModel, rotation_from_rpy
 
 ANGLES = st.floats(-math.pi, math.pi)
 ANYTHING = st.recursive(

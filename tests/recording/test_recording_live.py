@@ -12,10 +12,10 @@ from synthetic_flight import FENCE, HOME, PROVENANCE, SyntheticFlight
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
-from aerodaas.config import RecordingConfig
-from aerodaas.errors import ConfigError
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.live import LiveServer
 from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.types.errors import ConfigError
 
 pytestmark = pytest.mark.wall_clock
 

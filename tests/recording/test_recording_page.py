@@ -13,18 +13,18 @@ import pytest
 from numpy.typing import NDArray
 from synthetic_flight import PROVENANCE, SyntheticFlight, record
 
-from aerodaas.config import RecordingConfig
-from aerodaas.data import Header
-from aerodaas.errors import RecordingError
-from aerodaas.recording.comparison import write_comparison
-from aerodaas.recording.flight import Flight
-from aerodaas.recording.moments import key_moments, picture_moments
-from aerodaas.recording.page.document import document, paragraph, section, table
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.report import write_report
-from aerodaas.status import Message
-from aerodaas.vitals import Vitals, read_vitals
+from aerodaas.recording.report.comparison import write_comparison
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.recording.report.moments import key_moments, picture_moments
+from aerodaas.recording.report.page.document import document, paragraph, section, table
+from aerodaas.recording.report.report import write_report
+from aerodaas.types.data import Header
+from aerodaas.types.errors import RecordingError
+from aerodaas.types.status import Message
+from aerodaas.types.vitals import Vitals, read_vitals
 
 
 class Page(HTMLParser):
@@ -110,7 +110,7 @@ def test_comparison_that_cannot_be_written(recorded: Path, tmp_path: Path) -> No
 def test_key_moments_tell_the_flight(recorded: Path) -> None:
     """What was seen, the alert and each state come before repetitions, in order of time."""
     with Recording.open(recorded) as recording:
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
         moments = key_moments(flight, 9)
         pictures = picture_moments(recording, moments)
     assert len(moments) == 9
@@ -134,7 +134,7 @@ def test_vitals_become_cores_in_use(tmp_path: Path) -> None:
                 Message("@vitals/drone/tello", number, header.stamp, header, taken, (), vitals)
             )
     with Recording.open(path) as recording:
-        flight = Flight.read(recording)
+        flight = RecordedFlight.read(recording)
     load = flight.loads["drone/tello"]
     assert load.time == [1.0, 3.0]
     assert load.cpu == [pytest.approx(0.5), pytest.approx(0.25)]

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from synthetic_flight import PROVENANCE, SyntheticFlight, record
 
-from aerodaas.config import EnvironmentConfig, RecordingConfig
-from aerodaas.errors import RecordingError
-from aerodaas.recording.flight import Flight
+from aerodaas.config.model import EnvironmentConfig, RecordingConfig
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.recording.report import write_report
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.recording.report.report import write_report
+from aerodaas.types.errors import RecordingError
 
 
 @pytest.fixture(scope="module")
@@ -73,7 +73,7 @@ def test_pictures_show_something(recorded: Path, tmp_path: Path) -> None:
 def test_states_cover_the_flight(recorded: Path) -> None:
     """Bands follow one another without gaps, and every moment has its state."""
     with Recording.open(recorded) as recording:
-        robot = Flight.read(recording).robots["tello"]
+        robot = RecordedFlight.read(recording).robots["tello"]
     assert all(a.end == b.start for a, b in zip(robot.bands, robot.bands[1:], strict=False))
     assert [band.state for band in robot.bands[:3]] == ["preflight", "taking_off", "enroute"]
     middle = np.array([(band.start + band.end) / 2 for band in robot.bands])

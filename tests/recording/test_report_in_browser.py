@@ -13,8 +13,8 @@ import pytest
 from required import needs_peer, peer
 from synthetic_flight import SyntheticFlight, record
 
-from aerodaas.recording.comparison import write_comparison
-from aerodaas.recording.report import write_report
+from aerodaas.recording.report.comparison import write_comparison
+from aerodaas.recording.report.report import write_report
 
 BROWSER = peer("AERODAAS_BROWSER")
 PROBE = """

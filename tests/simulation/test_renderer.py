@@ -10,12 +10,12 @@ import pytest
 from numpy.typing import NDArray
 from panda3d.core import TransformState
 
-from aerodaas.config import SimulationConfig
-from aerodaas.data import Odometry
-from aerodaas.geometry import CameraModel, rotation_from_rpy
+from aerodaas.config.model import SimulationConfig
 from aerodaas.simulation.renderer import Renderer
 from aerodaas.simulation.scenario import Scenario
 from aerodaas.simulation.world import World
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import CameraModel, rotation_from_rpy
 
 POST = 0.3
 """Metres: height of the short posts used as markers."""

@@ -10,19 +10,20 @@ from typing import Any
 
 from typing_extensions import Self
 
-from aerodaas.clock import ScaledClock
-from aerodaas.config import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.navigation.commands import AddNavigation, Command, Start
-from aerodaas.navigation.loop import SetpointLoop
-from aerodaas.navigation.mission import Mission
-from aerodaas.navigation.planner import InlinePlanner
-from aerodaas.schedulers.waypoint.nearest_neighbor import NearestNeighborScheduler
-from aerodaas.status import MissionState, MissionStatus
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.mission.commands import AddNavigation, Command, Start
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
+from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 from aerodaas.testing.channel import Impairment
-from aerodaas.vehicle import VehicleMode, VehicleState
-from aerodaas.waypoints import AeroNavigation, NavigationType, SchedulingType, Waypoint
+from aerodaas.types.clock import ScaledClock
+from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
 from sitl.relay import Relay
 
 __all__ = ["FAR", "FARM", "PERFECT", "SitlFlight", "robot_at", "survey"]

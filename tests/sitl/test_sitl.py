@@ -15,19 +15,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from aerodaas.config import EnvironmentConfig, GeofenceConfig
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.fence import upload_fence
+from aerodaas.config.model import EnvironmentConfig, GeofenceConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.mavlink.microservices.fence import upload_fence
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.errors import VehicleError
-from aerodaas.navigation.commands import End, OpenStream, Pause, Resume, StreamItem
-from aerodaas.status import MissionState as S
-from aerodaas.vehicle import VehicleMode, VehicleState
-from aerodaas.waypoints import (
-    AeroNavigation,
-    NavigationType,
-    VelocityCommand,
-)
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.mission.commands import End, OpenStream, Pause, Resume, StreamItem
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.status import MissionState as S
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.types.waypoints import NavigationType, VelocityCommand
 from sitl.autopilot import Autopilot
 from sitl.flights import FAR, FARM, SitlFlight, robot_at, survey
 

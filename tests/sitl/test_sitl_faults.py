@@ -11,10 +11,10 @@ import time
 import pytest
 from required import needs_peer
 
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.navigation.commands import End
-from aerodaas.status import MissionState as S
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.mission.commands import End
 from aerodaas.testing.channel import Impairment
+from aerodaas.types.status import MissionState as S
 from sitl.autopilot import Autopilot
 from sitl.flights import FAR, FARM, SitlFlight
 

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import sys
 
-from aerodaas.navigation.commands import AddNavigation
-from aerodaas.status import MissionState
-from aerodaas.waypoints import AeroNavigation, NavigationType, Waypoint
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.mission.commands import AddNavigation
+from aerodaas.types.status import MissionState
+from aerodaas.types.waypoints import NavigationType, Waypoint
 from sitl.flights import SitlFlight
 
 if __name__ == "__main__":

@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.geometry import GeodeticOrigin
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.geometry import GeodeticOrigin
 
 __all__ = ["Witness"]
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from aerodaas.actors.streams import UnreadableError
-from aerodaas.actors.streams._codec import Encoded, UnsendableError, decode
-from aerodaas.data import Detection, Header
-from aerodaas.status import Hop, Message
-from aerodaas.waypoints import Waypoint
+from aerodaas.actors.streams.codec import Encoded, UnsendableError, decode
+from aerodaas.types.data import Detection, Header
+from aerodaas.types.status import Message, TraceSpan
+from aerodaas.types.waypoints import Waypoint
 
 READER = """
 import pickle, sys
@@ -27,12 +27,12 @@ print(sum(len(blob) for blob in blobs) // len(blobs))
 """
 SENDER = """
 import pickle, subprocess, sys
-from aerodaas.actors.application import capture
+from aerodaas.actors.run.application import capture
 from aerodaas.actors.streams import encode_message
-from aerodaas.config import EnvironmentConfig
-from aerodaas.data import Header
-from aerodaas.graph import Graph
-from aerodaas.status import Message
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.types.data import Header
+from aerodaas.dataflow.graph import Graph
+from aerodaas.types.status import Message
 class Known:
     def __init__(self, value):
         self.value = value
@@ -63,7 +63,7 @@ def test_a_known_class_is_named_and_any_class_is_built_once(tmp_path: Path) -> N
 
 
 def _message(item: object) -> Message[object]:
-    return Message("s", 3, 5, Header(1, 2, "cam"), 7, (Hop("a", 1, 2),), item)
+    return Message("s", 3, 5, Header(1, 2, "cam"), 7, (TraceSpan("a", 1, 2),), item)
 
 
 class Fragile:

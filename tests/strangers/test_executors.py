@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 
 from aerodaas.cameras.base import Picture
-from aerodaas.schedulers.analytics.cloud_only import CloudOnly
+from aerodaas.schedulers.analytics.published.cloud_only import CloudOnly
 from fruit import Crate
 
 HERE = str(Path(__file__).parent)

@@ -20,7 +20,7 @@ import numpy as np
 
 from aerodaas import TrajectoryScheduler
 from aerodaas.cameras.base import Picture
-from aerodaas.schedulers.analytics.edge_only import Fifo
+from aerodaas.schedulers.analytics.published.edge_only import Fifo
 
 sys.path.insert(0, str(Path(__file__).parent / "plug_ins"))
 

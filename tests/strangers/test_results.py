@@ -14,7 +14,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import pydantic
 
-from aerodaas.data import Detection, Header
+from aerodaas.types.data import Detection, Header
 from kit import Oblong
 from shapes import Round
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aerodaas.drivers.mavlink.dialect import mavlink as mav
+from aerodaas.drivers.mavlink.wire.dialect import mavlink as mav
 
 __all__ = ["ACKS", "FACTS", "VERSIONS", "Fact"]
 

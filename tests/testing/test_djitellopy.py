@@ -17,7 +17,7 @@ import pytest
 from required import needs_peer, peer
 
 from aerodaas.testing.tello import EmulatedTello, TelloOptions, VideoOptions
-from aerodaas.vehicle import VehicleMode
+from aerodaas.types.vehicle import VehicleMode
 
 PYTHON = peer("AERODAAS_DJITELLOPY")
 

@@ -7,17 +7,17 @@ from typing import Any
 import pytest
 from autopilot_facts import ACKS, FACTS, VERSIONS
 
-from aerodaas.drivers.mavlink.ardupilot import ArduPilot
-from aerodaas.drivers.mavlink.commander import Order
-from aerodaas.drivers.mavlink.dialect import mavlink as mav
-from aerodaas.drivers.mavlink.phase import FlightMode
-from aerodaas.drivers.mavlink.px4 import PX4
-from aerodaas.drivers.mavlink.telemetry import Telemetry
-from aerodaas.testing.mavlink import AutopilotOptions
-from aerodaas.testing.mavlink.ardupilot import EmulatedArduPilot
-from aerodaas.testing.mavlink.firmware import Firmware
-from aerodaas.testing.mavlink.flight import MavFlight
-from aerodaas.testing.mavlink.px4 import EmulatedPX4
+from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
+from aerodaas.drivers.mavlink.microservices.commander import PendingCommand
+from aerodaas.drivers.mavlink.state.phase import FlightMode
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink as mav
+from tools.mavlink_vehicle import AutopilotOptions
+from tools.mavlink_vehicle.ardupilot import EmulatedArduPilot
+from tools.mavlink_vehicle.firmware import Firmware
+from tools.mavlink_vehicle.flight import MavFlight
+from tools.mavlink_vehicle.px4 import EmulatedPX4
 
 STEP = 0.05
 HEIGHT = 8.0
@@ -59,7 +59,7 @@ class Bench:
         for order in self.dialect.take_off(HEIGHT, telemetry):
             self.give(order)
 
-    def give(self, order: Order) -> None:
+    def give(self, order: PendingCommand) -> None:
         """Have it obey."""
         values = tuple(float(value) for value in order.values)
         assert self.firmware.obey(order.number, values, order.frame) == mav.MAV_RESULT_ACCEPTED

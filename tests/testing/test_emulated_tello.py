@@ -11,12 +11,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.config import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.testing.channel import Channel
 from aerodaas.testing.tello import EmulatedTello, Impairment, TelloOptions, VideoOptions
 from aerodaas.testing.tello.flight import TelloFlight
 from aerodaas.testing.tello.sdk import TelloSdk
-from aerodaas.vehicle import VehicleMode
+from aerodaas.types.vehicle import VehicleMode
 
 pytestmark = pytest.mark.wall_clock
 

@@ -18,7 +18,7 @@ import pytest
 from autopilot_facts import VERSIONS
 from required import needs_peer, peer
 
-from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 PYTHON = peer("AERODAAS_MAVSDK")
 

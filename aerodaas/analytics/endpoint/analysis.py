@@ -16,9 +16,9 @@ from aerodaas.analytics.endpoint.connection import Connection
 from aerodaas.analytics.endpoint.function import FunctionUrl
 from aerodaas.analytics.endpoint.model import EndpointModel
 from aerodaas.analytics.endpoint.tensors import TensorSpec
-from aerodaas.config import ComputeConfig, EndpointConfig
-from aerodaas.data import Detections, Frame, Header
-from aerodaas.errors import EndpointError, GraphError
+from aerodaas.config.model import ComputeConfig, EndpointConfig
+from aerodaas.types.data import Detections, Frame, Header
+from aerodaas.types.errors import EndpointError, GraphError
 
 __all__ = ["TensorAnalysis", "endpoint_analysis"]
 

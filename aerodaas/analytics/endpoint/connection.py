@@ -13,8 +13,8 @@ import urllib3
 from urllib3.exceptions import HTTPError, NewConnectionError, ProtocolError
 from urllib3.exceptions import TimeoutError as NoTimeLeft
 
-from aerodaas.config import EndpointConfig
-from aerodaas.errors import ConfigError, EndpointError
+from aerodaas.config.model import EndpointConfig
+from aerodaas.types.errors import ConfigError, EndpointError
 
 __all__ = ["Connection", "Reply"]
 

@@ -20,8 +20,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from aerodaas.analytics.endpoint.connection import Connection, Reply
 from aerodaas.analytics.endpoint.model import refuse_denied
-from aerodaas.data import Detection, Detections, Frame
-from aerodaas.errors import ConfigError, EndpointError
+from aerodaas.types.data import Detection, Detections, Frame
+from aerodaas.types.errors import ConfigError, EndpointError
 
 __all__ = ["FunctionUrl"]
 

@@ -17,7 +17,7 @@ from aerodaas.analytics.endpoint.tensors import (
     decode_reply,
     encode_request,
 )
-from aerodaas.errors import ConfigError, EndpointError, ModelError
+from aerodaas.types.errors import ConfigError, EndpointError, ModelError
 
 __all__ = ["EndpointModel", "refuse_denied"]
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.errors import EndpointError
+from aerodaas.types.errors import EndpointError
 
 __all__ = ["DATATYPES", "HEADER_LENGTH", "TensorSpec", "decode_reply", "encode_request"]
 

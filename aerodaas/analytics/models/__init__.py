@@ -1,6 +1,6 @@
 """The networks that ship with the project, each beside its model card.
 
-They are trained by `aerodaas.training` on rendered pictures alone; `detector.md` and `pose.md`
+They are trained by `tools.training` on rendered pictures alone; `detector.md` and `pose.md`
 tell how, and how well they do. The detector takes 320 x 320 pixels and is laid out as Ultralytics
 exports are, so that `OnnxDetector` and other tools read it; the pose model takes cuts around
 people, which `PoseAnalytics` makes.

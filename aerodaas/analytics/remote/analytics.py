@@ -14,9 +14,9 @@ from pydantic import ValidationError
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
 from aerodaas.analytics.remote.guard import Guard, is_loopback
-from aerodaas.config import RemoteConfig
-from aerodaas.data import Frame
-from aerodaas.errors import ConfigError, SourceError
+from aerodaas.config.model import RemoteConfig
+from aerodaas.types.data import Frame
+from aerodaas.types.errors import ConfigError, SourceError
 
 if TYPE_CHECKING:
     import uvicorn

@@ -14,9 +14,7 @@ from starlette.exceptions import HTTPException as AnyHTTPException
 
 from aerodaas.analytics.commanding import MissionLink
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut, WaypointsIn
-from aerodaas.data import Alert, Frame, Header
-from aerodaas.errors import InvalidWaypointError
-from aerodaas.navigation.commands import (
+from aerodaas.mission.commands import (
     Answer,
     ClearNavigation,
     Command,
@@ -25,7 +23,9 @@ from aerodaas.navigation.commands import (
     Resume,
     ReturnHome,
 )
-from aerodaas.navigation.state_machine import TERMINAL
+from aerodaas.mission.state_machine import TERMINAL
+from aerodaas.types.data import Alert, Frame, Header
+from aerodaas.types.errors import InvalidWaypointError
 
 __all__ = ["build_app"]
 

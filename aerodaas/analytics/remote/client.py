@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 from urllib.parse import urlsplit
 
-from aerodaas.errors import ConfigError, MissionError, SourceError
+from aerodaas.types.errors import ConfigError, MissionError, SourceError
 
 __all__ = ["RemoteClient"]
 

@@ -8,17 +8,12 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from aerodaas.clock import seconds
-from aerodaas.navigation.commands import Answer
-from aerodaas.status import MissionStatus
-from aerodaas.vehicle import VehicleState
-from aerodaas.waypoints import (
-    DEFAULT_PRIORITY,
-    AeroNavigation,
-    NavigationType,
-    SchedulingType,
-    Waypoint,
-)
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.mission.commands import Answer
+from aerodaas.types.clock import seconds
+from aerodaas.types.status import MissionStatus
+from aerodaas.types.vehicle import VehicleState
+from aerodaas.types.waypoints import DEFAULT_PRIORITY, NavigationType, SchedulingType, Waypoint
 
 __all__ = ["AnswerOut", "StatusOut", "WaypointIn", "WaypointsIn"]
 

@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.connecting import Connection
-from aerodaas.drivers.mavlink.parameters import Parameters, unsafe_parameters
+from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.errors import AeroDaaSError
+from aerodaas.types.errors import AeroDaaSError
 
 _SETTLING = 2.0
 """Seconds in which the slowest of its messages have come."""

@@ -10,19 +10,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerodaas.config import RobotConfig
-from aerodaas.drivers.mavlink.alignment import Alignment, global_origin
-from aerodaas.drivers.mavlink.autopilot import Autopilot
-from aerodaas.drivers.mavlink.commander import Commander
-from aerodaas.drivers.mavlink.departure import Departure
-from aerodaas.drivers.mavlink.fence import upload_fence
-from aerodaas.drivers.mavlink.frames import LocalFrame
-from aerodaas.drivers.mavlink.link import MavlinkLink
-from aerodaas.drivers.mavlink.parameters import Parameters, unsafe_parameters
+from aerodaas.config.model import RobotConfig
+from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
+from aerodaas.drivers.mavlink.control.departure import Departure
+from aerodaas.drivers.mavlink.microservices.commander import Commander
+from aerodaas.drivers.mavlink.microservices.fence import upload_fence
+from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.drivers.mavlink.telemetry import Telemetry
-from aerodaas.errors import VehicleError
-from aerodaas.geometry import GeodeticOrigin, Vector, ned_to_enu
+from aerodaas.drivers.mavlink.state.alignment import Alignment, global_origin
+from aerodaas.drivers.mavlink.state.frames import LocalFrame
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.geometry import GeodeticOrigin, Vector, ned_to_enu
 
 __all__ = ["CHECKS", "Connection", "establish"]
 

@@ -8,10 +8,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.errors import ConfigError
-from aerodaas.geometry import GeodeticOrigin, yaw_ned_to_enu
-from aerodaas.waypoints import AeroNavigation, NavigationType, Waypoint, WaypointType
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import GeodeticOrigin, yaw_ned_to_enu
+from aerodaas.types.waypoints import NavigationType, Waypoint, WaypointType
 
 __all__ = ["read_plan"]
 

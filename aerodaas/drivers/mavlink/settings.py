@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from aerodaas.checked import checked
-from aerodaas.config import RobotConfig
+from aerodaas.config.checked import checked
+from aerodaas.config.model import RobotConfig
 
 __all__ = ["KEY_VARIABLE", "MavlinkSettings", "mavlink_settings"]
 

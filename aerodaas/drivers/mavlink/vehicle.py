@@ -12,28 +12,28 @@ from dataclasses import replace
 
 import numpy as np
 
-from aerodaas.clock import Clock, ScaledClock
-from aerodaas.config import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.mavlink.commander import Commander, Outcome
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish
-from aerodaas.drivers.mavlink.departure import Departure
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.finder import Finder, Found
-from aerodaas.drivers.mavlink.link import MavlinkLink, Message
-from aerodaas.drivers.mavlink.parameters import Parameters
-from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
-from aerodaas.drivers.mavlink.plans import Item, Progress, download, upload
-from aerodaas.drivers.mavlink.rates import RateKeeper
-from aerodaas.drivers.mavlink.reporting import REASONS, Report
+from aerodaas.drivers.mavlink.control.departure import Departure
+from aerodaas.drivers.mavlink.control.steering import Steering
+from aerodaas.drivers.mavlink.control.watchdog import Watchdog
+from aerodaas.drivers.mavlink.microservices.commander import Commander, CommandResult
+from aerodaas.drivers.mavlink.microservices.parameters import Parameters
+from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Progress, download, upload
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
-from aerodaas.drivers.mavlink.steering import Steering
-from aerodaas.drivers.mavlink.telemetry import Telemetry
-from aerodaas.drivers.mavlink.touchdown import Touchdown
-from aerodaas.drivers.mavlink.watchdog import Watchdog
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.state.reporting import REASONS, VehicleReport
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.state.touchdown import Touchdown
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.finder import Finder, FoundVehicle
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
+from aerodaas.drivers.mavlink.wire.rates import RateKeeper
 from aerodaas.drivers.setpoints import require_finite
-from aerodaas.errors import ConfigError, InvalidWaypointError, VehicleError
-from aerodaas.geometry import GeodeticOrigin, Vector
-from aerodaas.vehicle import (
+from aerodaas.types.clock import Clock, ScaledClock
+from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
+from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.vehicle import (
     Capabilities,
     PositionSetpoint,
     Setpoint,
@@ -54,7 +54,7 @@ _STEERED = {VehicleMode.HOLDING, VehicleMode.GUIDED, VehicleMode.RETURNING}
 
 
 class MavlinkVehicle:
-    """One multicopter with PX4 or ArduPilot; implements `aerodaas.vehicle.ClockedVehicle`.
+    """One multicopter with PX4 or ArduPilot; implements `aerodaas.types.vehicle.ClockedVehicle`.
 
     One thread at a time may use it, the link's own apart. Raises ConfigError for settings that it
     does not know.
@@ -81,7 +81,7 @@ class MavlinkVehicle:
         self._phase = FlightPhase()
         self._watchdog = Watchdog()
         self._touchdown = Touchdown()
-        self._report = Report(self._telemetry, self._phase, self._touchdown)
+        self._report = VehicleReport(self._telemetry, self._phase, self._touchdown)
         self._steering = Steering(self._robot, self._settings)
         self._words: deque[str] = deque()
         self._finder = Finder(self._settings)
@@ -160,7 +160,7 @@ class MavlinkVehicle:
             self.close()
             raise
 
-    def _find(self, link: MavlinkLink, deadline: float) -> Found:
+    def _find(self, link: MavlinkLink, deadline: float) -> FoundVehicle:
         while (found := self._finder.found) is None:
             if time.monotonic() >= deadline:
                 raise VehicleError(f"{self._name}: {self._finder.explain(link.counts)}")
@@ -341,7 +341,7 @@ class MavlinkVehicle:
         phase.ask(wish, now)
         order = connection.autopilot.ask_mode(wish)
 
-        def done(outcome: Outcome) -> None:
+        def done(outcome: CommandResult) -> None:
             if not (outcome.accepted or outcome.replaced) and phase.wish is wish:
                 said = "; ".join(self._telemetry.texts.recent(time.monotonic(), REASONS))
                 self._words.append(f"{order.what}: {outcome.text} {said}".rstrip())
@@ -351,12 +351,12 @@ class MavlinkVehicle:
         )
 
     def upload_mission(
-        self, items: Sequence[Item], progress: Progress = lambda _, __: None
+        self, items: Sequence[MissionItem], progress: Progress = lambda _, __: None
     ) -> None:
         """Put `items` in the place of the mission on the vehicle; waits, raises VehicleError."""
         upload(self._connected().link, items, mavlink.MAV_MISSION_TYPE_MISSION, progress)
 
-    def download_mission(self, progress: Progress = lambda _, __: None) -> list[Item]:
+    def download_mission(self, progress: Progress = lambda _, __: None) -> list[MissionItem]:
         """The mission on the vehicle; waits, raises VehicleError."""
         return download(self._connected().link, mavlink.MAV_MISSION_TYPE_MISSION, progress)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 from collections import deque
 
-from aerodaas.data import Battery
+from aerodaas.types.data import Battery
 
 __all__ = ["BatteryGauge"]
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from aerodaas.geometry import Vector
+from aerodaas.types.geometry import Vector
 
 __all__ = [
     "ENTER",
@@ -22,8 +22,8 @@ __all__ = [
     "STREAM_ON",
     "TAKE_OFF",
     "VERSION",
+    "BodyMotion",
     "Command",
-    "Motion",
     "StickScale",
     "Sticks",
     "ports",
@@ -77,7 +77,7 @@ def ports(state: int, video: int) -> Command:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class BodyMotion:
     """How a Tello flies in its own level frame."""
 
     velocity: Vector
@@ -116,7 +116,7 @@ class StickScale:
     turn: float
     """rad/s."""
 
-    def sticks(self, motion: Motion) -> Sticks:
+    def sticks(self, motion: BodyMotion) -> Sticks:
         """Sticks that fly `motion`; what is more than 100 % is cut to it."""
         ahead, left, up = motion.velocity
         return Sticks(
@@ -126,11 +126,11 @@ class StickScale:
             _percent(-motion.yaw_rate / self.turn),
         )
 
-    def motion(self, sticks: Sticks) -> Motion:
+    def motion(self, sticks: Sticks) -> BodyMotion:
         """How a Tello flies by these `sticks` once it has taken them up."""
         ahead, left = sticks.ahead * self.speed, -sticks.right * self.speed
         velocity = np.array([ahead, left, sticks.up * self.climb]) / _FULL
-        return Motion(velocity, -sticks.clockwise * self.turn / _FULL)
+        return BodyMotion(velocity, -sticks.clockwise * self.turn / _FULL)
 
 
 def _percent(share: float) -> int:

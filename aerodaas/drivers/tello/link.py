@@ -13,11 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from aerodaas.drivers.tello.commands import STILL, Command, Sticks
-from aerodaas.drivers.tello.last_word import LastWord
+from aerodaas.drivers.tello.dead_man import DeadMan
 from aerodaas.drivers.tello.settings import TelloSettings
 from aerodaas.drivers.tello.sockets import bound_socket, datagrams
 from aerodaas.drivers.tello.state import TelloState, parse_state
-from aerodaas.errors import VehicleError
+from aerodaas.types.errors import VehicleError
 
 __all__ = ["LinkCounts", "TelloLink"]
 
@@ -125,7 +125,7 @@ class TelloLink:
             self._bell, self._rope = map(opened.enter_context, socket.socketpair())
             self._bell.settimeout(0.0)
             self._rope.settimeout(0.0)
-            self._guard = LastWord(self._commands, self._peer)
+            self._guard = DeadMan(self._commands, self._peer)
             opened.callback(self._guard.close)
             self._resources = opened.pop_all()
         self._thread = threading.Thread(target=self._run, name=f"{name}-link", daemon=True)

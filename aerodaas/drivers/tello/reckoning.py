@@ -12,10 +12,10 @@ import math
 
 import numpy as np
 
-from aerodaas.data import Odometry
-from aerodaas.drivers.tello.commands import Motion
+from aerodaas.drivers.tello.commands import BodyMotion
 from aerodaas.drivers.tello.state import TelloState
-from aerodaas.geometry import Vector, body_to_enu, wrap_angle
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import Vector, body_to_enu, wrap_angle
 
 __all__ = ["DeadReckoning"]
 
@@ -89,7 +89,7 @@ class DeadReckoning:
             self._walked + (_SCALE_ERROR * self._way) ** 2 + (_BLIND * self._blind_for) ** 2
         )
 
-    def predict(self, now: float, asked: Motion) -> None:
+    def predict(self, now: float, asked: BodyMotion) -> None:
         """Carry the estimate on to `now`, with the sticks as `asked` since the last call."""
         elapsed = now - self.time
         self.time = now

@@ -6,9 +6,9 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from aerodaas.checked import checked
-from aerodaas.config import CameraConfig, RobotConfig, SensorConfig
-from aerodaas.errors import ConfigError
+from aerodaas.config.checked import checked
+from aerodaas.config.model import CameraConfig, RobotConfig, SensorConfig
+from aerodaas.types.errors import ConfigError
 
 __all__ = [
     "STATE_PORT",

@@ -8,8 +8,7 @@ import time
 
 import numpy as np
 
-from aerodaas.clock import NANOSECONDS, Clock, ScaledClock
-from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.setpoints import require_finite
 from aerodaas.drivers.tello.battery import BatteryGauge
 from aerodaas.drivers.tello.commands import (
@@ -17,20 +16,21 @@ from aerodaas.drivers.tello.commands import (
     LAND,
     STILL,
     TAKE_OFF,
+    BodyMotion,
     Command,
-    Motion,
     StickScale,
 )
-from aerodaas.drivers.tello.greeting import explain_no_states, greet, meaning
+from aerodaas.drivers.tello.handshake import explain_no_states, greet, meaning
 from aerodaas.drivers.tello.link import TelloLink
 from aerodaas.drivers.tello.phase import LIFTED, FlightPhase
 from aerodaas.drivers.tello.reckoning import DeadReckoning
 from aerodaas.drivers.tello.settings import TelloSettings, tello_settings, video_port
 from aerodaas.drivers.tello.state import TelloState
-from aerodaas.errors import InvalidWaypointError, VehicleError
-from aerodaas.geometry import Vector, enu_to_body, wrap_angle
-from aerodaas.navigation.control import limit_length, velocity_towards
-from aerodaas.vehicle import (
+from aerodaas.types.braking import limit_length, velocity_towards
+from aerodaas.types.clock import NANOSECONDS, Clock, ScaledClock
+from aerodaas.types.errors import InvalidWaypointError, VehicleError
+from aerodaas.types.geometry import Vector, enu_to_body, wrap_angle
+from aerodaas.types.vehicle import (
     Capabilities,
     PositionSetpoint,
     Setpoint,
@@ -70,7 +70,7 @@ _CLIMB_MARGIN = 3.0
 
 
 class TelloVehicle:
-    """A DJI Ryze Tello; implements `aerodaas.vehicle.Vehicle`.
+    """A DJI Ryze Tello; implements `aerodaas.types.vehicle.Vehicle`.
 
     Every motion goes by `rc`: velocities straight, places by our own loop from dead reckoning, so
     that a target can change at any moment and nothing is too small to be flown. Each `send` is one
@@ -265,7 +265,7 @@ class TelloVehicle:
                 yaw_rate = min(max(float(setpoint.yaw_rate), -self._turn), self._turn)
                 setpoint = VelocitySetpoint(velocity, yaw_rate)
             body = enu_to_body(velocity, odometry.yaw)
-            link.steer(self._scale.sticks(Motion(body, yaw_rate)))
+            link.steer(self._scale.sticks(BodyMotion(body, yaw_rate)))
             self._phase.mode = VehicleMode.GUIDED
             return setpoint
 
@@ -343,7 +343,7 @@ class TelloVehicle:
             self._phase.to(VehicleMode.HOLDING, now)
             return
         speed = math.copysign(min(self._climb, max(0.15, abs(up))), up)
-        link.steer(self._scale.sticks(Motion(np.array([0.0, 0.0, speed]))))
+        link.steer(self._scale.sticks(BodyMotion(np.array([0.0, 0.0, speed]))))
 
     def _risen(self, reply: str | None) -> None:
         """The Tello has answered to `takeoff`, or has not; in the link's thread."""

@@ -9,13 +9,13 @@ from typing import Any
 
 from foxglove.messages import Quaternion, Timestamp, Vector3
 
-from aerodaas.clock import NANOSECONDS
-from aerodaas.config import RecordingConfig
-from aerodaas.geometry import GeodeticOrigin, Vector
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, plain, topic
 from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.rotation import Rotation
-from aerodaas.status import Message
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.status import Message
 
 __all__ = ["MAP_FRAME", "Session", "convert", "quaternion", "vector", "xyz"]
 

@@ -22,16 +22,16 @@ from foxglove.messages import (
 )
 from numpy.typing import NDArray
 
-from aerodaas.config import RecordingConfig
-from aerodaas.data import Detection, Detections, Frame, Header
-from aerodaas.geometry import CameraModel
+from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector
 from aerodaas.recording.converters.vehicle import body_frame, odometry_json
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.h264 import H264Encoder
-from aerodaas.recording.palette import label_colour, rgb
+from aerodaas.recording.report.palette import label_colour, rgb
 from aerodaas.recording.rotation import OPTICAL, compose, from_rpy
-from aerodaas.status import Message
+from aerodaas.types.data import Detection, Detections, Frame, Header
+from aerodaas.types.geometry import CameraModel
+from aerodaas.types.status import Message
 
 __all__: list[str] = []
 

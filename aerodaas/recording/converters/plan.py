@@ -22,14 +22,14 @@ from foxglove.messages import (
     Vector3,
 )
 
-from aerodaas.config import GeofenceConfig
-from aerodaas.geometry import GeodeticOrigin
-from aerodaas.identifiers import internal
+from aerodaas.config.model import GeofenceConfig
 from aerodaas.recording.converters.base import MAP_FRAME, Session, quaternion, vector
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
-from aerodaas.recording.palette import OKABE_ITO, rgb
+from aerodaas.recording.report.palette import OKABE_ITO, rgb
 from aerodaas.recording.rotation import from_rpy
-from aerodaas.waypoints import Waypoint
+from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.identifiers import internal
+from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["fence_entries", "plan_entries"]
 

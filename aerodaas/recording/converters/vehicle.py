@@ -13,20 +13,13 @@ from foxglove.messages import (
 )
 from foxglove.messages import Odometry as FoxgloveOdometry
 
-from aerodaas.data import Battery, GpsFix, Odometry
-from aerodaas.geometry import enu_to_body
-from aerodaas.recording.converters.base import (
-    MAP_FRAME,
-    Session,
-    convert,
-    quaternion,
-    vector,
-    xyz,
-)
+from aerodaas.recording.converters.base import MAP_FRAME, Session, convert, quaternion, vector, xyz
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.rotation import from_rpy
-from aerodaas.status import Message, SetpointRecord
-from aerodaas.vehicle import FlightEnd, PositionSetpoint, Setpoint, VehicleState
+from aerodaas.types.data import Battery, GpsFix, Odometry
+from aerodaas.types.geometry import enu_to_body
+from aerodaas.types.status import Message, SetpointRecord
+from aerodaas.types.vehicle import FlightEnd, PositionSetpoint, Setpoint, VehicleState
 
 __all__ = ["body_frame", "odometry_json"]
 

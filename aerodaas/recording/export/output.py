@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from aerodaas.errors import RecordingError
+from aerodaas.types.errors import RecordingError
 
 __all__ = ["file_name", "new_file"]
 

@@ -12,10 +12,10 @@ from typing import Any
 from google.protobuf.json_format import MessageToDict
 from google.protobuf.message import Message
 
-from aerodaas.clock import seconds
-from aerodaas.errors import RecordingError
 from aerodaas.recording.export.output import file_name, new_file
 from aerodaas.recording.reader import Recording
+from aerodaas.types.clock import seconds
+from aerodaas.types.errors import RecordingError
 
 __all__ = ["table_of", "write_csv", "write_parquet"]
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.clock import NANOSECONDS, seconds
-from aerodaas.data import Frame
-from aerodaas.errors import RecordingError
 from aerodaas.recording.export.output import file_name, new_file
-from aerodaas.recording.flight import Flight
-from aerodaas.recording.overlay import draw_detections, draw_line
 from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.recording.report.overlay import draw_detections, draw_line
+from aerodaas.types.clock import NANOSECONDS, seconds
+from aerodaas.types.data import Frame
+from aerodaas.types.errors import RecordingError
 
 __all__ = ["write_videos"]
 
@@ -34,7 +34,7 @@ def write_videos(recording: Recording, folder: Path, *, overlays: bool = True) -
     """
     writers: dict[str, _Video] = {}
     found = detections_by_frame(recording) if overlays else {}
-    flight = Flight.read(recording)
+    flight = RecordedFlight.read(recording)
     try:
         for frame in frames(recording):
             source = frame.header.source
@@ -55,7 +55,7 @@ def write_videos(recording: Recording, folder: Path, *, overlays: bool = True) -
     return [writer.path for writer in writers.values()]
 
 
-def _caption(flight: Flight, frame: Frame) -> str:
+def _caption(flight: RecordedFlight, frame: Frame) -> str:
     now = seconds(frame.header.stamp)
     robot = flight.robots.get(frame.header.source.partition("/")[0])
     state = robot.state_at(np.array([now]))[0].replace("_", " ") if robot else ""

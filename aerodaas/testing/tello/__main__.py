@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 import typer
 
-from aerodaas.config import EnvironmentConfig
-from aerodaas.errors import AeroDaaSError
-from aerodaas.overrides import located
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.overrides import located
 from aerodaas.testing.emulated import watch
 from aerodaas.testing.tello import EmulatedTello, Impairment, TelloOptions, VideoOptions
+from aerodaas.types.errors import AeroDaaSError
 
 
 def main(

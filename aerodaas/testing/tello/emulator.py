@@ -8,7 +8,6 @@ import selectors
 import time
 
 from aerodaas.drivers.tello.sockets import bound_socket, datagrams
-from aerodaas.errors import VehicleError
 from aerodaas.simulation.dynamics import STEP
 from aerodaas.testing.channel import Channel, Impairment
 from aerodaas.testing.emulated import LONGEST_LEAP, EmulatedVehicle
@@ -16,7 +15,8 @@ from aerodaas.testing.tello.flight import TelloFlight
 from aerodaas.testing.tello.options import TelloOptions
 from aerodaas.testing.tello.sdk import Outcome, TelloSdk
 from aerodaas.testing.tello.video import VideoStream
-from aerodaas.vehicle import VehicleMode
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["EmulatedTello"]
 

@@ -6,14 +6,14 @@ import math
 
 import numpy as np
 
-from aerodaas.geometry import enu_to_body, wrap_angle
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.simulation.autopilot import FlightLimits, Goto, Steer
 from aerodaas.simulation.dynamics import STEP, Multirotor
 from aerodaas.simulation.wind import Wind
 from aerodaas.testing.emulated import EmulatedFlight
 from aerodaas.testing.tello.options import TelloOptions
-from aerodaas.vehicle import VehicleMode
+from aerodaas.types.geometry import enu_to_body, wrap_angle
+from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["TelloFlight"]
 

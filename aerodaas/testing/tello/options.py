@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from aerodaas.config import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.tello.settings import tello_camera_settings
 from aerodaas.testing.channel import Impairment
 

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.cameras.simulated import SimulatedCamera
-from aerodaas.clock import NANOSECONDS, host_time_ns
-from aerodaas.config import EnvironmentConfig, RobotConfig, SensorConfig, SimulationConfig
-from aerodaas.data import Odometry
+from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig, SimulationConfig
 from aerodaas.testing.tello.options import VideoOptions
 from aerodaas.testing.tello.stamp import write_stamp
+from aerodaas.types.clock import NANOSECONDS, host_time_ns
+from aerodaas.types.data import Odometry
 
 __all__ = ["PictureSource", "picture_source"]
 

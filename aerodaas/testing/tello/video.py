@@ -14,10 +14,10 @@ from fractions import Fraction
 import av
 from av.video.codeccontext import VideoCodecContext
 
-from aerodaas.data import Odometry
 from aerodaas.testing.channel import Channel
 from aerodaas.testing.tello.options import TelloOptions, VideoOptions
 from aerodaas.testing.tello.pictures import picture_source
+from aerodaas.types.data import Odometry
 
 __all__ = ["VideoStream", "packets"]
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from mavlink_flights import robot_of
 
-from aerodaas.config import EnvironmentConfig
-from aerodaas.drivers.mavlink import link
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.link import MavlinkLink
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.vehicle import VehicleMode
+from aerodaas.drivers.mavlink.wire import link
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["HOLD", "LAND", "OFFBOARD", "POSITION", "RETURN", "TAKE_OFF", "Handmade"]
 
@@ -51,7 +51,7 @@ class Handmade:
         self._ear = mavlink.MAVLink(None, 9, 9)
         self._inbox: list[tuple[bytes, tuple[str, int]]] = []
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=lambda _: self.advance())
-        for module in ("vehicle", "connecting", "watchdog"):
+        for module in ("vehicle", "connecting", "control.watchdog"):
             monkeypatch.setattr(f"aerodaas.drivers.mavlink.{module}.time", clock)
         self._links: list[MavlinkLink] = []
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.geometry import Vector
-from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot
-from aerodaas.vehicle import PositionSetpoint, Setpoint, VehicleMode, VehicleState
+from aerodaas.types.geometry import Vector
+from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VehicleMode, VehicleState
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 __all__ = ["LOOPBACK", "Pair", "flight", "free_port", "robot_of", "wait_for"]
 

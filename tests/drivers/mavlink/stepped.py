@@ -10,11 +10,11 @@ import pytest
 from mavlink_flights import LOOPBACK, free_port, robot_of
 from typing_extensions import Self
 
-from aerodaas.config import EnvironmentConfig
-from aerodaas.drivers.mavlink.link import MavlinkLink
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot
-from aerodaas.vehicle import PositionSetpoint, VehicleMode, VehicleState
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 __all__ = ["Stepped"]
 
@@ -40,7 +40,7 @@ class Stepped:
         """Connect; `options` of the autopilot, `settings` of the driver."""
         self.now = 1000.0
         clock = SimpleNamespace(monotonic=lambda: self.now, sleep=self.advance)
-        for module in ("vehicle", "connecting", "watchdog"):
+        for module in ("vehicle", "connecting", "control.watchdog"):
             monkeypatch.setattr(f"aerodaas.drivers.mavlink.{module}.time", clock)
         self._links: list[MavlinkLink] = []
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aerodaas.drivers.mavlink.alignment import Alignment, global_origin
-from aerodaas.drivers.mavlink.frames import Attitude, LocalFrame
-from aerodaas.drivers.mavlink.telemetry import Telemetry
-from aerodaas.geometry import Vector
+from aerodaas.drivers.mavlink.state.alignment import Alignment, global_origin
+from aerodaas.drivers.mavlink.state.frames import Attitude, LocalFrame
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.types.geometry import Vector
 
 NORTH = 0.001
 """Degrees of latitude that are 111.2 m at 47 degrees north."""

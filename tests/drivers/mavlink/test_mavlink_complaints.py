@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.health import Health
+from aerodaas.drivers.mavlink.state.health import Health
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 WELL = 0x3F
 """Attitude, velocities and positions of an estimator."""

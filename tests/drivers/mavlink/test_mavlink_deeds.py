@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from handmade import HOLD, LAND, OFFBOARD, POSITION, RETURN, TAKE_OFF, Handmade
 
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.errors import InvalidWaypointError, VehicleError
-from aerodaas.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.errors import InvalidWaypointError, VehicleError
+from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
 
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM
 MODE = mavlink.MAV_CMD_DO_SET_MODE

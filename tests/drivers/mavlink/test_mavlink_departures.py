@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 from stepped import Stepped
 
-from aerodaas.drivers.mavlink.commander import Commander
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.px4 import PX4
-from aerodaas.drivers.mavlink.withdrawal import Withdrawal
-from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot, Impairment
-from aerodaas.vehicle import VehicleMode
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
+from aerodaas.drivers.mavlink.control.withdrawal import Withdrawal
+from aerodaas.drivers.mavlink.microservices.commander import Commander
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.vehicle import VehicleMode
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot, Impairment
 
 FAMILIES = ("px4", "ardupilot")
 LOSSY = Impairment(loss=0.2, delay=0.1)

@@ -9,18 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aerodaas.config import RobotConfig
+from aerodaas.config.model import RobotConfig
 from aerodaas.drivers.mavlink import connecting
-from aerodaas.drivers.mavlink.ardupilot import ArduPilot
-from aerodaas.drivers.mavlink.autopilot import Autopilot
-from aerodaas.drivers.mavlink.commander import Commander
+from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.px4 import PX4
+from aerodaas.drivers.mavlink.microservices.commander import Commander
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.drivers.mavlink.telemetry import Sensors, Telemetry
-from aerodaas.errors import VehicleError
-from aerodaas.geometry import GeodeticOrigin
+from aerodaas.drivers.mavlink.state.telemetry import Sensors, Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.geometry import GeodeticOrigin
 
 CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 HOME = GeodeticOrigin(47.0, 8.0, 500.0)

@@ -8,13 +8,13 @@ from types import SimpleNamespace
 
 import pytest
 
-from aerodaas.drivers.mavlink.ardupilot import ArduPilot
-from aerodaas.drivers.mavlink.autopilot import ANYWHERE, Autopilot
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.events import event_number
-from aerodaas.drivers.mavlink.phase import FlightMode
-from aerodaas.drivers.mavlink.px4 import PX4
-from aerodaas.drivers.mavlink.telemetry import Sensors, Telemetry
+from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.autopilots.autopilot import ANYWHERE, Autopilot
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
+from aerodaas.drivers.mavlink.microservices.events import event_number
+from aerodaas.drivers.mavlink.state.phase import FlightMode
+from aerodaas.drivers.mavlink.state.telemetry import Sensors, Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 INTEGERS = (1, 2, 3, 4, 5, 6)

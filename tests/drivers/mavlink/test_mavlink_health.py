@@ -9,13 +9,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.drivers.mavlink.ardupilot import ArduPilot
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.event_words import CHECKS, COMMANDER
-from aerodaas.drivers.mavlink.events import EventReader, event_number
-from aerodaas.drivers.mavlink.health import Health
-from aerodaas.drivers.mavlink.px4 import PX4
-from aerodaas.drivers.mavlink.telemetry import Telemetry
+from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
+from aerodaas.drivers.mavlink.microservices.event_words import CHECKS, COMMANDER
+from aerodaas.drivers.mavlink.microservices.events import EventReader, event_number
+from aerodaas.drivers.mavlink.state.health import Health
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 CHECK, GPS = mavlink.MAV_SYS_STATUS_PREARM_CHECK, mavlink.MAV_SYS_STATUS_SENSOR_GPS
 GYRO = mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from aerodaas.drivers.mavlink import link as module
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.link import MavlinkLink
 from aerodaas.drivers.mavlink.settings import KEY_VARIABLE, MavlinkSettings
-from aerodaas.drivers.mavlink.signing import sign_with
-from aerodaas.drivers.mavlink.transport import Peer
+from aerodaas.drivers.mavlink.wire import link as module
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.drivers.mavlink.wire.signing import sign_with
+from aerodaas.drivers.mavlink.wire.transport import Peer
 
 KEY = bytes(range(32))
 HERE, THERE = ("10.0.0.1", 14550), ("10.0.0.2", 14550)

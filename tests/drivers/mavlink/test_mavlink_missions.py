@@ -12,9 +12,9 @@ from mavlink_flights import LOOPBACK, free_port
 from typer.testing import CliRunner
 
 from aerodaas import Environment
-from aerodaas.cli import app
-from aerodaas.status import MissionState
-from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot
+from aerodaas.cli.app import app
+from aerodaas.types.status import MissionState
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 

@@ -9,17 +9,21 @@ from typing import Any
 
 import pytest
 
-from aerodaas.drivers.mavlink import watchdog
-from aerodaas.drivers.mavlink.commander import Commander, Order, Outcome
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
-from aerodaas.drivers.mavlink.watchdog import Watchdog
-from aerodaas.vehicle import VehicleMode
+from aerodaas.drivers.mavlink.control import watchdog
+from aerodaas.drivers.mavlink.control.watchdog import Watchdog
+from aerodaas.drivers.mavlink.microservices.commander import (
+    Commander,
+    CommandResult,
+    PendingCommand,
+)
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.vehicle import VehicleMode
 
 OURS = 245
 LATER = mavlink.MAV_RESULT_TEMPORARILY_REJECTED
-ARM = Order(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0, 0, 0, 0, 0, 0, 0), "arm")
-CLIMB = Order(mavlink.MAV_CMD_NAV_TAKEOFF, (1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5), "take off")
+ARM = PendingCommand(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, (1.0, 0, 0, 0, 0, 0, 0), "arm")
+CLIMB = PendingCommand(mavlink.MAV_CMD_NAV_TAKEOFF, (1.5, 2.5, 3.5, 4.5, 5.5, 6.5, 7.5), "take off")
 
 
 class Ear:
@@ -27,14 +31,14 @@ class Ear:
 
     def __init__(self) -> None:
         self.sent: list[Any] = []
-        self.told: list[Outcome] = []
+        self.told: list[CommandResult] = []
         self.commander = Commander(self.sent.append, (7, 1), OURS)
 
-    def give(self, order: Order, now: float = 0.0) -> None:
+    def give(self, order: PendingCommand, now: float = 0.0) -> None:
         """Give an order."""
         self.commander.give(order, self.told.append, now=now)
 
-    def answer(self, order: Order, result: int, now: float, system: int = OURS) -> None:
+    def answer(self, order: PendingCommand, result: int, now: float, system: int = OURS) -> None:
         """Acknowledge it, to `system`."""
         ack = mavlink.MAVLink_command_ack_message(order.number, result, 0, 0, system, 191)
         self.commander.take(ack, now)
@@ -57,7 +61,7 @@ def test_a_command_with_a_frame_carries_whole_degrees_times_ten_million() -> Non
     """As COMMAND_INT, whose fifth and sixth parameters are integers."""
     ear = Ear()
     values = (1.5, 2.5, 3.5, 4.5, 473977420.0, -85455940.0, 500.5)
-    ear.give(Order(CLIMB.number, values, "take off", mavlink.MAV_FRAME_GLOBAL))
+    ear.give(PendingCommand(CLIMB.number, values, "take off", mavlink.MAV_FRAME_GLOBAL))
     (sent,) = ear.sent
     assert sent.get_type() == "COMMAND_INT"
     assert (sent.target_system, sent.target_component) == (7, 1)
@@ -137,17 +141,17 @@ def test_what_an_answer_means(result: int, *, accepted: bool, text: str) -> None
     ear.give(ARM, 0.0)
     ear.commander.turn(1.0)
     ear.answer(ARM, result, 1.1)
-    assert ear.told == [Outcome(accepted=accepted, text=text, tries=2)]
+    assert ear.told == [CommandResult(accepted=accepted, text=text, tries=2)]
     assert ear.commander.under_way(ARM.number) is None
 
 
 def test_an_order_that_does_not_insist_is_rejected_at_once() -> None:
     """Whatever else its rejection for now would mean."""
     ear = Ear()
-    once = Order(ARM.number, ARM.values, "disarm", insists=False)
+    once = PendingCommand(ARM.number, ARM.values, "disarm", insists=False)
     ear.give(once, 0.0)
     ear.answer(once, LATER, 0.1)
-    assert ear.told == [Outcome(accepted=False, text="rejected for now", tries=1)]
+    assert ear.told == [CommandResult(accepted=False, text="rejected for now", tries=1)]
 
 
 def test_whose_answer_it_is() -> None:
@@ -157,19 +161,19 @@ def test_whose_answer_it_is() -> None:
     ear.answer(ARM, mavlink.MAV_RESULT_ACCEPTED, 0.1, system=7)
     assert (ear.told, ear.commander.stray) == ([], 0)
     ear.answer(ARM, mavlink.MAV_RESULT_ACCEPTED, 0.1, system=0)
-    assert ear.told == [Outcome(accepted=True)]
+    assert ear.told == [CommandResult(accepted=True)]
     for times in (1, 2):
         ear.answer(CLIMB, mavlink.MAV_RESULT_ACCEPTED, 0.2)
         assert ear.commander.stray == times
     ear.give(ARM, 0.3)
     ear.answer(ARM, mavlink.MAV_RESULT_ACCEPTED, 0.4)
-    assert ear.told[1:] == [Outcome(accepted=True)]
+    assert ear.told[1:] == [CommandResult(accepted=True)]
 
 
 def test_orders_of_different_numbers_go_side_by_side() -> None:
     """One that waits holds up none behind it; each ends by itself."""
     ear, done = Ear(), [False]
-    told: list[Outcome] = []
+    told: list[CommandResult] = []
     ear.commander.give(ARM, ear.told.append, still=lambda: not done[0], now=0.5)
     ear.commander.give(CLIMB, told.append, now=0.0)
     assert ear.commander.under_way(ARM.number) is ARM
@@ -178,7 +182,7 @@ def test_orders_of_different_numbers_go_side_by_side() -> None:
     assert [one.command for one in ear.sent] == [ARM.number, CLIMB.number, CLIMB.number]
     done[0] = True
     ear.commander.turn(1.2)
-    assert ear.told == [Outcome(accepted=True, tries=1)]
+    assert ear.told == [CommandResult(accepted=True, tries=1)]
     assert told == []
     assert ear.commander.under_way(ARM.number) is None
     assert ear.commander.under_way(CLIMB.number) is CLIMB
@@ -195,7 +199,7 @@ def test_a_replaced_order_is_told_so_and_only_of_its_own_number() -> None:
     ear.give(CLIMB, 0.1)
     assert ear.told == []
     ear.commander.give(CLIMB, now=0.2)
-    replaced = Outcome(accepted=False, text="replaced by a newer order", replaced=True)
+    replaced = CommandResult(accepted=False, text="replaced by a newer order", replaced=True)
     assert ear.told == [replaced]
     ear.commander.withdraw(CLIMB.number)
     assert ear.commander.under_way(CLIMB.number) is None

@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from aerodaas.drivers.mavlink import parameters as module
-from aerodaas.drivers.mavlink.ardupilot import ArduPilot
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.parameters import Parameters, unsafe_parameters
-from aerodaas.drivers.mavlink.px4 import PX4
+from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
+from aerodaas.drivers.mavlink.microservices import parameters as module
+from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.errors import VehicleError
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.errors import VehicleError
 
 INT32, REAL32 = mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_REAL32
 

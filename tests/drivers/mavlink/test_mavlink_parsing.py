@@ -10,13 +10,13 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.config import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.mavlink.dialect import EventMessage, mavlink
-from aerodaas.drivers.mavlink.events import EventReader, event_number
-from aerodaas.drivers.mavlink.framing import Framer
-from aerodaas.drivers.mavlink.telemetry import Telemetry
-from aerodaas.drivers.mavlink.texts import Texts
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.drivers.mavlink.microservices.events import EventReader, event_number
+from aerodaas.drivers.mavlink.microservices.texts import Texts
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
+from aerodaas.drivers.mavlink.wire.dialect import EventMessage, mavlink
+from aerodaas.drivers.mavlink.wire.framing import Framer
 
 WANTED = frozenset({0, 30, 32, 77, 253, 410})
 

@@ -17,23 +17,27 @@ from hypothesis import strategies as st
 from mavlink_flights import flight
 from numpy.typing import NDArray
 
-from aerodaas.config import GeofenceConfig
-from aerodaas.drivers.mavlink import plans
-from aerodaas.drivers.mavlink.ardupilot import ArduPilot
-from aerodaas.drivers.mavlink.commander import Commander, Order, Outcome
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.fence import fence_items
-from aerodaas.drivers.mavlink.frames import LocalFrame, attitude_from_frd
-from aerodaas.drivers.mavlink.guidance import MovingTarget
-from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
+from aerodaas.config.model import GeofenceConfig
+from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
+from aerodaas.drivers.mavlink.control.guidance import MovingTarget
+from aerodaas.drivers.mavlink.microservices import plans
+from aerodaas.drivers.mavlink.microservices.commander import (
+    Commander,
+    CommandResult,
+    PendingCommand,
+)
+from aerodaas.drivers.mavlink.microservices.fence import fence_items
+from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.drivers.mavlink.plan_file import read_plan
-from aerodaas.drivers.mavlink.plans import Item
-from aerodaas.drivers.mavlink.px4 import PX4
-from aerodaas.errors import ConfigError
-from aerodaas.geometry import GeodeticOrigin
-from aerodaas.testing.mavlink import AutopilotOptions, Impairment
-from aerodaas.testing.mavlink.store import PlanStore
-from aerodaas.vehicle import VehicleMode
+from aerodaas.drivers.mavlink.state.frames import LocalFrame, attitude_from_frd
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.vehicle import VehicleMode
+from tools.mavlink_vehicle import AutopilotOptions, Impairment
+from tools.mavlink_vehicle.store import PlanStore
 
 metre = st.floats(-1e4, 1e4)
 place = st.tuples(metre, metre, metre).map(np.array)
@@ -173,7 +177,7 @@ class Ear:
 
     def __init__(self) -> None:
         self.sent: list[Any] = []
-        self.outcomes: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
+        self.outcomes: queue.SimpleQueue[CommandResult] = queue.SimpleQueue()
         self.commander = Commander(self.sent.append, (1, 1), 245)
 
     def acknowledge(self, number: int, result: int, now: float) -> None:
@@ -183,7 +187,7 @@ class Ear:
         )
 
 
-TAKE_OFF = Order(mavlink.MAV_CMD_NAV_TAKEOFF, (0.0,) * 7, "take off")
+TAKE_OFF = PendingCommand(mavlink.MAV_CMD_NAV_TAKEOFF, (0.0,) * 7, "take off")
 
 
 def test_a_lost_order_is_repeated_only_while_it_needs_doing() -> None:
@@ -221,13 +225,13 @@ def test_no_answer_at_all_is_an_outcome() -> None:
     for second in range(1, 20):
         ear.commander.turn(float(second) * 1.1)
     assert len(ear.sent) == 6
-    assert ear.outcomes.get_nowait() == Outcome(accepted=False, text="no answer", tries=6)
+    assert ear.outcomes.get_nowait() == CommandResult(accepted=False, text="no answer", tries=6)
 
 
 def test_a_replaced_order_ends() -> None:
     """Told once that it was replaced; only the newer one is repeated, and has the answer."""
-    ear, newer = Ear(), queue.SimpleQueue[Outcome]()
-    other = Order(TAKE_OFF.number, (1.0,) * 7, "take off higher")
+    ear, newer = Ear(), queue.SimpleQueue[CommandResult]()
+    other = PendingCommand(TAKE_OFF.number, (1.0,) * 7, "take off higher")
     ear.commander.give(TAKE_OFF, ear.outcomes.put, now=0.0)
     ear.commander.give(other, newer.put, now=0.5)
     outcome = ear.outcomes.get_nowait()
@@ -300,7 +304,9 @@ def test_missions_go_up_and_come_down() -> None:
     bad = Impairment(loss=0.1, duplicates=0.2)
     options = AutopilotOptions(uplink=bad, downlink=bad, seed=3)
     items = [
-        Item(mavlink.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 0.0), 473977420 + i, 85455940, 10.0)
+        MissionItem(
+            mavlink.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 0.0), 473977420 + i, 85455940, 10.0
+        )
         for i in range(12)
     ]
     seen: list[tuple[int, int]] = []
@@ -315,7 +321,9 @@ def test_an_upload_whose_acknowledgement_is_lost_begins_anew(
 ) -> None:
     """An autopilot that has all items answers none of them again."""
     items = [
-        Item(mavlink.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 0.0), 473977420 + i, 85455940, 10.0)
+        MissionItem(
+            mavlink.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 0.0), 473977420 + i, 85455940, 10.0
+        )
         for i in range(3)
     ]
     lost: list[Any] = []
@@ -368,7 +376,7 @@ def test_tries_of_an_upload_begin_anew_with_each_answer(monkeypatch: pytest.Monk
     """Five in vain end it, but in a row: a long plan over a bad link gets through."""
     monkeypatch.setattr(plans, "_TIMEOUT", 0.01)
     monkeypatch.setattr(plans, "_ITEM_TIMEOUT", 0.0025)
-    item = Item(mavlink.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 0.0), 1, 1, 10.0)
+    item = MissionItem(mavlink.MAV_CMD_NAV_WAYPOINT, (0.0, 0.0, 0.0, 0.0), 1, 1, 10.0)
     link = Tired(8)
     plans.upload(link, [item] * 8)  # type: ignore[arg-type]
     assert link.next == 8

@@ -11,20 +11,20 @@ from typing import Any
 
 import pytest
 
-from aerodaas.config import GeofenceConfig
-from aerodaas.drivers.mavlink import fence, plans
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.fence import upload_fence
-from aerodaas.drivers.mavlink.plans import Item, download, upload
-from aerodaas.drivers.mavlink.px4 import PX4
-from aerodaas.errors import VehicleError
-from aerodaas.geometry import GeodeticOrigin
+from aerodaas.config.model import GeofenceConfig
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
+from aerodaas.drivers.mavlink.microservices import fence, plans
+from aerodaas.drivers.mavlink.microservices.fence import upload_fence
+from aerodaas.drivers.mavlink.microservices.plans import MissionItem, download, upload
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.geometry import GeodeticOrigin
 
 MISSION = mavlink.MAV_MISSION_TYPE_MISSION
 FENCE = mavlink.MAV_MISSION_TYPE_FENCE
 RALLY = mavlink.MAV_MISSION_TYPE_RALLY
 ITEMS = [
-    Item(16, (1.0, 2.0, 3.0, 4.0), 473977420 + index, -85455940 - index, 10.5 + index)
+    MissionItem(16, (1.0, 2.0, 3.0, 4.0), 473977420 + index, -85455940 - index, 10.5 + index)
     for index in range(3)
 ]
 
@@ -244,7 +244,7 @@ def test_words_of_others_do_not_make_us_wait_longer(meet: Callable[..., Any]) ->
     assert autopilot.at == pytest.approx([100.0, 101.5, 103.0, 104.5, 106.0], abs=0.05)
 
 
-def holding(items: list[Item], kind: int) -> Callable[[Any], list[Any]]:
+def holding(items: list[MissionItem], kind: int) -> Callable[[Any], list[Any]]:
     """It has these items and gives them when asked."""
 
     def answer(message: Any) -> list[Any]:  # noqa: ANN401
@@ -257,7 +257,7 @@ def holding(items: list[Item], kind: int) -> Callable[[Any], list[Any]]:
     return answer
 
 
-def given(item: Item, index: int, kind: int) -> Any:  # noqa: ANN401
+def given(item: MissionItem, index: int, kind: int) -> Any:  # noqa: ANN401
     """One of its items on the wire."""
     return mavlink.MAVLink_mission_item_int_message(
         245,
@@ -278,7 +278,7 @@ def given(item: Item, index: int, kind: int) -> Any:  # noqa: ANN401
 @pytest.mark.parametrize("kind", [MISSION, FENCE])
 def test_a_download_word_by_word(meet: Callable[..., Any], kind: int) -> None:
     """The list, each item, and thanks; to the vehicle, and of this kind of plan throughout."""
-    held = [*ITEMS, Item(5001, (3.0, 0.0, 0.0, 0.0), -1, 2, 0.0, mavlink.MAV_FRAME_GLOBAL)]
+    held = [*ITEMS, MissionItem(5001, (3.0, 0.0, 0.0, 0.0), -1, 2, 0.0, mavlink.MAV_FRAME_GLOBAL)]
     autopilot, seen = meet(holding(held, kind)), []
     got = download(autopilot, kind, lambda done, total: seen.append((done, total)))
     assert got == held

@@ -8,18 +8,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aerodaas.clock import NANOSECONDS
-from aerodaas.drivers.mavlink.ardupilot import ArduPilot
-from aerodaas.drivers.mavlink.commander import Commander
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.frames import Attitude, LocalFrame
-from aerodaas.drivers.mavlink.link import LinkCounts
-from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
-from aerodaas.drivers.mavlink.rates import RateKeeper
-from aerodaas.drivers.mavlink.reporting import Report
-from aerodaas.drivers.mavlink.telemetry import Telemetry
-from aerodaas.drivers.mavlink.touchdown import Touchdown
-from aerodaas.vehicle import VehicleMode, VehicleState
+from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.microservices.commander import Commander
+from aerodaas.drivers.mavlink.state.frames import Attitude, LocalFrame
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.state.reporting import VehicleReport
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.state.touchdown import Touchdown
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import LinkCounts
+from aerodaas.drivers.mavlink.wire.rates import RateKeeper
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 
 class Told:
@@ -36,7 +36,7 @@ class Told:
         telemetry.back_at = 50.0
         self.hear(100.0)
         self.phase.observe(FlightMode.GUIDED, 100.0, armed=armed, critical=False)
-        self.report = Report(telemetry, self.phase, self.touchdown)
+        self.report = VehicleReport(telemetry, self.phase, self.touchdown)
         self.alignment = SimpleNamespace(frame=LocalFrame(np.array([5.0, 0.0, 0.0])), fault="")
         self.report.alignment = self.alignment  # type: ignore[assignment]
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from mavlink_flights import LOOPBACK, Pair, flight, free_port, robot_of, wait_for
 
-from aerodaas.clock import ScaledClock
-from aerodaas.config import EnvironmentConfig
-from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.errors import VehicleError
-from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot
-from aerodaas.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.clock import ScaledClock
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 

@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from aerodaas.drivers.mavlink.dialect import mavlink
 from aerodaas.drivers.mavlink.settings import KEY_VARIABLE, MavlinkSettings
-from aerodaas.drivers.mavlink.signing import load_key, sign_with, signature_fits
-from aerodaas.errors import ConfigError
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.signing import load_key, sign_with, signature_fits
+from aerodaas.types.errors import ConfigError
 
 KEY = bytes(range(32))
 BEAT = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aerodaas.config import GeofenceConfig
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.fence import fence_items
-from aerodaas.drivers.mavlink.frames import Attitude, LocalFrame, attitude_from_frd
-from aerodaas.drivers.mavlink.guidance import Target
-from aerodaas.drivers.mavlink.setpoint import position_message, velocity_message
-from aerodaas.geometry import GeodeticOrigin, Vector
-from aerodaas.vehicle import VelocitySetpoint
+from aerodaas.config.model import GeofenceConfig
+from aerodaas.drivers.mavlink.control.guidance import Target
+from aerodaas.drivers.mavlink.control.setpoint import position_message, velocity_message
+from aerodaas.drivers.mavlink.microservices.fence import fence_items
+from aerodaas.drivers.mavlink.state.frames import Attitude, LocalFrame, attitude_from_frd
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.vehicle import VelocitySetpoint
 
 HOME = GeodeticOrigin(47.0, 8.0, 500.0)
 FRAME = LocalFrame(np.array([100.0, 200.0, 50.0]))

@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aerodaas.config import RobotConfig
-from aerodaas.data import Odometry
-from aerodaas.drivers.mavlink.frames import LocalFrame
-from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
+from aerodaas.config.model import RobotConfig
+from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.drivers.mavlink.steering import Steering
-from aerodaas.geometry import Vector
-from aerodaas.vehicle import PositionSetpoint, VelocitySetpoint
+from aerodaas.drivers.mavlink.state.frames import LocalFrame
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import Vector
+from aerodaas.types.vehicle import PositionSetpoint, VelocitySetpoint
 
 FRAME = LocalFrame(np.array([100.0, 200.0, 50.0]))
 LIMITS = {"max_speed": 4.0, "cruise_speed": 2.0, "max_climb": 1.5, "max_yaw_rate": 90.0}

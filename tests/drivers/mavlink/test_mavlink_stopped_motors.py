@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from aerodaas.drivers.mavlink.phase import FlightMode
-from aerodaas.drivers.mavlink.touchdown import Touchdown
-from aerodaas.vehicle import FlightEnd
+from aerodaas.drivers.mavlink.state.phase import FlightMode
+from aerodaas.drivers.mavlink.state.touchdown import Touchdown
+from aerodaas.types.vehicle import FlightEnd
 
 START = 7.0
 """Metres up in the autopilot's frame at which it is armed."""

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aerodaas.drivers.mavlink.commander import Commander
-from aerodaas.drivers.mavlink.departure import Departure
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
-from aerodaas.drivers.mavlink.px4 import PX4
-from aerodaas.drivers.mavlink.telemetry import Telemetry
-from aerodaas.drivers.mavlink.withdrawal import Withdrawal
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
+from aerodaas.drivers.mavlink.control.departure import Departure
+from aerodaas.drivers.mavlink.control.withdrawal import Withdrawal
+from aerodaas.drivers.mavlink.microservices.commander import Commander
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 MODE = mavlink.MAV_CMD_DO_SET_MODE
 ARM = mavlink.MAV_CMD_COMPONENT_ARM_DISARM

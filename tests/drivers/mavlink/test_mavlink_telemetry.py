@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.events import event_number
-from aerodaas.drivers.mavlink.telemetry import Sensors, Telemetry
+from aerodaas.drivers.mavlink.microservices.events import event_number
+from aerodaas.drivers.mavlink.state.telemetry import Sensors, Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 ARMED = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
 

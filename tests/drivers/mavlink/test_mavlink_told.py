@@ -10,23 +10,24 @@ import numpy as np
 import pytest
 from stepped import Stepped
 
-from aerodaas.clock import NANOSECONDS, Clock
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.frames import LocalFrame
-from aerodaas.drivers.mavlink.link import LinkCounts
-from aerodaas.drivers.mavlink.phase import FlightMode, FlightPhase
-from aerodaas.drivers.mavlink.reporting import Report
-from aerodaas.drivers.mavlink.telemetry import Telemetry
-from aerodaas.drivers.mavlink.touchdown import Touchdown
-from aerodaas.navigation.commands import AddNavigation, Start
-from aerodaas.navigation.loop import SetpointLoop
-from aerodaas.navigation.mission import Mission
-from aerodaas.navigation.planner import InlinePlanner
-from aerodaas.schedulers.waypoint.nearest_neighbor import NearestNeighborScheduler
-from aerodaas.status import MissionState
-from aerodaas.testing.mavlink import AutopilotOptions
-from aerodaas.vehicle import VehicleMode, VehicleState
-from aerodaas.waypoints import AeroNavigation, NavigationType, Waypoint
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.mavlink.state.frames import LocalFrame
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.state.reporting import VehicleReport
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.state.touchdown import Touchdown
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import LinkCounts
+from aerodaas.mission.commands import AddNavigation, Start
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
+from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
+from aerodaas.types.clock import NANOSECONDS, Clock
+from aerodaas.types.status import MissionState
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.types.waypoints import NavigationType, Waypoint
+from tools.mavlink_vehicle import AutopilotOptions
 
 
 class _SteppedClock:
@@ -124,7 +125,7 @@ def test_a_landing_that_nobody_heard_did_not_fall(flown: Flown, duration: float)
 def test_a_vehicle_that_is_heard_again_is_given_time_to_say_where_it_is() -> None:
     """Its first words need not be a position; a second of words without one is a loss of it."""
     telemetry, phase = Telemetry(), FlightPhase()
-    report = Report(telemetry, phase, Touchdown())
+    report = VehicleReport(telemetry, phase, Touchdown())
     report.alignment = SimpleNamespace(frame=LocalFrame(np.zeros(3)), fault="")  # type: ignore[assignment]
 
     def hear(now: float, *, place: bool) -> VehicleState:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from aerodaas.drivers.mavlink.phase import FlightMode
-from aerodaas.drivers.mavlink.touchdown import Touchdown
-from aerodaas.vehicle import FlightEnd
+from aerodaas.drivers.mavlink.state.phase import FlightMode
+from aerodaas.drivers.mavlink.state.touchdown import Touchdown
+from aerodaas.types.vehicle import FlightEnd
 
 UP = 3.0
 

@@ -12,17 +12,17 @@ import pytest
 from mavlink_flights import flight
 from stepped import Stepped
 
-from aerodaas.drivers.mavlink.dialect import mavlink
-from aerodaas.drivers.mavlink.telemetry import Telemetry
-from aerodaas.errors import VehicleError
-from aerodaas.testing.mavlink import AutopilotOptions
-from aerodaas.vehicle import (
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.vehicle import (
     FlightEnd,
     PositionSetpoint,
     VehicleMode,
     VehicleState,
     VelocitySetpoint,
 )
+from tools.mavlink_vehicle import AutopilotOptions
 
 THERE = np.array([6.0, 3.0, 12.0])
 

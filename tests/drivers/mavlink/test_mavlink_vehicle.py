@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 from mavlink_flights import LOOPBACK, flight, free_port, robot_of, wait_for
 
-from aerodaas.clock import ScaledClock
-from aerodaas.config import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.mavlink.dialect import mavlink
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
-from aerodaas.errors import ConfigError, InvalidWaypointError, VehicleError
-from aerodaas.testing.mavlink import AutopilotOptions, EmulatedAutopilot, Impairment
-from aerodaas.vehicle import (
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.clock import ScaledClock
+from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
+from aerodaas.types.vehicle import (
     ClockedVehicle,
     PositionSetpoint,
     Vehicle,
     VehicleMode,
     VelocitySetpoint,
 )
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot, Impairment
 
 pytestmark = pytest.mark.wall_clock
 

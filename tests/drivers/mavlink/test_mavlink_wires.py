@@ -9,9 +9,9 @@ from collections.abc import Callable
 
 import pytest
 
-from aerodaas.drivers.mavlink.forwarding import Forwarder
-from aerodaas.drivers.mavlink.transport import Transport, open_transport
-from aerodaas.errors import ConfigError, VehicleError
+from aerodaas.drivers.mavlink.wire.forwarding import Forwarder
+from aerodaas.drivers.mavlink.wire.transport import Transport, open_transport
+from aerodaas.types.errors import ConfigError, VehicleError
 
 pytestmark = pytest.mark.wall_clock
 

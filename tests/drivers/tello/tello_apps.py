@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 
 from aerodaas.analytics.base import Analytics, Context
-from aerodaas.data import Detection, Detections, Frame
+from aerodaas.types.data import Detection, Detections, Frame
 
 __all__ = ["LimeVestFinder"]
 

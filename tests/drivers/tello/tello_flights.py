@@ -9,11 +9,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-from aerodaas.cameras.tello import TelloCamera
-from aerodaas.config import EnvironmentConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.drivers.tello.camera import TelloCamera
 from aerodaas.drivers.tello.vehicle import TelloVehicle
 from aerodaas.testing.tello import EmulatedTello, TelloOptions
-from aerodaas.vehicle import VehicleMode, VehicleState
+from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 __all__ = ["LOOPBACK", "Pair", "flight", "free_port", "robot_of", "wait_for"]
 

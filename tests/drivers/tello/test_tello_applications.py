@@ -11,7 +11,7 @@ import pytest
 from tello_evidence import Witness
 from tello_flights import free_port
 
-from aerodaas.config import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.testing.tello import EmulatedTello, TelloOptions, VideoOptions
 
 from missions.catalogue import MISSIONS  # isort: skip - found by tello_evidence

@@ -7,11 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from aerodaas.drivers.tello.commands import Motion
+from aerodaas.drivers.tello.commands import BodyMotion
 from aerodaas.drivers.tello.reckoning import DeadReckoning
 from aerodaas.drivers.tello.state import TelloState
 
-STILL = Motion(np.zeros(3))
+STILL = BodyMotion(np.zeros(3))
 
 
 def packet(
@@ -123,7 +123,7 @@ def test_heights_count_from_where_it_stood(before: float) -> None:
 def test_it_takes_up_a_velocity_with_a_lag() -> None:
     """After 0.35 s 63 % of 1 m/s, and 11 cm of way; forward, left and up of where it looks."""
     reckoning = begun(90.0)
-    reckoning.predict(100.35, Motion(np.array([1.0, 0.0, 0.0])))
+    reckoning.predict(100.35, BodyMotion(np.array([1.0, 0.0, 0.0])))
     share = 1.0 - 1.0 / math.e
     assert reckoning.odometry.velocity == pytest.approx([0.0, share, 0.0])
     assert reckoning.odometry.position == pytest.approx([1.0, 2.0 + 0.175 * share, 0.5])
@@ -131,14 +131,14 @@ def test_it_takes_up_a_velocity_with_a_lag() -> None:
     reckoning.predict(110.0, STILL)
     assert reckoning.odometry.velocity == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
     reckoning = begun(90.0)
-    reckoning.predict(110.0, Motion(np.array([0.0, 2.0, 1.0])))
+    reckoning.predict(110.0, BodyMotion(np.array([0.0, 2.0, 1.0])))
     assert reckoning.odometry.velocity == pytest.approx([-2.0, 0.0, 1.0])
 
 
 def test_it_takes_up_a_turn_with_a_lag() -> None:
     """After 0.2 s 63 % of 1 rad/s against the clock; where it looks turns with it."""
     reckoning = begun()
-    reckoning.predict(100.2, Motion(np.zeros(3), 1.0))
+    reckoning.predict(100.2, BodyMotion(np.zeros(3), 1.0))
     share = 1.0 - 1.0 / math.e
     assert reckoning.odometry.yaw_rate == pytest.approx(share)
     assert reckoning.odometry.yaw == pytest.approx(0.2 * share)
@@ -150,7 +150,7 @@ def test_it_takes_up_a_turn_with_a_lag() -> None:
 def test_on_the_ground_nothing_moves() -> None:
     """Whatever the sticks say; a landing ends every motion, on the height of the start."""
     reckoning = begun()
-    ahead = Motion(np.array([1.0, 0.0, 1.0]), 1.0)
+    ahead = BodyMotion(np.array([1.0, 0.0, 1.0]), 1.0)
     reckoning.predict(101.0, ahead)
     before = reckoning.odometry.position
     assert before[2] > 0.9
@@ -167,11 +167,11 @@ def test_time_that_stands_or_goes_back_moves_nothing() -> None:
     """And the next second counts from there."""
     reckoning = begun()
     for now in (100.0, 99.0):
-        reckoning.predict(now, Motion(np.array([5.0, 0.0, 0.0])))
+        reckoning.predict(now, BodyMotion(np.array([5.0, 0.0, 0.0])))
         assert reckoning.odometry.position == pytest.approx([1.0, 2.0, 0.5])
     fresh = DeadReckoning(np.zeros(3), 0.0)
     fresh.correct(packet(), 50.0, standing=False)
-    fresh.predict(50.0, Motion(np.array([5.0, 0.0, 0.0])))
+    fresh.predict(50.0, BodyMotion(np.array([5.0, 0.0, 0.0])))
     assert fresh.odometry.position == pytest.approx([0.0, 0.0, 0.0])
     assert fresh.sigma == 0.0
 
@@ -190,7 +190,7 @@ def test_of_the_way_flown_a_twentieth_is_unsure() -> None:
     reckoning = begun()
     for tenth in range(1, 101):
         ahead = 1.0 if tenth <= 50 else -1.0
-        reckoning.predict(100.0 + tenth / 10, Motion(np.array([0.6, 0.8, 3.0]) * ahead))
+        reckoning.predict(100.0 + tenth / 10, BodyMotion(np.array([0.6, 0.8, 3.0]) * ahead))
         velocity = (0.6 * ahead, -0.8 * ahead, -3.0 * ahead)
         reckoning.correct(packet(velocity), 100.0 + tenth / 10, standing=False)
     walked = 10.0 * 0.1**2 / 6

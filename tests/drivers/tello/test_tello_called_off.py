@@ -11,7 +11,7 @@ from tello_flights import flight
 from aerodaas.drivers.tello.phase import FlightPhase
 from aerodaas.drivers.tello.state import TelloState
 from aerodaas.testing.tello import Impairment, TelloOptions
-from aerodaas.vehicle import FlightEnd, VehicleMode
+from aerodaas.types.vehicle import FlightEnd, VehicleMode
 
 
 def standing(motor_time: float = 0.0) -> TelloState:

@@ -10,8 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from aerodaas.drivers.tello import last_word
-from aerodaas.drivers.tello.last_word import LastWord
+from aerodaas.drivers.tello import dead_man as last_word
+from aerodaas.drivers.tello.dead_man import DeadMan
 
 PEER = ("192.168.10.1", 8889)
 SILENCE = None
@@ -127,7 +127,7 @@ class Process:
 
         quiet = SimpleNamespace(Popen=start, PIPE=-1, TimeoutExpired=subprocess.TimeoutExpired)
         monkeypatch.setattr(last_word, "subprocess", quiet)
-        self.guard = LastWord(SimpleNamespace(fileno=lambda: 42), PEER)  # type: ignore[arg-type]
+        self.guard = DeadMan(SimpleNamespace(fileno=lambda: 42), PEER)  # type: ignore[arg-type]
 
     def _wait(self, timeout: float | None = None) -> None:
         self.waited.append(timeout)

@@ -17,10 +17,10 @@ from tello_flights import free_port
 
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
 from aerodaas.analytics import VipFollowAnalytics
-from aerodaas.options import RunOptions, current_options
-from aerodaas.status import MissionState
+from aerodaas.config.options import RunOptions, current_options
 from aerodaas.testing.tello import EmulatedTello, TelloOptions, VideoOptions
-from aerodaas.vehicle import VehicleMode
+from aerodaas.types.status import MissionState
+from aerodaas.types.vehicle import VehicleMode
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 

@@ -10,12 +10,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from aerodaas.drivers.tello.commands import Motion, Sticks, StickScale
+from aerodaas.drivers.tello.commands import BodyMotion, Sticks, StickScale
 from aerodaas.drivers.tello.reckoning import DeadReckoning
 from aerodaas.drivers.tello.state import parse_state
-from aerodaas.geometry import wrap_angle
 from aerodaas.testing.tello.flight import TelloFlight
 from aerodaas.testing.tello.options import TelloOptions
+from aerodaas.types.geometry import wrap_angle
 
 SCALE = StickScale(speed=1.0, climb=1.0, turn=math.radians(100))
 TICK = 0.05
@@ -113,7 +113,7 @@ def test_sticks_and_motions_undo_each_other_within_a_percent(
 ) -> None:
     """What is sent is what was asked, clamped to 100 % and rounded to one."""
     for ahead, left, rate in asked:
-        sticks = SCALE.sticks(Motion(np.array([ahead, left, 0.0]), rate))
+        sticks = SCALE.sticks(BodyMotion(np.array([ahead, left, 0.0]), rate))
         assert max(abs(sticks.ahead), abs(sticks.right), abs(sticks.clockwise)) <= 100
         back = SCALE.motion(sticks)
         for given_, flown, full in (
@@ -127,4 +127,4 @@ def test_sticks_and_motions_undo_each_other_within_a_percent(
 @given(st.sampled_from([math.nan, math.inf, -math.inf]))
 def test_sticks_of_nonsense_are_centred(value: float) -> None:
     """No number that is not finite reaches the wire."""
-    assert SCALE.sticks(Motion(np.array([value, value, value]), value)) == Sticks()
+    assert SCALE.sticks(BodyMotion(np.array([value, value, value]), value)) == Sticks()

@@ -15,7 +15,7 @@ from aerodaas.drivers.tello.commands import (
     STREAM_ON,
     TAKE_OFF,
     VERSION,
-    Motion,
+    BodyMotion,
     Sticks,
     StickScale,
     ports,
@@ -120,16 +120,16 @@ def test_what_is_cut_off_before_its_semicolon_counts_for_nothing() -> None:
 @pytest.mark.parametrize(
     ("motion", "sticks"),
     [
-        (Motion(np.array([1.0, 0.0, 0.0])), Sticks(ahead=50)),
-        (Motion(np.array([0.0, 1.0, 0.0])), Sticks(right=-50)),
-        (Motion(np.array([0.0, 0.0, 0.25])), Sticks(up=50)),
-        (Motion(np.zeros(3), 0.25), Sticks(clockwise=-20)),
-        (Motion(np.array([-9.0, -9.0, -9.0]), -9.0), Sticks(100, -100, -100, 100)),
-        (Motion(np.array([9.0, 9.0, 9.0]), 9.0), Sticks(-100, 100, 100, -100)),
-        (Motion(np.array([0.03, -0.03, 0.0]), 0.0), Sticks(right=2, ahead=2)),
+        (BodyMotion(np.array([1.0, 0.0, 0.0])), Sticks(ahead=50)),
+        (BodyMotion(np.array([0.0, 1.0, 0.0])), Sticks(right=-50)),
+        (BodyMotion(np.array([0.0, 0.0, 0.25])), Sticks(up=50)),
+        (BodyMotion(np.zeros(3), 0.25), Sticks(clockwise=-20)),
+        (BodyMotion(np.array([-9.0, -9.0, -9.0]), -9.0), Sticks(100, -100, -100, 100)),
+        (BodyMotion(np.array([9.0, 9.0, 9.0]), 9.0), Sticks(-100, 100, 100, -100)),
+        (BodyMotion(np.array([0.03, -0.03, 0.0]), 0.0), Sticks(right=2, ahead=2)),
     ],
 )
-def test_which_stick_flies_where(motion: Motion, sticks: Sticks) -> None:
+def test_which_stick_flies_where(motion: BodyMotion, sticks: Sticks) -> None:
     """Forward, left, up and against the clock to us; right, ahead, up and with the clock to it."""
     assert SCALE.sticks(motion) == sticks
 
@@ -150,7 +150,9 @@ def test_what_sticks_fly() -> None:
 
 def test_one_bad_figure_centres_its_own_stick_alone() -> None:
     """The others are flown."""
-    assert SCALE.sticks(Motion(np.array([math.nan, 1.0, math.inf]), 0.25)) == Sticks(-50, 0, 0, -20)
+    assert SCALE.sticks(BodyMotion(np.array([math.nan, 1.0, math.inf]), 0.25)) == Sticks(
+        -50, 0, 0, -20
+    )
 
 
 def test_what_is_said() -> None:

@@ -94,7 +94,7 @@ class Wire:
             ("threading", quiet),
             ("time", clock),
             ("selectors", selectors),
-            ("LastWord", guard),
+            ("DeadMan", guard),
         ):
             monkeypatch.setattr(module, name, fake)
         settings = TelloSettings(local_address="127.0.0.5", interface="wlan7")

@@ -1,0 +1,1 @@
+"""Ray itself: a local one, a cluster to join, what ends them, and what watches over them."""

@@ -1,0 +1,65 @@
+"""Whether the head of the cluster answers: Ray itself waits for it in silence."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+import time
+from collections.abc import Callable
+
+from aerodaas.actors.cluster.handshake import listener_of
+
+__all__ = ["HeadWatch"]
+
+_EVERY = 2.0
+_PATIENCE = 3.0
+"""Seconds that a connection may take."""
+_LOST_AFTER = 10.0
+"""Seconds without an answer after which people are told."""
+
+
+class HeadWatch:
+    """Connects to the head every few seconds, in a thread of its own."""
+
+    def __init__(self, address: str, tell: Callable[[str, str], None]) -> None:
+        """Watch the head at `address`, `host:port`.
+
+        `tell` is called in the thread, with the kind of an alert and its text.
+        """
+        self.address = address
+        self.lost = False
+        """Whether it has not answered for some time."""
+        self._tell = tell
+        self._ended = threading.Event()
+        if (listener := listener_of(address)) is not None:
+            watching = threading.Thread(target=self._watch, args=(listener,), daemon=True)
+            watching.start()
+
+    def end(self) -> None:
+        """Watch no longer."""
+        self._ended.set()
+
+    def _watch(self, listener: tuple[str, int]) -> None:
+        answered = time.monotonic()
+        while not self._ended.wait(_EVERY):
+            if _answers(listener):
+                if self.lost:
+                    away = time.monotonic() - answered
+                    self.lost = False
+                    self._tell("head_back", f"the cluster's head is back after {away:.0f} s")
+                answered = time.monotonic()
+            elif not self.lost and time.monotonic() - answered > _LOST_AFTER:
+                self.lost = True
+                self._tell(
+                    "head_lost",
+                    f"the cluster's head at {self.address} is out of reach: the flight goes on "
+                    "without it, but nothing that dies now is restarted",
+                )
+
+
+def _answers(listener: tuple[str, int]) -> bool:
+    with contextlib.suppress(OSError):
+        socket.create_connection(listener, timeout=_PATIENCE).close()
+        return True
+    return False

@@ -1,0 +1,69 @@
+"""Word of actors that die and come back, from Ray itself, as soon as it knows."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from concurrent.futures import Future
+from typing import Any, Literal
+
+from ray.exceptions import ActorUnavailableError, RayError
+
+__all__ = ["ASKED_AGAIN", "LIFE", "LIFELINES", "Life", "LivenessMonitor"]
+
+LIFE = "life"
+"""Concurrency group of an actor in which the calls of its lifelines wait."""
+LIFELINES = 2
+"""Most lifelines of one actor: its run's and, for an executor, the dispatcher's."""
+Life = Literal["serving", "restarting", "gone"]
+ASKED_AGAIN = 0.1
+"""Seconds before Ray is asked again for an actor that is not there; its own retries take one."""
+
+
+class LivenessMonitor:
+    """One call waits in each actor for as long as it lives; its end is the news."""
+
+    def __init__(self, actors: Mapping[str, Any], tell: Callable[[str, Life], None]) -> None:
+        """Watch over Ray actor handles by name; `tell` is called, from any thread, with news.
+
+        An actor has the methods `await_start` and `await_stop` and the concurrency group LIFE.
+        """
+        self._tell = tell
+        self._names: dict[Any, list[str]] = {}
+        self._handles: dict[Any, Any] = {}
+        self._ended = False
+        for name, handle in actors.items():
+            actor = handle._actor_id  # noqa: SLF001 - Ray has no other name for it
+            self._names.setdefault(actor, []).append(name)
+            self._handles[actor] = handle
+        for actor in self._handles:
+            self._ask(actor, "await_start")
+
+    def end(self) -> None:
+        """Watch no longer."""
+        self._ended = True
+
+    def _ask(self, actor: Any, what: Literal["await_start", "await_stop"]) -> None:  # noqa: ANN401
+        method = getattr(self._handles[actor], what)
+        reference = method.options(concurrency_group=LIFE).remote()
+
+        def heard(future: Future[None]) -> None:
+            if self._ended:
+                return
+            error = future.exception()
+            if error is None and what == "await_start":
+                self._news(actor, "serving")
+                self._ask(actor, "await_stop")
+            elif isinstance(error, ActorUnavailableError):
+                self._news(actor, "restarting")
+                timer = threading.Timer(ASKED_AGAIN, self._ask, (actor, "await_start"))
+                timer.daemon = True
+                timer.start()
+            elif isinstance(error, RayError):
+                self._news(actor, "gone")
+
+        reference.future().add_done_callback(heard)
+
+    def _news(self, actor: Any, life: Life) -> None:  # noqa: ANN401
+        for name in self._names[actor]:
+            self._tell(name, life)

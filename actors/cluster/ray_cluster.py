@@ -1,0 +1,256 @@
+"""Ray itself: start one of our own here, or join a cluster, and find places for actors."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import importlib
+import logging
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import ray
+from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+from aerodaas.actors.cluster.handshake import greet, hushed, take_up_token
+from aerodaas.actors.cluster.local_ray import LocalRay
+from aerodaas.actors.cluster.ray_variables import VARIABLES
+from aerodaas.config.model import ComputeConfig
+from aerodaas.types.errors import AeroDaaSError, ConfigError
+
+__all__ = [
+    "Placement",
+    "begin",
+    "connect",
+    "disconnect",
+    "discover",
+    "home_edge",
+    "is_local",
+    "join",
+    "nodes_at",
+    "options_for",
+    "pinned",
+]
+
+_KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
+_SHARE = 0.001
+"""Share of a node's `edge` or `cloud` resource that an actor takes: it says where, not how much."""
+_NAMESPACE = "aerodaas"
+"""Ray's, for the names of actors that outlive their application."""
+
+_PRINTS = "print_to_stdstream"
+
+_local: LocalRay | None = None
+"""The Ray that this process has had started."""
+
+
+@dataclass(frozen=True)
+class Placement:
+    """Where an actor belongs."""
+
+    kind: Literal["edge", "cloud"] = "edge"
+    node: str | None = None
+    """IP address of one node, where the kind alone does not say."""
+
+
+def begin(address: str | None) -> None:
+    """Have a Ray of our own begin to start, where `connect` will need one; returns at once."""
+    global _local  # noqa: PLW0603 - one Ray for each process
+    if ray.is_initialized() or address or os.environ.get("RAY_ADDRESS") or _local is not None:
+        return
+    _local = LocalRay(VARIABLES)
+    atexit.register(disconnect)
+
+
+def connect(address: str | None) -> None:
+    """Start a Ray of our own on this machine, or join the cluster at `address` (or `RAY_ADDRESS`).
+
+    Raises AeroDaaSError if the cluster cannot be reached or Ray does not start, ConfigError if the
+    cluster offers no edge node.
+    """
+    if ray.is_initialized():
+        return
+    address = address or os.environ.get("RAY_ADDRESS")
+    if address:
+        join(address)
+        _require_edge(address)
+        return
+    begin(None)
+    assert _local is not None  # noqa: S101 - begun
+    address = _local.address
+    _set_variables()
+    take_up_token()
+    _init(address, _node_ip_address=_local.node_address)
+
+
+def join(address: str) -> None:
+    """Join the cluster at `address`, whatever its nodes offer; AeroDaaSError if that fails."""
+    if ray.is_initialized():
+        return
+    _set_variables()
+    greet(address)
+    _init(address)
+
+
+def _set_variables() -> None:
+    """Before Ray's C++ part is used for the first time: it reads them once."""
+    for name, value in VARIABLES.items():
+        os.environ.setdefault(name, value)
+    # The first error is told; Ray would print the tracebacks of those that followed.
+    os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
+
+
+def _init(address: str, **more: Any) -> None:  # noqa: ANN401 - as Ray takes them
+    quiet: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
+    try:
+        with hushed(), _fatal_only():
+            ray.init(address=address, namespace=_NAMESPACE, **quiet, **more)
+    except (ConnectionError, RuntimeError, ValueError) as error:
+        reason = str(error).strip().splitlines()[0]
+        raise _unreachable(address, reason) from None
+    _silence_nodes()
+
+
+def _silence_nodes() -> None:
+    """Ray prints what its nodes say of processes that die; the run tells of them by name.
+
+    `log_to_driver` does not cover it, nor does anything else that Ray lets one choose.
+    """
+    worker = importlib.import_module("ray._private.worker")
+    if hasattr(worker, _PRINTS):
+        setattr(worker, _PRINTS, lambda *_, **__: None)
+
+
+@contextlib.contextmanager
+def _fatal_only() -> Iterator[None]:
+    """Ray's C++ part, which reads this once, writes its errors to the terminal; we tell them."""
+    name = "RAY_BACKEND_LOG_LEVEL"
+    if name in os.environ:
+        yield
+        return
+    os.environ[name] = "fatal"
+    try:
+        yield
+    finally:
+        del os.environ[name]
+
+
+def _unreachable(address: str, reason: str) -> AeroDaaSError:
+    return AeroDaaSError(
+        f"cannot join the Ray cluster at {address}: {reason}; "
+        "check the address and that the head runs the same Ray and Python versions"
+    )
+
+
+def _require_edge(address: str) -> None:
+    if not any("edge" in node["Resources"] for node in ray.nodes() if node["Alive"]):
+        ray.shutdown()
+        raise ConfigError(
+            f"the Ray cluster at {address} has no edge node; start the one beside the drone "
+            """with `ray start --address … --resources '{"edge": 1}'`"""
+        )
+
+
+def is_local() -> bool:
+    """Tell whether the connected Ray was started for this process alone."""
+    return _local is not None
+
+
+def disconnect() -> None:
+    """Leave Ray; one of our own ends, at once or once the last drone has landed."""
+    global _local  # noqa: PLW0603 - one Ray for each process
+    ray.shutdown()
+    if _local is not None:
+        atexit.unregister(disconnect)
+        _local.end()
+        _local = None
+
+
+def discover() -> list[ComputeConfig]:
+    """The compute resources that the connected cluster offers: one for each kind of node."""
+    found: dict[str, ComputeConfig] = {}
+    for node in ray.nodes():
+        for kind in _KINDS:
+            if node["Alive"] and kind in node["Resources"]:
+                found[kind] = ComputeConfig(id=kind, kind=kind)
+    return list(found.values())
+
+
+def nodes_at(place: Placement) -> list[dict[str, Any]]:
+    """The living nodes that `place` may mean, as Ray describes them.
+
+    Raises ConfigError if there are none, or if Ray does not know the named one as this kind.
+    """
+    alive = [node for node in ray.nodes() if node["Alive"]]
+    kind = [node for node in alive if place.kind in node["Resources"]]
+    if place.node is None:
+        if not kind:
+            raise ConfigError(
+                f"no node of the cluster offers {place.kind!r}; start one with "
+                f"`ray start --address … --resources '{{\"{place.kind}\": 1}}'`"
+            )
+        return kind
+    named = [node for node in alive if place.node in _names(node)]
+    if not named:
+        known = ", ".join(sorted({_label(node) for node in alive}))
+        raise ConfigError(f"no node of the cluster is called {place.node!r}; known: {known}")
+    if not any(node in kind for node in named):
+        raise ConfigError(
+            f"the node {place.node!r} does not offer {place.kind!r}; start it with "
+            f"`--resources '{{\"{place.kind}\": 1}}'`, or correct the resource's kind"
+        )
+    return [node for node in named if node in kind]
+
+
+def _names(node: dict[str, Any]) -> set[str]:
+    """How an environment file may call a node: by address, name, host name or id."""
+    keys = ("NodeManagerAddress", "NodeName", "NodeManagerHostname", "NodeID")
+    return {node[key] for key in keys if key in node}
+
+
+def _label(node: dict[str, Any]) -> str:
+    address: str = node["NodeManagerAddress"]
+    name: str = node.get("NodeName", address)
+    return address if name == address else f"{name} ({address})"
+
+
+def home_edge() -> str:
+    """Id of the edge node beside the drones where the environment file names none.
+
+    This process' own node if it is one, else the first. Raises ConfigError if there is none.
+    """
+    offered = sorted(node["NodeID"] for node in nodes_at(Placement()))
+    here: str = ray.get_runtime_context().get_node_id()
+    return here if here in offered else offered[0]
+
+
+def options_for(place: Placement, *, restarts: int) -> dict[str, Any]:
+    """Ray's options for an actor at `place`.
+
+    Raises ConfigError if no node of the cluster fits.
+    """
+    nodes = nodes_at(place)
+    options: dict[str, Any] = {
+        "num_cpus": 0,
+        "resources": {place.kind: _SHARE},
+        "max_restarts": restarts,
+    }
+    if place.node is not None:
+        address = nodes[0]["NodeManagerAddress"]
+        neighbours = [n for n in ray.nodes() if n["Alive"] and n["NodeManagerAddress"] == address]
+        if len(neighbours) == 1:
+            # By its address, so that a node that was restarted is known again.
+            options["resources"][f"node:{address}"] = _SHARE
+        else:
+            options["scheduling_strategy"] = pinned(nodes[0]["NodeID"])
+    elif place.kind == "edge":
+        # All that is beside the drones is beside each other, however many edges there are.
+        options["scheduling_strategy"] = pinned(home_edge())
+    return options
+
+
+def pinned(node_id: str) -> NodeAffinitySchedulingStrategy:
+    """Ray's strategy of running on this node or nowhere."""
+    return NodeAffinitySchedulingStrategy(node_id, soft=False)

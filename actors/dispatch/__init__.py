@@ -1,0 +1,1 @@
+"""The dispatcher's actor, which runs an analytics scheduler, and the executors."""

@@ -1,0 +1,94 @@
+"""What the dispatcher tells of its scheduler: each decision with its reason, and the sums."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+from aerodaas.actors.stream_names import DECISIONS
+from aerodaas.actors.streams import Publisher
+from aerodaas.schedulers.analytics.base import MILLISECOND, Result, Task, TaskOutcome
+from aerodaas.schedulers.analytics.windows import QoeWindows
+from aerodaas.types.clock import host_time_ns
+from aerodaas.types.data import Header
+from aerodaas.types.status import Decision
+
+__all__ = ["Counts", "DecisionLog"]
+
+
+class DecisionLog:
+    """Publishes what became of each task."""
+
+    def __init__(self, publisher: Publisher, many: set[str]) -> None:
+        """Publish on `publisher`; `many` are the analyses that watch several cameras."""
+        self._publisher = publisher
+        self._many = many
+
+    def label(self, task: Task) -> str:
+        """The analysis and the frame; also the camera, where the analysis watches several."""
+        model = task.profile.model
+        source = f"{task.source}:" if model in self._many else ""
+        return f"{model}#{source}{task.segment}"
+
+    def note(
+        self,
+        task: Task,
+        action: str,
+        reason: str,
+        now: int,
+        totals: Mapping[str, float] | None = None,
+    ) -> None:
+        """Publish one decision or one end; `totals` are further figures."""
+        slack = task.deadline + task.reserve - now
+        waited = (now - task.arrival) / 1e6
+        # The tasks of a frame arrive at one moment; their numbers tell the order.
+        values = {"slack_ms": slack / 1e6, "waited_ms": waited, "number": float(task.id)}
+        if action in {"edge", "cloud"}:
+            values["edge_ms"] = task.profile.edge_time / MILLISECOND
+            values["cloud_ms"] = task.profile.cloud_time / MILLISECOND
+        if task.reserve:
+            values["reserve_ms"] = task.reserve / 1e6
+        values |= totals or {}
+        header = Header(self._publisher.sent, now, DECISIONS)
+        record = Decision(now, self.label(task), action, reason, values)
+        self._publisher.measure(record, header, host_time_ns())
+
+
+class Counts:
+    """What a run is judged by, as in the lab."""
+
+    def __init__(self) -> None:
+        """Nothing has happened yet."""
+        self.retried = 0
+        self._tasks = 0
+        self._outcomes: Counter[str] = Counter()
+        self._utility = 0.0
+        self._windows = QoeWindows()
+
+    def arrived(self, task: Task) -> None:
+        """Count a task."""
+        self._tasks += 1
+        self._windows.arrived(task)
+
+    def ended(self, result: Result) -> None:
+        """Count its end."""
+        self._outcomes[result.outcome.value] += 1
+        self._utility += result.utility
+        if result.outcome is TaskOutcome.DONE:
+            self._windows.done(result.task)
+
+    @property
+    def totals(self) -> dict[str, float]:
+        """Utility so far."""
+        return {"qos_total": self._utility, "qoe_total": self._windows.utility}
+
+    def values(self) -> dict[str, Any]:
+        """Everything, for the report."""
+        return {
+            "tasks": self._tasks,
+            "outcomes": dict(self._outcomes),
+            "retried": self.retried,
+            **self.totals,
+            "qoe_windows": self._windows.won,
+        }

@@ -1,0 +1,483 @@
+"""The dispatcher's actor: an analytics scheduler decides live what runs where, and when.
+
+The scheduler is the very class that the lab studies, driven through the same `Dispatch`. Each
+frame becomes a task for each managed analysis. The edge executor is serial, as in the model that
+the schedulers were made for: whichever analysis it is, one runs at a time. The dispatcher alone
+publishes the analyses' results, so that a result that comes too late goes nowhere.
+
+An executor that dies is restarted (by Ray), and its task is tried once more if the deadline
+allows. A cloud that is gone has no slots until it answers again. A scheduler that raises, talks
+nonsense or is slow is replaced by edge-first EDF.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from aerodaas.actors.base import StreamActor, failure_line
+from aerodaas.actors.cluster.liveness import Life, LivenessMonitor
+from aerodaas.actors.dispatch.deadline_reserve import DeadlineReserve
+from aerodaas.actors.dispatch.decisions import Counts, DecisionLog
+from aerodaas.actors.dispatch.estimates import Estimates
+from aerodaas.actors.dispatch.executor_pool import ExecutorPool
+from aerodaas.actors.dispatch.guarded_scheduler import GuardedDispatch
+from aerodaas.actors.dispatch.remote_executor import Executor, RemoteResult
+from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
+from aerodaas.actors.stream_names import ACKS, DECISIONS, done_stream, task_stream
+from aerodaas.actors.triggers import Triggers, TriggerSpec
+from aerodaas.schedulers.analytics.base import (
+    AnalyticsScheduler,
+    Decision,
+    Drop,
+    Profile,
+    Resources,
+    Result,
+    RunOnEdge,
+    Task,
+    TaskOutcome,
+    TaskPlace,
+    WakeAt,
+)
+from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf
+from aerodaas.types.clock import NANOSECONDS, host_time_ns
+from aerodaas.types.status import Message
+
+__all__ = ["DispatcherActor", "Managed"]
+
+_LAST_ANSWERS = 2.0
+"""Seconds given to the cloud at the end of a run."""
+_COMPLAINTS_KEPT = 16
+_EDGE_PATIENCE = 4
+"""An execution on the edge that takes so many times its expected time has failed."""
+_LEAST_PATIENCE = NANOSECONDS
+"""... but not before this: a first inference may take some."""
+_FORGOTTEN = NANOSECONDS
+"""A task still undecided so long after its deadline, the edge being idle, has been forgotten."""
+
+
+@dataclass(frozen=True)
+class Managed:
+    """One analysis under the dispatcher."""
+
+    stream: str
+    inputs: tuple[str, ...]
+    profile: Profile
+    """Its model's name is the stream."""
+    acknowledges: bool = False
+    """True in lockstep for an analysis whose results nobody reads."""
+    open_times: frozenset[str] = frozenset()
+    """Times of the profile that the user left to be measured."""
+    triggers: tuple[TriggerSpec, ...] = ()
+
+
+class DispatcherActor(StreamActor):
+    """Drives `scheduler` over the executors of the `managed` analyses."""
+
+    niceness = 5
+
+    def __init__(
+        self,
+        session: Session,
+        scheduler: AnalyticsScheduler,
+        managed: tuple[Managed, ...],
+        resources: Resources,
+    ) -> None:
+        """Belong to `session`; without a cloud, `resources` has no slots there."""
+        inputs = dict.fromkeys((s for one in managed for s in one.inputs), FRAME_DEPTH)
+        answers = dict.fromkeys((done_stream(one.stream) for one in managed), MESSAGE_DEPTH)
+        # Of what comes together, ends are told before arrivals, as in the lab.
+        super().__init__(session, "dispatcher", {**answers, **inputs})
+        self._managed = managed
+        self._by_done = {done_stream(one.stream): one for one in managed}
+        self._resources = resources
+        self._dispatch = GuardedDispatch(scheduler, resources, self)
+        self._dispatch.hurried = not session.lockstep
+        self._replaced = False
+        self._numbers = itertools.count()
+        self._frames: dict[int, Message[Any]] = {}
+        self._results: dict[int, Message[Any]] = {}
+        self._timers: list[int] = []
+        self._edge_since = 0
+        self._way = DeadlineReserve()
+        self._estimates = Estimates(session.speed or 1.0, scheduler.learns)
+        self._now = 0
+        self._figures: dict[int, dict[str, float]] = {}
+        """What an execution in the cloud took, by task."""
+        self._why: dict[int, str] = {}
+        """Why an execution failed, by task."""
+        self._lost: set[int] = set()
+        """Tasks whose executor died under them."""
+        self._second: set[int] = set()
+        """Tasks that are tried for the second time."""
+        self._again: deque[Task] = deque()
+        """Tasks to be tried once more at once, ..."""
+        self._orphans: dict[str, list[Task]] = {}
+        """... and those that wait for their executor, by model."""
+        self._gone: set[str] = set()
+        """Models whose executor on the edge will not come back."""
+        self._complaints: deque[str] = deque(maxlen=_COMPLAINTS_KEPT)
+        """Failures in the cloud that people were told of."""
+        self._counts = Counts()
+        self._cloud: ExecutorPool | None = None
+        self._liveness_monitor: LivenessMonitor | None = None
+        self._lives: deque[tuple[str, Life]] = deque()
+        """News of executors on the edge, from other threads."""
+
+    def prepare(
+        self,
+        edge: Mapping[str, Any] | None = None,
+        cloud: Sequence[Executor] = (),
+    ) -> Any:  # noqa: ANN401 - the base's info
+        """Open the streams.
+
+        `edge` are the actors of the analyses, by stream; `cloud` are the executors in the cloud.
+        """
+        info = super().prepare()
+        assert self.subscriber is not None  # noqa: S101 - prepared
+        timeout = self._resources.cloud_timeout
+        wake = self.subscriber.wake
+        self._cloud = (
+            ExecutorPool(cloud, timeout, wake, self.session.speed or 1.0) if cloud else None
+        )
+
+        def tell(model: str, life: Life) -> None:
+            self._lives.append((model, life))
+            wake()
+
+        self._liveness_monitor = LivenessMonitor(edge or {}, tell)
+        return info
+
+    def _open(self) -> None:
+        many = {one.stream for one in self._managed if len(one.inputs) > 1}
+        self._log = DecisionLog(self.publisher(DECISIONS), many)
+        self._tasks = {one.stream: self.publisher(task_stream(one.stream)) for one in self._managed}
+        self._acks = {
+            one.stream: self.publisher(f"{ACKS}/{one.stream}")
+            for one in self._managed
+            if one.acknowledges and self.session.lockstep
+        }
+        self._answers = {one.stream: self.publisher(one.stream) for one in self._managed}
+        self._triggers = {
+            one.stream: Triggers(one.triggers, self.publisher) for one in self._managed
+        }
+
+    def _run(self) -> None:
+        assert self.subscriber is not None  # noqa: S101 - prepare came first
+        self._guarded("start", self._time())
+        while not self.stopping:
+            for message in self.subscriber.receive(self._patience()):
+                self._wake_scheduler()
+                self._take(message)
+            while self._lives:
+                self._executor_is(*self._lives.popleft(), self._time())
+            if self.session.lockstep:
+                self._settle()
+            else:
+                self._catch_up()
+
+    # What happens.
+
+    def _take(self, message: Message[Any]) -> None:
+        now = self._time(message.stamp)
+        managed = self._by_done.get(message.stream)
+        if managed is not None:
+            self._edge_answered(managed, message, now)
+            return
+        for one in self._managed:
+            if message.stream in one.inputs:
+                self._frame_arrived(one, message, now)
+
+    def _frame_arrived(self, managed: Managed, message: Message[Any], now: int) -> None:
+        if message.item is None:
+            self._publish(managed.stream, message, None)
+            return
+        cloud = self._cloud.expected(managed.stream) if self._cloud is not None else None
+        link = self._cloud.on_the_way(managed.stream) if self._cloud is not None else 0.0
+        profile = self._estimates.profile(managed.profile, managed.open_times, cloud, link)
+        reserve = 0 if self.session.lockstep else self._way.reserve(profile.deadline)
+        task = Task(
+            id=next(self._numbers),
+            profile=profile,
+            arrival=now,
+            deadline=now + profile.deadline - reserve,
+            source=message.header.source,
+            segment=message.header.id,
+            reserve=reserve,
+        )
+        self._frames[task.id] = message
+        self._counts.arrived(task)
+        self._guarded("arrived", task, now)
+
+    def _edge_answered(self, managed: Managed, message: Message[Any], now: int) -> None:
+        if managed.stream in self._dispatch.down and managed.stream not in self._gone:
+            self._executor_is(managed.stream, "serving", now)
+        task = self._dispatch.running
+        if task is None or task.profile.model != managed.stream:
+            return
+        if self._frames[task.id].header != message.header:
+            return
+        self._results[task.id] = message
+        if not self.session.lockstep:
+            self._way.travelled(message, now - self._edge_since)
+            taken = self.session.host_seconds(now - self._edge_since)
+            self._estimates.edge.observe(managed.stream, taken)
+        self._guarded("finished", task, now)
+
+    def _executor_is(self, model: str, life: Life, now: int) -> None:
+        """Take note that an executor on the edge died, is back, or will not come back."""
+        down = self._dispatch.down
+        if life == "serving":
+            if model in down:
+                down.discard(model)
+                self.alert("executor_back", f"{model} is back on the edge")
+                self._again.extend(self._orphans.pop(model, ()))
+                self._try_again(now)
+            return
+        if life == "gone":
+            self._gone.add(model)
+        if model not in down:
+            down.add(model)
+            self.alert("executor_lost", f"{model} died on the edge: {life}")
+        for orphan in self._orphans.pop(model, ()) if life == "gone" else ():
+            self._end(Result(orphan, TaskOutcome.FAILED, TaskPlace.EDGE, now, now))
+        running = self._dispatch.running
+        if running is not None and running.profile.model == model:
+            self._lose(running, "its executor on the edge died", now)
+
+    def _catch_up(self) -> None:
+        """Real time: timers that are due, answers from the cloud, executions that hang."""
+        self._wake_scheduler()
+        now = self._time()
+        if self._cloud is not None:
+            self._hear_from(self._cloud, now)
+        running = self._dispatch.running
+        if running and now - self._edge_since > self._patience_with(running.profile):
+            model = running.profile.model
+            self.alert("executor_lost", f"{model} does not answer on the edge")
+            self._dispatch.down.add(model)
+            self._lose(running, "it did not answer", now)
+        elif running is None:
+            self._require_decisions(now)
+
+    def _wake_scheduler(self) -> None:
+        """Real time: tell of the timers that are due, before anything that came after them."""
+        while not self.session.lockstep and self._timers and self._timers[0] <= self._time():
+            self._way.delayed(self._now - heapq.heappop(self._timers))
+            self._guarded("timer", self._now)
+
+    def _patience_with(self, profile: Profile) -> int:
+        """How long an execution on the edge may take, nanoseconds."""
+        return max(_EDGE_PATIENCE * profile.edge_time, _LEAST_PATIENCE)
+
+    def _hear_from(self, cloud: ExecutorPool, now: int) -> None:
+        answers = list(cloud.answers(now))
+        cloud.probe(now)
+        # First of all, so that nothing is tried again in a cloud that is gone.
+        slots, before = cloud.slots, self._dispatch.resources.cloud_slots
+        if slots != before:
+            if not slots:
+                self.alert("cloud_lost", "the cloud is gone; work stays on the edge meanwhile")
+            elif slots < before:
+                self.alert("cloud_lost", f"a part of the cloud is gone; {slots} slots are left")
+            else:
+                self.alert("cloud_back", "the cloud answers again")
+            self._guarded("change_resources", replace(self._resources, cloud_slots=slots), now)
+        for answer in answers:
+            self._cloud_answered(answer, now)
+
+    def _cloud_answered(self, answer: RemoteResult, now: int) -> None:
+        task = answer.task
+        if answer.way:
+            self._why[task.id] = answer.way
+        if answer.figures is not None:
+            self._figures[task.id] = answer.figures
+        if answer.lost:
+            self._lose(task, answer.error, now)
+        elif answer.timed_out:
+            self._why[task.id] = answer.error
+            self._guarded("finished", task, now, TaskOutcome.TIMEOUT)
+        elif answer.message is None:
+            self._why[task.id] = answer.error
+            if answer.error not in self._complaints:
+                self._complaints.append(answer.error)
+                self.alert("cloud_failed", f"{task.profile.model} {answer.way}: {answer.error}")
+            self._guarded("finished", task, now, TaskOutcome.FAILED)
+        else:
+            self._results[task.id] = answer.message
+            self._guarded("finished", task, now)
+
+    def _require_decisions(self, now: int) -> None:
+        oldest = next(iter(self._dispatch.undecided.values()), None)
+        if oldest is None or self._replaced or now <= oldest.deadline + _FORGOTTEN:
+            return
+        self._replace(f"left {self._log.label(oldest)} undecided beyond its deadline", now)
+
+    def _settle(self) -> None:
+        """Lockstep: let the scheduler's own time run on until every task is decided."""
+        if self._dispatch.running is not None:
+            return
+        while self._dispatch.undecided and self._dispatch.running is None:
+            if not self._timers:
+                self._replace("left tasks undecided without asking to be woken", self._now)
+                return
+            self._now = max(self._now, heapq.heappop(self._timers))
+            self._guarded("timer", self._now)
+
+    def _guarded(self, event: str, *args: Any) -> None:  # noqa: ANN401
+        """Tell the scheduler; one that raises, talks nonsense or is slow is replaced."""
+        now = next(arg for arg in reversed(args) if isinstance(arg, int))
+        try:
+            getattr(self._dispatch, event)(*args)
+        except Exception as error:  # noqa: BLE001 - a plug-in may raise anything
+            self._replace(failure_line(error), now)
+        self._try_again(now)
+
+    def _replace(self, why: str, now: int) -> None:
+        name = type(self._dispatch.scheduler).__name__
+        if self._replaced:
+            self.alert("scheduler_failed", f"{name}: {why}")
+            return
+        self._replaced = True
+        self.alert("scheduler_failed", f"{name}: {why}; going on with edge-first EDF")
+        self._dispatch.replace(EdgeCloudEdf(), now)
+
+    # Tasks whose executor dies.
+
+    def _lose(self, task: Task, why: str, now: int) -> None:
+        self._lost.add(task.id)
+        self._why[task.id] = why
+        self._guarded("finished", task, now, TaskOutcome.FAILED)
+
+    def _retried(self, task: Task, now: int) -> bool:
+        """Keep a lost task for a second try, if its deadline allows one."""
+        profile, resources = task.profile, self._dispatch.resources
+        room = task.deadline - now
+        if task.id in self._second:
+            return False
+        down = profile.model in self._dispatch.down
+        cloud = resources.cloud_slots and profile.cloud_gain > 0 and profile.cloud_time <= room
+        if cloud or (profile.edge_time <= room and not down):
+            self._again.append(task)
+            return True
+        if profile.edge_time <= room and profile.model not in self._gone:
+            self._orphans.setdefault(profile.model, []).append(task)
+            return True
+        return False
+
+    def _try_again(self, now: int) -> None:
+        """Hand lost tasks to the scheduler once more, as new ones with the deadline they had."""
+        while self._again:
+            lost = self._again.popleft()
+            why = self._why.pop(lost.id, "")
+            if lost.deadline < now:
+                self._end(Result(lost, TaskOutcome.FAILED, TaskPlace.NOWHERE, now, now))
+                continue
+            task = replace(lost, id=next(self._numbers))
+            self._frames[task.id] = self._frames.pop(lost.id)
+            self._second.add(task.id)
+            self._counts.retried += 1
+            self._log.note(task, "retry", why, now)
+            self._guarded("arrived", task, now)
+
+    # The host of `Dispatch`.
+
+    def run_edge(self, task: Task, now: int) -> None:
+        """Give a task to its analysis' executor on the edge."""
+        frame = self._frames[task.id]
+        self._edge_since = now
+        self._tasks[task.profile.model].derive(frame.item, frame, host_time_ns(), frame.stamp)
+
+    def run_cloud(self, task: Task, now: int) -> None:
+        """Send a task to the cloud."""
+        if self._cloud is not None:
+            left = self.session.host_seconds(task.deadline + task.reserve - now)
+            self._cloud.send(task, self._frames[task.id], now, left)
+
+    def wake_at(self, at: int) -> None:
+        """Remember a time at which the scheduler wants to be woken."""
+        heapq.heappush(self._timers, at)
+
+    def decided(self, decision: Decision, now: int) -> None:
+        """Publish a decision with its reason."""
+        if isinstance(decision, WakeAt):
+            return
+        task = decision.task
+        if isinstance(decision, Drop):
+            self._why[task.id] = decision.reason
+            self._log.note(task, "drop", decision.reason, now)
+        else:
+            action = "edge" if isinstance(decision, RunOnEdge) else "cloud"
+            self._log.note(task, action, decision.reason, now)
+
+    def closed(self, result: Result) -> None:
+        """Publish a task's result, if it came in time."""
+        lost = result.task.id in self._lost
+        self._lost.discard(result.task.id)
+        if not (lost and self._retried(result.task, result.finished)):
+            self._end(result)
+
+    def _end(self, result: Result) -> None:
+        task = result.task
+        frame = self._frames.pop(task.id)
+        answer = self._results.pop(task.id, None)
+        self._second.discard(task.id)
+        in_time = result.outcome is TaskOutcome.DONE
+        origin = answer if answer is not None else frame
+        self._publish(task.profile.model, origin, origin.item if answer and in_time else None)
+        self._counts.ended(result)
+        why = self._why.pop(task.id, None)
+        figures = self._figures.pop(task.id, None)
+        if result.outcome is not TaskOutcome.DROPPED:
+            reason = f"{result.place.value}: {why}" if why else result.place.value
+        elif why is None:
+            reason = "no room in the cloud in time"
+        else:
+            return
+        totals = {"utility": result.utility, **self._counts.totals, **(figures or {})}
+        self._log.note(task, result.outcome.value, reason, result.finished, totals)
+
+    def _publish(self, node: str, origin: Message[Any], item: Any) -> None:  # noqa: ANN401
+        if item is not None:
+            stamp = origin.stamp if self.session.lockstep else self.clock.now()
+            self._triggers[node].fire(item, origin, stamp, partial(self._complain, node))
+        if item is not None or self.session.lockstep:
+            self._answers[node].derive(item, origin, host_time_ns(), origin.stamp)
+        if node in self._acks:
+            done = ((origin.header.source, origin.header.stamp),)
+            self._acks[node].derive(done, origin, host_time_ns(), origin.stamp)
+
+    def _complain(self, node: str, error: Exception) -> None:
+        self.alert("analysis_failed", f"{node}: {failure_line(error)}")
+
+    def _time(self, stamp: int = 0) -> int:
+        self._now = max(self._now, stamp if self.session.lockstep else self.clock.now())
+        return self._now
+
+    def _patience(self) -> float:
+        if self._timers and not self.session.lockstep:
+            return min(0.2, max(0.0, self.session.host_seconds(self._timers[0] - self._time())))
+        return 0.2
+
+    def _close(self) -> None:
+        if self._liveness_monitor is not None:
+            self._liveness_monitor.end()
+        if self._cloud is not None:
+            self._cloud.finish(_LAST_ANSWERS)
+        self._dispatch.close()
+
+    def _values(self) -> dict[str, Any]:
+        return {
+            **self._counts.values(),
+            "scheduler": type(self._dispatch.scheduler).__name__,
+            "replaced": self._replaced,
+            "edge_down": sorted(self._dispatch.down),
+            "cloud_slots": self._dispatch.resources.cloud_slots,
+            "reserve_ms": self._way.reserve(1 << 62) / 1e6,
+            "sites": self._cloud.values() if self._cloud is not None else {},
+        }

@@ -1,0 +1,85 @@
+"""The trajectory scheduler's actor: plans beside the drone's, which a long plan must not delay."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import ray
+from ray.exceptions import GetTimeoutError, RayActorError
+from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+from aerodaas.actors.priority import be_nice
+from aerodaas.actors.run.application import Application
+
+__all__ = ["PlannerExecutor"]
+
+T = TypeVar("T")
+
+_NICENESS = 10
+"""Of its process: a plan may take longer, the setpoint loop beside it must not."""
+
+
+class _PlannerActor:
+    """Calls what it is given; holds no state, so that a restart loses nothing."""
+
+    def __init__(self, application: Application | None) -> None:
+        """Know what the application defines, after a restart, too."""
+        del application
+
+    @ray.method(max_task_retries=-1)
+    def load(self, *_: object) -> None:
+        """Arrive with one's arguments, however often the process dies on the way."""
+        be_nice(_NICENESS)
+
+    def call(self, function: Callable[..., T], *args: Any, **kwargs: Any) -> T:  # noqa: ANN401
+        return function(*args, **kwargs)
+
+
+class PlannerExecutor(Executor):
+    """Runs one call after another in an actor on this node, started anew where one hangs."""
+
+    def __init__(
+        self, patience: float, *used: object, application: Application | None = None
+    ) -> None:
+        """Give each call `patience` wall seconds; returns when the actor is there.
+
+        The modules of what is `used` later are loaded at once, for it takes seconds.
+        """
+        here = ray.get_runtime_context().get_node_id()
+        remote: Any = ray.remote(_PlannerActor)
+        self._actor = remote.options(
+            num_cpus=0,
+            max_restarts=-1,
+            scheduling_strategy=NodeAffinitySchedulingStrategy(here, soft=False),
+        ).remote(application)
+        self._patience = patience
+        self._caller = ThreadPoolExecutor(1, "planner")
+        ray.get(self._actor.load.remote(*used))
+
+    def submit(self, function: Callable[..., T], /, *args: Any, **kwargs: Any) -> Future[T]:  # noqa: ANN401
+        """Call `function` in the actor; the future raises RuntimeError if that hangs or dies."""
+        return self._caller.submit(self._call, function, args, kwargs)
+
+    def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - the base's
+        """End the actor, and the calls that wait for it."""
+        del wait, cancel_futures
+        with contextlib.suppress(Exception):
+            ray.kill(self._actor)
+        self._caller.shutdown(wait=False, cancel_futures=True)
+
+    def _call(self, function: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
+        try:
+            # An actor that is starting anew is waited for: patience counts from when it is there.
+            ray.get(self._actor.load.remote())
+            done = self._actor.call.remote(function, *args, **kwargs)
+            result: T = ray.get(done, timeout=self._patience)
+        except GetTimeoutError:
+            ray.kill(self._actor, no_restart=False)
+            text = f"the scheduler took longer than {self._patience:.0f} s; its actor starts anew"
+            raise RuntimeError(text) from None
+        except RayActorError:
+            raise RuntimeError("the scheduler's actor died; it starts anew") from None
+        return result

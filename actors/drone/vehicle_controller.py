@@ -1,0 +1,343 @@
+"""One drone inside its actor: vehicle, mission and setpoint loop, and the streams they feed."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from aerodaas.actors.base import failure_line
+from aerodaas.actors.drone.background_publisher import BackgroundPublisher
+from aerodaas.actors.drone.planner import PlannerExecutor
+from aerodaas.actors.drone.robot_report import Latencies
+from aerodaas.actors.run.replayed import ReplayedArrivals, WatchedPlanner, as_planned
+from aerodaas.actors.session import Session
+from aerodaas.actors.stream_names import (
+    reply_stream,
+    request_stream,
+    setpoint_stream,
+    state_stream,
+    status_stream,
+)
+from aerodaas.actors.streams import Publisher
+from aerodaas.config.model import RobotConfig, SensorConfig
+from aerodaas.config.plugins import load_plugin
+from aerodaas.mission.commands import (
+    Answer,
+    ClearNavigation,
+    Command,
+    Reply,
+    Request,
+    Start,
+    StreamItem,
+)
+from aerodaas.mission.loop import SetpointLoop
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
+from aerodaas.mission.rehearsal import give
+from aerodaas.mission.safety.setpoint_filter import Neighbour
+from aerodaas.recording.replay.timeline import NEVER
+from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns
+from aerodaas.types.data import Alert, Header
+from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.status import Message, MissionStatus, ReceivedMessage, SetpointRecord
+from aerodaas.types.vehicle import (
+    ClockedVehicle,
+    PlayedVehicle,
+    SteppedVehicle,
+    Vehicle,
+    VehicleState,
+)
+
+__all__ = ["RobotSpec", "VehicleController", "sensor_item"]
+
+_PLANS_PATIENCE = 4.0
+"""Times the plan's time-out, after which a scheduler that has not answered is stopped."""
+_TURNS_FAILED = 20
+"""Turns in a row that raise, a second of them, after which the vehicle is left to itself."""
+_LEAST_PATIENCE = 5.0
+"""Wall seconds; enough for an actor that is starting anew, whatever the speed of the mission."""
+
+
+def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
+    """What a sensor that reads the vehicle itself yields; None where the vehicle cannot tell."""
+    readings: dict[str, object] = {
+        "odometry": state.odometry,
+        "gps": state.gps,
+        "battery": state.battery,
+        "status": status,
+    }
+    return readings[sensor.type]
+
+
+@dataclass(frozen=True)
+class RobotSpec:
+    """One robot as its actor gets it."""
+
+    robot: RobotConfig
+    sensors: tuple[SensorConfig, ...]
+    """The vehicle's own sensors (no cameras) that somebody reads."""
+    navigation: tuple[str, ...]
+    """Streams that feed its mission."""
+    commands: tuple[str, ...]
+    """Streams that carry commands from triggers and cameras."""
+    requesters: tuple[str, ...]
+    """Analyses that command its mission and wait for an answer."""
+    initial: tuple[Command, ...]
+    """Navigation known before take-off."""
+    scheduler: TrajectoryScheduler
+
+
+class VehicleController:
+    """Flies one robot; driven by the drone's actor."""
+
+    def __init__(self, spec: RobotSpec, session: Session, background: BackgroundPublisher) -> None:
+        """Build the vehicle and the mission; nothing is connected yet."""
+        self._background = background
+        self.spec = spec
+        self.id = spec.robot.id
+        self.latencies = Latencies()
+        """Milliseconds from capture to the arrival of the command made from it."""
+        self._session = session
+        self._told = 0
+        self._turned = -1
+        self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
+        self._due = {sensor.id: self._next_due(sensor, -1) for sensor in spec.sensors}
+        self._arrivals = ReplayedArrivals(
+            session.replay_timeline.heard.get(self.id, ()), spec.commands
+        )
+        self._heard: list[ReceivedMessage] = []
+        """Since the last turn."""
+        self._failures = 0
+        """Turns in a row that raised."""
+        self._blamed: set[tuple[str, type[Exception]]] = set()
+        """Whose failure people have been told of already."""
+        self._alerts: list[Alert] = []
+        plugin = load_plugin("drivers", spec.robot.driver)
+        self.vehicle: Vehicle = plugin(spec.robot, session.environment)
+
+    def open(self, publishers: dict[str, Publisher]) -> None:
+        """Connect the vehicle, build its mission; publish through `publishers`, by stream."""
+        self._publishers = publishers
+        self.vehicle.connect()
+        robot, environment = self.spec.robot, self._session.environment
+        takeoff = self.vehicle.read().odometry.position
+        home = environment.home
+        self._planner = WatchedPlanner(self.make_planner(self.spec.scheduler))
+        self.mission = Mission(
+            robot,
+            self._planner,
+            takeoff=takeoff,
+            origin=GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None,
+            wind=np.array(environment.simulation.wind, dtype=np.float64),
+            obeyed=self.vehicle.capabilities.obeys,
+        )
+        self.loop = SetpointLoop(self.vehicle, self.mission)
+        self.state: VehicleState = self.vehicle.read()
+        """The newest state that the loop or a sensor went by."""
+        give(self.id, self.spec.initial, lambda command: self.handle(command, 0))
+
+    def make_planner(self, scheduler: TrajectoryScheduler) -> Planner:
+        """What plans by `scheduler`; may take seconds to start."""
+        # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
+        if self._session.lockstep:
+            return as_planned(scheduler, self._session.replay_timeline.plans.get(self.id, ()))
+        if not scheduler.isolated:
+            return BackgroundPlanner(scheduler)
+        patience = _PLANS_PATIENCE * self.spec.robot.mission.plan_timeout
+        wall = self._session.host_seconds(round(patience * NANOSECONDS))
+        return BackgroundPlanner(
+            scheduler,
+            PlannerExecutor(
+                max(_LEAST_PATIENCE, wall),
+                solve,
+                scheduler,
+                application=self._session.application,
+            ),
+        )
+
+    @staticmethod
+    def streams(spec: RobotSpec) -> list[str]:
+        """Streams that a pilot of this robot publishes for all, the replies aside."""
+        own = [state_stream(spec.robot.id), status_stream(spec.robot.id)]
+        return [
+            *own,
+            setpoint_stream(spec.robot.id),
+            *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
+        ]
+
+    def start(self, clock: Clock) -> None:
+        """Start the mission, whose time is that of `clock`."""
+        if isinstance(self.vehicle, ClockedVehicle):
+            self.vehicle.use_clock(clock)
+        if not self._session.lockstep:
+            # A replay takes off where the mission was built for, which lockstep tells at 0 s.
+            self._publish(state_stream(self.id), self.state, clock.now())
+        self.handle(Start(), clock.now())
+
+    def grow(self, spec: RobotSpec, publishers: dict[str, Publisher]) -> None:
+        """Hear further streams; answer analyses that command the mission through `publishers`."""
+        self.spec = spec
+        self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
+        self._publishers.update(publishers)
+
+    def use_planner(self, planner: Planner) -> None:
+        """Plan by `planner` from now on, beginning with what is queued."""
+        former, self._planner.planner = self._planner.planner, planner
+        if isinstance(former, BackgroundPlanner):
+            former.close()
+        self.mission.replan()
+
+    def advance_to(self, stamp: int) -> None:
+        """Move a simulated vehicle's time on."""
+        if isinstance(self.vehicle, SteppedVehicle):
+            self.vehicle.advance_to(stamp)
+
+    def handle(self, command: Command, now: int) -> Answer:
+        """Pass a command on to the mission; what it raises is refused, and told."""
+        return self._obey(command, now, f"the command {type(command).__name__}")
+
+    def _obey(self, command: Command, now: int, source: str) -> Answer:
+        try:
+            answer: object = self.mission.handle(command, now)
+            if isinstance(answer, Answer):
+                return answer
+            raise TypeError(f"{type(command).__name__} is no command")  # noqa: TRY301 - as any
+        except Exception as error:  # noqa: BLE001 - the command's failure, never the loop's
+            return self._refuse(source, error, now)
+
+    def _refuse(self, source: str, error: Exception, now: int) -> Answer:
+        """Take note of what `source` brought upon itself; people are told once of each kind."""
+        text = f"{source} failed: {failure_line(error)}"
+        if (source, type(error)) not in self._blamed:
+            self._blamed.add((source, type(error)))
+            self._tell(now, "command_failed", text)
+        return Answer(accepted=False, text=text)
+
+    def _tell(self, now: int, kind: str, text: str) -> None:
+        self._alerts.append(Alert(Header(len(self._alerts), now, self.id), kind, text))
+
+    def take(self, message: Message[Any], now: int) -> None:
+        """Pass on what came by stream: navigation, or a command of a trigger.
+
+        In a replay, it counts when it did in the recorded flight: `listen` passes it on.
+        """
+        try:
+            self._take(message, now)
+        except Exception as error:  # noqa: BLE001 - the item's failure, never the loop's
+            self._refuse(f"an item of {message.stream}", error, now)
+
+    def _take(self, message: Message[Any], now: int) -> None:
+        if message.item is None:
+            return
+        if message.stream in self.spec.navigation:
+            self.latencies.append((host_time_ns() - message.captured) / 1e6)
+        if message.stream in (*self.spec.navigation, *self.spec.commands):
+            self._arrivals.add(message, now)
+            if not self._session.lockstep:
+                self.listen(now + 1)
+        elif message.stream in self._replies and isinstance(message.item, Request):
+            answer = self._obey(message.item.command, now, f"a request on {message.stream}")
+            reply = Reply(message.item.number, answer)
+            self._publish(self._replies[message.stream], reply, now)
+
+    def listen(self, now: int) -> None:
+        """Have the mission hear what counts before `now`."""
+        for message, at in self._arrivals.before(now):
+            item: Any = message.item
+            header = message.header
+            self._heard.append(ReceivedMessage(message.stream, header.source, header.stamp, at))
+            steers = message.stream in self.spec.navigation
+            command = StreamItem(message.stream, item, header) if steers else item
+            self._obey(command, at, f"an item of {message.stream}")
+
+    def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
+        """One turn of the setpoint loop; publishes what was decided.
+
+        A turn that raises, for what somebody's data did to the mission, empties the queue and lets
+        the drone hover; the error is raised only once a second of turns has ended so.
+        """
+        try:
+            self._planner.turn(now)
+            record = self.loop.turn(now, neighbours)
+            self._failures = 0
+        except Exception as error:
+            self._failures += 1
+            if self._failures >= _TURNS_FAILED or self.loop.state is None:
+                raise
+            record = self._recover(error, now)
+        record = replace(record, heard=tuple(self._heard), planned=self._planner.answered)
+        self._heard.clear()
+        self._turned = now
+        self._publish(setpoint_stream(self.id), record, now)
+        self._publish(status_stream(self.id), self.mission.status, now)
+        return record
+
+    def _recover(self, error: Exception, now: int) -> SetpointRecord:
+        if self._failures == 1:
+            text = f"the queue was emptied, for flying by it raised {failure_line(error)}"
+            self._tell(now, "turn_failed", text)
+            self._obey(ClearNavigation(), now, "emptying the queue")
+            with contextlib.suppress(AeroDaaSError):
+                self.vehicle.hold()
+        return SetpointRecord(now, None, None)
+
+    def observe(self, now: int) -> list[tuple[str, int]]:
+        """Publish the vehicle's state and the readings of the sensors that are due by now.
+
+        Returns (stream, stamp) of each. At the time of a turn the state is the one that the turn
+        went by, so that a replay finds the mission's own input.
+        """
+        seen = self.loop.state if self._turned == now else None
+        state = self.state = seen or self.vehicle.read()
+        published = [self._publish(state_stream(self.id), state, now)]
+        for sensor in self.spec.sensors:
+            if self._due[sensor.id] <= now:
+                self._due[sensor.id] = self._next_due(sensor, now)
+                item = sensor_item(sensor, state, self.mission.status)
+                published.append(self._publish(f"{self.id}/{sensor.id}", item, now))
+        return published
+
+    def _next_due(self, sensor: SensorConfig, after: int) -> int:
+        return self._session.next_due(f"{self.id}/{sensor.id}", sensor.rate, after)
+
+    @property
+    def next_reading(self) -> int:
+        """When the next sensor is due; NEVER without sensors."""
+        return min(self._due.values(), default=NEVER)
+
+    @property
+    def over(self) -> bool:
+        """True once the mission has ended, on the ground or out of our hands, or was replayed."""
+        played = isinstance(self.vehicle, PlayedVehicle) and self.vehicle.finished
+        return self.mission.finished or played
+
+    @property
+    def status(self) -> MissionStatus:
+        """What the mission says about itself."""
+        return self.mission.status
+
+    def new_alerts(self) -> list[Alert]:
+        """What the mission has had to say since the last call."""
+        alerts = list(self.mission.alerts[self._told :])
+        self._told += len(alerts)
+        alerts += self._alerts
+        self._alerts.clear()
+        return alerts
+
+    def abandon(self) -> None:
+        """Our own code has failed: have the vehicle land by itself."""
+        with contextlib.suppress(AeroDaaSError):
+            self.vehicle.land()
+
+    def _publish(self, stream: str, item: object, now: int) -> tuple[str, int]:
+        publisher, measured = self._publishers[stream], host_time_ns()
+        self._background.do(
+            lambda: publisher.measure(item, Header(publisher.sent, now, stream), measured)
+        )
+        return stream, now

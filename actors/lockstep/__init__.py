@@ -1,0 +1,1 @@
+"""Lockstep: the barrier and the gate at which mission time waits."""

@@ -1,0 +1,187 @@
+"""What an environment and a graph must be before anything starts, each fault with its remedy.
+
+Whatever an actor would refuse when it opens is refused here first, as far as it can be known: Ray
+takes seconds to start, and a fleet on its way to the field does not come back for a typing error.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+from collections.abc import Collection, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel
+
+from aerodaas.analytics.base import Analytics
+from aerodaas.config.checked import checked, near
+from aerodaas.config.plugins import PluginKind, is_built_in, load_plugin, require_plugin
+from aerodaas.dataflow.names import snake_case
+from aerodaas.types.errors import ConfigError, GraphError
+from aerodaas.types.identifiers import find_scoped
+
+if TYPE_CHECKING:
+    from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
+    from aerodaas.dataflow.graph import Graph, Node
+
+__all__ = ["check_environment", "check_graph", "check_plugins", "check_served", "check_tasks"]
+
+_PLAYED = {"folder", "mcap", "recorded", "video"}
+"""Cameras that read what the setting `path` names."""
+_CAMERA = ("open", "capture", "close")
+_VEHICLE = (
+    "connect", "read", "preflight", "take_off", "send", "hold", "return_home", "land", "close"
+)  # fmt: skip
+_OWN_CAMERA = 'give the sensor a "driver" of its own, such as "simulated", "video" or module:Class'
+_LAST_PORT = 65535
+_NAMED = 200
+"""Files of a folder that are looked through for the one that may have been meant."""
+
+
+def check_environment(config: EnvironmentConfig, place: str) -> None:
+    """Raise ConfigError or UnknownIdError for names and settings of plug-ins that there are not.
+
+    Nothing of an application's own is imported, for it may be the application's own file; that is
+    for `check_plugins`.
+    """
+    require_plugin("trajectory_schedulers", config.schedulers.trajectory)
+    for robot in config.robots:
+        require_plugin("drivers", robot.driver)
+        if is_built_in("drivers", robot.driver):
+            _check_settings("drivers", robot.driver, robot.settings, f"{place}: robot {robot.id}")
+    for sensor in (one for one in config.all_sensors() if one.type == "camera"):
+        driver = config.camera_driver(sensor)
+        require_plugin("cameras", driver)
+        if is_built_in("cameras", driver):
+            _check_settings("cameras", driver, sensor.settings, f"{place}: sensor {sensor.full_id}")
+
+
+def check_plugins(
+    config: EnvironmentConfig,
+    robots: Iterable[RobotConfig],
+    cameras: Iterable[SensorConfig],
+    *,
+    here: bool,
+) -> None:
+    """Raise the project's errors for drivers and cameras that could not be opened.
+
+    A plug-in of a stranger's is held to the pydantic model `settings_model` of its class, if it
+    has one; one of ours is built, which opens nothing. `here` is True where all runs on this
+    machine: then what is to be played must be on it.
+    """
+    for robot in robots:
+        _require_methods("drivers", robot.driver, _VEHICLE, f"robot {robot.id}")
+        _check_settings("drivers", robot.driver, robot.settings, f"robot {robot.id}")
+        if is_built_in("drivers", robot.driver):
+            load_plugin("drivers", robot.driver)(robot, config)
+    for sensor in cameras:
+        driver = config.camera_driver(sensor)
+        hint = "" if sensor.driver else f"; its robot's driver was taken: {_OWN_CAMERA}"
+        _require_methods("cameras", driver, _CAMERA, f"sensor {sensor.full_id}", hint)
+        _check_settings("cameras", driver, sensor.settings, f"sensor {sensor.full_id}")
+        if is_built_in("cameras", driver):
+            load_plugin("cameras", driver)(sensor, config)
+        if here and driver in _PLAYED:
+            _check_path(sensor)
+
+
+def check_graph(graph: Graph, config: EnvironmentConfig, flying: Collection[str]) -> None:
+    """Raise the project's errors for a graph that could fail only once it runs.
+
+    `flying` are the robots that navigate.
+    """
+    for node in graph.nodes.values():
+        if node.kind == "sensor":
+            continue
+        if node.kind == "external" and not _is_rate(node.work.rate):
+            raise GraphError(
+                f"{node.id}: its rate must be a positive number of Hz, not {node.work.rate!r}"
+            )
+        _check_process(node)
+        for trigger in node.triggers:
+            if trigger.method is not None and trigger.target not in flying:
+                raise GraphError(
+                    f"{node.id} triggers {trigger.target}.{trigger.method}, but {trigger.target} "
+                    f"does not fly: call {trigger.target}.navigate(…), or leave the trigger out"
+                )
+            if trigger.method is None and trigger.target not in graph.nodes:
+                raise GraphError(f"{node.id} wakes {trigger.target}, which is not in its graph")
+    _check_names("runtime_env", config.runtime_env, graph)
+
+
+def _check_process(node: Node) -> None:
+    process, name = node.work.process, type(node.work).__name__
+    if hasattr(node.work, "postprocess"):
+        return  # an endpoint's, whose parts are called
+    if getattr(process, "__func__", None) is Analytics.process:
+        raise GraphError(f"{name} ({node.id}) has no process(self, item, context), so does nothing")
+    try:
+        inspect.signature(process).bind(None, None)
+    except TypeError as error:
+        raise GraphError(
+            f"{name} ({node.id}): process is called with an item and a context: {error}"
+        ) from None
+
+
+def check_tasks(graph: Graph, config: EnvironmentConfig) -> None:
+    """Raise UnknownIdError for tasks of analyses that there are not, which would have no effect.
+
+    A file that several applications share may name the analyses that ship with the project.
+    """
+    from aerodaas import analytics  # noqa: PLC0415 - loads its modules where they are asked for
+
+    shipped = {snake_case(name).removesuffix("_analytics") for name in dir(analytics)}
+    told = [name for name in config.schedulers.tasks if name not in shipped]
+    _check_names("schedulers.tasks", told, graph)
+
+
+def _check_names(section: str, told: Iterable[str], graph: Graph) -> None:
+    known = [node.id for node in graph.nodes.values() if node.kind != "sensor"]
+    for name in told:
+        find_scoped(f"analysis (under {section})", name, known)
+
+
+def _check_settings(kind: PluginKind, name: str, settings: dict[str, Any], place: str) -> None:
+    model = getattr(load_plugin(kind, name), "settings_model", None)
+    if isinstance(model, type) and issubclass(model, BaseModel):
+        checked(model, settings, f"{place}: settings")
+
+
+def _require_methods(
+    kind: PluginKind, name: str, methods: Iterable[str], place: str, hint: str = ""
+) -> None:
+    plugin = load_plugin(kind, name)
+    what = f"{place}: driver {name!r}"
+    if not callable(plugin):
+        raise ConfigError(f"{what} is no class but {plugin!r}{hint}")
+    # A function may make anything; what it makes is known only once it has been called.
+    missing = [one for one in methods if isinstance(plugin, type) and not hasattr(plugin, one)]
+    if missing:
+        kinds = kind.removesuffix("s").replace("driver", "vehicle")
+        raise ConfigError(f"{what} is no {kinds}, for it has no {', '.join(missing)}{hint}")
+
+
+def _check_path(sensor: SensorConfig) -> None:
+    path = str(sensor.settings.get("path") or "")
+    if "://" in path or Path(path).exists():
+        return
+    beside = Path(path).parent
+    names = [one.name for one in beside.iterdir()] if beside.is_dir() else []
+    raise ConfigError(
+        f"sensor {sensor.full_id}: settings.path: there is no {path}"
+        f"{near(Path(path).name, names[:_NAMED])}"
+    )
+
+
+def check_served(option: str, address: str | None) -> None:
+    """Raise ConfigError for an address to serve at that is none; None is not asked for."""
+    if address is None:
+        return
+    host, _, port = address.rpartition(":")
+    if not host or not port.isdigit() or int(port) > _LAST_PORT:
+        raise ConfigError(f"{option} takes host:port, such as 127.0.0.1:8765, not {address!r}")
+
+
+def _is_rate(rate: object) -> bool:
+    return isinstance(rate, int | float) and math.isfinite(rate) and rate > 0

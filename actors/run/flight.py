@@ -1,0 +1,568 @@
+"""A run as the application's process sees it: start all actors, watch them, stop them."""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+import time
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, cast
+
+import ray
+from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
+from typing_extensions import Self
+
+from aerodaas.actors.analytics import AnalyticsActor
+from aerodaas.actors.base import ActorInfo, ActorReport, StreamActor
+from aerodaas.actors.cluster.head_watch import HeadWatch
+from aerodaas.actors.cluster.liveness import ASKED_AGAIN, LIFE, LIFELINES, Life, LivenessMonitor
+from aerodaas.actors.cluster.orphan_reaper import OrphanReaper
+from aerodaas.actors.cluster.ray_cluster import Placement, is_local, nodes_at, options_for
+from aerodaas.actors.dispatch.dispatcher import DispatcherActor
+from aerodaas.actors.dispatch.executor import CloudExecutor
+from aerodaas.actors.dispatch.offload import CloudProcess
+from aerodaas.actors.dispatch.remote_executor import Executor
+from aerodaas.actors.drone.actor import COMMANDS, DroneActor
+from aerodaas.actors.drone.robot_report import RobotReport
+from aerodaas.actors.isolation import isolation_options
+from aerodaas.actors.recorder import RecorderActor
+from aerodaas.actors.run.application import Application
+from aerodaas.actors.run.application_process import ApplicationProcess
+from aerodaas.actors.run.growth import Growth, growth
+from aerodaas.actors.run.losses import DeadError, SilentError, SuspensionMonitor, drone_lost
+from aerodaas.actors.run.member import Member, ask, require_clock, routes
+from aerodaas.actors.run.plan import AnalyticsActorPlan, Cameras, DispatchPlan, FlightPlan
+from aerodaas.actors.run.shutdown import end_actors, may_fly
+from aerodaas.actors.sensor import SensorActor
+from aerodaas.actors.stream_names import done_stream
+from aerodaas.mission.commands import Answer, Command
+from aerodaas.recording.provenance import Provenance
+from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+from aerodaas.types.clock import host_time_ns
+from aerodaas.types.data import Alert
+from aerodaas.types.errors import AeroDaaSError, MissionError
+
+__all__ = ["Flight", "FlightState"]
+
+_PREPARE_TIMEOUT = 90.0
+_GROWING = 10.0
+"""Wall seconds that an actor may take to join in, or to come to rest for it."""
+_SILENT_FOR = 30.0
+"""Seconds that a drone's actor may not answer before the run counts as failed; it flies on."""
+_REPORT_INTERVAL = 0.5
+_RESTARTS = 3
+_LOOKS = 2
+"""Calls of an executor in the cloud that only look whether and how far away it is."""
+
+
+@dataclass(frozen=True)
+class FlightState:
+    """All of a run at one moment."""
+
+    robots: dict[str, RobotReport]
+    reports: dict[str, ActorReport]
+    over: bool
+    """True once every mission has ended."""
+
+    @property
+    def alerts(self) -> list[Alert]:
+        """The newest alerts of all actors, oldest first."""
+        alerts = [alert for report in self.reports.values() for alert in report.alerts]
+        return sorted(alerts, key=lambda alert: alert.header.stamp)
+
+
+class Flight:
+    """The actors of one run. Use as a context manager: leaving it stops them all."""
+
+    def __init__(
+        self,
+        plan: FlightPlan,
+        recording: Path | None = None,
+        provenance: Provenance | None = None,
+        live: str | None = None,
+        page: str | None = None,
+    ) -> None:
+        """Create the actors of `plan`, all at once; `recording` is where the MCAP file goes.
+
+        With `live`, `host:port`, what is recorded is served there, too; with `page`, the cameras
+        are shown there to browsers.
+        """
+        self.plan = plan
+        # The recorder on a cluster's node does not share our working directory.
+        self.recording = recording.absolute() if recording and plan.recorded else None
+        self._drones: dict[str, str] = {}
+        self._members: dict[str, Member] = {}
+        self._helpers: list[Any] = []
+        """Actors without streams, to be killed at the end."""
+        self._job = ray.get_runtime_context().get_job_id()
+        self._reaper: Any = None
+        self._pulse = SuspensionMonitor()
+        self._opening: list[Any] = []
+        self._liveness_monitor: list[LivenessMonitor] = []
+        self._head: HeadWatch | None = None
+        session, edge = plan.session, Placement()
+        environments = _environments(plan)
+        for specs, place in zip(plan.drones, plan.edges, strict=True):
+            name = f"drone/{'+'.join(spec.robot.id for spec in specs)}"
+            self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
+            mine = {spec.robot.id for spec in specs}
+            others = tuple(
+                spec.robot.id
+                for group in plan.drones
+                for spec in group
+                if spec.robot.id not in mine
+            )
+            self._create(name, DroneActor, place, (session, name, specs, plan.conduct, others))
+        self._create_cameras(plan.cameras)
+        self._create_analyses(plan.analyses, environments)
+        if plan.dispatch is not None:
+            self._create_dispatcher(plan.dispatch, environments)
+        if self.recording is not None and provenance is not None:
+            recorder = (session, self.recording, plan.recorded, provenance, live, page)
+            self._create("recorder", RecorderActor, edge, recorder, restarts=_RESTARTS)
+        if not is_local():
+            self._appoint_reaper()
+        self._origin = 0
+        self._answers: dict[str, tuple[float, dict[str, RobotReport]]] = {}
+        """When each drone's actor last answered, monotonic seconds, and what."""
+        self._next_reports = 0.0
+        self._stopped = False
+
+    def __enter__(self) -> Self:
+        """Stop the actors when left."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stop the actors."""
+        self.stop()
+
+    def launch(self, progress: Callable[[str], None] = lambda _: None) -> None:
+        """Open everything and start flying; raises what an actor could not open.
+
+        `progress` is told what has become ready.
+        """
+        self._prepare(list(self._members.values()), progress)
+        for reference in self._opening:
+            ask(reference, _PREPARE_TIMEOUT)
+        if self._reaper is None:
+            # Until here the local Ray would have ended with us.
+            self._appoint_reaper()
+        self._origin = host_time_ns()
+        self._start(list(self._members.values()))
+        self._head = HeadWatch(ray.get_runtime_context().gcs_address, self._note)
+
+    def _start(self, members: list[Member]) -> None:
+        # Those that only listen go first, so that nobody speaks to an empty room.
+        for member in reversed(members):
+            member.handle.start.remote(self._origin)
+            member.report = ActorReport("running")
+        mortal = {member.name: member.handle for member in members if member.restarts}
+        self._liveness_monitor.append(LivenessMonitor(mortal, self._life_of))
+
+    def poll(self, newest: int = 200) -> FlightState:
+        """Ask how everyone fares, with the `newest` latencies of each robot.
+
+        Also tells the drones that the application is alive.
+        """
+        self._pulse.beat()
+        if time.monotonic() >= self._next_reports:
+            self._next_reports = time.monotonic() + _REPORT_INTERVAL
+            self._gather_reports()
+            self._record_vitals()
+        if self._reaper is not None:
+            self._reaper.heard.remote()
+        robots: dict[str, RobotReport] = {}
+        for name in set(self._drones.values()):
+            robots.update(self._robots_of(name, newest))
+        over = all(self._members[name].report.phase in {"done", "failed"} for name in self._ids())
+        return FlightState(robots, self.reports(), over)
+
+    def _robots_of(self, name: str, newest: int) -> dict[str, RobotReport]:
+        """What a drone's actor says; its last word while it is too busy to say anything."""
+        before = self._answers.get(name)
+        try:
+            robots: dict[str, RobotReport] = ask(self._members[name].handle.robots.remote(newest))
+        except DeadError:
+            raise self._drone_lost(self._members[name]) from None
+        except SilentError:
+            if before is None or time.monotonic() - before[0] > _SILENT_FOR:
+                raise
+            return before[1]
+        self._answers[name] = time.monotonic(), robots
+        return robots
+
+    def _drone_lost(self, member: Member) -> MissionError:
+        """Why a drone's actor has gone: an application that stood still is no proof of it."""
+        frozen = self._pulse.frozen
+        if frozen and self._reaper is not None:
+            try:
+                ended = ask(self._reaper.ending.remote())
+            except DeadError:
+                ended = True
+            except SilentError:
+                ended = False
+            frozen = frozen if ended else 0.0
+        return drone_lost(member.name, member.report, frozen)
+
+    @property
+    def reachable(self) -> bool:
+        """False once this process has left the cluster that the actors live in."""
+        return ray.is_initialized() and ray.get_runtime_context().get_job_id() == self._job
+
+    def learn(self, application: Application) -> None:
+        """Have every actor know what the application defines by now."""
+        application = self.plan.session.application.and_later(application)
+        session = replace(self.plan.session, application=application)
+        self.plan = replace(self.plan, session=session)
+        for reference in [one.handle.learn.remote(application) for one in self._members.values()]:
+            # One that has died learns it when it is set up anew.
+            with contextlib.suppress(AeroDaaSError):
+                ask(reference)
+
+    def grow(self, plan: FlightPlan) -> None:
+        """Fly on by `plan`, the graph as it is now; returns when all that is new runs.
+
+        Raises GraphError for what cannot be changed in flight, and what a new actor could not
+        open; then everything goes on as it was.
+        """
+        change = growth(self.plan, plan)
+        drones = [self._members[name].handle for name in sorted(self._ids())]
+        held = drones if plan.session.lockstep else []
+        try:
+            if not all(ask(one.hold.remote(_GROWING), 2 * _GROWING) for one in held):
+                raise MissionError("the mission did not come to rest, so nothing can join it")
+            self._join(change)
+        finally:
+            for drone in held:
+                drone.release.remote()
+        self.plan = plan
+
+    def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
+        """Have all robots plan by `scheduler` from now on."""
+        for name in sorted(self._ids()):
+            handle = self._members[name].handle
+            ask(handle.use_scheduler.remote(scheduler, _GROWING), _PREPARE_TIMEOUT)
+
+    def _join(self, change: Growth) -> None:
+        known = set(self._members)
+        environments = _environments(replace(self.plan, analyses=change.analyses))
+        try:
+            self._create_cameras(change.cameras)
+            self._create_analyses(change.analyses, environments)
+            fresh = [member for name, member in self._members.items() if name not in known]
+            # Before they can do anything: the application may be killed at any time.
+            self._inform_reaper()
+            self._prepare(fresh, lambda _: None)
+            for name, nodes in change.joining.items():
+                member = self._members[name]
+                member.info = ask(member.handle.join.remote(*nodes), _PREPARE_TIMEOUT)
+                member.setup += nodes
+        except BaseException:
+            for name in set(self._members) - known:
+                ray.kill(self._members.pop(name).handle)
+            self._inform_reaper()
+            raise
+        for name, streams in change.acknowledging.items():
+            ask(self._members[name].handle.acknowledge.remote(streams))
+        if (recorder := self._members.get("recorder")) is not None and change.recorded:
+            recorder.further |= change.recorded
+            recorder.info = ask(recorder.handle.listen.remote(change.recorded), _GROWING)
+        for robots in change.drones:
+            drone = self._members[self._drones[robots[0].robot.id]]
+            grown = drone.handle.grow.remote(robots, change.conduct, _GROWING)
+            drone.info = ask(grown, 2 * _GROWING)
+        for stream, ends in change.ending.items():
+            camera = self._members[f"sensor/{stream}"]
+            camera.setup = (ends,)
+            ask(camera.handle.end_mission_when_finished.remote(ends))
+        self._connect_all()
+        self._start(fresh)
+
+    def _inform_reaper(self) -> None:
+        if self._reaper is not None:
+            self._reaper.look_after.remote(self._in_ending_order(), list(self._helpers))
+
+    @property
+    def flying(self) -> bool:
+        """Whether a drone may be in the air that would not be safe if its actor ended."""
+        drones = [self._members[name].handle for name in self._ids()]
+        return not self.plan.session.lockstep and any(map(may_fly, drones))
+
+    @property
+    def headless(self) -> str:
+        """Where the head of the cluster was, if it is out of reach; else empty."""
+        return self._head.address if self._head is not None and self._head.lost else ""
+
+    def command(self, robot: str, command: Command) -> Answer:
+        """Tell a robot's mission something."""
+        handle = self._members[self._drones[robot]].handle
+        method = handle.command.options(concurrency_group=COMMANDS)
+        answer: Answer = ask(method.remote(robot, command))
+        return answer
+
+    def reports(self) -> dict[str, ActorReport]:
+        """The newest report of each actor."""
+        return {name: member.report for name, member in self._members.items()}
+
+    def infos(self) -> dict[str, ActorInfo]:
+        """Where each actor lives, once launched."""
+        return {m.name: m.info for m in self._members.values() if m.info is not None}
+
+    def publisher(self, stream: str) -> tuple[Any, str] | None:
+        """Who publishes `stream`, an actor's handle, and its node; None if nobody does."""
+        for name, info in self.infos().items():
+            if stream in info.publishes:
+                return self._members[name].handle, info.node_id
+        return None
+
+    def stop(self) -> dict[str, ActorReport]:
+        """Stop all actors, the recorder last, and return their last reports."""
+        if self._stopped:
+            return self.reports()
+        self._watch_no_longer()
+        last = end_actors(self._in_ending_order(), self._helpers)
+        for member in self._members.values():
+            member.report = last.get(member.handle, member.report)
+        return self.reports()
+
+    def leave(self) -> None:
+        """Leave the drones, and all that they need, to the orphan reaper."""
+        self._watch_no_longer()
+
+    def _watch_no_longer(self) -> None:
+        self._stopped = True
+        for liveness_monitor in self._liveness_monitor:
+            liveness_monitor.end()
+        if self._head is not None:
+            self._head.end()
+
+    def _in_ending_order(self) -> list[list[Any]]:
+        """All actors with streams; the recorder last, for it records the end of the others."""
+        recorder = [m.handle for m in self._members.values() if m.name == "recorder"]
+        others = [m.handle for m in self._members.values() if m.name != "recorder"]
+        return [others, recorder]
+
+    def _appoint_reaper(self) -> None:
+        options = self._options("orphan_reaper", Placement(), restarts=0)
+        remote: Any = ray.remote(OrphanReaper)
+        drones = [self._members[name].handle for name in self._ids()]
+        watched = (drones, self._in_ending_order(), list(self._helpers))
+        application = ApplicationProcess(self.plan.session.lockstep)
+        self._reaper = remote.options(**options).remote(application, *watched)
+        self._helpers.append(self._reaper)
+
+    def _ids(self) -> set[str]:
+        return set(self._drones.values())
+
+    def _create(
+        self,
+        name: str,
+        kind: type[StreamActor],
+        place: Placement,
+        args: tuple[Any, ...],
+        *,
+        restarts: int = 0,
+        setup: tuple[Any, ...] = (),
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        remote: Any = ray.remote
+        # Calls that wait, for its life to end or for its loop, must not keep others waiting.
+        groups = {LIFE: LIFELINES} if restarts else {}
+        groups |= {COMMANDS: 1} if kind is DroneActor else {}
+        if groups:
+            remote = remote(concurrency_groups=groups)
+        placed = {**self._options(name, place, restarts=restarts), **(options or {})}
+        made = remote(kind).options(**placed)
+        self._members[name] = Member(name, made.remote(*args), setup, restarts)
+
+    def _options(self, name: str, place: Placement, *, restarts: int) -> dict[str, Any]:
+        """Ray's options; actors outlive the application, and therefore have a name."""
+        outliving = {"lifetime": "detached", "name": f"{self.plan.session.id}/{name}"}
+        return {**options_for(place, restarts=restarts), **outliving}
+
+    def _create_cameras(self, cameras: Iterable[Cameras]) -> None:
+        for camera in cameras:
+            args = (self.plan.session, camera.stream, camera.sensor, camera.state)
+            name = f"sensor/{camera.stream}"
+            setup = (camera.ends,)
+            self._create(name, SensorActor, camera.place, args, restarts=_RESTARTS, setup=setup)
+
+    def _create_analyses(
+        self, actors: Iterable[AnalyticsActorPlan], environments: Mapping[str, Mapping[str, Any]]
+    ) -> None:
+        for actor in actors:
+            self._create(
+                actor.name,
+                AnalyticsActor,
+                actor.place,
+                (self.plan.session, actor.name),
+                setup=actor.nodes,
+                restarts=_RESTARTS,
+                options=environments[actor.name],
+            )
+
+    def _create_dispatcher(
+        self, dispatch: DispatchPlan, environments: Mapping[str, Mapping[str, Any]]
+    ) -> None:
+        executors = [
+            self._create_executor(f"cloud/{number}/{process.site}", process, environments)
+            for number, process in enumerate(dispatch.cloud)
+        ]
+        hosts = {
+            node.stream: self._members[actor.name].handle
+            for actor in self.plan.analyses
+            for node in actor.nodes
+        }
+        edge = {one.stream: hosts[done_stream(one.stream)] for one in dispatch.managed}
+        args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
+        setup = (edge, executors)
+        self._create(
+            "dispatcher", DispatcherActor, Placement(), args, restarts=_RESTARTS, setup=setup
+        )
+
+    def _create_executor(
+        self, name: str, process: CloudProcess, environments: Mapping[str, Mapping[str, Any]]
+    ) -> Executor:
+        # A node that comes and goes must not use restarts up: without one there is no cloud.
+        options = {**self._options(name, process.place, restarts=-1), **environments[name]}
+        remote: Any = ray.remote(CloudExecutor)
+        concurrency = process.slots + _LOOKS
+        handle = remote.options(**options, max_concurrency=concurrency).remote(
+            self.plan.session.application
+        )
+        self._helpers.append(handle)
+        works = ray.put(process.works)
+        self._opening.append(handle.prepare.remote(works))
+        models = frozenset(process.works)
+        return Executor(process.site, handle, [works], models, process.slots, process.compression)
+
+    def _prepare(self, members: list[Member], progress: Callable[[str], None]) -> None:
+        waiting = {member.handle.prepare.remote(*member.setup): member for member in members}
+        deadline, began = time.monotonic() + _PREPARE_TIMEOUT, host_time_ns()
+        while waiting:
+            ready, _ = ray.wait(list(waiting), timeout=max(0.0, deadline - time.monotonic()))
+            if not ready:
+                names = ", ".join(sorted(member.name for member in waiting.values()))
+                raise MissionError(f"{names} not ready within {_PREPARE_TIMEOUT:.0f} s")
+            member = waiting.pop(ready[0])
+            info: ActorInfo = ask(ready[0])
+            require_clock(member.name, info, began)
+            member.info = info
+            progress(member.name)
+        self._connect_all()
+
+    def _connect_all(self) -> None:
+        for reference in [self._connect(member) for member in self._members.values()]:
+            ask(reference)
+
+    def _connect(self, member: Member) -> Any:  # noqa: ANN401 - Ray's reference
+        """Tell a publisher of its readers on other nodes, or without shared memory."""
+        return member.handle.connect.remote(routes(member, self._members.values()))
+
+    def _gather_reports(self) -> None:
+        for member in self._members.values():
+            if member.pending is None:
+                member.pending = member.handle.report.remote()
+            ready, _ = ray.wait([member.pending], timeout=0.05)
+            if not ready:
+                continue
+            member.pending = None
+            try:
+                member.report = ray.get(ready[0])
+            except RayActorError:
+                if member.name in self._ids():
+                    raise self._drone_lost(member) from None
+                # Of those with a lifeline, that tells, and sooner.
+                if not member.restarts:
+                    self._lost(member)
+            except RayTaskError as error:
+                # An actor that can't say how it fares is no reason to leave the drones alone.
+                reason = MissionError(f"no report from {member.name}: {error.cause}")
+                member.report = replace(member.report, error=reason)
+
+    def _record_vitals(self) -> None:
+        """Have the recorder note what each process takes; it alone could not ask other nodes."""
+        recorder = self._members.get("recorder")
+        if recorder is None or recorder.report.phase != "running":
+            return
+        recorder.handle.vitals.remote(
+            {
+                f"{member.name}@{member.info.node_id[:8]}": member.report.vitals
+                for member in self._members.values()
+                if member.info is not None and member.report.vitals is not None
+            }
+        )
+
+    def _life_of(self, name: str, life: Life) -> None:
+        """Take note, in any thread, that an actor died, serves, or will not come back."""
+        member = self._members[name]
+        if life == "serving":
+            self._back(member)
+        elif member.lost_at is None:
+            self._lost(member)
+            threading.Thread(target=self._revive, args=(member,), daemon=True).start()
+
+    def _lost(self, member: Member) -> None:
+        error = MissionError(f"the actor {member.name} died")
+        if member.lost_at is None:
+            member.lost_at = time.monotonic()
+            self._note("actor_lost", str(error))
+            self._wait_no_longer()
+        member.report = ActorReport("failed", error)
+
+    def _back(self, member: Member) -> None:
+        if member.lost_at is not None:
+            absence = time.monotonic() - member.lost_at
+            member.lost_at = None
+            member.report = ActorReport("running")
+            self._wait_no_longer()
+            self._note("actor_back", f"{member.name} is back after {absence:.1f} s")
+
+    def _wait_no_longer(self) -> None:
+        for name in self._ids():
+            self._members[name].handle.wait_no_longer.remote()
+
+    def _note(self, kind: str, text: str) -> None:
+        for name in self._ids():
+            self._members[name].handle.note.remote(kind, text)
+
+    def _revive(self, member: Member) -> None:
+        """Set an actor up anew, in a thread, as soon as Ray has restarted it."""
+        actor, lost_at = member.handle, member.lost_at
+        while member.lost_at == lost_at and not self._stopped:
+            try:
+                if cast("ActorReport", ray.get(actor.report.remote())).phase == "new":
+                    ray.get(actor.learn.remote(self.plan.session.application))
+                    member.info = ray.get(actor.prepare.remote(*member.setup))
+                    if member.further:
+                        member.info = ray.get(actor.listen.remote(member.further))
+                    self._connect(member)
+                    ray.get(actor.start.remote(self._origin))
+            except ActorUnavailableError:
+                pass  # it is not there yet, or no longer
+            except RayTaskError as error:
+                self._note("actor_failed", f"{member.name} cannot start again: {error.cause}")
+                return
+            except RayActorError:
+                return
+            time.sleep(ASKED_AGAIN)
+
+
+def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
+    """Ray's options for the environment of each process that runs analyses.
+
+    Before any actor is there, so that what cannot be provided leaves nothing behind. Raises
+    ConfigError for that, and for a place that no node offers.
+    """
+    processes: dict[str, AnalyticsActorPlan | CloudProcess] = {
+        one.name: one for one in plan.analyses
+    }
+    for number, process in enumerate(plan.dispatch.cloud if plan.dispatch else ()):
+        processes[f"cloud/{number}/{process.site}"] = process
+    for place in {*plan.edges, *(one.place for one in processes.values())}:
+        nodes_at(place)
+    return {
+        name: isolation_options(one.runtime_env, one.place, name) for name, one in processes.items()
+    }

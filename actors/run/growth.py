@@ -1,0 +1,91 @@
+"""What a graph that has grown in flight needs beyond the actors that run already."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from aerodaas.actors.analytics import NodeSpec
+from aerodaas.actors.drone.actor import LockstepSchedule
+from aerodaas.actors.drone.vehicle_controller import RobotSpec
+from aerodaas.actors.run.plan import AnalyticsActorPlan, Cameras, FlightPlan
+from aerodaas.types.errors import GraphError
+
+__all__ = ["Growth", "growth"]
+
+
+@dataclass(frozen=True)
+class Growth:
+    """The difference between two plans of one run."""
+
+    cameras: tuple[Cameras, ...]
+    """To be started."""
+    ending: dict[str, bool]
+    """Running cameras whose last picture ends the mission now, or no longer does, by stream."""
+    analyses: tuple[AnalyticsActorPlan, ...]
+    """Actors to be started."""
+    joining: dict[str, tuple[NodeSpec, ...]]
+    """Analyses that join an actor that runs already, by its name."""
+    acknowledging: dict[str, dict[str, bool]]
+    """In lockstep, the running analyses that are the last of their path now, or no longer are: by
+    actor and stream."""
+    drones: tuple[tuple[RobotSpec, ...], ...]
+    """All robots as they are now, by actor."""
+    conduct: LockstepSchedule
+    recorded: dict[str, int]
+    """Further streams for the recorder, and how many messages of each may wait."""
+
+
+def growth(old: FlightPlan, new: FlightPlan) -> Growth:
+    """Compare the plan that flies with that of the graph as it is now.
+
+    Raises GraphError for what cannot be changed in flight: which tasks the analytics scheduler has.
+    """
+    _require_same_tasks(old, new)
+    running = {node.stream: node for actor in old.analyses for node in actor.nodes}
+    known = {actor.name for actor in old.analyses}
+    ended = {camera.stream: camera.ends for camera in old.cameras}
+    fresh = [
+        (actor, tuple(node for node in actor.nodes if node.stream not in running))
+        for actor in new.analyses
+    ]
+    acknowledging = {
+        actor.name: {
+            node.stream: node.acknowledges
+            for node in actor.nodes
+            if node.stream in running and running[node.stream].acknowledges != node.acknowledges
+        }
+        for actor in new.analyses
+    }
+    return Growth(
+        cameras=tuple(one for one in new.cameras if one.stream not in ended),
+        ending={
+            one.stream: one.ends
+            for one in new.cameras
+            if one.stream in ended and ended[one.stream] != one.ends
+        },
+        analyses=tuple(
+            replace(actor, nodes=nodes)
+            for actor, nodes in fresh
+            if nodes and actor.name not in known
+        ),
+        joining={actor.name: nodes for actor, nodes in fresh if nodes and actor.name in known},
+        acknowledging={name: streams for name, streams in acknowledging.items() if streams},
+        drones=new.drones,
+        conduct=new.conduct,
+        recorded={
+            stream: depth for stream, depth in new.recorded.items() if stream not in old.recorded
+        },
+    )
+
+
+def _require_same_tasks(old: FlightPlan, new: FlightPlan) -> None:
+    before, after = (
+        {one.stream for one in plan.dispatch.managed} if plan.dispatch is not None else set()
+        for plan in (old, new)
+    )
+    if after - before:
+        raise GraphError(
+            f"{', '.join(sorted(after - before))} would be a task of the analytics scheduler, "
+            "which knows all its tasks when the mission starts: call analyse() before "
+            "start_mission(), and trigger() it if it is to sleep until it is needed"
+        )

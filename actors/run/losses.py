@@ -1,0 +1,52 @@
+"""What people are told of a drone whose actor has gone: whose it was, and what it does now."""
+
+from __future__ import annotations
+
+import time
+
+from aerodaas.actors.base import ActorReport
+from aerodaas.types.errors import MissionError
+
+__all__ = ["ALONE", "DeadError", "SilentError", "SuspensionMonitor", "drone_lost"]
+
+ALONE = "alone"
+"""Key of a drone's report: what each vehicle does without its actor, by robot."""
+_FROZEN = 5.0
+"""Seconds of silence after which the drones have taken the application for dead."""
+
+
+class SilentError(MissionError):
+    """An actor did not answer in time; it may be busy."""
+
+
+class DeadError(MissionError):
+    """An actor's process has gone."""
+
+
+class SuspensionMonitor:
+    """Knows when this process was stopped from outside for so long that its drones came home."""
+
+    def __init__(self) -> None:
+        self._last = float("inf")
+        self.frozen = 0.0
+        """Seconds of the last such stop; 0 without any."""
+
+    def beat(self) -> None:
+        """Note that this process runs."""
+        now = time.monotonic()
+        if now - self._last > _FROZEN:
+            self.frozen = now - self._last
+        self._last = now
+
+
+def drone_lost(name: str, report: ActorReport, frozen: float) -> MissionError:
+    """The error for the drone's actor `name`, whose last word was `report`."""
+    robots = ", ".join(name.rpartition("/")[2].split("+"))
+    if frozen:
+        return MissionError(
+            f"{robots}: this application did not run for {frozen:.0f} s, after which a drone comes "
+            "home by itself; its processes have ended"
+        )
+    alone = report.values.get(ALONE, {})
+    what = "; ".join(dict.fromkeys(alone.values())) or "its own failsafe is what remains"
+    return MissionError(f"the actor of {robots} died: {what}")

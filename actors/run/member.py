@@ -1,0 +1,88 @@
+"""One actor of a run, as the application's process knows it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+import ray
+from ray.exceptions import GetTimeoutError, RayActorError, RayTaskError
+
+from aerodaas.actors.base import ActorInfo, ActorReport
+from aerodaas.actors.run.losses import DeadError, SilentError
+from aerodaas.types.clock import NANOSECONDS, host_time_ns
+from aerodaas.types.errors import AeroDaaSError, MissionError
+
+__all__ = ["Member", "ask", "require_clock", "routes"]
+
+_ANSWER_TIMEOUT = 5.0
+_CLOCKS_APART = 1.0
+"""Seconds by which clocks may differ; missions are timed by them, and latencies measured."""
+
+
+@dataclass
+class Member:
+    """One actor of the run."""
+
+    name: str
+    handle: Any
+    setup: tuple[Any, ...]
+    """What `prepare` is given."""
+    restarts: int
+    """How often Ray restarts it."""
+    further: dict[str, int] = field(default_factory=dict)
+    """Streams that it has come to read in flight, and how many messages of each may wait."""
+    info: ActorInfo | None = None
+    report: ActorReport = field(default_factory=lambda: ActorReport("new"))
+    pending: ray.ObjectRef[ActorReport] | None = None
+    lost_at: float | None = None
+    """Host's monotonic seconds at which it was found dead; None while it lives."""
+
+
+def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN401 - as it says
+    """What a call to an actor returns; raises the project's errors, SilentError after `timeout`."""
+    try:
+        return ray.get(reference, timeout=timeout)
+    except RayTaskError as error:
+        cause = error.cause
+        if isinstance(cause, AeroDaaSError):
+            raise cause from None
+        raise MissionError(f"{type(cause).__name__}: {cause}") from cause
+    except RayActorError as error:
+        # Ray puts the remote traceback first and what went wrong last.
+        reason = str(error).strip().splitlines()[-1]
+        raise DeadError(f"an actor died: {reason}") from None
+    except GetTimeoutError:
+        raise SilentError(f"an actor did not answer within {timeout:.0f} s") from None
+
+
+def routes(member: Member, members: Iterable[Member]) -> dict[str, list[Any]]:
+    """The readers of each stream of `member` on other nodes, or without shared memory."""
+    here = member.info
+    assert here is not None  # noqa: S101 - prepared
+    known = [(one.handle, one.info) for one in members if one.info is not None]
+    found = {
+        stream: [
+            handle
+            for handle, reader in known
+            if stream in reader.reads and not _share_memory(here, reader)
+        ]
+        for stream in here.publishes
+    }
+    return {stream: readers for stream, readers in found.items() if readers}
+
+
+def require_clock(name: str, info: ActorInfo, began: int) -> None:
+    """A clock that reads what it cannot have read while `prepare` was under way is wrong."""
+    ahead = max(info.clock - host_time_ns(), 0) - max(began - info.clock, 0)
+    if abs(ahead) > _CLOCKS_APART * NANOSECONDS:
+        side = "ahead of" if ahead > 0 else "behind"
+        raise MissionError(
+            f"the clock of the machine that runs {name} is {abs(ahead) / NANOSECONDS:.0f} s {side} "
+            "this one's; set both by NTP (`timedatectl set-ntp true`) before flying"
+        )
+
+
+def _share_memory(one: ActorInfo, other: ActorInfo) -> bool:
+    return one.node_id == other.node_id and one.shared_memory and other.shared_memory

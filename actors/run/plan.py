@@ -1,0 +1,417 @@
+"""From an application's graph to the actors that will run it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from aerodaas.actors.analytics import NodeSpec, Wake
+from aerodaas.actors.cluster.ray_cluster import Placement
+from aerodaas.actors.dispatch.dispatcher import Managed
+from aerodaas.actors.dispatch.offload import (
+    CloudProcess,
+    allowed,
+    cloud_processes,
+    priced,
+    short_name,
+)
+from aerodaas.actors.drone.actor import LockstepSchedule
+from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
+from aerodaas.actors.lockstep.barrier import paths, widest
+from aerodaas.actors.run.checks import check_graph, check_plugins, check_tasks
+from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
+from aerodaas.actors.stream_names import (
+    ACKS,
+    DECISIONS,
+    alert_stream,
+    done_stream,
+    end_stream,
+    state_stream,
+    task_stream,
+    trigger_stream,
+)
+from aerodaas.actors.triggers import TriggerSpec
+from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.commanding import CommandingAnalytics
+from aerodaas.analytics.endpoint.analysis import endpoint_analysis
+from aerodaas.config.model import (
+    ComputeConfig,
+    RobotConfig,
+    RuntimeEnvConfig,
+    SensorConfig,
+    TaskConfig,
+)
+from aerodaas.dataflow.graph import Graph, NavigationEdge, Node
+from aerodaas.dataflow.handles import SENSOR_ITEMS
+from aerodaas.mission.commands import TRIGGERED, initial_commands
+from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Resources
+from aerodaas.schedulers.analytics.published.profiles import told_profile
+from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+from aerodaas.types.data import Frame
+from aerodaas.types.errors import GraphError
+from aerodaas.types.identifiers import told
+
+__all__ = ["AnalyticsActorPlan", "Cameras", "DispatchPlan", "FlightPlan", "make_plan"]
+
+_CAMERA_WINDOW = 4
+_STATE_WINDOW = 16
+
+
+@dataclass(frozen=True)
+class Cameras:
+    """One camera's actor."""
+
+    stream: str
+    sensor: SensorConfig
+    state: str
+    ends: bool
+    place: Placement
+
+
+@dataclass(frozen=True)
+class AnalyticsActorPlan:
+    """One analytics actor."""
+
+    name: str
+    place: Placement
+    nodes: tuple[NodeSpec, ...]
+    runtime_env: RuntimeEnvConfig | None = None
+
+
+@dataclass(frozen=True)
+class DispatchPlan:
+    """The dispatcher's actor, and the executors in the cloud."""
+
+    scheduler: AnalyticsScheduler
+    managed: tuple[Managed, ...]
+    resources: Resources
+    cloud: tuple[CloudProcess, ...]
+
+
+@dataclass(frozen=True)
+class FlightPlan:
+    """All actors of a run, before they are placed."""
+
+    session: Session
+    drones: tuple[tuple[RobotSpec, ...], ...]
+    """One actor for each group."""
+    edges: tuple[Placement, ...]
+    """Where the drones of each group are flown from."""
+    cameras: tuple[Cameras, ...]
+    analyses: tuple[AnalyticsActorPlan, ...]
+    dispatch: DispatchPlan | None
+    conduct: LockstepSchedule
+    recorded: dict[str, int]
+    """Streams for the recorder and how many messages of each may wait; empty for none."""
+
+
+class _Planner:
+    """Reads one graph; each method answers one question about it."""
+
+    def __init__(
+        self,
+        session: Session,
+        graph: Graph,
+        compute: list[ComputeConfig],
+        scheduler: TrajectoryScheduler,
+        dispatch_with: AnalyticsScheduler | None,
+    ) -> None:
+        self.session = session
+        self.graph = graph
+        self.scheduler = scheduler
+        self.dispatch_with = dispatch_with
+        self.compute = {resource.id: resource for resource in compute}
+        named = {edge.robot for edge in graph.navigation}
+        self.robots = [r for r in session.environment.robots if r.id in named]
+        self.recorded = session.environment.recording.enabled
+        self._add_sensors()
+        self.steering = {name for edge in graph.navigation for name in _streams_of(edge)}
+
+    def _add_sensors(self) -> None:
+        """Sensors that the application does not read run all the same, cameras if recorded."""
+        for robot in self.robots:
+            for sensor in robot.sensors:
+                stream = f"{robot.id}/{sensor.id}"
+                shows = self.recorded and self.session.environment.has_pictures(sensor)
+                wanted = shows or sensor.type != "camera"
+                if sensor.driver == "replayed" or not wanted or stream in self.graph.nodes:
+                    continue
+                item = SENSOR_ITEMS[sensor.type]
+                self.graph.add(Node(stream, "sensor", item, sensor, robot.id))
+
+    def sensors(self) -> list[Node]:
+        return [node for node in self.graph.nodes.values() if node.kind == "sensor"]
+
+    def analyses(self) -> list[Node]:
+        return [node for node in self.graph.nodes.values() if node.kind != "sensor"]
+
+    def robot_of(self, node: Node) -> str:
+        return node.robot or self.robots[0].id
+
+    def state_of(self, node: Node) -> str:
+        return state_stream(self.robot_of(node))
+
+    def reaches_a_drone(self, stream: str, asked: frozenset[str] = frozenset()) -> bool:
+        """Tell whether what `stream` carries can change what a drone does.
+
+        By navigation, by a trigger's command, or by waking an analysis that can; `asked` are the
+        streams that the question came through.
+        """
+        if stream in self.steering:
+            return True
+        node = self.graph.nodes.get(stream)
+        triggers = node.triggers if node is not None else []
+        further = {trigger.target for trigger in triggers if trigger.method is None}
+        further |= {reader.id for reader in self.graph.downstream(stream)}
+        return any(trigger.method is not None for trigger in triggers) or any(
+            self.reaches_a_drone(one, asked | {stream}) for one in further - asked
+        )
+
+    def acknowledgements(self, stream: str) -> int:
+        return paths(self.graph, stream, self.steering, recorded=self.recorded)
+
+    def cameras(self) -> tuple[Cameras, ...]:
+        return tuple(
+            Cameras(
+                node.id,
+                node.work,
+                self.state_of(node),
+                self.reaches_a_drone(node.id),
+                self.edge_of(node.robot),
+            )
+            for node in self.sensors()
+            if node.work.type == "camera"
+        )
+
+    def is_managed(self, node: Node) -> bool:
+        """The dispatcher manages the analyses of frames that want to be scheduled."""
+        if self.dispatch_with is None or not node.work.scheduled or not node.inputs:
+            return False
+        return all(self.graph.nodes[name].item is Frame for name in node.inputs)
+
+    def managed(self) -> list[Node]:
+        return [node for node in self.analyses() if self.is_managed(node)]
+
+    def dispatching(self) -> DispatchPlan | None:
+        nodes = self.managed()
+        if self.dispatch_with is None or not nodes:
+            return None
+        # In lockstep time stands still while an analysis runs, so there is nothing to offload.
+        compute = {} if self.session.lockstep else self.compute
+        envs = {node.id: self.runtime_env_of(node) for node in nodes}
+        processes = cloud_processes(nodes, compute, envs)
+        slots = {process.site: process.slots for process in processes}
+        return DispatchPlan(
+            scheduler=self.dispatch_with,
+            managed=tuple(self.managed_one(node) for node in nodes),
+            resources=Resources(cloud_slots=sum(slots.values())),
+            cloud=processes,
+        )
+
+    def managed_one(self, node: Node) -> Managed:
+        tasks = self.session.environment.schedulers.tasks
+        own = told(node.id, tasks) or TaskConfig()
+        times = ("edge_time", "cloud_time")
+        profile = told_profile(node.id, tasks)
+        return Managed(
+            stream=node.id,
+            inputs=tuple(node.inputs),
+            profile=priced(profile, allowed(node, self.compute)),
+            acknowledges=self.acknowledgements(node.id) == 0,
+            open_times=frozenset(time for time in times if getattr(own, time) is None),
+            triggers=self.triggers_of(node),
+        )
+
+    @staticmethod
+    def triggers_of(node: Node) -> tuple[TriggerSpec, ...]:
+        return tuple(
+            TriggerSpec(
+                trigger_stream(trigger.target, node.id),
+                TRIGGERED[trigger.method] if trigger.method else Wake(),
+                trigger.when,
+            )
+            for trigger in node.triggers
+        )
+
+    def node_spec(self, node: Node) -> NodeSpec:
+        managed = self.is_managed(node)
+        wakers = [n for n in self.analyses() if any(t.target == node.id for t in n.triggers)]
+        return NodeSpec(
+            stream=done_stream(node.id) if managed else node.id,
+            work=self.work_of(node),
+            inputs={
+                name: self.depth(name) if self.session.lockstep else 1
+                for name in ([task_stream(node.id)] if managed else node.inputs)
+            },
+            robot=self.robot_of(node),
+            state=self.state_of(node),
+            external=node.kind == "external",
+            dormant=node.dormant,
+            # The dispatcher publishes the results of those that it manages, wherever they ran.
+            triggers=() if managed else self.triggers_of(node),
+            kind=self.place_of(node).kind,
+            acknowledges=self.acknowledgements(node.id) == 0 and not managed,
+            answers_always=managed,
+            wakes=tuple(trigger_stream(node.id, waker.id) for waker in wakers),
+        )
+
+    def depth(self, stream: str) -> int:
+        """How many messages may wait for a reader of `stream` that wants them all."""
+        node = self.graph.nodes.get(stream.removesuffix(task_stream("")))
+        frames = stream.endswith(task_stream("")) or (node is not None and node.item is Frame)
+        return FRAME_DEPTH if frames else MESSAGE_DEPTH
+
+    def edge_of(self, robot: str | None) -> Placement:
+        """The edge beside a robot; that of all drones for what no robot carries."""
+        named = next((r.edge for r in self.robots if r.id == robot), None)
+        return Placement("edge", self.compute[named].node) if named is not None else Placement()
+
+    def place_of(self, node: Node) -> Placement:
+        resource = self.compute[node.compute] if node.compute is not None else None
+        # Under a dispatcher, an analysis has an executor on the edge wherever it is deployed; an
+        # endpoint is called from there.
+        if resource is None or resource.kind == "http" or self.is_managed(node):
+            return self.edge_of(node.robot)
+        return Placement(resource.kind, resource.node)
+
+    def work_of(self, node: Node) -> Analytics[Any]:
+        """The analysis itself, or before the endpoint that it is deployed on."""
+        resource = self.compute[node.compute] if node.compute is not None else None
+        work: Analytics[Any] = node.work
+        if resource is None or resource.kind != "http" or self.is_managed(node):
+            return work
+        return endpoint_analysis(work, short_name(node), resource, strict=False)
+
+    def runtime_env_of(self, node: Node) -> RuntimeEnvConfig | None:
+        """What an analysis has for itself: the environment file's word comes last."""
+        return told(node.id, self.session.environment.runtime_env) or node.runtime_env
+
+    def analyses_by_actor(self) -> tuple[AnalyticsActorPlan, ...]:
+        shared: dict[Placement, list[NodeSpec]] = {}
+        actors = []
+        for node in self.analyses():
+            env = self.runtime_env_of(node)
+            if node.work.isolated or env is not None:
+                name = f"analytics/{node.id}"
+                spec = self.node_spec(node)
+                actors.append(AnalyticsActorPlan(name, self.place_of(node), (spec,), env))
+            else:
+                shared.setdefault(self.place_of(node), []).append(self.node_spec(node))
+        for place, nodes in shared.items():
+            name = f"analytics/{place.node or place.kind}"
+            actors.append(AnalyticsActorPlan(name, place, tuple(nodes)))
+        return tuple(actors)
+
+    def robot_spec(self, robot: RobotConfig) -> RobotSpec:
+        edges = [edge for edge in self.graph.navigation if edge.robot == robot.id]
+        mine = [node for node in self.sensors() if node.robot == robot.id]
+        commanding = [end_stream(camera.stream) for camera in self.cameras() if camera.ends]
+        commanding += [
+            trigger_stream(robot.id, node.id)
+            for node in self.analyses()
+            if any(trigger.target == robot.id for trigger in node.triggers)
+        ]
+        return RobotSpec(
+            robot=robot,
+            sensors=tuple(node.work for node in mine if node.work.type != "camera"),
+            navigation=tuple(dict.fromkeys(n for edge in edges for n in _streams_of(edge))),
+            commands=tuple(commanding),
+            requesters=tuple(
+                node.id
+                for node in self.analyses()
+                if isinstance(node.work, CommandingAnalytics) and self.robot_of(node) == robot.id
+            ),
+            initial=tuple(initial_commands(edges)),
+            scheduler=self.scheduler,
+        )
+
+    def _room(self, source: str) -> int:
+        """Measurements beyond the newest whose results fit into what readers may leave waiting."""
+        return max(0, MESSAGE_DEPTH // widest(self.graph, source) - 1)
+
+    def conduct(
+        self, specs: tuple[RobotSpec, ...], cameras: tuple[Cameras, ...]
+    ) -> LockstepSchedule:
+        rates = {camera.stream: camera.sensor.rate for camera in cameras}
+        for node in self.analyses():
+            if node.kind == "external":
+                rates[node.id] = node.work.rate
+        own = [
+            stream
+            for spec in specs
+            for stream in (
+                state_stream(spec.robot.id),
+                *(f"{spec.robot.id}/{sensor.id}" for sensor in spec.sensors),
+            )
+        ]
+        windows = {
+            source: 0 if self.reaches_a_drone(source) else min(size, self._room(source))
+            for size, sources in ((_CAMERA_WINDOW, list(rates)), (_STATE_WINDOW, own))
+            for source in sources
+        }
+        readers = [
+            f"{ACKS}/{node.id}" for node in self.analyses() if not self.acknowledgements(node.id)
+        ]
+        if self.recorded:
+            readers.append(f"{ACKS}/recorder")
+        return LockstepSchedule(
+            rates=rates,
+            acknowledgements={source: self.acknowledgements(source) for source in windows},
+            windows=windows,
+            readers=tuple(readers),
+        )
+
+
+def make_plan(
+    session: Session,
+    graph: Graph,
+    compute: list[ComputeConfig],
+    scheduler: TrajectoryScheduler,
+    dispatch_with: AnalyticsScheduler | None = None,
+    *,
+    here: bool = True,
+) -> FlightPlan:
+    """Decide which actors a graph becomes.
+
+    With an analytics scheduler to `dispatch_with`, heavy analyses run when and where it says;
+    `here` is False where actors may run on other machines. Raises the project's errors for a
+    graph that cannot fly, with what is wrong and what to do about it.
+    """
+    planner = _Planner(session, graph, compute, scheduler, dispatch_with)
+    if not planner.robots:
+        raise GraphError("no robot navigates: call drone.navigate(…) before start_mission()")
+    check_graph(graph, session.environment, {robot.id for robot in planner.robots})
+    if dispatch_with is not None:
+        check_tasks(graph, session.environment)
+    lenses = [node.work for node in planner.sensors() if node.work.type == "camera"]
+    check_plugins(session.environment, planner.robots, lenses, here=here)
+    specs = tuple(planner.robot_spec(robot) for robot in planner.robots)
+    cameras = planner.cameras()
+    analyses = planner.analyses_by_actor()
+    streams = [stream for spec in specs for stream in VehicleController.streams(spec)]
+    streams += [camera.stream for camera in cameras]
+    streams += [node.id for node in planner.analyses()]
+    dispatch = planner.dispatching()
+    if dispatch is not None:
+        streams.append(DECISIONS)
+    drones = (specs,) if session.lockstep else tuple((spec,) for spec in specs)
+    names = [f"drone/{'+'.join(spec.robot.id for spec in group)}" for group in drones]
+    names += [f"sensor/{camera.stream}" for camera in cameras]
+    names += [actor.name for actor in analyses]
+    names += ["dispatcher"] if dispatch is not None else []
+    streams += [alert_stream(name) for name in names]
+    return FlightPlan(
+        session=session,
+        drones=drones,
+        edges=tuple(planner.edge_of(group[0].robot.id) for group in drones),
+        cameras=cameras,
+        analyses=analyses,
+        dispatch=dispatch,
+        conduct=planner.conduct(specs, cameras) if session.lockstep else LockstepSchedule(),
+        recorded={stream: planner.depth(stream) for stream in streams} if planner.recorded else {},
+    )
+
+
+def _streams_of(edge: NavigationEdge) -> list[str]:
+    names = [edge.navigation.stream.name] if edge.navigation.stream is not None else []
+    return [*names, edge.clear_on] if edge.clear_on else names

@@ -1,0 +1,54 @@
+"""Ending the actors of a run: what still writes comes last, and nobody is waited for for ever."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterable, Sequence
+from typing import Any, cast
+
+import ray
+from ray.exceptions import GetTimeoutError, RayActorError, RayError
+
+from aerodaas.actors.base import ActorReport
+from aerodaas.types.errors import AeroDaaSError
+
+__all__ = ["end_actors", "may_fly"]
+
+_STOP_TIMEOUT = 20.0
+_ANSWER_TIMEOUT = 5.0
+
+
+def may_fly(drone: Any) -> bool:  # noqa: ANN401 - an actor's handle
+    """Whether the mission of a drone's actor goes on, or may do so as far as anyone can tell."""
+    try:
+        report = cast("ActorReport", ray.get(drone.report.remote(), timeout=_ANSWER_TIMEOUT))
+    except RayActorError:
+        return False
+    except GetTimeoutError:
+        return True
+    else:
+        return report.phase == "running"
+
+
+def end_actors(groups: Iterable[Sequence[Any]], helpers: Sequence[Any]) -> dict[Any, ActorReport]:
+    """Stop each group of actors in turn, then end the processes of all, the `helpers`' too.
+
+    Returns the last report of each that gave one, by handle.
+    """
+    reports: dict[Any, ActorReport] = {}
+    killed = list(helpers)
+    for group in groups:
+        references = {actor.stop.remote(): actor for actor in group}
+        killed += group
+        if not references:
+            continue
+        done, _ = ray.wait(list(references), num_returns=len(references), timeout=_STOP_TIMEOUT)
+        for reference in done:
+            with contextlib.suppress(RayError, AeroDaaSError):
+                reports[references[reference]] = ray.get(reference)
+    for actor in killed:
+        with contextlib.suppress(RayError):
+            # To be killed takes the cluster's head, which may be lost.
+            actor.leave.remote()
+            ray.kill(actor)
+    return reports

@@ -1,0 +1,133 @@
+"""Messages as bytes: pickle 5 with large arrays out of band, so that a reader copies nothing.
+
+Layout: u32 number of buffers, u32 length of the envelope's pickle, u32 length of the item's, u64
+length of each buffer, the two pickles, then each buffer, aligned to 64 bytes. Little-endian, as
+both ends run the same host. The envelope is apart so that it can be read whatever the item is.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+import struct
+from collections.abc import Callable
+from functools import partial
+from operator import attrgetter
+from typing import Any
+
+from aerodaas.actors.streams import definitions as _definitions
+from aerodaas.actors.streams.pickling_errors import culprit
+from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.status import Message
+
+__all__ = ["Encoded", "UnreadableError", "UnsendableError", "decode", "encode"]
+
+_envelope = attrgetter(*(one.name for one in dataclasses.fields(Message) if one.name != "item"))
+_ALIGNMENT = 64
+_HEAD = struct.Struct("<III")
+_defined: set[str] = set()
+"""Streams whose items were found to be of classes that pickle cannot name."""
+
+
+class UnsendableError(AeroDaaSError):
+    """An item cannot be pickled; the text says what of it."""
+
+
+class UnreadableError(AeroDaaSError):
+    """An item cannot be rebuilt here."""
+
+    def __init__(self, message: Message[Any], kind: str, reason: str) -> None:
+        """An item of the class `kind`; `message` is its envelope, empty."""
+        super().__init__(f"{kind} from {message.stream}: {reason}")
+        self.message = message
+
+
+def _aligned(offset: int) -> int:
+    return -(-offset // _ALIGNMENT) * _ALIGNMENT
+
+
+class Encoded:
+    """A message ready to be written into a buffer of `size` bytes."""
+
+    def __init__(self, message: Message[Any]) -> None:
+        """Pickle the message, leaving the memory of its arrays where it is.
+
+        Raises UnsendableError for an item that cannot be pickled.
+        """
+        item, buffers = _pickled(message)
+        envelope = pickle.dumps((*_envelope(message), type(message.item).__name__), protocol=5)
+        self._buffers = [buffer.raw() for buffer in buffers]
+        lengths = [buffer.nbytes for buffer in self._buffers]
+        self._head = _HEAD.pack(len(lengths), len(envelope), len(item)) + struct.pack(
+            f"<{len(lengths)}Q", *lengths
+        )
+        self._pickle = envelope + item
+        self._offsets: list[int] = []
+        end = len(self._head) + len(self._pickle)
+        for length in lengths:
+            start = _aligned(end)
+            self._offsets.append(start)
+            end = start + length
+        self.size = end
+
+    def write_into(self, target: memoryview) -> None:
+        """Write all `size` bytes into `target`."""
+        start = len(self._head)
+        target[:start] = self._head
+        target[start : start + len(self._pickle)] = self._pickle
+        for offset, buffer in zip(self._offsets, self._buffers, strict=True):
+            target[offset : offset + buffer.nbytes] = buffer
+
+    def to_bytes(self) -> bytes:
+        """All of it as one bytes object."""
+        whole = bytearray(self.size)
+        self.write_into(memoryview(whole))
+        return bytes(whole)
+
+
+def encode(message: Message[Any]) -> bytes:
+    """The message as one bytes object."""
+    return Encoded(message).to_bytes()
+
+
+def decode(source: memoryview) -> Message[Any]:
+    """Rebuild a message; its arrays are read-only views into `source`, which they keep alive.
+
+    Raises UnreadableError if its item cannot be rebuilt.
+    """
+    source = source.toreadonly()
+    count, first, second = _HEAD.unpack_from(source)
+    lengths = struct.unpack_from(f"<{count}Q", source, _HEAD.size)
+    start = _HEAD.size + 8 * count
+    middle = start + first
+    end = middle + second
+    buffers = []
+    cursor = end
+    for length in lengths:
+        cursor = _aligned(cursor)
+        buffers.append(source[cursor : cursor + length])
+        cursor += length
+    *fields, kind = pickle.loads(source[start:middle])  # noqa: S301 - our own bytes
+    kept: Any = Message
+    make: Callable[[Any], Message[Any]] = partial(kept, *fields)
+    try:
+        item = pickle.loads(source[middle:end], buffers=buffers)  # noqa: S301
+    except Exception as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise UnreadableError(make(None), kind, reason) from error
+    return make(item)
+
+
+def _pickled(message: Message[Any]) -> tuple[bytes, list[pickle.PickleBuffer]]:
+    buffers: list[pickle.PickleBuffer] = []
+    if message.stream not in _defined:
+        try:
+            return pickle.dumps(message.item, protocol=5, buffer_callback=buffers.append), buffers
+        except Exception:  # noqa: BLE001 - whatever it is, the other way tells
+            buffers = []
+    try:
+        data = _definitions.pickled(message.item, buffers.append)
+    except Exception as error:
+        raise UnsendableError(culprit(message.item, error)) from error
+    _defined.add(message.stream)
+    return data, buffers

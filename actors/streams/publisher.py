@@ -1,0 +1,109 @@
+"""The writing end of a stream."""
+
+from __future__ import annotations
+
+import warnings
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+from aerodaas.actors.streams.codec import Encoded, UnsendableError
+from aerodaas.actors.streams.remote import RemoteReader, send_to
+from aerodaas.actors.streams.shared_memory import SharedPublisher, shared_memory_available
+from aerodaas.types.clock import host_time_ns
+from aerodaas.types.data import Header
+from aerodaas.types.status import Message, TraceSpan
+
+__all__ = ["Publisher", "RemoteReader"]
+
+_LATENCIES_KEPT = 256
+_MESSAGES_KEPT = 4
+
+
+class Publisher:
+    """Publishes one stream: in shared memory on this node, by reference to other nodes.
+
+    An item that cannot be sent leaves its message empty, so that everyone who waits for it goes on.
+    """
+
+    def __init__(
+        self, scope: str, stream: str, unsendable: Callable[[str], None] = warnings.warn
+    ) -> None:
+        """Open `stream` for writing; `scope` is the prefix of its name on this node.
+
+        `unsendable` is told of what cannot be sent, and why.
+        """
+        self._unsendable = unsendable
+        self.scope = scope
+        self.stream = stream
+        self.sent = 0
+        self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
+        """Milliseconds from capture to publishing, newest last."""
+        self.remote: list[RemoteReader] = []
+        self._shared = SharedPublisher(f"{scope}/{stream}") if shared_memory_available() else None
+        self._kept: deque[tuple[int, bytes]] | None = None
+
+    def measure(self, item: Any, header: Header, captured: int) -> Message[Any]:  # noqa: ANN401
+        """Publish a measurement: the first message of its way. `captured` is host time in ns."""
+        span = TraceSpan(self.stream, captured, host_time_ns())
+        return self._send(header.stamp, header, captured, (span,), item)
+
+    def derive(
+        self,
+        item: Any,  # noqa: ANN401
+        origin: Message[Any],
+        received: int,
+        stamp: int,
+        state: int | None = None,
+    ) -> Message[Any]:
+        """Publish what was made from `origin`, which arrived at host time `received`.
+
+        `state` is the mission time of the vehicle's state that it was made by.
+        """
+        spans = (*origin.spans, TraceSpan(self.stream, received, host_time_ns(), state))
+        return self._send(stamp, origin.header, origin.captured, spans, item)
+
+    def _send(
+        self,
+        stamp: int,
+        header: Header,
+        captured: int,
+        spans: tuple[TraceSpan, ...],
+        item: Any,  # noqa: ANN401
+    ) -> Message[Any]:
+        self.latencies.append((spans[-1].published - captured) / 1e6)
+        message = Message(self.stream, self.sent, stamp, header, captured, spans, item)
+        self.sent += 1
+        problem = ""
+        try:
+            encoded = Encoded(message)
+        except UnsendableError as error:
+            problem = str(error)
+            message = replace(message, item=None)
+            encoded = Encoded(message)
+        if self._shared is not None:
+            self._shared.send(encoded)
+        if self.remote:
+            send_to(self.remote, self.stream, encoded)
+        if self._kept is not None:
+            self._kept.append((message.seq, encoded.to_bytes()))
+        if problem:
+            self._unsendable(problem)
+        return message
+
+    def since(self, seq: int) -> list[bytes]:
+        """Encoded messages from number `seq` on, of the newest few; any thread may ask.
+
+        They are kept from the first question on. Whoever is ahead of this publisher has known one
+        before it, and is given all.
+        """
+        if self._kept is None:
+            self._kept = deque(maxlen=_MESSAGES_KEPT)
+        first = seq if seq <= self.sent else 0
+        return [data for number, data in list(self._kept) if number >= first]
+
+    def close(self) -> None:
+        """Leave the stream."""
+        if self._shared is not None:
+            self._shared.close()

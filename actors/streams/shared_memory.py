@@ -1,0 +1,214 @@
+"""The only file that knows iceoryx2: publish-subscribe and event services of one stream.
+
+Its Python API is young; the version is pinned in pyproject.toml. A publisher writes a message
+once into shared memory, a reader maps it without a copy, and a full reader loses its oldest
+message (safe overflow), never the newest.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import functools
+import importlib
+import weakref
+from typing import Any
+
+from aerodaas.actors.streams.codec import Encoded, decode
+from aerodaas.types.status import Message
+
+__all__ = ["SharedPublisher", "SharedSubscriber", "SharedWaiter", "shared_memory_available"]
+
+MAX_READERS = 16
+MAX_DEPTH = 32
+"""Messages that a reader may leave waiting."""
+MAX_BORROWED = 16
+"""Messages that a reader may hold on to while it goes on receiving."""
+_INITIAL_BYTES = 4096
+_COPIED_BYTES = 65536
+"""Messages up to this size are copied, which takes microseconds, so that nobody borrows them."""
+
+
+@functools.cache
+def _iceoryx() -> Any:  # noqa: ANN401 - the library ships no types
+    iceoryx2: Any = importlib.import_module("iceoryx2")  # only where a stream is opened
+    iceoryx2.set_log_level(iceoryx2.LogLevel.Fatal)
+    return iceoryx2
+
+
+@functools.cache
+def shared_memory_available() -> bool:
+    """Tell whether this host can carry streams in shared memory."""
+    try:
+        _node()
+    except Exception:  # noqa: BLE001 - whatever the library raises, the answer is no
+        return False
+    return True
+
+
+@functools.cache
+def _node() -> Any:  # noqa: ANN401
+    """One iceoryx2 node for each process."""
+    iox = _iceoryx()
+    builder = iox.NodeBuilder.new().signal_handling_mode(iox.SignalHandlingMode.Disabled)
+    return builder.create(iox.ServiceType.Ipc)
+
+
+@functools.lru_cache(maxsize=512)
+def _services(name: str) -> tuple[Any, Any]:
+    iox = _iceoryx()
+    data = (
+        _node()
+        .service_builder(iox.ServiceName.new(name))
+        .publish_subscribe(iox.Slice[ctypes.c_uint8])
+        .enable_safe_overflow(True)  # noqa: FBT003 - the library's own signature
+        .max_publishers(2)
+        .max_subscribers(MAX_READERS)
+        .max_nodes(MAX_READERS + 2)
+        .subscriber_max_buffer_size(MAX_DEPTH)
+        .subscriber_max_borrowed_samples(MAX_BORROWED)
+        .history_size(0)
+        .open_or_create()
+    )
+    event = _event(name, notifiers=4)
+    return data, event
+
+
+def _event(name: str, notifiers: int) -> Any:  # noqa: ANN401
+    iox = _iceoryx()
+    return (
+        _node()
+        .service_builder(iox.ServiceName.new(name))
+        .event()
+        .max_listeners(MAX_READERS)
+        .max_notifiers(notifiers)
+        .max_nodes(MAX_READERS + notifiers)
+        .open_or_create()
+    )
+
+
+class SharedPublisher:
+    """Writes one stream into shared memory."""
+
+    def __init__(self, name: str) -> None:
+        """Open the stream `name` for writing."""
+        iox = _iceoryx()
+        data, event = _services(name)
+        self._publisher = (
+            data.publisher_builder()
+            .initial_max_slice_len(_INITIAL_BYTES)
+            .allocation_strategy(iox.AllocationStrategy.PowerOfTwo)
+            .create()
+        )
+        # The library keeps slots for all that its readers may hold; memory is only touched when
+        # they are used. With fewer slots than that, a reader that falls behind aborts us.
+        self._notifier = event.notifier_builder().create()
+        self.refused = 0
+        """Messages not sent because there was no memory for them."""
+
+    def send(self, encoded: Encoded) -> None:
+        """Write a message and wake the readers."""
+        try:
+            sample = self._publisher.loan_slice_uninit(encoded.size)
+        except Exception:  # noqa: BLE001 - LoanError has no stable import path
+            self.refused += 1
+            return
+        address = sample.payload().data_ptr
+        block = (ctypes.c_uint8 * encoded.size).from_address(address)
+        encoded.write_into(memoryview(block).cast("B"))
+        sample.assume_init().send()
+        self._notifier.notify()
+
+    def close(self) -> None:
+        """Leave the stream."""
+        self._publisher.delete()
+        self._notifier.delete()
+
+
+class _Loan:
+    """A message that its reader has not let go of."""
+
+    __slots__ = ("__weakref__", "_sample")
+
+    def __init__(self, sample: Any) -> None:  # noqa: ANN401
+        self._sample = sample
+
+
+class SharedSubscriber:
+    """Reads one stream from shared memory."""
+
+    def __init__(self, name: str, depth: int) -> None:
+        """Open the stream `name`, keeping the newest `depth` messages."""
+        data, event = _services(name)
+        self._subscriber = data.subscriber_builder().buffer_size(depth).create()
+        self.listener = event.listener_builder().create()
+        self._loans: weakref.WeakSet[_Loan] = weakref.WeakSet()
+
+    def receive(self) -> Message[Any] | None:
+        """Return the oldest message kept, or None.
+
+        Large arrays in it live in shared memory, unless the reader holds on to so many already
+        that only a copy lets it go on receiving. Raises UnreadableError if its item cannot be
+        rebuilt here.
+        """
+        try:
+            sample = self._subscriber.receive()
+        except Exception:  # noqa: BLE001 - ReceiveError has no stable import path
+            # A publisher that died halfway; the living must not fall over it.
+            return None
+        if sample is None:
+            return None
+        payload = sample.payload()
+        size = payload.number_of_elements
+        block = (ctypes.c_uint8 * size).from_address(payload.data_ptr)
+        if size <= _COPIED_BYTES or len(self._loans) >= MAX_BORROWED - 1:
+            return decode(memoryview(bytes(block)))
+        # The views that decode makes keep `block` alive, and `block` keeps the sample borrowed.
+        loan = _Loan(sample)
+        self._loans.add(loan)
+        block._loan = loan  # noqa: SLF001
+        return decode(memoryview(block).cast("B"))
+
+    def close(self) -> None:
+        """Leave the stream."""
+        self._subscriber.delete()
+        self.listener.delete()
+
+
+class SharedWaiter:
+    """Sleeps until one of several streams, or another thread of this process, calls."""
+
+    def __init__(self, name: str) -> None:
+        """Wait under the process-wide unique `name`."""
+        iox = _iceoryx()
+        self._microseconds = iox.Duration.from_micros
+        builder = iox.WaitSetBuilder.new().signal_handling_mode(iox.SignalHandlingMode.Disabled)
+        self._set = builder.create(iox.ServiceType.Ipc)
+        call = _event(name, notifiers=2)
+        self._listener = call.listener_builder().create()
+        self._notifier = call.notifier_builder().create()
+        self._listeners = [self._listener]
+        self._guards = [self._set.attach_notification(self._listener)]
+
+    def attach(self, subscriber: SharedSubscriber) -> None:
+        """Wake up for this stream, too."""
+        self._listeners.append(subscriber.listener)
+        self._guards.append(self._set.attach_notification(subscriber.listener))
+
+    def wait(self, timeout: float) -> None:
+        """Sleep up to `timeout` seconds, without holding the interpreter."""
+        self._set.wait_and_process_with_timeout(self._microseconds(max(1, int(timeout * 1e6))))
+        for listener in self._listeners:
+            while listener.try_wait():
+                pass
+
+    def wake(self) -> None:
+        """Wake the sleeper from another thread."""
+        self._notifier.notify()
+
+    def close(self) -> None:
+        """Release the wait set."""
+        for guard in self._guards:
+            guard.delete()
+        self._set.delete()
+        self._listener.delete()
+        self._notifier.delete()

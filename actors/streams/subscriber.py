@@ -1,0 +1,171 @@
+"""The reading end: one subscriber for all the streams that an actor reads."""
+
+from __future__ import annotations
+
+import threading
+import warnings
+from collections import deque
+from collections.abc import Callable, Mapping
+from queue import SimpleQueue
+from typing import Any
+
+from aerodaas.actors.streams.codec import UnreadableError, decode
+from aerodaas.actors.streams.shared_memory import (
+    MAX_DEPTH,
+    SharedSubscriber,
+    SharedWaiter,
+    shared_memory_available,
+)
+from aerodaas.types.status import Message
+
+__all__ = ["Subscriber"]
+
+
+class Subscriber:
+    """Reads several streams from one thread; another thread may `deliver` and `wake`.
+
+    Each stream keeps its newest `depth` messages. What was overwritten unread shows as a gap in
+    the messages' `seq` and is counted in `dropped`.
+    """
+
+    def __init__(
+        self,
+        scope: str,
+        name: str,
+        depths: Mapping[str, int],
+        unreadable: Callable[[str], None] = warnings.warn,
+    ) -> None:
+        """Read the streams named in `depths`; `scope` is the prefix of their names on this node.
+
+        `name` is the reader's own, unique within the scope. A message whose item cannot be rebuilt
+        here is received empty, and `unreadable` is told what it was, and why, in any thread.
+        """
+        self._unreadable = unreadable
+        self.received: dict[str, int] = dict.fromkeys(depths, 0)
+        self.dropped: dict[str, int] = dict.fromkeys(depths, 0)
+        self._next: dict[str, int] = {}
+        self._delivered = {
+            stream: deque[Message[Any]](maxlen=depth) for stream, depth in depths.items()
+        }
+        self._called = threading.Condition()
+        self._calls = 0
+        self._scope = scope
+        self._added: SimpleQueue[tuple[Mapping[str, int], threading.Event]] = SimpleQueue()
+        self._subscribers: dict[str, SharedSubscriber] = {}
+        self._waiter: SharedWaiter | None = None
+        if shared_memory_available():
+            self._waiter = SharedWaiter(f"{scope}/subscriber/{name}")
+            self._subscribe(depths)
+
+    def add(self, depths: Mapping[str, int]) -> threading.Event:
+        """Read these streams, too; any thread may ask.
+
+        The event is set once the reading thread has subscribed: what is published later arrives.
+        """
+        subscribed = threading.Event()
+        self._added.put((depths, subscribed))
+        self.wake()
+        return subscribed
+
+    def subscribe_added(self) -> None:
+        """Subscribe to what was added; for the reading thread, whose `receive` does it, too."""
+        while not self._added.empty():
+            depths, subscribed = self._added.get()
+            fresh = {name: depth for name, depth in depths.items() if name not in self._delivered}
+            self._subscribe(fresh)
+            for stream, depth in fresh.items():
+                self.received[stream] = self.dropped[stream] = 0
+                self._delivered[stream] = deque(maxlen=depth)
+            subscribed.set()
+
+    @property
+    def shared(self) -> bool:
+        """True where this subscriber reads shared memory."""
+        return self._waiter is not None
+
+    def receive(self, timeout: float) -> list[Message[Any]]:
+        """Return what has arrived, in order within each stream; wait up to `timeout` seconds.
+
+        Returns early, perhaps empty-handed, when woken. Streams come in the order in which they
+        were named, whatever the order of arrival.
+        """
+        self.subscribe_added()
+        messages = self._collect()
+        if not messages and timeout > 0:
+            self._wait(timeout)
+            messages = self._collect()
+        return messages
+
+    def deliver(self, stream: str, data: bytes) -> None:
+        """Take a message that came from another node."""
+        try:
+            message = decode(memoryview(data))
+        except UnreadableError as error:
+            message = self._emptied(error)
+        with self._called:
+            self._delivered[stream].append(message)
+        self.wake()
+
+    def wake(self) -> None:
+        """Let a waiting `receive` return."""
+        with self._called:
+            self._calls += 1
+            self._called.notify_all()
+        if self._waiter is not None:
+            self._waiter.wake()
+
+    def close(self) -> None:
+        """Leave all streams."""
+        for subscriber in self._subscribers.values():
+            subscriber.close()
+        if self._waiter is not None:
+            self._waiter.close()
+
+    def _subscribe(self, depths: Mapping[str, int]) -> None:
+        if self._waiter is None:
+            return
+        for stream, depth in depths.items():
+            subscriber = SharedSubscriber(f"{self._scope}/{stream}", min(depth, MAX_DEPTH))
+            self._waiter.attach(subscriber)
+            self._subscribers[stream] = subscriber
+
+    def _wait(self, timeout: float) -> None:
+        if self._waiter is not None:
+            self._waiter.wait(timeout)
+            return
+        with self._called:
+            calls = self._calls
+            self._called.wait_for(
+                lambda: self._calls != calls or any(self._delivered.values()), timeout
+            )
+
+    def _collect(self) -> list[Message[Any]]:
+        messages: list[Message[Any]] = []
+        for stream, delivered in self._delivered.items():
+            start = len(messages)
+            subscriber = self._subscribers.get(stream)
+            if subscriber is not None:
+                while (message := self._read(subscriber)) is not None:
+                    messages.append(message)
+            while delivered:
+                messages.append(delivered.popleft())
+            for message in messages[start:]:
+                self._count(message)
+        return messages
+
+    def _read(self, subscriber: SharedSubscriber) -> Message[Any] | None:
+        try:
+            return subscriber.receive()
+        except UnreadableError as error:
+            return self._emptied(error)
+
+    def _emptied(self, error: UnreadableError) -> Message[Any]:
+        self._unreadable(str(error))
+        return error.message
+
+    def _count(self, message: Message[Any]) -> None:
+        stream = message.stream
+        missing = message.seq - self._next.get(stream, message.seq)
+        self.dropped[stream] += max(0, missing)
+        self.received[stream] += 1
+        self._next[stream] = message.seq + 1

@@ -1,0 +1,291 @@
+"""OnnxDetector: frames in, labelled boxes (and keypoints) out, by any model of a known family."""
+
+from __future__ import annotations
+
+import copy
+import logging
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+import onnxruntime as ort
+from numpy.typing import NDArray
+from typing_extensions import Self
+
+from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.detection.coco import COCO_NAMES
+from aerodaas.analytics.detection.families import FAMILIES
+from aerodaas.analytics.detection.families.base import Candidates, Decoder, ModelFamily
+from aerodaas.analytics.detection.letterbox import Letterbox
+from aerodaas.analytics.detection.model_file import ModelFile, read_model
+from aerodaas.analytics.detection.providers import open_session
+from aerodaas.analytics.detection.suppression import strongest, suppress
+from aerodaas.analytics.endpoint.tensors import TensorSpec
+from aerodaas.analytics.models import DETECTOR
+from aerodaas.types.data import Detection, Detections, Frame
+from aerodaas.types.errors import ModelError
+
+__all__ = ["OnnxDetector"]
+
+_log = logging.getLogger(__name__)
+_MOST_CANDIDATES = 1000
+_MOST_DETECTIONS = 300
+_WARM_UP_RUNS = 2
+
+
+class _Desk(threading.local):
+    """What one thread works with; a copy of it, sent elsewhere, is a clean one."""
+
+    letterbox: Letterbox | None = None
+    buffer: NDArray[np.floating] | None = None
+
+    def __reduce__(self) -> tuple[type[_Desk], tuple[()]]:
+        return _Desk, ()
+
+
+class OnnxDetector(Analytics[Detections]):
+    """Detects objects, and keypoints where the model is a pose model.
+
+    ``OnnxDetector("yolo11n.onnx", classes=["person"])``. The model's kind, names and input size
+    are told from the file, which travels to the actor by value: an edge or cloud node needs no
+    copy of its own.
+    """
+
+    accepts: ClassVar[tuple[type, ...]] = (Frame,)
+    produces: ClassVar[type] = Detections
+    isolated = True
+    scheduled = True
+    concurrent = True
+
+    def __init__(
+        self,
+        path: str | Path = DETECTOR,
+        *,
+        classes: Sequence[str] | None = None,
+        min_score: float = 0.3,
+        iou: float = 0.6,
+        names: Sequence[str] | None = None,
+        size: int | None = None,
+        providers: Sequence[str] | None = None,
+        threads: int | None = None,
+        families: Sequence[ModelFamily] = FAMILIES,
+    ) -> None:
+        """Read the model at `path`, by default the one that ships, and make sure that it detects.
+
+        `classes` keeps these class names only. `min_score` (0 to 1) is the least confidence of a
+        detection; of two boxes of one class that overlap by more than `iou`, the better one
+        stays. `names` overrides the file's class names. `size`, in pixels, is for models whose
+        input may vary. `providers` and `threads` go to onnxruntime; by default the best provider
+        there is, and half of the cores. Raises ModelError for a file or setting that cannot work.
+        """
+        for name, value in (("min_score", min_score), ("iou", iou)):
+            if not 0.0 < value <= 1.0:
+                message = f"{name} must lie above 0 and not above 1, not {value}"
+                raise ModelError(message)
+        if threads is not None and threads < 1:
+            message = f"threads must be 1 or more, not {threads}"
+            raise ModelError(message)
+        model = read_model(path, size)
+        self.path = str(path)
+        self.classes = classes
+        self.min_score = min_score
+        self.iou = iou
+        self.providers = providers
+        self.threads = threads
+        self.decoder = _decoder_for(model, families)
+        self.names = _names_for(model, self.decoder, names)
+        self.size = model.size
+        self.invalid = 0
+        """Outputs dropped so far because they were not finite numbers."""
+        self.excess = 0
+        """Boxes dropped so far because a frame had more than any scene holds."""
+        self._wanted = _wanted_classes(self.path, self.names, classes)
+        self._content = model.content
+        self._input = model.input.name
+        self._dtype = model.dtype
+        self._batches = model.batches
+        self._flexible = model.resizes
+        self._session: ort.InferenceSession | None = None
+        self._outputs = tuple(
+            TensorSpec.of(output.name, np.float32, output.shape) for output in model.outputs
+        )
+        self._desk = _Desk()
+
+    def with_model(self, path: str | Path) -> Self:
+        """Return the same detector with the model at `path`; raises ModelError."""
+        twin = copy.copy(self)
+        OnnxDetector.__init__(
+            twin,
+            path,
+            classes=self.classes,
+            min_score=self.min_score,
+            iou=self.iou,
+            providers=self.providers,
+            threads=self.threads,
+        )
+        return twin
+
+    def open(self) -> None:
+        """Create the session and run it, so that the first frame of the mission is not slow."""
+        self._session = open_session(self._content, self.path, self.providers, self.threads)
+        blank = np.zeros((1, 3, *self.size), self._dtype)
+        for _ in range(_WARM_UP_RUNS):
+            self.infer(blank)
+
+    def close(self) -> None:
+        """Release the session, and say what was dropped."""
+        if self.invalid or self.excess:
+            _log.warning(
+                "%s: dropped %d outputs that were not finite and %d boxes too many",
+                self.path,
+                self.invalid,
+                self.excess,
+            )
+        self._session = None
+
+    def process(self, item: Frame, context: Context) -> Detections:
+        """Find the objects in one frame."""
+        del context
+        return self.detect([item])[0]
+
+    def detect(self, frames: Sequence[Frame]) -> list[Detections]:
+        """Find the objects in each frame: at once if all have one size and the model allows it."""
+        same_size = len({frame.image.shape for frame in frames}) == 1
+        if len(frames) > 1 and not (self._batches and same_size):
+            return [self.detect([frame])[0] for frame in frames]
+        if not frames or frames[0].image.size == 0:
+            return [Detections.of(frame, ()) for frame in frames]
+        return self.postprocess(frames, self.infer(self.preprocess(frames)))
+
+    @property
+    def model_name(self) -> str:
+        """What the model is called at an endpoint that serves it: its file's name, bare."""
+        return Path(self.path).stem
+
+    @property
+    def signature(self) -> tuple[TensorSpec, tuple[TensorSpec, ...]]:
+        """The network's input for one frame, and its outputs."""
+        axes = (None, None) if self._flexible else self.size
+        spec = TensorSpec.of(self._input, self._dtype, (1, 3, *axes))
+        return spec, self._outputs
+
+    def preprocess(self, frames: Sequence[Frame]) -> NDArray[np.floating]:
+        """Letterbox frames of one size into the network's input, count x 3 x height x width.
+
+        The array is the detector's own and is overwritten by this thread's next call.
+        """
+        desk = self._desk
+        shape = (frames[0].height, frames[0].width)
+        if desk.letterbox is None or desk.letterbox.frame != shape:
+            style = self.decoder.preprocessing
+            desk.letterbox = Letterbox(shape, self.size, style, flexible=self._flexible)
+            desk.buffer = None
+        if desk.buffer is None or len(desk.buffer) != len(frames):
+            desk.buffer = desk.letterbox.buffer(len(frames), self._dtype)
+        for frame, slot in zip(frames, desk.buffer, strict=True):
+            desk.letterbox.write(frame.image, slot)
+        return desk.buffer
+
+    def infer(self, pixels: NDArray[np.floating]) -> list[NDArray[np.floating]]:
+        """Run the network; raises ModelError before `open`."""
+        if self._session is None:
+            message = f"{self.path}: call open() before the first frame"
+            raise ModelError(message)
+        return [np.asarray(output) for output in self._session.run(None, {self._input: pixels})]
+
+    def postprocess(
+        self, frames: Sequence[Frame], outputs: Sequence[NDArray[np.floating]]
+    ) -> list[Detections]:
+        """Turn the network's outputs for the frames last preprocessed into detections."""
+        letterbox = self._desk.letterbox
+        if letterbox is None:
+            message = f"{self.path}: preprocess the frames first"
+            raise ModelError(message)
+        return [
+            self._gather(frame, letterbox, [np.asarray(o[index], np.float32) for o in outputs])
+            for index, frame in enumerate(frames)
+        ]
+
+    def _gather(
+        self, frame: Frame, letterbox: Letterbox, outputs: Sequence[NDArray[np.float32]]
+    ) -> Detections:
+        found = self.decoder.decode(outputs, letterbox.network, self.min_score)
+        self._count_invalid(found.invalid)
+        if self._wanted is not None:
+            found = found.take(np.isin(found.classes, self._wanted))
+        everything = len(found)
+        found = strongest(found, _MOST_CANDIDATES)
+        self.excess += everything - len(found)
+        if self.decoder.overlapping:
+            found = suppress(found, self.iou)
+        bounded = strongest(found, _MOST_DETECTIONS)
+        self.excess += len(found) - len(bounded)
+        return Detections.of(frame, self._detections(bounded, letterbox))
+
+    def _detections(self, found: Candidates, letterbox: Letterbox) -> list[Detection]:
+        boxes = letterbox.restore(found.boxes.reshape(-1, 2, 2)).reshape(-1, 4)
+        points = found.keypoints
+        if points is not None:
+            points = np.concatenate([letterbox.restore(points[..., :2]), points[..., 2:]], axis=2)
+        # Beyond the picture's edge nothing of a box may be left after clipping.
+        inside = np.flatnonzero((boxes[:, 2:] > boxes[:, :2]).all(axis=1))
+        rows = zip(inside, boxes[inside].tolist(), strict=True)
+        return [
+            Detection(
+                (left, top, right, bottom),
+                self.names[int(found.classes[index])],
+                min(1.0, float(found.scores[index])),
+                keypoints=None if points is None else points[index],
+            )
+            for index, (left, top, right, bottom) in rows
+        ]
+
+    def _count_invalid(self, count: int) -> None:
+        if count and not self.invalid:
+            _log.warning("%s: gives outputs that are not finite; they are dropped", self.path)
+        self.invalid += count
+
+
+def _decoder_for(model: ModelFile, families: Sequence[ModelFamily]) -> Decoder:
+    task = model.metadata.get("task", "detect")
+    if task not in ("detect", "pose"):
+        raise model.refusal(f"is made to {task}, not to detect", "choose a detect or pose model")
+    decoder = next((found for family in families if (found := family(model))), None)
+    if decoder is None:
+        shapes = ", ".join(str(list(output.shape)) for output in model.outputs)
+        problem = f"gives {shapes}, the output of no detector that is known here"
+        remedy = "choose a YOLO detector, or pass a ModelFamily of your own in families="
+        raise model.refusal(problem, remedy)
+    return decoder
+
+
+def _names_for(model: ModelFile, decoder: Decoder, names: Sequence[str] | None) -> tuple[str, ...]:
+    given = tuple(names) if names is not None else model.names
+    if given is None and decoder.classes == len(COCO_NAMES):
+        _log.info("%s names no classes; its 80 are taken for COCO's", model.path)
+        given = COCO_NAMES
+    if given is None:
+        _log.warning("%s names no classes; they are called by number", model.path)
+        given = tuple(str(number) for number in range(decoder.classes))
+    if len(given) != decoder.classes:
+        problem = f"tells {decoder.classes} classes apart, but {len(given)} are named"
+        raise model.refusal(problem, "give one name for each in names=")
+    return given
+
+
+def _wanted_classes(
+    path: str, names: Sequence[str], classes: Sequence[str] | None
+) -> list[int] | None:
+    if classes is None:
+        return None
+    chosen = [classes] if isinstance(classes, str) else list(classes)
+    unknown = [label for label in chosen if label not in names]
+    if unknown or not chosen:
+        message = (
+            f"the model {path} knows no class {', '.join(unknown) or '(none asked for)'}; "
+            f"it knows {', '.join(names)}"
+        )
+        raise ModelError(message)
+    return [number for number, label in enumerate(names) if label in chosen]

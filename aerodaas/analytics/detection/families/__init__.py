@@ -1,0 +1,14 @@
+"""The kinds of models that are recognised, in the order in which they are tried."""
+
+from __future__ import annotations
+
+from aerodaas.analytics.detection.families.base import ModelFamily
+from aerodaas.analytics.detection.families.end2end import end_to_end
+from aerodaas.analytics.detection.families.ultralytics import ultralytics
+from aerodaas.analytics.detection.families.yolov5 import yolov5
+from aerodaas.analytics.detection.families.yolox import yolox
+
+__all__ = ["FAMILIES"]
+
+FAMILIES: tuple[ModelFamily, ...] = (yolov5, yolox, ultralytics, end_to_end)
+"""The strictest first: those that must fit the grid of the input's size exactly."""

@@ -1,0 +1,65 @@
+"""Exports whose NMS is built in (`nms=True`) or not needed (YOLOv10 and 26, end to end).
+
+One output of shape [batch, detections, 6 + keypoints], at most a few hundred detections: left,
+top, right, bottom in input pixels, score, class, then keypoints; unused rows score zero. Source:
+ultralytics/engine/exporter.py, `NMSModel`, and ultralytics/nn/modules/head.py, `postprocess`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.analytics.detection.coco import COCO_NAMES
+from aerodaas.analytics.detection.families.base import Candidates, Preprocessing, keep_finite
+from aerodaas.analytics.detection.families.ultralytics import keypoint_shape, read_keypoints
+from aerodaas.analytics.detection.model_file import ModelFile
+
+__all__ = ["EndToEndDecoder", "end_to_end"]
+
+_AXES = 3
+_SCORE, _CLASS, _ROW = 4, 5, 6
+_MOST_DETECTIONS = 3000
+_PIXELS = Preprocessing()
+
+
+@dataclass(frozen=True)
+class EndToEndDecoder:
+    """Decodes [detections, 6 + keypoints]."""
+
+    classes: int
+    keypoints: tuple[int, int] | None = None
+    family: str = "Ultralytics end to end"
+    preprocessing: Preprocessing = _PIXELS
+    overlapping: bool = False
+
+    def decode(
+        self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
+    ) -> Candidates:
+        """Keep the rows above `min_score` whose class exists."""
+        del size
+        rows = outputs[0]
+        invalid = int(np.count_nonzero(np.isnan(rows[:, _SCORE])))
+        rows = rows[rows[:, _SCORE] >= min_score]
+        known = (rows[:, _CLASS] >= 0) & (rows[:, _CLASS] < self.classes)
+        invalid += int(np.count_nonzero(~known))
+        rows = rows[known]
+        keypoints = read_keypoints(rows[:, _ROW:], self.keypoints)
+        classes = rows[:, _CLASS].astype(np.int32)
+        found = Candidates(rows[:, :_SCORE], rows[:, _SCORE], classes, keypoints, invalid)
+        return keep_finite(found)
+
+
+def end_to_end(model: ModelFile) -> EndToEndDecoder | None:
+    """Recognise rows of six numbers, beside the keypoints that the metadata tells of."""
+    shape = model.output_shape
+    keypoints = keypoint_shape(model)
+    depth = _ROW + (keypoints[0] * keypoints[1] if keypoints else 0)
+    if len(model.outputs) != 1 or len(shape) != _AXES or shape[2] != depth:
+        return None
+    if shape[1] > _MOST_DETECTIONS:
+        return None
+    return EndToEndDecoder(len(model.names or COCO_NAMES), keypoints)

@@ -1,0 +1,73 @@
+"""Letterboxing: a frame of any size into the network's input, and boxes back again."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.analytics.detection.families.base import Preprocessing
+
+__all__ = ["Letterbox"]
+
+_STRIDE = 32
+
+
+class Letterbox:
+    """The mapping between frames of one size and a network input of one size.
+
+    The padding is written once, when the buffer is made; each frame then overwrites the middle
+    only. Resizing is bilinear, as in training.
+    """
+
+    def __init__(
+        self,
+        frame: tuple[int, int],
+        network: tuple[int, int],
+        style: Preprocessing,
+        *,
+        flexible: bool = False,
+    ) -> None:
+        """Map frames of `frame` (height, width) pixels to at most `network` (height, width).
+
+        Where the input's size is `flexible`, padding beyond the next multiple of 32 is left out.
+        """
+        height, width = frame
+        self.ratio = min(network[0] / height, network[1] / width)
+        self.inner = (max(1, round(height * self.ratio)), max(1, round(width * self.ratio)))
+        if flexible:
+            network = (_round_up(self.inner[0]), _round_up(self.inner[1]))
+        self.frame = frame
+        self.network = network
+        self.style = style
+        slack = (network[0] - self.inner[0], network[1] - self.inner[1])
+        # Halves are rounded down, as by Ultralytics' LetterBox.
+        self.top, self.left = (slack[0] // 2, slack[1] // 2) if style.centred else (0, 0)
+
+    def buffer(self, count: int, dtype: type[np.float32 | np.float16]) -> NDArray[np.floating]:
+        """Make an input for `count` frames, count x 3 x height x width, filled with padding."""
+        return np.full((count, 3, *self.network), self.style.fill * self.style.scale, dtype)
+
+    def write(self, image: NDArray[np.uint8], slot: NDArray[np.floating]) -> None:
+        """Resize a BGR `image` into `slot` (3 x height x width) of a buffer."""
+        height, width = self.inner
+        if self.frame != self.inner:
+            image = np.asarray(cv2.resize(image, (width, height)), np.uint8)
+        planes = cv2.split(image)
+        window = slot[:, self.top : self.top + height, self.left : self.left + width]
+        scale = slot.dtype.type(self.style.scale)
+        for channel, plane in enumerate(reversed(planes) if self.style.rgb else planes):
+            np.multiply(plane, scale, out=window[channel], casting="unsafe")
+
+    def restore(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Points (..., 2) of the network's input, as u and v of the frame, clipped to it."""
+        height, width = self.frame
+        # Per axis, because rounding to whole pixels stretches the two a little differently.
+        scale = np.array([width / self.inner[1], height / self.inner[0]], np.float32)
+        moved = (points - np.array([self.left, self.top], np.float32)) * scale
+        clipped: NDArray[np.float32] = np.clip(moved, 0, np.array([width, height], np.float32))
+        return clipped
+
+
+def _round_up(length: int) -> int:
+    return -(-length // _STRIDE) * _STRIDE

@@ -1,0 +1,31 @@
+"""One box for each object, where a detector gives several: of a part, or with what is beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from aerodaas.types.data import Detection
+
+__all__ = ["one_for_each"]
+
+
+def one_for_each(items: Sequence[Detection], shared: float) -> list[Detection]:
+    """Keep, best first, what shares no more than `shared` of the smaller box with a better one.
+
+    A box of half an object lies in that of the whole, and overlaps it too little for the usual
+    suppression, which divides by the union. Labels are told apart.
+    """
+    kept: list[Detection] = []
+    boxes = np.zeros((0, 4))
+    for item in sorted(items, key=lambda one: -one.score):
+        box = np.array(item.box)
+        sides = np.minimum(boxes[:, 2:], box[2:]) - np.maximum(boxes[:, :2], box[:2])
+        common = np.clip(sides, 0.0, None).prod(axis=1)
+        smaller = np.minimum((boxes[:, 2:] - boxes[:, :2]).prod(axis=1), item.area)
+        same = np.array([one.label == item.label for one in kept], np.bool_)
+        if not (same & (common > shared * smaller)).any():
+            kept.append(item)
+            boxes = np.vstack([boxes, box])
+    return kept

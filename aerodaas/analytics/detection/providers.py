@@ -1,0 +1,72 @@
+"""Where inference runs: execution providers, threads, and the session's options."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import onnxruntime as ort
+
+from aerodaas.types.errors import ModelError
+
+__all__ = ["default_threads", "open_session"]
+
+_log = logging.getLogger(__name__)
+_PREFERRED = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
+_ERRORS_ONLY = 3
+_ENGINES = Path.home() / ".cache" / "aerodaas" / "tensorrt"
+# A TensorRT engine takes minutes to build: it is kept for the next flight.
+_OPTIONS: dict[str, dict[str, Any]] = {
+    "TensorrtExecutionProvider": {
+        "trt_fp16_enable": True,
+        "trt_engine_cache_enable": True,
+        "trt_engine_cache_path": str(_ENGINES),
+    }
+}
+
+
+def default_threads() -> int:
+    """Half of the cores this process may use, so that two models on one edge don't fight."""
+    return max(1, len(os.sched_getaffinity(0)) // 2)
+
+
+def open_session(
+    content: bytes, label: str, providers: Sequence[str] | None, threads: int | None
+) -> ort.InferenceSession:
+    """Create the session for a model's `content`, and log where it runs.
+
+    `providers` are names in onnxruntime's spelling, best first; None takes what is there of
+    TensorRT, CUDA and CPU. Raises ModelError if a provider is not installed or the session
+    cannot be created.
+    """
+    available = ort.get_available_providers()
+    missing = [name for name in providers or () if name not in available]
+    if missing:
+        message = (
+            f"{label}: onnxruntime here has no {', '.join(missing)}, only "
+            f"{', '.join(available)}; install onnxruntime-gpu, or leave providers out"
+        )
+        raise ModelError(message)
+    chosen = list(providers or (name for name in _PREFERRED if name in available))
+    options = ort.SessionOptions()
+    options.log_severity_level = _ERRORS_ONLY
+    options.intra_op_num_threads = threads or default_threads()
+    options.inter_op_num_threads = 1
+    # Waiting threads would otherwise burn the cores that other actors need.
+    options.add_session_config_entry("session.intra_op.allow_spinning", "0")
+    if "TensorrtExecutionProvider" in chosen:
+        _ENGINES.mkdir(parents=True, exist_ok=True)
+    try:
+        session = ort.InferenceSession(
+            content, options, providers=[(name, _OPTIONS.get(name, {})) for name in chosen]
+        )
+    except Exception as error:  # noqa: BLE001 - onnxruntime has no common base class
+        raise ModelError(f"{label} cannot be started on {', '.join(chosen)}: {error}") from None
+    used = session.get_providers()
+    if used[0] != chosen[0]:
+        _log.warning("%s: %s is not usable here, see onnxruntime's log", label, chosen[0])
+    _log.info("%s runs on %s, %d threads", label, used[0], options.intra_op_num_threads)
+    return session

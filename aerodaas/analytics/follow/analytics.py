@@ -1,0 +1,294 @@
+"""Following: the boxes of a detector become velocity commands that keep a drone at its target."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+from shapely import Point, Polygon
+
+from aerodaas.analytics.base import Context, NavigableAnalytics
+from aerodaas.analytics.boxes import BoxAnalytics
+from aerodaas.analytics.detection.overlap import one_for_each
+from aerodaas.analytics.detection.tracking import Tracker
+from aerodaas.analytics.follow.observation import observation
+from aerodaas.analytics.people.debounce import Debounce
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.following.follow_controller import LYING, FollowController, FollowPhase
+from aerodaas.following.follow_settings import FollowGains, FollowLimits, LostPolicy, TargetChoice
+from aerodaas.following.relative_target import RelativeTarget, TargetSize, ends_in_picture, sight
+from aerodaas.following.target_motion import TargetMotion, place_of
+from aerodaas.types.data import Alert, Detection, Detections
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.waypoints import DEFAULT_PRIORITY, NavigationType
+
+__all__ = ["FollowAnalytics"]
+
+_log = logging.getLogger(__name__)
+_REACH, _REACH_SHARE = 0.3, 0.2
+"""Metres, and parts of the distance, from where the target should stand to where it is seen; and
+as far as it may have gone since, while it was not."""
+_SURER = 0.2
+"""By how much the score of another must be better than that of a doubtful target."""
+_ALOFT = (1.0, 0.6)
+"""Metres of height, or parts of the height to follow at, from which all who stand near are seen:
+from the ground, the chest of who stands 3 m away is above the picture, and a passer's is not."""
+_BLOCKED = (3, 10)
+"""Of the last 10 frames so many in which something stands in the way are told."""
+_WIDTH_MEMORY = 0.1
+"""Weight of the newest look in the mean of the target's width: arms swing."""
+
+
+class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
+    """Follows one object of known size at a distance, and stays with that one.
+
+    It locks on the nearest trusted target of its labels and holds it by its track. Until a
+    first target is seen, and after one was given up, it commands nothing, so that other
+    navigation goes on. The camera must be calibrated (`horizontal_fov` of the sensor).
+    """
+
+    falls: ClassVar[bool] = True
+    """Whether a target may fall: a change of its height is then no motion along the ground."""
+
+    def __init__(
+        self,
+        labels: Sequence[str] = ("person",),
+        distance: float = 2.0,
+        height: float = 1.5,
+        *,
+        target_height: float = 1.7,
+        target_width: float = 0.55,
+        priority: int = DEFAULT_PRIORITY,
+        gains: FollowGains | None = None,
+        limits: FollowLimits | None = None,
+        lost: LostPolicy | None = None,
+        motion: TargetMotion | None = None,
+        area: Sequence[tuple[float, float]] | None = None,
+        choice: TargetChoice | None = None,
+        detector: BoxAnalytics.Detector | None = None,
+    ) -> None:
+        """Follow what carries one of `labels` from `distance`, flying at `height`, in metres.
+
+        `target_height` and `target_width` are the size of the object itself, in metres. With an
+        `area`, the corners of a polygon in metres east and north of home, a target that leaves it
+        is given up at once. `motion` says how it moves, `choice` what it takes to be followed.
+        Raises ConfigError for lengths that are not positive, and for an
+        area that is none.
+        """
+        lengths = {
+            "distance": distance,
+            "height": height,
+            "target_height": target_height,
+            "target_width": target_width,
+        }
+        for name, length in lengths.items():
+            if not 0.0 < length < math.inf:
+                message = f"{type(self).__name__}: {name} must be above 0 m, not {length}"
+                raise ConfigError(message)
+        super().__init__(labels, detector)
+        self.area = None if area is None else _polygon(area)
+        self.size = TargetSize(target_height, target_width)
+        self.choice = choice or TargetChoice()
+        self.controller = FollowController(
+            distance,
+            height,
+            gains=gains,
+            limits=limits,
+            lost=lost,
+            motion=motion,
+            priority=priority,
+        )
+        self.tracker = Tracker(
+            max_age=self.controller.lost.slow, min_hits=self.choice.looks, sure=self.choice.sure
+        )
+        self.target: int | None = None
+        """Track that is followed."""
+        self._blocked = Debounce(*_BLOCKED)
+        self._aloft = 0
+        """Frames taken since it was high enough to choose."""
+        self._width = target_width
+
+    def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
+        """Return one velocity command, or None where there is nobody to follow."""
+        item = boxes
+        if item.camera is None:
+            self.explain_once(item, context)
+            return None
+        if self._has_left():
+            self._let_go(item, context)
+        self._aloft = self._aloft + 1 if self._is_aloft(item) else 0
+        phase = self.controller.phase
+        tracked = self.tracker.update(self._possible(item))
+        detection = self._target_in(tracked)
+        sighting = None if detection is None else self._sight(detection, item)
+        others = self._others(tracked, detection)
+        command = self.controller.step(observation(item, sighting, context, others))
+        self._tell_changes(phase, item, context)
+        self._tell_what_blocks(item, context)
+        if command is None:
+            return None
+        return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
+
+    def _possible(self, item: Detections) -> Detections:
+        """Leave out the boxes of what cannot be the target, so that no track takes them."""
+        boxes = [box for box in item if all(map(math.isfinite, box.box))]
+        if self.choice.grounded:
+            boxes = [box for box in boxes if ends_in_picture(box, item)]
+            seen = [(box, sight(box, item, self.size)) for box in boxes]
+            boxes = [box for box, found in seen if found is None or not found.afloat]
+        if self.choice.shared < 1.0:
+            boxes = one_for_each(boxes, self.choice.shared)
+        return replace(item, items=tuple(boxes))
+
+    def _target_in(self, tracked: Detections) -> Detection | None:
+        """Find the target among the boxes of this frame; choose one where there is none."""
+        found = tracked.labelled(*self.labels)
+        trusted = [item for item in found if item.track_id is not None]
+        mine = next((item for item in trusted if item.track_id == self.target), None)
+        if mine is None:
+            mine = self._found_where_expected(found, tracked)
+        if self.target is None and self._aloft < self.choice.looks:
+            return None
+        lost = mine is None and self._is_lost()
+        least = self.choice.score if lost or self.target is None else self._score_to_displace(mine)
+        chosen = [
+            item
+            for item in trusted
+            if self._score(item) >= least
+            and self._is_inside(item, tracked)
+            and (lost or self._shows_enough(item, tracked))
+        ]
+        if not chosen:
+            return mine
+        best = max(chosen, key=lambda item: item.area * item.score)
+        if mine is not None:
+            self.controller.change_target()
+        self.target = best.track_id
+        self._width = self.size.width
+        return best
+
+    def _is_aloft(self, item: Detections) -> bool:
+        """Whether the drone is so high that a first choice misses nobody."""
+        least, part = _ALOFT
+        height = math.inf if item.odometry is None else item.odometry.height
+        return not height < min(least, part * self.controller.height)
+
+    def _score_to_displace(self, mine: Detection | None) -> float:
+        """Least score of what takes the place of the target, seen as `mine`; infinite for nothing.
+
+        One that has come to look doubtful, such as a passer in a bright shirt, gives way to a much
+        surer one.
+        """
+        held = self.tracker.find(self.target)
+        if mine is None or held is None or held.score >= self.choice.score:
+            return math.inf
+        return max(self.choice.score, held.score + _SURER)
+
+    def _score(self, item: Detection) -> float:
+        track = self.tracker.find(item.track_id)
+        return 0.0 if track is None else track.score
+
+    def _has_left(self) -> bool:
+        place = self.controller.motion.place
+        return self.area is not None and place is not None and not self.area.covers(Point(place))
+
+    def _let_go(self, item: Detections, context: Context) -> None:
+        self.target = None
+        self.controller.give_up()
+        text = f"The {' or '.join(self.labels)} has left the area; following ends."
+        context.alert(Alert(item.header, "target_left_area", text))
+
+    def _shows_enough(self, detection: Detection, item: Detections) -> bool:
+        """Tell whether its size can be told, if that is asked of a first look."""
+        if not self.choice.whole:
+            return True
+        sighting = sight(detection, item, self.size)
+        return sighting is not None and sighting.width is not None
+
+    def _is_inside(self, detection: Detection, item: Detections) -> bool:
+        """Tell whether it may be followed: it is in the area, if there is one."""
+        if self.area is None:
+            return True
+        sighting, odometry = sight(detection, item, self.size), item.odometry
+        if sighting is None or odometry is None:
+            return False
+        place = place_of(sighting, odometry)
+        return bool(np.isfinite(place).all() and self.area.covers(Point(*place)))
+
+    def _found_where_expected(
+        self, found: Sequence[Detection], item: Detections
+    ) -> Detection | None:
+        """The box that stands on the ground where the target should: it has lost its track only.
+
+        A drone that pitches shakes the picture more than a tracker of boxes can know.
+        """
+        odometry, controller = item.odometry, self.controller
+        expected = None if odometry is None else controller.expected(odometry, item.header.stamp)
+        if self.target is None or expected is None:
+            return None
+        reach = _REACH + _REACH_SHARE * expected.distance
+        reach += controller.motion.spread(item.header.stamp)
+        best = None
+        for detection in found:
+            sighting = sight(detection, item, self.size.with_width(self._width))
+            if sighting is None:
+                continue
+            off = float(np.linalg.norm(sighting.offset - expected.offset))
+            if sighting.bound or expected.bound:
+                off = max(0.0, off - LYING)
+            if off <= reach:
+                best, reach = detection, off
+        if best is not None and best.track_id is not None:
+            self.target = best.track_id
+        return best
+
+    def _is_lost(self) -> bool:
+        """Whether the target has been gone for a while; another one is then taken as it is."""
+        free = (FollowPhase.WAITING, FollowPhase.SEARCHING)
+        return self.target is not None and self.controller.phase in free
+
+    def _sight(self, detection: Detection, item: Detections) -> RelativeTarget | None:
+        sighting = sight(detection, item, self.size.with_width(self._width))
+        if sighting is not None and sighting.width is not None:
+            self._width += _WIDTH_MEMORY * (sighting.width - self._width)
+        if sighting is not None and not self.falls:
+            sighting = replace(sighting, top=None)
+        return sighting
+
+    def _others(self, tracked: Detections, target: Detection | None) -> tuple[RelativeTarget, ...]:
+        least = self.choice.score
+        found = (box for box in tracked.labelled(*self.labels) if box is not target)
+        boxes = (box for box in found if box.score >= least)
+        seen = (sight(box, tracked, self.size) for box in boxes)
+        return tuple(sighting for sighting in seen if sighting is not None)
+
+    def _tell_what_blocks(self, item: Detections, context: Context) -> None:
+        self._blocked.update(item.header.stamp, self.controller.blocked)
+        if self._blocked.began:
+            what = " or ".join(self.labels)
+            text = f"Something stands in the way to the {what}; the drone waits."
+            context.alert(Alert(item.header, "way_blocked", text))
+
+    def _tell_changes(self, before: FollowPhase, item: Detections, context: Context) -> None:
+        phase = self.controller.phase
+        if phase is before:
+            return
+        _log.info("following: %s, was %s", phase.value, before.value)
+        what = " or ".join(self.labels)
+        if phase is FollowPhase.SEARCHING:
+            context.alert(Alert(item.header, "target_lost", f"The {what} is out of sight."))
+        elif phase is FollowPhase.WAITING:
+            self.target = None
+            text = f"The {what} was not found again; following ends."
+            context.alert(Alert(item.header, "target_given_up", text))
+
+
+def _polygon(area: Sequence[tuple[float, float]]) -> Polygon:
+    corners = 3
+    if len(area) < corners or not np.isfinite(np.asarray(area, np.float64)).all():
+        raise ConfigError("an area is three or more corners (metres east, metres north)")
+    return Polygon(area)

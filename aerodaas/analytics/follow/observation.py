@@ -1,0 +1,30 @@
+"""What a follower's controller is told about one frame."""
+
+from __future__ import annotations
+
+from aerodaas.analytics.base import Context
+from aerodaas.following.clearance import surfaces
+from aerodaas.following.follow_controller import Observation
+from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.types.data import Detections
+
+__all__ = ["observation"]
+
+
+def observation(
+    boxes: Detections,
+    sighting: RelativeTarget | None,
+    context: Context,
+    others: tuple[RelativeTarget, ...] = (),
+) -> Observation:
+    """The `sighting` in `boxes`, with the drone as it was at capture and as it is now."""
+    state = context.vehicle()
+    return Observation(
+        stamp=boxes.header.stamp,
+        sighting=sighting,
+        at_capture=boxes.odometry,
+        now=None if state is None else state.odometry,
+        now_stamp=None if state is None else state.stamp,
+        others=others,
+        surfaces=surfaces(boxes),
+    )

@@ -1,0 +1,201 @@
+"""TowerInspectionAnalytics: approach a tower, climb along it taking pictures, and land."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+
+from aerodaas.analytics.base import Context, NavigableAnalytics
+from aerodaas.analytics.boxes import BoxAnalytics
+from aerodaas.analytics.follow.observation import observation
+from aerodaas.dataflow.graph import AeroStreamData, Trigger
+from aerodaas.dataflow.interfaces import IAeroData, IEnvironment
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.following.ground import GroundView
+from aerodaas.following.inspection import InspectionController, InspectionPhase, InspectionPlan
+from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.types.data import Alert, Detection, Detections, Frame
+from aerodaas.types.errors import ConfigError, GraphError
+from aerodaas.types.waypoints import DEFAULT_PRIORITY, NavigationType
+
+__all__ = ["InspectionOver", "TowerInspectionAnalytics", "inspection_over"]
+
+_log = logging.getLogger(__name__)
+_MARGIN = 0.02
+"""Part of the picture's side within which a box counts as cut by its edge."""
+
+
+class InspectionOver(AeroNavigation):
+    """The last navigation of an inspection: stop. What waits for it may land."""
+
+
+def inspection_over(result: object) -> bool:
+    """Tell whether an inspection has ended, as a condition for `trigger`."""
+    return isinstance(result, InspectionOver)
+
+
+class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
+    """Inspects the first tower that is seen, then lands; until then it commands nothing.
+
+    The drone comes down to `base` on its way to the stand-off, climbs to `top` facing the tower,
+    comes down again and lands where it is. The tower's distance is that of its foot on the ground
+    (flat, at the height of home), so that the foot must be in the picture from the start: a
+    camera that looks ahead sees it. The drone never moves towards the tower within the stand-off,
+    nor while the tower is out of sight; an unseen tower and a limit of time end the inspection.
+    """
+
+    def __init__(
+        self,
+        environment: IEnvironment | None = None,
+        *,
+        stand_off: float = 8.0,
+        base: float = 2.0,
+        top: float = 35.0,
+        interval: float = 2.0,
+        speed: float = 1.5,
+        climb: float = 1.0,
+        patience: float = 20.0,
+        longest: float = 600.0,
+        width: float = 3.0,
+        sure: float = 0.5,
+        labels: Sequence[str] = ("tower",),
+        lands: bool = True,
+        pictures: str | Path | None = None,
+        priority: int = DEFAULT_PRIORITY,
+        detector: BoxAnalytics.Detector | None = None,
+    ) -> None:
+        """Keep `stand_off` metres, climb from `base` to `top` (metres above home) at `climb` m/s.
+
+        A picture is taken each `interval` metres; with a folder `pictures`, on the machine where
+        the analysis runs, they are written there as JPEG. `width` is the tower's at its foot.
+        An inspection begins with boxes of a score of `sure` (0 to 1) and more.
+        `patience` and `longest`, in seconds, bound the time without a sight of the tower and the
+        time in all. With `lands=False` the drone is left to other navigation at the end. The
+        paper's listings pass the environment; the analysed stream knows its own. Raises
+        ConfigError for numbers that cannot be.
+        """
+        del environment
+        if not 0.0 < width < math.inf:
+            raise ConfigError(f"{type(self).__name__}: width must be above 0 m, not {width}")
+        plan = InspectionPlan(
+            stand_off, base, top, interval, speed, climb, patience=patience, longest=longest
+        )
+        super().__init__(labels, detector)
+        self.controller = InspectionController(plan, priority)
+        self.lands = lands
+        self.width = width
+        self.sure = sure
+        self.folder = None if pictures is None else Path(pictures)
+        self.taken: list[float] = []
+        """Heights in metres of the pictures taken so far."""
+        self._told = False
+        self._frame: Frame | None = None
+
+    def analyse(self, data: IAeroData[Any]) -> AeroStreamData[AeroNavigation]:
+        """Inspect by a stream of frames or boxes; raises GraphError for any other.
+
+        Only frames can be written to a folder.
+        """
+        frames = isinstance(data, AeroStreamData) and issubclass(data.item, Frame)
+        if self.folder is not None and not frames:
+            message = (
+                f"{type(self).__name__} has no pictures to write to {self.folder}: analyse the "
+                "camera's stream, with detector= where you have your own"
+            )
+            raise GraphError(message)
+        stream = super().analyse(data)
+        if self.node is not None and self.node.robot is not None and self.lands:
+            landing = Trigger(self.node.robot, "end_mission", inspection_over)
+            if landing not in self.node.triggers:
+                self.node.triggers.append(landing)
+        return stream
+
+    def process(self, item: Detections | Frame, context: Context) -> AeroNavigation | None:
+        """Return one velocity command, or None where there is nothing to inspect."""
+        self._frame = item if isinstance(item, Frame) else None
+        return super().process(item, context)
+
+    def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
+        """Return one velocity command, or None where there is nothing to inspect."""
+        if boxes.camera is None or boxes.odometry is None:
+            self.explain_once(boxes, context)
+            return None
+        if self.controller.phase is InspectionPhase.DONE and self._told:
+            return None
+        before = self.controller.phase
+        least = self.sure if self.controller.phase is InspectionPhase.WAITING else 0.0
+        found = [box for box in boxes.labelled(*self.labels) if box.score >= least]
+        sighting = self._sight(max(found, key=lambda item: item.score), boxes) if found else None
+        command = self.controller.step(observation(boxes, sighting, context))
+        self._tell_changes(before, boxes, context)
+        if self.controller.picture_due is not None:
+            self._take_picture(self.controller.picture_due)
+        if command is None:
+            return None
+        over = self.controller.phase is InspectionPhase.DONE
+        self._told = over
+        kind = InspectionOver if over else AeroNavigation
+        return kind(NavigationType.ANALYTICS_DRIVEN, [command])
+
+    def _sight(self, detection: Detection, boxes: Detections) -> RelativeTarget | None:
+        """Where the tower's foot is; where that is out of the picture, at most how far."""
+        left, _, right, bottom = detection.box
+        if not all(map(math.isfinite, detection.box)):
+            return None
+        at_most = self._at_most(detection, boxes)
+        try:
+            (foot,) = GroundView(boxes).points(np.array([[(left + right) / 2, bottom]]))
+        except ValueError:
+            return None
+        if at_most is None or bottom >= (1 - _MARGIN) * boxes.height or not np.isfinite(foot).all():
+            return at_most
+        # What hides the foot makes the tower seem farther.
+        distance = min(float(np.hypot(*foot)), at_most.distance)
+        return RelativeTarget(math.atan2(foot[1], foot[0]), distance)
+
+    def _at_most(self, detection: Detection, boxes: Detections) -> RelativeTarget | None:
+        """A tower is nowhere wider than its foot is from corner to corner."""
+        camera = boxes.camera
+        left, top, right, bottom = detection.box
+        if camera is None:
+            return None
+        scale_u, scale_v = camera.width / boxes.width, camera.height / boxes.height
+        v = (top + bottom) / 2 * scale_v
+        rays = [camera.ray(u * scale_u, v) for u in (left, (left + right) / 2, right)]
+        start, middle, end = (math.atan2(ray[1], ray[0]) for ray in rays)
+        spread = math.remainder(start - end, math.tau)
+        if not 0.0 < spread < math.pi:
+            return None
+        widest = math.sqrt(2) * self.width
+        return RelativeTarget(middle, widest / 2 / math.tan(spread / 2), bound=True)
+
+    def _take_picture(self, height: float) -> None:
+        self.taken.append(height)
+        if self.folder is None or self._frame is None:
+            return
+        self.folder.mkdir(parents=True, exist_ok=True)
+        path = self.folder / f"{len(self.taken):03d}_{height:04.1f}m.jpg"
+        if not cv2.imwrite(str(path), self._frame.image):
+            _log.warning("%s cannot be written", path)
+
+    def _tell_changes(self, before: InspectionPhase, boxes: Detections, context: Context) -> None:
+        controller = self.controller
+        if controller.phase is before:
+            return
+        _log.info("inspection: %s, was %s", controller.phase.value, before.value)
+        what = " or ".join(self.labels)
+        if controller.phase is InspectionPhase.APPROACHING:
+            text = f"A {what} was found; its inspection begins."
+            context.alert(Alert(boxes.header, "inspection_began", text))
+        if controller.reason and before in {InspectionPhase.APPROACHING, InspectionPhase.CLIMBING}:
+            text = f"The inspection ends early: {controller.reason}."
+            context.alert(Alert(boxes.header, "inspection_cut_short", text))
+        if controller.phase is InspectionPhase.DONE:
+            text = f"The inspection is over: {len(self.taken)} pictures."
+            context.alert(Alert(boxes.header, "inspection_over", text))

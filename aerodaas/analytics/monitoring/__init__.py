@@ -1,0 +1,1 @@
+"""Watching readings, distances and GPS loggers."""

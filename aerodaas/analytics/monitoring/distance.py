@@ -1,0 +1,87 @@
+"""DistanceAnalytics: how far the nearest person or thing is, and an alert when that is too near."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+from aerodaas.analytics.base import Context
+from aerodaas.analytics.boxes import BoxAnalytics
+from aerodaas.analytics.people.debounce import Debounce
+from aerodaas.following.relative_target import RelativeTarget, TargetSize, sight
+from aerodaas.types.data import Alert, Detections, Readings
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["SIZES", "DistanceAnalytics"]
+
+SIZES: Mapping[str, TargetSize] = {
+    "person": TargetSize(1.7, 0.55),
+    "vest": TargetSize(0.6, 0.43),
+    "car": TargetSize(1.5, 1.8, widest=4.2),
+}
+"""Heights and widths in metres of what the shipped detector finds."""
+
+
+class DistanceAnalytics(BoxAnalytics[Readings]):
+    """Metres along the ground from the drone to the nearest object of known size.
+
+    Each result has `distance` and `bearing` (radians, positive to the left) of the nearest, and
+    `distance.LABEL` of the nearest of each label; nothing of what is not seen. An object that the
+    picture's edges cut on all sides is at the distance told or nearer.
+    """
+
+    produces: ClassVar[type] = Readings
+
+    def __init__(
+        self,
+        *,
+        limit: float = 1.5,
+        sizes: Mapping[str, TargetSize | tuple[float, float]] | None = None,
+        needed: int = 2,
+        of: int = 3,
+        detector: BoxAnalytics.Detector | None = None,
+    ) -> None:
+        """Alert when `needed` of the last `of` frames show something within `limit` metres.
+
+        `sizes` are heights and widths in metres by label, by default those of persons, vests and
+        cars; other labels are not looked at. Raises ConfigError for numbers that cannot be.
+        """
+        given = SIZES if sizes is None else sizes
+        self.sizes = {
+            label: size if isinstance(size, TargetSize) else TargetSize(*size)
+            for label, size in given.items()
+        }
+        lengths = {"limit": limit}
+        for label, size in self.sizes.items():
+            lengths |= {f"height of {label}": size.height, f"width of {label}": size.width}
+        for name, length in lengths.items():
+            if not 0.0 < length < math.inf:
+                raise ConfigError(f"{type(self).__name__}: {name} must be above 0 m, not {length}")
+        if not self.sizes:
+            raise ConfigError(f"{type(self).__name__}: sizes names nothing to look at")
+        super().__init__(list(self.sizes), detector)
+        self.limit = limit
+        self._near = Debounce(needed, of)
+
+    def examine(self, boxes: Detections, context: Context) -> Readings:
+        """Measure the distances in one frame."""
+        stamp = boxes.header.stamp
+        if boxes.camera is None:
+            self.explain_once(boxes, context)
+            return Readings(stamp, {})
+        nearest: dict[str, RelativeTarget] = {}
+        for item in boxes.labelled(*self.labels):
+            found = sight(item, boxes, self.sizes[item.label])
+            known = nearest.get(item.label)
+            if found is not None and (known is None or found.distance < known.distance):
+                nearest[item.label] = found
+        values = {f"distance.{label}": found.distance for label, found in nearest.items()}
+        least = min(nearest.items(), key=lambda entry: entry[1].distance, default=None)
+        if least is not None:
+            values |= {"distance": least[1].distance, "bearing": least[1].bearing}
+        self._near.update(stamp, least is not None and least[1].distance < self.limit)
+        if self._near.began and least is not None:
+            text = f"a {least[0]} is {least[1].distance:.1f} m away, nearer than {self.limit:g} m"
+            context.alert(Alert(boxes.header, "too_near", text, values))
+        return Readings(stamp, values)

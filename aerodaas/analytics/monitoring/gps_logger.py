@@ -1,0 +1,165 @@
+"""GpsLoggerAnalytics: the places that a GPS logger wrote down, or tells by HTTP, as a stream."""
+
+from __future__ import annotations
+
+import bisect
+import logging
+import math
+import time
+import urllib.request
+from pathlib import Path
+from typing import ClassVar
+
+from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.monitoring.gps_rows import TimedFix, parse_track
+from aerodaas.types.clock import seconds
+from aerodaas.types.data import Alert, GpsFix, Header
+from aerodaas.types.errors import ConfigError, SourceError
+
+__all__ = ["GpsLoggerAnalytics"]
+
+_log = logging.getLogger(__name__)
+_LARGEST = 64 * 2**20
+_LARGEST_ANSWER = 2**20
+_LOST_AFTER = 3
+"""Failures in a row after which people are told."""
+
+
+class GpsLoggerAnalytics(Analytics[GpsFix]):
+    """An external source: the fixes of a GPS logger, such as the one in a person's pocket.
+
+    ``GpsLoggerAnalytics("vip.gpx").deploy(edge).instantiate()``. The source is a GPX or CSV file,
+    or the `http://` address of a feed that answers with its newest row (JSON, CSV or GPX).
+
+    A file's first time is mission time zero, plus `offset` seconds: a row that was written 10 s
+    after the first one is current 10 s into the mission, at any speed and in lockstep. Rows
+    without times follow each other at `rate`. Each new fix is told once. A feed is asked at
+    `rate` by the wall clock, and what it says is stamped when it says it.
+    """
+
+    produces: ClassVar[type] = GpsFix
+
+    def __init__(
+        self,
+        source: str | Path,
+        *,
+        rate: float = 1.0,
+        offset: float = 0.0,
+        max_age: float = 10.0,
+        timeout: float = 2.0,
+    ) -> None:
+        """Read the file at `source`, which then travels by value; a feed is first asked in flight.
+
+        `rate` in Hz; a fix older than `max_age` seconds is not told, but counted. A feed has
+        `timeout` seconds to answer. Raises SourceError for a file without a single usable row,
+        and ConfigError for settings that cannot be.
+        """
+        for name, value in (("rate", rate), ("max_age", max_age), ("timeout", timeout)):
+            if not 0.0 < value < math.inf:
+                raise ConfigError(f"{type(self).__name__}: {name} must be above 0, not {value}")
+        if not math.isfinite(offset):
+            raise ConfigError(f"{type(self).__name__}: offset must be finite, not {offset}")
+        self.source = str(source)
+        self.rate = rate
+        self.max_age = max_age
+        self.timeout = timeout
+        self.malformed = 0
+        """Rows so far that could not be read."""
+        self.stale = 0
+        """Rows so far that came too late or told an old time."""
+        self.failures = 0
+        """Requests so far that a feed did not answer."""
+        self._is_feed = self.source.startswith(("http://", "https://"))
+        self._times: list[float] = []
+        self._fixes: list[GpsFix] = []
+        self._last = -math.inf
+        self._failed_in_a_row = 0
+        if not self._is_feed:
+            self._load(Path(source), offset)
+
+    def close(self) -> None:
+        """Say what was not used."""
+        if self.malformed or self.stale or self.failures:
+            _log.warning(
+                "%s: %d malformed rows, %d stale ones, %d requests without an answer",
+                self.source,
+                self.malformed,
+                self.stale,
+                self.failures,
+            )
+
+    def process(self, item: None, context: Context) -> GpsFix | None:
+        """Return the newest fix that was not told yet, or None."""
+        del item
+        if self._is_feed:
+            return self._ask(context)
+        now = seconds(context.now())
+        index = bisect.bisect_right(self._times, now) - 1
+        if index < 0 or self._times[index] <= self._last:
+            return None
+        self._last = self._times[index]
+        if now - self._last > self.max_age:
+            self.stale += 1
+            return None
+        return self._fixes[index]
+
+    def _load(self, path: Path, offset: float) -> None:
+        try:
+            if path.stat().st_size > _LARGEST:
+                raise SourceError(f"{path} is larger than {_LARGEST >> 20} MiB; cut it shorter")
+            text = path.read_text(encoding="utf-8", errors="replace")
+        except OSError as error:
+            raise SourceError(f"cannot read the GPS log {path}: {error.strerror}") from None
+        track = parse_track(text, str(path))
+        self.malformed, self.stale = track.malformed, track.stale
+        timed = [row for row in track.rows if row.time is not None]
+        rows = timed or track.rows
+        self.malformed += len(track.rows) - len(rows)
+        if not rows:
+            raise SourceError(
+                f"{path} holds no usable row ({self.malformed} malformed); it needs latitude and "
+                "longitude in degrees"
+            )
+        first = rows[0].time or 0.0
+        steps = [
+            index / self.rate if row.time is None else row.time - first
+            for index, row in enumerate(rows)
+        ]
+        self._times = [step + offset for step in steps]
+        self._fixes = [row.fix for row in rows]
+
+    def _ask(self, context: Context) -> GpsFix | None:
+        try:
+            rows = self._fetch()
+        except (OSError, SourceError, ValueError) as error:
+            self.failures += 1
+            self._failed_in_a_row += 1
+            if self._failed_in_a_row == _LOST_AFTER:
+                text = f"the GPS feed {self.source} does not answer: {error}"
+                header = Header(self.failures, context.now(), self.name or "gps_logger")
+                context.alert(Alert(header, "gps_feed_lost", text))
+            return None
+        self._failed_in_a_row = 0
+        return self._newest(rows)
+
+    def _newest(self, rows: list[TimedFix]) -> GpsFix | None:
+        if not rows:
+            return None
+        newest = rows[-1]
+        if newest.time is None:
+            return newest.fix
+        if newest.time <= self._last:
+            return None
+        self._last = newest.time
+        if time.time() - newest.time > self.max_age:
+            self.stale += 1
+            return None
+        return newest.fix
+
+    def _fetch(self) -> list[TimedFix]:
+        with urllib.request.urlopen(self.source, timeout=self.timeout) as answer:  # noqa: S310 - http only
+            content = answer.read(_LARGEST_ANSWER)
+        track = parse_track(content.decode("utf-8", errors="replace"), self.source)
+        self.malformed += track.malformed
+        self.stale += track.stale
+        return track.rows

@@ -1,5 +1,0 @@
-"""Neural detectors in ONNX files: any export that people in this field use.
-
-`aerodaas.analytics.onnx.detector.OnnxDetector` is the analysis; `families` holds what is
-particular to each kind of model.
-"""

@@ -1,0 +1,1 @@
+"""People in pictures: joints, gestures, falls, and how close they stand."""

@@ -1,0 +1,179 @@
+"""PoseAnalytics: people and their joints, first the boxes, then the keypoints in each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.detection.detector import OnnxDetector
+from aerodaas.analytics.detection.keypoints import Box, KeypointModel
+from aerodaas.analytics.models import POSE
+from aerodaas.types.data import Detection, Detections, Frame
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["PoseAnalytics", "body_around"]
+
+_PEOPLE = ("person",)
+_VESTS = ("vest", "hazard vest")
+
+_ABOVE, _BELOW = 0.55, 1.6
+"""Heights of an upright person's vest from its upper edge to the crown, its lower to the soles."""
+
+_LYING = 3.0
+"""A lying person's length in lengths of the vest, at most."""
+
+_SAME, _SMALLER = 0.6, 0.35
+"""Boxes of one body share this much of the smaller one, which has this much of the other's area."""
+
+_TRUSTED = 0.35
+"""Confidence of keypoints that say how far a body reaches."""
+
+_LEAST = 5
+"""Keypoints of that confidence, without which they do not."""
+
+_ROOM = 0.08
+"""Of a body's extent, from the outermost joint to the outline."""
+
+
+class PoseAnalytics(Analytics[Detections]):
+    """Finds people and the 17 keypoints of COCO, the shipped networks one after the other.
+
+    The detector gives boxes of people, and of vests: a vest in no person's box shows where
+    somebody must be. The keypoint network then looks at a square cut around each, all in one run,
+    at the `most` largest only. Boxes of one body, with an arm and without, count as one. Runs in
+    the detector's process; the analytics scheduler takes both networks for one task.
+    """
+
+    accepts: ClassVar[tuple[type, ...]] = (Frame,)
+    produces: ClassVar[type] = Detections
+    isolated = True
+    scheduled = True
+    concurrent = True
+
+    def __init__(
+        self,
+        model: str | Path = POSE,
+        *,
+        detector: OnnxDetector | None = None,
+        most: int = 5,
+        min_score: float = 0.3,
+        providers: Sequence[str] | None = None,
+        threads: int | None = None,
+    ) -> None:
+        """Read the models; raises ModelError for a file, ConfigError for a `most` below 1.
+
+        `model` finds keypoints in cuts (`python -m tools.training pose` makes one). `detector`
+        finds `person` or `vest`; by default it is the one that ships, which keeps boxes of
+        `min_score` and more. `providers` and `threads` are as for `OnnxDetector`.
+        """
+        if most < 1:
+            raise ConfigError(f"most must be 1 or more, not {most}")
+        self.most = most
+        self.detector = detector or OnnxDetector(
+            classes=[*_PEOPLE, _VESTS[0]],
+            min_score=min_score,
+            providers=providers,
+            threads=threads,
+        )
+        self.keypoints = KeypointModel(model, providers=providers, threads=threads)
+
+    def open(self) -> None:
+        """Load both networks."""
+        self.detector.open()
+        self.keypoints.open()
+
+    def close(self) -> None:
+        """Release both."""
+        self.detector.close()
+        self.keypoints.close()
+
+    def process(self, item: Frame, context: Context) -> Detections:
+        """Find the people in one frame."""
+        del context
+        return self.detect(item)
+
+    def detect(self, frame: Frame) -> Detections:
+        """Find the people in `frame`, with keypoints of (17, 3): u, v, confidence."""
+        found = self.detector.detect([frame])[0]
+        people = _merged(found.labelled(*_PEOPLE))
+        for vest in found.labelled(*_VESTS):
+            if not any(_holds(person.box, vest.centre) for person in people):
+                people.append(self._wearer(frame, vest))
+        people = sorted(people, key=lambda one: -one.area)[: self.most]
+        if not people:
+            return Detections.of(frame, ())
+        joints = self.keypoints.find(frame.image, [one.box for one in people])
+        return Detections.of(
+            frame,
+            [
+                Detection(one.box, _PEOPLE[0], one.score, keypoints=points)
+                for one, points in zip(people, joints, strict=True)
+            ],
+        )
+
+    def _wearer(self, frame: Frame, vest: Detection) -> Detection:
+        """The person around a vest: a guess, set right by the joints that it shows."""
+        guess = body_around(vest.box)
+        (joints,) = self.keypoints.find(frame.image, [guess])
+        size = (frame.width, frame.height)
+        box = _clipped(_extent(joints) or guess, size)
+        return Detection(box, _PEOPLE[0], vest.score)
+
+
+def _merged(people: Sequence[Detection]) -> list[Detection]:
+    """Each body once, in the box around all that were found of it; best first."""
+    kept: list[Detection] = []
+    for one in people:
+        same = next((at for at, other in enumerate(kept) if _alike(one.box, other.box)), None)
+        if same is None:
+            kept.append(one)
+            continue
+        low = np.minimum(one.box, kept[same].box)[:2].tolist()
+        high = np.maximum(one.box, kept[same].box)[2:].tolist()
+        kept[same] = Detection((*low, *high), kept[same].label, kept[same].score)
+    return kept
+
+
+def _alike(one: Box, other: Box) -> bool:
+    """Whether most of the smaller box lies in the other, and it is not much smaller."""
+    width = min(one[2], other[2]) - max(one[0], other[0])
+    height = min(one[3], other[3]) - max(one[1], other[1])
+    inner = max(0.0, width) * max(0.0, height)
+    areas = [(box[2] - box[0]) * (box[3] - box[1]) for box in (one, other)]
+    return inner > _SAME * min(areas) and min(areas) > _SMALLER * max(areas)
+
+
+def body_around(vest: Box) -> Box:
+    """Guess the box of the person who wears a vest whose box this is, upright or lying."""
+    left, top, right, bottom = vest
+    wide, high = right - left, bottom - top
+    if high >= wide:
+        return left - 0.5 * wide, top - _ABOVE * high, right + 0.5 * wide, bottom + _BELOW * high
+    middle, half = ((left + right) / 2, (top + bottom) / 2), _LYING * wide / 2
+    return middle[0] - half, middle[1] - half, middle[0] + half, middle[1] + half
+
+
+def _extent(joints: NDArray[np.float32]) -> Box | None:
+    """Box around the joints that are trusted; None if they are too few."""
+    places = joints[joints[:, 2] >= _TRUSTED, :2].astype(float)
+    if len(places) < _LEAST:
+        return None
+    low, high = places.min(axis=0), places.max(axis=0)
+    room = _ROOM * float((high - low).max())
+    left, top = (low - room).tolist()
+    right, bottom = (high + room).tolist()
+    return left, top, right, bottom
+
+
+def _clipped(box: Box, size: tuple[int, int]) -> Box:
+    left, top, right, bottom = box
+    return max(0.0, left), max(0.0, top), min(float(size[0]), right), min(float(size[1]), bottom)
+
+
+def _holds(box: Box, point: tuple[float, float]) -> bool:
+    return box[0] <= point[0] <= box[2] and box[1] <= point[1] <= box[3]

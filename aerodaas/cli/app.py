@@ -1,0 +1,196 @@
+"""The command line: flying, watching, studying, clusters, and recordings."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from aerodaas.cli import cluster, lab, remote
+from aerodaas.cli.application import run_application, speed_option
+from aerodaas.cli.export import export
+from aerodaas.cli.replay import replay
+from aerodaas.cli.report import compare, report
+from aerodaas.config.options import RunOptions, current_options
+from aerodaas.config.overrides import parse_setting
+from aerodaas.types.errors import AeroDaaSError, GraphError, InvalidWaypointError, UnknownIdError
+
+__all__ = ["app", "main", "run_typer"]
+
+_CAUSED_BY_A_LINE = (GraphError, InvalidWaypointError, UnknownIdError)
+"""Errors of which the application's own line is the place."""
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="markdown",
+    pretty_exceptions_enable=False,
+    help="""Program drones as a service.
+
+An application of some 20 lines becomes a dataflow of sensing, analytics and navigation, and
+flies a simulated drone or a Tello.
+
+    aerodaas run apps/farm_survey.py --speed max
+""",
+)
+app.add_typer(remote.app, name="remote")
+app.add_typer(lab.app, name="lab")
+app.add_typer(cluster.app, name="cluster")
+
+
+@app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+def run(
+    context: typer.Context,
+    application: Annotated[Path, typer.Argument(help="The application: a Python file.")],
+    env: Annotated[
+        Path | None, typer.Option(help="Environment file instead of the application's own.")
+    ] = None,
+    speed: Annotated[
+        str | None,
+        typer.Option(
+            help="Mission seconds per wall second, or `max`: as fast as the machine goes, "
+            "repeatable to the last digit. Default: `max` if every robot is simulated, else 1."
+        ),
+    ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(help="Where recording, plots and summary go. Default: a folder in runs/."),
+    ] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the simulation.")] = None,
+    address: Annotated[
+        str | None, typer.Option(help="Ray cluster to join. Default: RAY_ADDRESS, or none.")
+    ] = None,
+    guest: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="Another application that shares the sensors and compute, but may not navigate."
+        ),
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
+    ] = None,
+    view: Annotated[
+        bool | None,
+        typer.Option(
+            "--view/--no-view",
+            help="Show the cameras in a browser, too. By default the terminal shows the flight; "
+            "with --no-view nothing does.",
+        ),
+    ] = None,
+    view_address: Annotated[
+        str, typer.Option(help="Where --view listens; on 0.0.0.0 anyone on the network may watch.")
+    ] = "127.0.0.1:8360",
+    live: Annotated[  # noqa: FBT002
+        bool, typer.Option("--live", help="Serve the flight to Foxglove while it goes on.")
+    ] = False,
+    live_address: Annotated[
+        str, typer.Option(help="Where --live listens; on 0.0.0.0 anyone on the network may watch.")
+    ] = "127.0.0.1:8765",
+) -> None:
+    """Fly an application.
+
+    Words after `--` are the application's own.
+
+        aerodaas run apps/farm_survey.py
+        aerodaas run apps/farm_survey.py --speed 5 --seed 7 --record /tmp/farm
+        aerodaas run apps/farm_survey.py --set quadrotor_base.limits.cruise_speed=1
+        aerodaas run apps/disaster_survey.py --guest apps/crowd_watch.py
+        aerodaas run apps/watch_frames.py -- pictures/ yolov8n.onnx --rate 5
+    """
+    factor, lockstep = speed_option(speed)
+    options = RunOptions(
+        environment=env,
+        speed=factor,
+        lockstep=lockstep,
+        seed=seed,
+        record=record,
+        address=address,
+        overrides=dict(parse_setting(text) for text in setting or ()),
+        view=view is not False,
+        live=live_address if live else None,
+        page=view_address if view else None,
+        guests=tuple(path.resolve() for path in guest or ()),
+        application=application.resolve(),
+    )
+    if view:
+        typer.echo(f"view: open http://{view_address} in a browser")
+    if live:
+        typer.echo(f"live: open ws://{live_address} in Foxglove")
+    run_application(application, context.args, options)
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of environment files.
+
+    aerodaas schema > environment.schema.json
+    """
+    import json  # noqa: PLC0415 - only here
+
+    from aerodaas.config.model import EnvironmentConfig  # noqa: PLC0415
+
+    typer.echo(json.dumps(EnvironmentConfig.model_json_schema(by_alias=True), indent=2))
+
+
+@app.command()
+def doctor(
+    address: Annotated[str | None, typer.Option(help="Ray cluster to check, too.")] = None,
+) -> None:
+    """Say what this machine can do.
+
+    aerodaas doctor
+    """
+    from aerodaas.cli.doctor import examine  # noqa: PLC0415 - only here
+
+    raise typer.Exit(0 if examine(address) else 1)
+
+
+app.command()(report)
+app.command()(compare)
+app.command()(export)
+app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(replay)
+
+
+def main() -> None:
+    """Run the command line."""
+    run_typer(app)
+
+
+def run_typer(typer_app: typer.Typer, name: str | None = None) -> None:
+    """Run a Typer application as a program; errors become one message and an exit code."""
+    try:
+        typer_app(standalone_mode=True, prog_name=name)
+    except AeroDaaSError as error:
+        line = _application_line(error) if isinstance(error, _CAUSED_BY_A_LINE) else ""
+        _say(str(error) + (f"\n  at {line}" if line and "\n  at " not in str(error) else ""))
+        sys.exit(error.exit_code)
+    except SyntaxError as error:
+        _say(f"{error.filename}:{error.lineno}: {error.msg}: {(error.text or '').strip()}")
+        sys.exit(1)
+    except Exception as error:  # noqa: BLE001 - the application may raise anything
+        line = _application_line(error)
+        _say(f"{type(error).__name__}: {error}" + (f"\n  at {line}" if line else ""))
+        sys.exit(1)
+
+
+def _application_line(error: Exception) -> str:
+    """The application's own last line on the way to an error, as `file:line: code`, or empty."""
+    application = current_options.get().application
+    if application is None:
+        return ""
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        path = Path(frame.filename)
+        if path.is_file() and path.resolve().is_relative_to(application.parent):
+            return f"{path.name}:{frame.lineno}: {frame.line}"
+    return ""
+
+
+def _say(text: str) -> None:
+    from rich.console import Console  # noqa: PLC0415 - only when there is something to say
+    from rich.text import Text  # noqa: PLC0415
+
+    Console(stderr=True).print(Text("error: ", style="bold red") + Text(text), soft_wrap=True)

@@ -1,0 +1,127 @@
+"""The tasks of a recorded flight: when each came, where it ran, how it ended."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from aerodaas.config.model import EnvironmentConfig, validated
+from aerodaas.recording.reader import Recording
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    Profile,
+    Resources,
+    TaskOutcome,
+    TaskPlace,
+)
+from aerodaas.schedulers.analytics.published.profiles import told_profile
+from aerodaas.types.errors import RecordingError
+
+__all__ = ["Flown", "FlownTask"]
+
+_ENDS = {"drop": TaskOutcome.DROPPED} | {outcome.value: outcome for outcome in TaskOutcome}
+_ANSWERED = (TaskOutcome.DONE, TaskOutcome.LATE)
+_PLACES = {place.value: place for place in TaskPlace}
+
+
+@dataclass(slots=True)
+class FlownTask:
+    """One task of the flight; stamps and durations in nanoseconds."""
+
+    model: str
+    source: str
+    arrival: int
+    number: int
+    """Of its arrival: the tasks of one frame arrive at one moment, but in an order."""
+    reserve: int
+    began: int | None = None
+    place: TaskPlace = TaskPlace.NOWHERE
+    """Where its execution began."""
+    ended: int = 0
+    outcome: TaskOutcome | None = None
+    """None if the flight was over before."""
+    why: str = ""
+    """Reason of the last decision about it."""
+
+    @property
+    def took(self) -> int | None:
+        """How long its execution took, if an answer came."""
+        answered = self.outcome in _ANSWERED and self.began is not None
+        return self.ended - (self.began or 0) if answered else None
+
+    def note(self, record: dict[str, Any]) -> None:
+        """Take note of a recorded decision or of the end."""
+        action = record["action"]
+        if action in {"edge", "cloud"}:
+            self.began, self.place, self.why = record["stamp"], TaskPlace(action), record["reason"]
+        elif action in _ENDS:
+            self.outcome, self.ended = _ENDS[action], record["stamp"]
+            if action == "drop":
+                self.place, self.why = TaskPlace.NOWHERE, record["reason"]
+            else:
+                # A busy recorder may have lost the decision.
+                named = record["reason"].partition(":")[0]
+                self.place = _PLACES.get(named, TaskPlace.NOWHERE)
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What a recording says of the tasks that its analytics scheduler decided on."""
+
+    name: str
+    tasks: list[FlownTask]
+    """In order of arrival."""
+    models: dict[str, Profile]
+    """As the environment tells of them."""
+    resources: Resources
+
+    @classmethod
+    def read(cls, path: str | Path) -> Flown:
+        """Read a recording.
+
+        Raises RecordingError for one without decisions or without its environment.
+        """
+        with Recording.open(path) as recording:
+            decisions = [r.value for r in recording.records(schemas=["aerodaas.Decision"])]
+            tasks = _tasks(one for one in decisions if "waited_ms" in one["values"])
+            if not tasks:
+                raise RecordingError(
+                    f"{path} holds no decisions of an analytics scheduler; fly with one, such as "
+                    '"schedulers": {"analytics": "dems"} in the environment file'
+                )
+            if "environment.json" not in recording.attachments:
+                raise RecordingError(
+                    f"{path} holds no environment, so no run of ours has written it"
+                )
+            content = json.loads(recording.attachment("environment.json"))
+        environment = validated(content, f"the environment in {path}")
+        told = environment.schedulers.tasks
+        models = {name: told_profile(name, told) for name in sorted({t.model for t in tasks})}
+        return cls(Path(path).stem, tasks, models, Resources(_cloud_slots(environment)))
+
+
+def _tasks(decisions: Iterable[dict[str, Any]]) -> list[FlownTask]:
+    found: dict[str, FlownTask] = {}
+    for record in decisions:
+        name, figures = record["task"], record["values"]
+        task = found.get(name)
+        if task is None:
+            model, _, frame = name.partition("#")
+            task = found[name] = FlownTask(
+                model,
+                frame.rpartition(":")[0],
+                record["stamp"] - round(figures["waited_ms"] * MILLISECOND),
+                int(figures.get("number", 0)),
+                round(figures.get("reserve_ms", 0.0) * MILLISECOND),
+            )
+        task.note(record)
+    return sorted(found.values(), key=lambda task: (task.arrival, task.number))
+
+
+def _cloud_slots(environment: EnvironmentConfig) -> int:
+    if environment.compute == "auto":
+        return Resources().cloud_slots
+    return sum(one.executors for one in environment.compute if one.kind == "cloud")

@@ -1,0 +1,113 @@
+"""One way of checking what people write in files, and of wording what is wrong with it."""
+
+from __future__ import annotations
+
+import difflib
+import re
+import types
+import typing
+from collections.abc import Iterable, Sequence
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["checked", "explained", "near"]
+
+M = TypeVar("M", bound=BaseModel)
+_SECRET = "token"  # noqa: S105 - a setting's name
+_WORD = re.compile(r"[\w .\-]{0,40}")
+
+
+def checked(model: type[M], content: object, place: str, hint: str = "") -> M:
+    """Make a `model` of `content`; raises ConfigError that names `place`, setting and remedy."""
+    try:
+        return model.model_validate(content)
+    except ValidationError as error:
+        raise ConfigError(f"{place}: {explained(error, model, content)}{hint}") from None
+
+
+def explained(error: ValidationError, model: type[BaseModel], content: object) -> str:
+    """What is wrong, setting by setting, each with its value and what would be right."""
+    problems = [one for one in error.errors() if not _is_other_choice(one)] or error.errors()
+    return "; ".join(_problem(one, model, content) for one in problems)
+
+
+def near(name: str, known: Iterable[str]) -> str:
+    """What may have been meant by `name`, as a remedy to put behind an error."""
+    choices = sorted(known)
+    close = difflib.get_close_matches(name, choices, n=1, cutoff=0.6)
+    meant = f"; did you mean {close[0]}?" if close else ""
+    return f"{meant} (known: {', '.join(choices) or 'none'})"
+
+
+def _is_other_choice(problem: ErrorDetails) -> bool:
+    """What pydantic says of a word that might have stood where there is more than a word."""
+    return problem["type"] == "literal_error" and not isinstance(problem["input"], str)
+
+
+def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> str:
+    # Among several kinds that a setting may have, pydantic names the one that it tried.
+    place = tuple(one for one in problem["loc"] if not (isinstance(one, str) and "[" in one))
+    said = problem["msg"].removeprefix("Value error, ")
+    text = ".".join(str(part) for part in place) or "file"
+    whose = _whose(content, place)
+    if problem["type"] == "extra_forbidden":
+        known = _settings_at(model, place[:-1])
+        return f"{text}: there is no such setting{whose}{near(str(place[-1]), known)}"
+    value = problem["input"]
+    number = value is None or isinstance(value, bool | int | float)
+    # A word may be shown, but no address, which may hold a password, and no secret.
+    word = isinstance(value, str) and _WORD.fullmatch(value) and _SECRET not in text
+    shown = repr(value) if number or word else ""
+    if problem["type"] == "missing" or not shown:
+        return f"{text}: {said}{whose}"
+    return f"{text}: {said}, not {shown}{whose}"
+
+
+def _whose(content: object, place: Sequence[int | str]) -> str:
+    """The ids on the way to `place`, for a number in a list says little: ` (of drone, cam)`."""
+    found = []
+    for part in place:
+        try:
+            content = content[part]  # type: ignore[index]
+        except (TypeError, LookupError):
+            break
+        if isinstance(content, dict) and isinstance(part, int) and "id" in content:
+            found.append(str(content["id"]))
+    return f" (of {', '.join(found)})" if found else ""
+
+
+def _settings_at(model: type[BaseModel], place: Sequence[int | str]) -> list[str]:
+    """Names of the settings that the part of `model` at `place` has."""
+    kinds: list[Any] = [model]
+    for part in place:
+        kinds = [inner for kind in kinds for inner in _inside(kind, part)]
+    models = (kind for kind in kinds if _is_model(kind))
+    return sorted(
+        {field.alias or name for kind in models for name, field in kind.model_fields.items()}
+    )
+
+
+def _inside(kind: Any, part: int | str) -> list[Any]:  # noqa: ANN401 - an annotation
+    if _is_model(kind):
+        fields = kind.model_fields
+        return _alternatives(fields[part].annotation) if part in fields else []
+    arguments = typing.get_args(kind)
+    if typing.get_origin(kind) in {list, tuple, dict} and arguments:
+        return _alternatives(arguments[-1])
+    return [kind]
+
+
+def _alternatives(kind: Any) -> list[Any]:  # noqa: ANN401 - an annotation
+    if typing.get_origin(kind) is typing.Annotated:
+        return _alternatives(typing.get_args(kind)[0])
+    if typing.get_origin(kind) in {typing.Union, types.UnionType}:
+        return [one for inner in typing.get_args(kind) for one in _alternatives(inner)]
+    return [kind]
+
+
+def _is_model(kind: Any) -> bool:  # noqa: ANN401 - an annotation
+    return isinstance(kind, type) and issubclass(kind, BaseModel)

@@ -1,0 +1,109 @@
+"""Settings laid over an environment file: `camera.rate=5`, `simulation.seed=3`."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from aerodaas.config.model import EnvironmentConfig, SensorConfig, validated
+from aerodaas.types.errors import AmbiguousIdError, ConfigError, UnknownIdError
+
+__all__ = ["located", "overridden", "parse_setting"]
+
+
+def parse_setting(text: str) -> tuple[str, Any]:
+    """Split `id.setting=value`; the value is JSON, or else a string. Raises ConfigError."""
+    name, equals, value = text.partition("=")
+    if not equals or "." not in name:
+        raise ConfigError(f"a setting is written id.setting=value, not {text!r}")
+    try:
+        return name, json.loads(value)
+    except json.JSONDecodeError:
+        return name, value
+
+
+def overridden(config: EnvironmentConfig, settings: Mapping[str, Any]) -> EnvironmentConfig:
+    """Return `config` with `settings` laid over it.
+
+    The part before the first dot is the id of a robot, a sensor (or `robot/sensor`) or a compute
+    resource, or a section of the file such as `simulation`. What bears an id that others bear, too,
+    goes by `robots/…`, `sensors/…` or `compute/…`. Raises ConfigError for an unknown setting,
+    UnknownIdError for an unknown id and AmbiguousIdError for one that fits several.
+    """
+    if not settings:
+        return config
+    content = config.model_dump(by_alias=True)
+    for name, value in settings.items():
+        owner, _, path = name.partition(".")
+        _assign(_find(content, owner), path.split("."), copy.deepcopy(value))
+    return validated(content, "environment with overrides")
+
+
+def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
+    """Return `config` with the relative paths in its settings made absolute.
+
+    What lies in `folder`, or else in the working directory, is meant; a path that leads nowhere
+    stays as it is. Actors have other working directories than the application.
+    """
+    content = config.model_dump(by_alias=True)
+    places: list[dict[str, Any]] = [*content["robots"], *content["sensors"]]
+    places += [sensor for robot in content["robots"] for sensor in robot["sensors"]]
+    for settings in (place["settings"] for place in places):
+        if isinstance(settings.get("path"), str):
+            settings["path"] = _absolute(settings["path"], folder)
+    for env in content["runtime_env"].values():
+        env["packages"] = [
+            _absolute(package, folder) if package.endswith(".whl") else package
+            for package in env["packages"]
+        ]
+    if content["simulation"]["world"].endswith(".json"):
+        content["simulation"]["world"] = _absolute(content["simulation"]["world"], folder)
+    return validated(content, "environment")
+
+
+def _absolute(path: str, folder: Path) -> str:
+    found = (place.resolve() for place in (folder / path, Path(path)) if place.exists())
+    return str(next(found, path))
+
+
+def _find(content: dict[str, Any], owner: str) -> dict[str, Any]:
+    places = _places(content)
+    section = content.get(owner)
+    if isinstance(section, dict):
+        places[owner] = section
+    fitting = [name for name in places if owner in {name, *_shorter(name, places[name])}]
+    if len(fitting) > 1:
+        raise AmbiguousIdError("part of the environment", owner, fitting)
+    if fitting:
+        return places[fitting[0]]
+    known = sorted(places[name].get("id", name) for name in places)
+    raise UnknownIdError("robot, sensor, compute resource or section", owner, known)
+
+
+def _places(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """What has an id, by names that no two share."""
+    compute = [] if content["compute"] == "auto" else content["compute"]
+    sections = {"robots": content["robots"], "sensors": content["sensors"], "compute": compute}
+    places = {
+        f"{section}/{place['id']}": place for section, many in sections.items() for place in many
+    }
+    for robot in content["robots"]:
+        for sensor in robot["sensors"]:
+            places[f"robots/{robot['id']}/{sensor['id']}"] = sensor
+    return places
+
+
+def _shorter(name: str, place: dict[str, Any]) -> list[str]:
+    """Other names of a part: its id, and that with its robot's."""
+    return [name.partition("/")[2], str(place["id"])] if "id" in place else []
+
+
+def _assign(place: dict[str, Any], path: list[str], value: Any) -> None:  # noqa: ANN401
+    for key in path[:-1]:
+        place = place.setdefault(key, {})
+    if path[-1] not in place and "settings" in place and path[-1] not in SensorConfig.model_fields:
+        place = place["settings"]
+    place[path[-1]] = value

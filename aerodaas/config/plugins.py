@@ -1,0 +1,133 @@
+"""Plug-ins: found by registered name, by entry point, or by `module:Class`.
+
+A package adds its own by an entry point in the group `aerodaas.<kind>`, such as
+`aerodaas.cameras`; an application may name any importable class as `module:Class`.
+"""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Mapping
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+from typing import Any, Literal
+
+from aerodaas.types.errors import AeroDaaSError, ConfigError, UnknownIdError
+
+__all__ = [
+    "PluginKind",
+    "is_built_in",
+    "load_plugin",
+    "main_name",
+    "plugin_names",
+    "require_plugin",
+]
+
+PluginKind = Literal["drivers", "cameras", "trajectory_schedulers", "analytics_schedulers"]
+
+_BUILT_IN: dict[PluginKind, dict[str, str]] = {
+    "drivers": {
+        "simulated": "aerodaas.drivers.simulated:SimulatedVehicle",
+        "tello": "aerodaas.drivers.tello.vehicle:TelloVehicle",
+        "mavlink": "aerodaas.drivers.mavlink.vehicle:MavlinkVehicle",
+        "replayed": "aerodaas.recording.replay.vehicle:ReplayedVehicle",
+    },
+    "cameras": {
+        "simulated": "aerodaas.cameras.simulated:SimulatedCamera",
+        "tello": "aerodaas.drivers.tello.camera:TelloCamera",
+        "recorded": "aerodaas.cameras.recorded:recorded_camera",
+        "folder": "aerodaas.cameras.folder:FolderCamera",
+        "video": "aerodaas.cameras.video:VideoCamera",
+        "mavlink": "aerodaas.cameras.video:VideoCamera",
+        "mcap": "aerodaas.recording.replay.mcap_camera:McapCamera",
+        "replayed": "aerodaas.recording.replay.mcap_camera:ReplayedCamera",
+    },
+    "trajectory_schedulers": {
+        "ordered": "aerodaas.schedulers.trajectory.ordered:OrderedScheduler",
+        "nearest_neighbor": (
+            "aerodaas.schedulers.trajectory.nearest_neighbor:NearestNeighborScheduler"
+        ),
+        "priority": "aerodaas.schedulers.trajectory.priority:PriorityScheduler",
+        "deadline": "aerodaas.schedulers.trajectory.deadline:DeadlineScheduler",
+        "optimal": "aerodaas.schedulers.trajectory.optimal:OptimalScheduler",
+    },
+    "analytics_schedulers": {
+        "fifo": "aerodaas.schedulers.analytics.published.edge_only:Fifo",
+        "edf": "aerodaas.schedulers.analytics.published.edge_only:Edf",
+        "sjf": "aerodaas.schedulers.analytics.published.edge_only:Sjf",
+        "hbf": "aerodaas.schedulers.analytics.published.edge_only:Hbf",
+        "huf": "aerodaas.schedulers.analytics.published.edge_only:Huf",
+        "hpf": "aerodaas.schedulers.analytics.published.edge_only:Hpf",
+        "cld": "aerodaas.schedulers.analytics.published.cloud_only:CloudOnly",
+        "ec_edf": "aerodaas.schedulers.analytics.published.edge_cloud:EdgeCloudEdf",
+        "ec_sjf": "aerodaas.schedulers.analytics.published.edge_cloud:EdgeCloudSjf",
+        "dem": "aerodaas.schedulers.analytics.published.dem:Dem",
+        "dems": "aerodaas.schedulers.analytics.published.dems:Dems",
+        "dems_a": "aerodaas.schedulers.analytics.published.dems_a:DemsA",
+        "gems": "aerodaas.schedulers.analytics.published.gems:Gems",
+        "kalmia": "aerodaas.schedulers.analytics.published.kalmia:Kalmia",
+        "dedas": "aerodaas.schedulers.analytics.published.dedas:Dedas",
+        "margin": "aerodaas.schedulers.analytics.margin:Margin",
+    },
+}
+
+
+def plugin_names(kind: PluginKind) -> list[str]:
+    """Names that `load_plugin` knows, sorted."""
+    found = {point.name for point in entry_points(group=f"aerodaas.{kind}")}
+    return sorted(found | set(_BUILT_IN[kind]))
+
+
+def require_plugin(kind: PluginKind, name: str) -> None:
+    """Import nothing, but raise UnknownIdError if nothing is called `name`."""
+    _target(kind, name)
+
+
+def is_built_in(kind: PluginKind, name: str) -> bool:
+    """Tell whether the project itself brings what is called `name`."""
+    return name in _BUILT_IN[kind]
+
+
+def load_plugin(kind: PluginKind, name: str) -> Any:  # noqa: ANN401 - a class of the caller's kind
+    """Import the class called `name`.
+
+    Raises UnknownIdError for an unknown name, ConfigError for one that cannot be imported.
+    """
+    target = _target(kind, name)
+    module, _, attribute = target.partition(":")
+    try:
+        return getattr(_imported(module), attribute)
+    except AeroDaaSError:
+        raise
+    except (ImportError, AttributeError) as error:
+        raise ConfigError(f"cannot load {name!r} ({target}): {error}") from error
+
+
+def main_name(namespace: Mapping[str, Any]) -> str | None:
+    """The name by which others would import the file that runs as `__main__`; None without one."""
+    spec, file = namespace.get("__spec__"), namespace.get("__file__")
+    if spec is not None:
+        return str(spec.name)
+    return Path(file).stem if file else None
+
+
+def _imported(name: str) -> ModuleType:
+    # Imported once more, the application's own file would start its mission once more.
+    main = sys.modules.get("__main__")
+    if main is not None and name == main_name(vars(main)):
+        return main
+    return importlib.import_module(name)
+
+
+def _target(kind: PluginKind, name: str) -> str:
+    if name in _BUILT_IN[kind]:
+        return _BUILT_IN[kind][name]
+    for point in entry_points(group=f"aerodaas.{kind}"):
+        if point.name == name:
+            return point.value
+    if ":" in name:
+        return name
+    label = kind.replace("_", " ").removesuffix("s")
+    raise UnknownIdError(label, name, plugin_names(kind))

@@ -1,0 +1,259 @@
+"""The application as a graph: what `analyse()` and `navigate()` record, and nothing else.
+
+Nodes are sensors and analytics; edges are streams. Building checks types and shapes at once and
+points at the application's own line; nothing runs before the mission starts. The runtime reads
+the finished graph and attaches itself, after which the same stream objects are live.
+"""
+
+from __future__ import annotations
+
+import inspect
+import linecache
+import typing
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
+
+from aerodaas.config.model import RuntimeEnvConfig
+from aerodaas.dataflow.interfaces import IAeroData
+from aerodaas.dataflow.names import PaperNames
+from aerodaas.types.errors import GraphError
+
+if TYPE_CHECKING:
+    from aerodaas.dataflow.navigation import AeroNavigation
+
+__all__ = [
+    "AeroStreamData",
+    "Graph",
+    "NavigationEdge",
+    "Node",
+    "NodeKind",
+    "StreamReader",
+    "Trigger",
+    "application_line",
+    "refusal",
+]
+
+E = TypeVar("E")
+E_co = TypeVar("E_co", covariant=True)
+NodeKind = typing.Literal["sensor", "analytics", "external"]
+_PACKAGE = Path(__file__).resolve().parents[1]
+# Two of the package's folders may stand elsewhere, behind links.
+_OURS = (_PACKAGE, *((_PACKAGE / name).resolve() for name in ("actors", "schedulers")))
+
+
+def application_line() -> str:
+    """The application's line that called into this package, as `file:line: code`, or empty."""
+    frame = inspect.currentframe()
+    while frame is not None:
+        path = Path(frame.f_code.co_filename).resolve()
+        if not any(path.is_relative_to(folder) for folder in _OURS):
+            code = linecache.getline(str(path), frame.f_lineno).strip()
+            return f"{path.name}:{frame.f_lineno}: {code}"
+        frame = frame.f_back
+    return ""
+
+
+def refusal(message: str) -> GraphError:
+    """An error that names the application's own line."""
+    line = application_line()
+    return GraphError(f"{message}\n  at {line}" if line else message)
+
+
+class StreamReader(Protocol[E_co]):
+    """A live subscription, provided by the runtime."""
+
+    def next(self, timeout: float | None) -> E_co:
+        """The next item; raises TimeoutError, or StopIteration once the mission has ended."""
+        ...
+
+    def newest(self, timeout: float | None) -> E_co:
+        """The newest item, seen before or not; waits for the first one, and raises as `next`."""
+        ...
+
+
+@dataclass(frozen=True)
+class Trigger:
+    """Wakes an analysis, or calls a robot's method, when a result satisfies `when`."""
+
+    target: str
+    """Id of the node or of the robot."""
+    method: str | None = None
+    """Name of the robot's method; None for a node."""
+    when: Callable[[Any], bool] | None = None
+
+
+@dataclass
+class Node:
+    """One sensor or analysis."""
+
+    id: str
+    """Unique; also the name of its stream."""
+    kind: NodeKind
+    item: type
+    """Type of the items in its stream."""
+    work: Any
+    """What the actor runs: a sensor's configuration or an analysis."""
+    robot: str | None = None
+    inputs: list[str] = field(default_factory=list)
+    compute: str | None = None
+    runtime_env: RuntimeEnvConfig | None = None
+    """What it has for itself, if the application says so."""
+    triggers: list[Trigger] = field(default_factory=list)
+    dormant: bool = False
+    """Runs only once triggered."""
+
+
+@dataclass(frozen=True)
+class NavigationEdge:
+    """Navigation that reaches a robot: waypoints known beforehand, or a stream."""
+
+    robot: str
+    navigation: AeroNavigation
+    index: int | None = None
+    deadline: float | None = None
+    clear_on: str | None = None
+    """Stream whose first item empties the queue."""
+
+
+class Graph:
+    """The dataflow of one application."""
+
+    def __init__(self, sensors: Iterable[str] = ()) -> None:
+        """Start empty; the ids of `sensors` are theirs, whether they are used or not."""
+        self._sensors = frozenset(sensors)
+        self.nodes: dict[str, Node] = {}
+        self.navigation: list[NavigationEdge] = []
+        self.reader: Callable[[str], StreamReader[Any]] | None = None
+        """Opens a live subscription by stream; set by the runtime while a mission runs."""
+        self.on_launch: list[Callable[[], None]] = []
+        """Called once the streams are live."""
+        self.on_growth: Callable[[], None] | None = None
+        """Has the runtime start what was added; set by it while a mission runs."""
+
+    def add(self, node: Node) -> Node:
+        """Add a node, giving it a fresh id where its own is taken by another."""
+        base, count = node.id, 2
+        while node.id in self.nodes or (node.kind != "sensor" and node.id in self._sensors):
+            node.id = f"{base}_{count}"
+            count += 1
+        self.nodes[node.id] = node
+        return node
+
+    @property
+    def flying(self) -> bool:
+        """Whether a mission runs by this graph."""
+        return self.on_growth is not None
+
+    def launch(self, node: Node) -> None:
+        """Start `node`, which was just added, if a mission runs; it is taken out if that fails.
+
+        Raises what the runtime raises.
+        """
+        if self.on_growth is None:
+            return
+        try:
+            self.on_growth()
+        except BaseException:
+            del self.nodes[node.id]
+            raise
+
+    def require_idle(self, node: Node, what: str) -> None:
+        """Raise GraphError, with the line, if `node` runs already, so that `what` is too late."""
+        if self.flying and node.id in self.nodes:
+            message = (
+                f"{node.id} runs already, too late to {what}; do that before analyse(), or with a "
+                "further analysis"
+            )
+            raise refusal(message)
+
+    def connect(self, source: AeroStreamData[Any], target: Node, accepts: tuple[type, ...]) -> None:
+        """Draw an edge; raises GraphError for a wrong type, a foreign graph or a cycle."""
+        if source.graph is not self:
+            message = f"{source.name} belongs to another Environment than {target.id}"
+            raise refusal(message)
+        if not issubclass(source.item, accepts):
+            wanted = " or ".join(kind.__name__ for kind in accepts)
+            message = (
+                f"{type(target.work).__name__} takes a stream of {wanted}, "
+                f"but {source.name} carries {source.item.__name__}"
+            )
+            raise refusal(message)
+        if target.id in self.upstream(source.name):
+            message = f"{target.id} would analyse its own results by way of {source.name}"
+            raise refusal(message)
+        if source.name not in target.inputs:
+            target.inputs.append(source.name)
+
+    def upstream(self, name: str) -> set[str]:
+        """Ids of `name` and of everything that it is made from."""
+        found: set[str] = set()
+        waiting = [name]
+        while waiting:
+            current = waiting.pop()
+            if current not in found:
+                found.add(current)
+                waiting.extend(self.nodes[current].inputs)
+        return found
+
+    def downstream(self, name: str) -> list[Node]:
+        """The nodes that read the stream `name`."""
+        return [node for node in self.nodes.values() if name in node.inputs]
+
+
+class AeroStreamData(PaperNames, IAeroData[E], Generic[E]):
+    """The stream of one node: an edge while the graph is built, an iterator in flight."""
+
+    def __init__(self, graph: Graph, name: str, item: type) -> None:
+        """Name the stream of node `name`, which carries `item`."""
+        self.graph = graph
+        self.name = name
+        self.item = item
+        self._reader: StreamReader[E] | None = None
+        self._opened_by: Callable[[str], StreamReader[Any]] | None = None
+
+    @property
+    def data(self) -> AeroStreamData[E]:
+        """The stream itself: its data arrives in flight."""
+        return self
+
+    def get_data(self, timeout: float | None = None) -> E:
+        """Return the next item in flight, waiting up to `timeout` seconds (None: for ever).
+
+        Raises GraphError before the mission has started, TimeoutError when nothing came, and
+        StopIteration once the mission has ended.
+        """
+        return self._live().next(timeout)
+
+    def get_newest(self, timeout: float | None = None) -> E:
+        """Return the newest item in flight, waiting up to `timeout` seconds for the first one.
+
+        Raises what `get_data` raises.
+        """
+        return self._live().newest(timeout)
+
+    def _live(self) -> StreamReader[E]:
+        opener = self.graph.reader
+        if opener is None:
+            message = (
+                f"{self.name} has no data before the mission starts; "
+                "call start_mission(wait=False) first"
+            )
+            raise refusal(message)
+        if self._reader is None or self._opened_by is not opener:
+            self._reader, self._opened_by = opener(self.name), opener
+        return self._reader
+
+    def set_data(self, data: E) -> None:
+        """Refuse: a stream's data comes from its node."""
+        message = f"{self.name} is a stream: its data comes from its node, not from {data!r}"
+        raise refusal(message)
+
+    def __iter__(self) -> Iterator[E]:
+        """Iterate over items as they arrive."""
+        return self
+
+    def __next__(self) -> E:
+        """Return the next item; ends with the mission."""
+        return self.get_data()

@@ -1,0 +1,111 @@
+"""The handles of sensors and compute resources that an application holds."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+from aerodaas.config.model import ComputeConfig, SensorConfig
+from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
+from aerodaas.dataflow.interfaces import ICompute, IPullSensor, IPushSensor
+from aerodaas.dataflow.names import PaperNames
+from aerodaas.types.data import Battery, Frame, GpsFix, Odometry
+from aerodaas.types.errors import UnknownIdError
+from aerodaas.types.status import MissionStatus
+
+__all__ = ["SENSOR_ITEMS", "Compute", "Sensor"]
+
+E = TypeVar("E")
+
+SENSOR_ITEMS: dict[str, type] = {
+    "camera": Frame,
+    "odometry": Odometry,
+    "gps": GpsFix,
+    "battery": Battery,
+    "status": MissionStatus,
+}
+"""Type of the items of each type of sensor."""
+
+
+class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
+    """A sensor of a robot or of the environment; read it as a stream, by callback, or by poll."""
+
+    def __init__(self, graph: Graph, config: SensorConfig, robot: str | None) -> None:
+        """Belong to `robot`, or to the environment if None."""
+        self._graph = graph
+        self._config = config
+        self._robot = robot
+        self._poller: AeroStreamData[E] | None = None
+
+    def get_sensor_id(self) -> str:
+        """Return the unique ID of the sensor."""
+        return self._config.id
+
+    def get_sensor_property(self, name: str) -> str:
+        """Return one property as text: id, type, driver, rate, or one of the driver's settings.
+
+        Raises UnknownIdError for any other name.
+        """
+        known: dict[str, Any] = {
+            "id": self._config.id,
+            "type": self._config.type,
+            "driver": self._config.driver or "",
+            "rate": self._config.rate,
+            "robot": self._robot or "",
+            **self._config.settings,
+        }
+        if name not in known:
+            raise UnknownIdError(f"property of {self._config.id}", name, list(known))
+        return str(known[name])
+
+    def get_data_stream(self) -> AeroStreamData[E]:
+        """Return the stream of the sensor's data; in flight, a camera that is off is started."""
+        name = self._config.full_id
+        item = SENSOR_ITEMS[self._config.type]
+        if name not in self._graph.nodes:
+            node = self._graph.add(Node(name, "sensor", item, self._config, self._robot))
+            self._graph.launch(node)
+        return AeroStreamData(self._graph, name, item)
+
+    def subscribe(self, callback: Callable[[E], None]) -> None:
+        """Call `callback` with each item while the mission runs, in a thread of this process.
+
+        Before the mission, from its start; in flight, from now on.
+        """
+        stream = self.get_data_stream()
+
+        def deliver() -> None:
+            for item in stream:
+                callback(item)
+
+        def start() -> None:
+            threading.Thread(target=deliver, name=f"push {stream.name}", daemon=True).start()
+
+        if self._graph.flying:
+            start()
+        else:
+            self._graph.on_launch.append(start)
+
+    def poll(self, timeout: float = 1.0) -> E:
+        """Return the newest item, waiting up to `timeout` seconds for the first one.
+
+        Raises GraphError before the mission has started, TimeoutError when nothing came.
+        """
+        if self._poller is None:
+            self._poller = self.get_data_stream()
+        return self._poller.get_newest(timeout)
+
+
+class Compute(PaperNames, ICompute):
+    """A compute resource, to `deploy` analytics on."""
+
+    def __init__(self, graph: Graph, config: ComputeConfig) -> None:
+        """Stand for the resource that `config` describes."""
+        self.graph = graph
+        self.config = config
+
+    def get_compute_properties(self) -> dict[str, Any]:
+        """Return id, kind, node, executors and the resource's own settings."""
+        properties = self.config.model_dump()
+        return {**properties.pop("settings"), **properties}

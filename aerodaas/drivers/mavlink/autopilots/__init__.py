@@ -1,0 +1,1 @@
+"""The autopilot families, each behind the same seam."""

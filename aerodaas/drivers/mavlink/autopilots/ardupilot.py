@@ -1,0 +1,158 @@
+"""ArduCopter: guided, modes by number, take-off to a height above home."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, Failsafe, FenceAction
+from aerodaas.drivers.mavlink.microservices.commander import PendingCommand
+from aerodaas.drivers.mavlink.state.phase import FlightMode
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+
+__all__ = ["ArduPilot"]
+
+_GUIDED, _LAND, _RETURN, _BRAKE = 4, 9, 6, 17
+_ASKED = {
+    FlightMode.GUIDED: _GUIDED,
+    FlightMode.TAKE_OFF: _GUIDED,
+    # Loiter would take the throttle of a remote control that may not be there, and sink.
+    FlightMode.HOLD: _BRAKE,
+    FlightMode.RETURN: _RETURN,
+    FlightMode.LAND: _LAND,
+}
+_NAMES = {
+    0: "stabilize",
+    1: "acro",
+    2: "altitude hold",
+    3: "auto",
+    _GUIDED: "guided",
+    5: "loiter",
+    _RETURN: "return",
+    7: "circle",
+    _LAND: "land",
+    11: "drift",
+    13: "sport",
+    14: "flip",
+    15: "autotune",
+    16: "position hold",
+    _BRAKE: "brake",
+    18: "throw",
+    20: "guided without GPS",
+    21: "smart return",
+    27: "automatic return",
+}
+_KNOWN = {
+    _GUIDED: FlightMode.GUIDED,
+    _BRAKE: FlightMode.HOLD,
+    _RETURN: FlightMode.RETURN,
+    21: FlightMode.RETURN,
+    _LAND: FlightMode.LAND,
+}
+_TALK = 35.0
+"""Seconds: it repeats what it objects to every 30 s."""
+
+
+class ArduPilot(Autopilot):
+    """ArduCopter 4.3 and later."""
+
+    name: ClassVar[str] = "ArduPilot"
+    family: ClassVar[int] = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    stream_before: ClassVar[float] = 0.0
+    stops_short: ClassVar[bool] = False
+    alone: ClassVar[str] = (
+        "ArduPilot stops within 3 s and hovers until somebody lands it; it comes home only with "
+        'FS_GCS_ENABLE at 1 and "role": "ground_station"'
+    )
+    orphaned: ClassVar[str] = (
+        "if this process dies it hovers where it is; with FS_GCS_ENABLE at 1 and "
+        '"role": "ground_station" it comes home'
+    )
+    rates: ClassVar[dict[int, float]] = {
+        **Autopilot.rates,
+        mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 2.0,
+    }
+    failsafes: ClassVar[tuple[Failsafe, ...]] = (
+        Failsafe(
+            "BATT_FS_LOW_ACT",
+            frozenset({0.0}),
+            2.0,
+            "a low battery only leads to a warning",
+        ),
+        Failsafe(
+            "FS_EKF_ACTION",
+            frozenset({0.0}),
+            1.0,
+            "the loss of its position is only reported",
+        ),
+        Failsafe(
+            "FS_GCS_ENABLE",
+            frozenset({0.0}),
+            1.0,
+            "the loss of the ground station is ignored",
+            role="ground_station",
+        ),
+    )
+
+    def mode(self, custom_mode: int) -> FlightMode:
+        """What a HEARTBEAT's mode comes to."""
+        return _KNOWN.get(custom_mode, FlightMode.OTHER)
+
+    def mode_name(self, custom_mode: int) -> str:
+        """What people call it."""
+        return _NAMES.get(custom_mode, f"mode {custom_mode}")
+
+    def ask_mode(self, mode: FlightMode) -> PendingCommand:
+        """Ask for one of its modes."""
+        values = (1.0, float(_ASKED[mode]), 0.0, 0.0, 0.0, 0.0, 0.0)
+        return PendingCommand(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}", mode=mode)
+
+    def take_off(self, height: float, telemetry: Telemetry) -> tuple[PendingCommand, ...]:
+        """Guided first, then arm, then climb: it takes off in guided mode only."""
+        del telemetry
+        climb = PendingCommand(
+            mavlink.MAV_CMD_NAV_TAKEOFF,
+            (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height),
+            "take off",
+            mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
+        )
+        return self.ask_mode(FlightMode.GUIDED), self.arm(), climb
+
+    def ready(self, telemetry: Telemetry) -> bool | None:
+        """It says that it has the check, and whether it passes."""
+        sensors, check = telemetry.sensors, mavlink.MAV_SYS_STATUS_PREARM_CHECK
+        if sensors is None or not sensors.present & check:
+            return None
+        return bool(sensors.health & check)
+
+    def objections(self, telemetry: Telemetry, now: float) -> list[str]:
+        """Its PreArm texts."""
+        if self.ready(telemetry) is not False:
+            return []
+        said = [
+            text
+            for text in telemetry.texts.recent(now, _TALK)
+            if text.startswith(("PreArm:", "Arm:"))
+        ]
+        return said or ["ArduPilot's arming checks fail"]
+
+    def encode(self, value: float, kind: int) -> float:
+        """Every parameter travels as a float."""
+        del kind
+        return value
+
+    def decode(self, value: float, kind: int) -> float:
+        """Every parameter travels as a float."""
+        del kind
+        return value
+
+    def fence(self, action: FenceAction, ceiling: float) -> dict[str, float]:
+        """FENCE_ACTION: 0 report, 1 return or land, 2 land, 4 brake or land; all fence types."""
+        code = {"warn": 0.0, "hold": 4.0, "return": 1.0, "land": 2.0}[action]
+        altitude_and_polygon = 5.0
+        return {
+            "FENCE_ACTION": code,
+            "FENCE_ALT_MAX": ceiling,
+            "FENCE_TYPE": altitude_and_polygon,
+            "FENCE_ENABLE": 1.0,
+        }

@@ -1,0 +1,169 @@
+"""PX4: offboard, modes by main and sub mode, take-off to an altitude above the sea."""
+
+from __future__ import annotations
+
+import struct
+from typing import ClassVar
+
+from aerodaas.drivers.mavlink.autopilots.autopilot import (
+    ANYWHERE,
+    NOT_GIVEN,
+    Autopilot,
+    Failsafe,
+    FenceAction,
+)
+from aerodaas.drivers.mavlink.microservices.commander import PendingCommand
+from aerodaas.drivers.mavlink.state.phase import FlightMode
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+
+__all__ = ["PX4"]
+
+_AUTO, _OFFBOARD = 4, 6
+_MAIN = {
+    1: "manual",
+    2: "altitude",
+    3: "position",
+    5: "acro",
+    _OFFBOARD: "offboard",
+    7: "stabilized",
+}
+_SUB = {
+    1: "ready",
+    2: "take-off",
+    3: "hold",
+    4: "mission",
+    5: "return",
+    6: "land",
+    8: "follow",
+    9: "precision landing",
+}
+_MODES = {
+    FlightMode.GUIDED: (_OFFBOARD, 0),
+    FlightMode.TAKE_OFF: (_AUTO, 2),
+    FlightMode.HOLD: (_AUTO, 3),
+    FlightMode.RETURN: (_AUTO, 5),
+    FlightMode.LAND: (_AUTO, 6),
+}
+_KNOWN = {mode: ours for ours, mode in _MODES.items()}
+_INTEGER = {
+    mavlink.MAV_PARAM_TYPE_UINT8,
+    mavlink.MAV_PARAM_TYPE_INT8,
+    mavlink.MAV_PARAM_TYPE_UINT16,
+    mavlink.MAV_PARAM_TYPE_INT16,
+    mavlink.MAV_PARAM_TYPE_UINT32,
+    mavlink.MAV_PARAM_TYPE_INT32,
+}
+
+
+class PX4(Autopilot):
+    """PX4 1.13 and later (flown: 1.16)."""
+
+    name: ClassVar[str] = "PX4"
+    family: ClassVar[int] = mavlink.MAV_AUTOPILOT_PX4
+    stream_before: ClassVar[float] = 1.2
+    stops_short: ClassVar[bool] = True
+    rates: ClassVar[dict[int, float]] = {
+        **Autopilot.rates,
+        mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS: 2.0,
+    }
+    alone: ClassVar[str] = (
+        "PX4 leaves offboard mode within 1.3 s and does what COM_OBL_RC_ACT says: by default, and "
+        "without a radio, it sinks where it is"
+    )
+    failsafes: ClassVar[tuple[Failsafe, ...]] = (
+        Failsafe(
+            "COM_LOW_BAT_ACT",
+            frozenset({0.0, 1.0}),
+            3.0,
+            "a low battery only leads to a warning",
+        ),
+        Failsafe(
+            "COM_OBL_RC_ACT",
+            frozenset({1.0, 2.0, 6.0, 7.0}),
+            5.0,
+            "when our setpoints stop it expects a pilot's sticks, or cuts the motors",
+        ),
+        Failsafe(
+            "COM_OBL_RC_ACT",
+            frozenset({0.0}),
+            5.0,
+            "when our setpoints stop it sinks where it is, unless a pilot has a radio",
+            role="ground_station",
+        ),
+        Failsafe(
+            "NAV_DLL_ACT",
+            frozenset({0.0}),
+            2.0,
+            "the loss of the ground station is ignored",
+            role="ground_station",
+        ),
+    )
+
+    def mode(self, custom_mode: int) -> FlightMode:
+        """What a HEARTBEAT's mode comes to."""
+        main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
+        return _KNOWN.get((main, sub if main == _AUTO else 0), FlightMode.OTHER)
+
+    def mode_name(self, custom_mode: int) -> str:
+        """What people call it."""
+        main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
+        names, number = (_SUB, sub) if main == _AUTO else (_MAIN, main)
+        return names.get(number, f"mode {main}/{sub}")
+
+    def ask_mode(self, mode: FlightMode) -> PendingCommand:
+        """Ask for one of its modes."""
+        main, sub = _MODES[mode]
+        values = (1.0, float(main), float(sub), 0.0, 0.0, 0.0, 0.0)
+        return PendingCommand(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}", mode=mode)
+
+    def take_off(self, height: float, telemetry: Telemetry) -> tuple[PendingCommand, ...]:
+        """From hold, where no sticks are needed: arm, then climb to an altitude above the sea."""
+        altitude = (telemetry.altitude or 0.0) + height
+        climb = PendingCommand(
+            mavlink.MAV_CMD_NAV_TAKEOFF,
+            (NOT_GIVEN, 0.0, 0.0, NOT_GIVEN, ANYWHERE, ANYWHERE, altitude),
+            "take off",
+            mavlink.MAV_FRAME_GLOBAL,
+        )
+        return self.ask_mode(FlightMode.HOLD), self.arm(), climb
+
+    def ready(self, telemetry: Telemetry) -> bool | None:
+        """It has the bit in `health` only; before it has looked, nothing is present."""
+        if telemetry.sensors is None or not telemetry.sensors.present:
+            return None
+        return bool(telemetry.sensors.health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
+
+    def objections(self, telemetry: Telemetry, now: float) -> list[str]:
+        """What its latest report of the arming checks complained about."""
+        del now
+        if telemetry.altitude is None:
+            return ["PX4 does not know its altitude above the sea yet"]
+        ready, events = self.ready(telemetry), telemetry.events
+        if ready is None:
+            return ["PX4 has not told yet whether its arming checks pass"]
+        if ready:
+            return []
+        if self.mode(telemetry.custom_mode) is not FlightMode.HOLD and events.objections:
+            # A take-off begins with hold, so that what only its present mode lacks does not matter.
+            return list(events.objections_to_hold)
+        return list(events.objections) or ["PX4's arming checks fail"]
+
+    def encode(self, value: float, kind: int) -> float:
+        """Integers travel as the float of the same bytes."""
+        if kind not in _INTEGER:
+            return value
+        (encoded,) = struct.unpack("<f", struct.pack("<i", round(value)))
+        return float(encoded)
+
+    def decode(self, value: float, kind: int) -> float:
+        """Integers travel as the float of the same bytes."""
+        if kind not in _INTEGER:
+            return value
+        (decoded,) = struct.unpack("<i", struct.pack("<f", value))
+        return float(decoded)
+
+    def fence(self, action: FenceAction, ceiling: float) -> dict[str, float]:
+        """GF_ACTION: 1 warn, 2 hold, 3 return, 5 land."""
+        code = {"warn": 1.0, "hold": 2.0, "return": 3.0, "land": 5.0}[action]
+        return {"GF_ACTION": code, "GF_MAX_VER_DIST": ceiling}

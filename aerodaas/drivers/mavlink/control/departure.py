@@ -1,0 +1,143 @@
+"""A take-off from its order to its end: done, refused, or called off and taken back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from aerodaas.drivers.mavlink.control.climb import Climb
+from aerodaas.drivers.mavlink.control.withdrawal import Withdrawal
+from aerodaas.drivers.mavlink.microservices.commander import Commander, PendingCommand
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+
+__all__ = ["Departure"]
+_TAKING_OFF = frozenset({FlightMode.TAKE_OFF, FlightMode.HOLD, FlightMode.GUIDED})
+"""Modes that a vehicle may show while a take-off is taken back."""
+
+
+class Departure:
+    """The take-offs of one vehicle, one at a time; under the driver's lock."""
+
+    def __init__(
+        self,
+        commander: Commander,
+        telemetry: Telemetry,
+        phase: FlightPhase,
+        *,
+        disarm: PendingCommand,
+        hold: PendingCommand,
+        flies: Callable[[], bool],
+        words: Callable[[], list[str]],
+        land: Callable[[], None],
+    ) -> None:
+        """`flies` tells whether it has left the ground; `land` lands what does.
+
+        `words` are the autopilot's own about why it refuses.
+        """
+        self.refusal = ""
+        """Why the latest take-off came to nothing."""
+        self._commander = commander
+        self._telemetry = telemetry
+        self._phase = phase
+        self._disarm = disarm
+        self._hold = hold
+        self._flies = flies
+        self._words = words
+        self._land = land
+        self._climb: Climb | None = None
+        self._withdrawal: Withdrawal | None = None
+
+    @property
+    def goal(self) -> float | None:
+        """Metres up in the autopilot's frame, once the whole climb is ordered."""
+        return self._climb.goal if self._climb is not None and self._climb.ordered else None
+
+    @property
+    def climbs(self) -> bool:
+        """Whether a take-off is under way."""
+        return self._climb is not None
+
+    @property
+    def withdrawing(self) -> bool:
+        """Whether one was called off, and motors might still start or turn."""
+        return self._withdrawal is not None
+
+    def begin(self, orders: Sequence[PendingCommand], height: float, now: float) -> None:
+        """Rise `height` metres above here by `orders`."""
+        assert self._telemetry.position is not None  # noqa: S101 - checked before
+        self._phase.rest()
+        self._climb = Climb(
+            self._commander,
+            orders,
+            height - float(self._telemetry.position[2]),
+            height=height,
+            armed=lambda: self._phase.armed,
+            shows=self._shows,
+            climbs=lambda at: self._phase.ask(FlightMode.TAKE_OFF, at),
+            failed=self._failed,
+            now=now,
+        )
+
+    def call_off(self, now: float) -> None:
+        """Take the take-off back: what has not begun must not begin, what flies is landed."""
+        climb, self._climb = self._climb, None
+        if climb is None:
+            return
+        climb.cancel()
+        if climb.may_start:
+            self.withdraw(now)
+
+    def withdraw(self, now: float) -> None:
+        """Stop motors that turn, or may yet start, on the ground; land what flies after all."""
+        self._phase.ask(FlightMode.LAND, now, meanwhile=_TAKING_OFF)
+        if not self._flies():
+            # In the mode of a take-off, an order to arm that comes late would have it fly.
+            self._commander.give(self._hold, now=now)
+        self._withdrawal = Withdrawal(
+            self._commander, self._disarm, self._land, now, flies=self._flies()
+        )
+
+    def restart(self) -> None:
+        """The autopilot has started anew."""
+        if self._climb is not None:
+            self._climb.fail("the autopilot started anew")
+
+    def let_go(self) -> None:
+        """Somebody else flies: order nothing any more."""
+        if self._climb is not None:
+            self._climb.cancel()
+        self._climb = self._withdrawal = None
+
+    def observe(self, now: float, *, was_armed: bool) -> None:
+        """A HEARTBEAT has come, and the phase has taken note of it."""
+        phase = self._phase
+        if was_armed and not phase.armed and self._climb is not None:
+            self._climb.fail("it stopped its motors again")
+        if phase.taken is not None:
+            self.let_go()
+        if self._withdrawal is not None:
+            self._withdrawal.observe(now, armed=phase.armed)
+            if self._withdrawal.over:
+                self._withdrawal = None
+                phase.rest()
+
+    def turn(self, now: float) -> None:
+        """See how far the climb is; 20 times a second."""
+        position, velocity = self._telemetry.position, self._telemetry.velocity
+        if self._climb is None or position is None:
+            return
+        if self._climb.turn(now, -float(position[2]), -float(velocity[2])):
+            self._climb = None
+
+    def _shows(self, order: PendingCommand) -> bool:
+        if order.number == mavlink.MAV_CMD_COMPONENT_ARM_DISARM:
+            return self._phase.armed
+        if order.number == mavlink.MAV_CMD_NAV_TAKEOFF:
+            return self._phase.armed and self._flies()
+        return self._phase.shown is order.mode
+
+    def _failed(self, text: str) -> None:
+        self.refusal = "; ".join([text, *self._words()])
+        now = self._telemetry.heard_at
+        self.call_off(now)

@@ -1,0 +1,56 @@
+"""Setpoints as packets: SET_POSITION_TARGET_LOCAL_NED in the frame that both autopilots know."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from aerodaas.drivers.mavlink.control.guidance import Target
+from aerodaas.drivers.mavlink.state.frames import LocalFrame
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.vehicle import VelocitySetpoint
+
+__all__ = ["position_message", "velocity_message"]
+
+_NO_ACCELERATION = 0b0000_0001_1100_0000
+_PLACE_VELOCITY_YAW = _NO_ACCELERATION | 0b1000_0000_0000
+"""Bits of what is to be ignored: acceleration and yaw rate."""
+_VELOCITY_YAW_RATE = _NO_ACCELERATION | 0b0100_0000_0111
+"""The same: acceleration, place and yaw."""
+_MASK32 = 0xFFFFFFFF
+
+
+def position_message(
+    target: Target,
+    frame: LocalFrame,
+    vehicle: tuple[int, int],
+    now: float,
+) -> Any:  # noqa: ANN401 - pymavlink has no types
+    """The target's place, velocity and heading, for the `vehicle` (system, component)."""
+    north, east, down = frame.place(target.position)
+    ahead, right, sinking = frame.velocity(target.velocity)
+    return mavlink.MAVLink_set_position_target_local_ned_message(
+        int(now * 1e3) & _MASK32,
+        *vehicle,
+        mavlink.MAV_FRAME_LOCAL_NED,
+        _PLACE_VELOCITY_YAW,
+        *(north, east, down),
+        *(ahead, right, sinking),
+        *(0.0, 0.0, 0.0),
+        frame.heading(target.yaw),
+        0.0,
+    )
+
+
+def velocity_message(setpoint: VelocitySetpoint, vehicle: tuple[int, int], now: float) -> Any:  # noqa: ANN401 - pymavlink has no types
+    """A velocity and a yaw rate, for the `vehicle` (system, component)."""
+    return mavlink.MAVLink_set_position_target_local_ned_message(
+        int(now * 1e3) & _MASK32,
+        *vehicle,
+        mavlink.MAV_FRAME_LOCAL_NED,
+        _VELOCITY_YAW_RATE,
+        *(0.0, 0.0, 0.0),
+        *LocalFrame.velocity(setpoint.velocity),
+        *(0.0, 0.0, 0.0),
+        0.0,
+        -setpoint.yaw_rate,
+    )

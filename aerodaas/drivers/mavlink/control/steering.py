@@ -1,0 +1,107 @@
+"""The stream of setpoints: clipped to what the vehicle may do, and seen to be followed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from aerodaas.config.model import RobotConfig
+from aerodaas.drivers.mavlink.control.guidance import MovingTarget
+from aerodaas.drivers.mavlink.control.setpoint import position_message, velocity_message
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
+from aerodaas.drivers.mavlink.state.frames import LocalFrame
+from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
+from aerodaas.drivers.mavlink.wire.link import Message
+from aerodaas.types.braking import limit_length
+from aerodaas.types.data import Odometry
+from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
+
+__all__ = ["Steering"]
+
+_STREAM_GAP = 0.5
+"""Seconds between setpoints after which the stream counts as begun anew."""
+_ASK_AGAIN = 2.0
+"""Seconds after which guided flight is asked for again."""
+
+
+class Steering:
+    """The stream of setpoints to one vehicle; under the driver's lock."""
+
+    def __init__(self, robot: RobotConfig, settings: MavlinkSettings) -> None:
+        limits = robot.limits
+        self._speed = min(limits.max_speed, settings.max_speed)
+        self._cruise = min(limits.cruise_speed, self._speed)
+        self.climb_rate = min(limits.max_climb, settings.max_climb)
+        """m/s up and down at most."""
+        self._turn_rate = math.radians(limits.max_yaw_rate)
+        self._target = MovingTarget(limits.max_acceleration, self._turn_rate)
+        self._stream_since = self._streamed_at = -math.inf
+        self._guided_asked_at = -math.inf
+
+    def message(
+        self,
+        setpoint: Setpoint,
+        odometry: Odometry,
+        frame: LocalFrame | None,
+        target: tuple[int, int],
+        now: float,
+        *,
+        waits: bool,
+    ) -> tuple[Message, Setpoint]:
+        """The packet for `target` and the setpoint as it was clipped.
+
+        Without a `frame`, which is without a position, it is told to stand still; while it `waits`
+        for its mode the target of a flight stays with it.
+        """
+        if now - self._streamed_at > _STREAM_GAP:
+            self._stream_since = now
+            self._target.forget()
+        self._streamed_at = now
+        if frame is None:
+            return self._velocity(VelocitySetpoint(np.zeros(3)), target, now)
+        if isinstance(setpoint, VelocitySetpoint):
+            return self._velocity(setpoint, target, now)
+        wanted = self._cruise if setpoint.speed is None else float(setpoint.speed)
+        speed = min(wanted, self._speed)
+        moved = self._target.towards(
+            setpoint.position,
+            setpoint.yaw,
+            speed,
+            vehicle=odometry.position,
+            velocity=odometry.velocity,
+            facing=odometry.yaw,
+            now=now,
+            waits=waits,
+        )
+        sent = PositionSetpoint(setpoint.position, setpoint.yaw, speed)
+        return position_message(moved, frame, target, now), sent
+
+    def _velocity(
+        self, setpoint: VelocitySetpoint, target: tuple[int, int], now: float
+    ) -> tuple[Message, Setpoint]:
+        self._target.forget()
+        across = limit_length(setpoint.velocity[:2], self._speed)
+        up = float(np.clip(setpoint.velocity[2], -self.climb_rate, self.climb_rate))
+        rate = float(np.clip(setpoint.yaw_rate, -self._turn_rate, self._turn_rate))
+        sent = VelocitySetpoint(np.array([across[0], across[1], up]), rate)
+        return velocity_message(sent, target, now), sent
+
+    def see_to_guidance(
+        self,
+        phase: FlightPhase,
+        stream_before: float,
+        change: Callable[[FlightMode], None],
+        now: float,
+    ) -> None:
+        """Have the autopilot follow, once it has heard setpoints for `stream_before` seconds."""
+        if phase.wish is FlightMode.GUIDED and phase.seen:
+            return
+        if now - self._stream_since < stream_before:
+            return
+        if phase.shown is FlightMode.GUIDED and phase.wish in {None, FlightMode.TAKE_OFF}:
+            phase.ask(FlightMode.GUIDED, now)
+        elif now - self._guided_asked_at > _ASK_AGAIN:
+            self._guided_asked_at = now
+            change(FlightMode.GUIDED)

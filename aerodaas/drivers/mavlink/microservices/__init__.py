@@ -1,0 +1,1 @@
+"""MAVLink's microservices: commands, parameters, missions and fences, events, status texts."""

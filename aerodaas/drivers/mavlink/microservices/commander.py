@@ -1,0 +1,187 @@
+"""Commands and their acknowledgements: asked again when lost, never done twice by mistake."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from aerodaas.drivers.mavlink.state.phase import FlightMode
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+
+__all__ = ["CommandResult", "Commander", "PendingCommand", "always"]
+
+_TIMEOUT = 1.0
+"""Seconds to wait for an acknowledgement."""
+_PROGRESS = 5.0
+"""The same after the word that it is being worked on."""
+_TRIES = 6
+_LATER = 1.0
+"""Seconds after which an order is tried again that was rejected for now, such as one to arm while
+the estimator still settles."""
+_RESULTS = {
+    mavlink.MAV_RESULT_TEMPORARILY_REJECTED: "rejected for now",
+    mavlink.MAV_RESULT_DENIED: "denied",
+    mavlink.MAV_RESULT_UNSUPPORTED: "not supported",
+    mavlink.MAV_RESULT_FAILED: "failed",
+}
+
+
+@dataclass(frozen=True)
+class PendingCommand:
+    """One command to the autopilot.
+
+    With a `frame` it goes as COMMAND_INT, where parameters 5 and 6 are degrees times 10^7.
+    """
+
+    number: int
+    values: tuple[float, ...]
+    """Parameters 1 to 7."""
+    what: str
+    """For people: what it does."""
+    frame: int | None = None
+    mode: FlightMode | None = None
+    """The mode that it asks for, if it asks for one."""
+    insists: bool = True
+    """Whether it is tried again when it is rejected for now."""
+
+
+@dataclass(frozen=True)
+class CommandResult:
+    """What became of an order."""
+
+    accepted: bool
+    text: str = ""
+    """Why not, in a few words."""
+    replaced: bool = False
+    """A newer order of the same number has taken its place: neither done nor refused."""
+    tries: int = 1
+    """How often it was sent."""
+
+
+def always() -> bool:
+    """An order that may be repeated whatever has happened meanwhile."""
+    return True
+
+
+@dataclass
+class _Pending:
+    order: PendingCommand
+    done: Callable[[CommandResult], None]
+    still: Callable[[], bool]
+    tries: int = 0
+    deadline: float = 0.0
+    answer: str = "no answer"
+    """What to say if it is given up."""
+
+
+class Commander:
+    """One outstanding order of each number; the link's thread calls `take` and `turn`."""
+
+    def __init__(self, send: Callable[[Any], None], target: tuple[int, int], ours: int) -> None:
+        """Send by `send` to `target` (system, component); `ours` is our own system id."""
+        self.stray = 0
+        """Acknowledgements that came late, twice, or to somebody else."""
+        self._send = send
+        self._target = target
+        self._ours = ours
+        self._pending: dict[int, _Pending] = {}
+        self._lock = threading.RLock()
+
+    def give(
+        self,
+        order: PendingCommand,
+        done: Callable[[CommandResult], None] = lambda _: None,
+        *,
+        still: Callable[[], bool] = always,
+        now: float,
+    ) -> None:
+        """Give an order; `done` is told its outcome, in the link's thread.
+
+        It is repeated while it is not answered or rejected for now, and only while `still` says
+        that it needs doing: what the vehicle shows to be done is done, acknowledged or not. A
+        newer order of the same number takes the place of an older one, whose `done` is told so.
+        """
+        with self._lock:
+            before = self._pending.get(order.number)
+            self._pending[order.number] = pending = _Pending(order, done, still)
+            self._transmit(pending, now)
+        if before is not None:
+            before.done(
+                CommandResult(accepted=False, text="replaced by a newer order", replaced=True)
+            )
+
+    def withdraw(self, number: int) -> None:
+        """Repeat the order of this `number` no more; its `done` is told nothing."""
+        with self._lock:
+            self._pending.pop(number, None)
+
+    def under_way(self, number: int) -> PendingCommand | None:
+        """The order of this `number` that is still to be answered; None if there is none."""
+        with self._lock:
+            pending = self._pending.get(number)
+            return None if pending is None else pending.order
+
+    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Take a COMMAND_ACK."""
+        if message.target_system not in {0, self._ours}:
+            return
+        with self._lock:
+            pending = self._pending.get(message.command)
+            if pending is None:
+                self.stray += 1
+                return
+            if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
+                pending.deadline = now + _PROGRESS
+                return
+            later = message.result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+            if later and pending.order.insists:
+                if pending.answer != _RESULTS[message.result]:
+                    # PX4 says it twice, and only the first time counts.
+                    pending.answer = _RESULTS[message.result]
+                    pending.deadline = now + _LATER
+                return
+            del self._pending[message.command]
+        if message.result == mavlink.MAV_RESULT_ACCEPTED:
+            pending.done(CommandResult(accepted=True, tries=pending.tries))
+        else:
+            word = _RESULTS.get(message.result, f"result {message.result}")
+            pending.done(CommandResult(accepted=False, text=word, tries=pending.tries))
+
+    def turn(self, now: float) -> None:
+        """Repeat what has not been acknowledged, or give it up; end what shows to be done."""
+        ended: list[tuple[_Pending, CommandResult]] = []
+        with self._lock:
+            for number, pending in list(self._pending.items()):
+                if not pending.still():
+                    del self._pending[number]
+                    ended.append((pending, CommandResult(accepted=True, tries=pending.tries)))
+                elif now < pending.deadline:
+                    continue
+                elif pending.tries >= _TRIES:
+                    del self._pending[number]
+                    outcome = CommandResult(
+                        accepted=False, text=pending.answer, tries=pending.tries
+                    )
+                    ended.append((pending, outcome))
+                else:
+                    self._transmit(pending, now)
+        for pending, outcome in ended:
+            pending.done(outcome)
+
+    def _transmit(self, pending: _Pending, now: float) -> None:
+        order = pending.order
+        p1, p2, p3, p4, p5, p6, p7 = order.values
+        if order.frame is None:
+            message = mavlink.MAVLink_command_long_message(
+                *self._target, order.number, pending.tries, p1, p2, p3, p4, p5, p6, p7
+            )
+        else:
+            message = mavlink.MAVLink_command_int_message(
+                *self._target, order.frame, order.number, 0, 0, p1, p2, p3, p4, int(p5), int(p6), p7
+            )
+        pending.tries += 1
+        pending.answer = "no answer"
+        pending.deadline = now + _TIMEOUT
+        self._send(message)

@@ -1,0 +1,88 @@
+"""PX4's events: what it says instead of STATUSTEXT.
+
+An event's number is a hash of its name (`events::ID` of PX4: 24 bits of 32-bit FNV-1a below the
+component's number). The full texts lie in a file on the autopilot whose version they belong to;
+people are told ours, and nothing of an event that we have no words for.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from aerodaas.drivers.mavlink.microservices.event_words import CHECKS, COMMANDER
+
+__all__ = ["EventReader", "EventText", "event_number"]
+
+
+def event_number(name: str) -> int:
+    """The number of the autopilot's event called `name`."""
+    digest = 0x811C9DC5
+    for letter in name.encode():
+        digest = (digest ^ letter) * 0x01000193 & 0xFFFFFFFF
+    return 1 << 24 | digest & 0xFFFFFF
+
+
+_CHECKS = {event_number(f"check_{name}"): words for name, words in CHECKS.items()}
+_TEXTS = {
+    **_CHECKS,
+    **{event_number(f"commander_{name}"): words for name, words in COMMANDER.items()},
+}
+_OF_THE_MODE = frozenset(
+    CHECKS[name]
+    for name in (
+        "modes_cannot_takeoff",
+        "modes_manual_control",
+        "modes_mission",
+        "modes_offboard_signal",
+    )
+)
+_BEGIN = event_number("commander_arming_check_summary")
+_END = event_number("commander_health_summary")
+_HARMLESS = 5
+"""Log level of a notice; larger ones are information, or for the protocol only."""
+
+
+class EventText(NamedTuple):
+    """What an event says, and its severity as in STATUSTEXT."""
+
+    text: str
+    severity: int
+
+
+class EventReader:
+    """Reads events, and gathers those of each report of the arming checks."""
+
+    def __init__(self) -> None:
+        self.objections: tuple[str, ...] = ()
+        """What the latest whole report of the arming checks complains about."""
+        self._report: list[str] | None = None
+        self._latest: int | None = None
+
+    @property
+    def objections_to_hold(self) -> tuple[str, ...]:
+        """The same without those that its present mode alone calls for: hold needs none of them."""
+        return tuple(text for text in self.objections if text not in _OF_THE_MODE)
+
+    def take(self, number: int, log_levels: int, sequence: int) -> EventText | None:
+        """Take one event; None for one that is a repetition or nobody needs to know."""
+        if sequence == self._latest:
+            return None
+        self._latest = sequence
+        if number == _BEGIN:
+            self._report = []
+            return None
+        if number == _END:
+            if self._report is not None:
+                self.objections = tuple(dict.fromkeys(self._report))
+            self._report = None
+            return None
+        severity = log_levels & 0x0F
+        if severity >= _HARMLESS:
+            return None
+        text = _TEXTS.get(number)
+        if self._report is not None:
+            # What a check objects to is for who wants to take off; in flight it is told by health.
+            self._report.append(text or f"a check that is not known here (event {number:#010x})")
+            return None
+        # A check outside a report is of one whose beginning got lost.
+        return None if text is None or number in _CHECKS else EventText(text, severity)

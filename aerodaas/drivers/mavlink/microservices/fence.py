@@ -1,0 +1,60 @@
+"""The robot's geofence on the vehicle itself, with the action that makes it more than a drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from aerodaas.config.model import GeofenceConfig
+from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, FenceAction
+from aerodaas.drivers.mavlink.microservices.parameters import Parameters
+from aerodaas.drivers.mavlink.microservices.plans import MissionItem, upload
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.types.geometry import GeodeticOrigin
+
+__all__ = ["fence_items", "upload_fence"]
+
+
+def fence_items(fence: GeofenceConfig, origin: GeodeticOrigin) -> list[MissionItem]:
+    """The polygons of `fence`, whose ENU zero lies at `origin`, as items of the fence protocol."""
+    inside = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
+    outside = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
+    outlines = [(inside, fence.polygon)] if fence.polygon else []
+    outlines += [(outside, outline) for outline in fence.no_fly]
+    return [
+        _corner(command, east, north, len(outline), origin)
+        for command, outline in outlines
+        for east, north in outline
+    ]
+
+
+def _corner(
+    command: int, east: float, north: float, corners: int, origin: GeodeticOrigin
+) -> MissionItem:
+    latitude, longitude, _ = origin.to_geodetic(np.array([east, north, 0.0]))
+    values = (float(corners), 0.0, 0.0, 0.0)
+    frame = mavlink.MAV_FRAME_GLOBAL
+    return MissionItem(command, values, round(latitude * 1e7), round(longitude * 1e7), 0.0, frame)
+
+
+def upload_fence(
+    link: MavlinkLink,
+    autopilot: Autopilot,
+    fence: GeofenceConfig,
+    origin: GeodeticOrigin,
+    action: FenceAction,
+    *,
+    progress: Callable[[int, int], None] = lambda _, __: None,
+) -> None:
+    """Upload `fence` and have it enforced by `action`.
+
+    The floor stays with us: neither autopilot's can be left for a landing. Waits for the vehicle;
+    raises VehicleError.
+    """
+    items = fence_items(fence, origin)
+    upload(link, items, mavlink.MAV_MISSION_TYPE_FENCE, progress)
+    parameters = Parameters(link, autopilot)
+    for name, value in autopilot.fence(action, fence.ceiling).items():
+        parameters.set(name, value)

@@ -1,0 +1,124 @@
+"""The autopilot's parameters: read, set, and judged for safety. These calls wait for replies."""
+
+from __future__ import annotations
+
+import queue
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, Failsafe
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.types.errors import VehicleError
+
+__all__ = ["Parameters", "UnsafeParameter", "unsafe_parameters"]
+
+_TIMEOUT = 0.7
+_TRIES = 4
+_LONGEST = 16
+"""Letters of a parameter's name."""
+
+
+@dataclass(frozen=True)
+class _Value:
+    value: float
+    kind: int
+
+
+class Parameters:
+    """One vehicle's parameters, by name; not for use in the link's thread."""
+
+    def __init__(self, link: MavlinkLink, autopilot: Autopilot) -> None:
+        self._link = link
+        self._autopilot = autopilot
+
+    def get(self, name: str) -> float | None:
+        """The value of `name`; None if the vehicle knows none of that name, or does not answer."""
+        found = self._read(name)
+        return None if found is None else found.value
+
+    def set(self, name: str, value: float) -> None:
+        """Set `name`, and see that it was set; raises VehicleError if it was not."""
+        before = self._read(name)
+        if before is None:
+            raise VehicleError(f"the autopilot knows no parameter {name}")
+        if self._same(before, value):
+            return
+        encoded = self._autopilot.encode(value, before.kind)
+        request = mavlink.MAVLink_param_set_message(
+            *self._target(), _bytes(name), encoded, before.kind
+        )
+        for answer in self._answers(name, request):
+            if self._same(answer, value):
+                return
+        now = self._read(name)
+        if now is None or not self._same(now, value):
+            held = "nothing is known of it" if now is None else f"it is {now.value:g}"
+            raise VehicleError(f"the autopilot did not set {name} to {value:g}: {held}")
+
+    def _read(self, name: str) -> _Value | None:
+        request = mavlink.MAVLink_param_request_read_message(*self._target(), _bytes(name), -1)
+        return next(self._answers(name, request), None)
+
+    def _answers(self, name: str, request: object) -> Iterator[_Value]:
+        """Values of `name` that come after `request`, which is repeated while none do."""
+        with self._link.listen("PARAM_VALUE") as inbox:
+            for _ in range(_TRIES):
+                self._link.send(request)
+                deadline = time.monotonic() + _TIMEOUT
+                while (left := deadline - time.monotonic()) > 0.0:
+                    try:
+                        message = inbox.get(timeout=left)
+                    except queue.Empty:
+                        break
+                    if message.param_id == name:
+                        kind = message.param_type
+                        yield _Value(self._autopilot.decode(message.param_value, kind), kind)
+
+    @staticmethod
+    def _same(one: _Value, value: float) -> bool:
+        # They are singles on the autopilot.
+        return abs(one.value - value) <= 1e-5 * max(1.0, abs(value))
+
+    def _target(self) -> tuple[int, int]:
+        assert self._link.target is not None  # noqa: S101 - only a known vehicle has parameters
+        return self._link.target
+
+
+def _bytes(name: str) -> bytes:
+    encoded = name.encode("ascii", "replace")
+    if len(encoded) > _LONGEST:
+        raise VehicleError(f"no parameter's name is as long as {name!r}")
+    return encoded
+
+
+@dataclass(frozen=True)
+class UnsafeParameter:
+    """A parameter that leaves the vehicle unprotected."""
+
+    failsafe: Failsafe
+    value: float
+
+    @property
+    def text(self) -> str:
+        """One sentence, with the value that we would set."""
+        failsafe = self.failsafe
+        return (
+            f"{failsafe.name} is {self.value:g}, so that {failsafe.why}; {failsafe.safe:g} is safer"
+        )
+
+
+def unsafe_parameters(
+    parameters: Parameters, autopilot: Autopilot, settings: MavlinkSettings
+) -> list[UnsafeParameter]:
+    """What the vehicle's parameters leave unprotected; takes a moment for each."""
+    found = []
+    for failsafe in autopilot.failsafes:
+        if failsafe.role not in {"any", settings.role}:
+            continue
+        value = parameters.get(failsafe.name)
+        if value is not None and value in failsafe.unsafe:
+            found.append(UnsafeParameter(failsafe, value))
+    return found

@@ -1,0 +1,205 @@
+"""What is wrong with the vehicle, by its name: GPS, estimator, battery, vibration, sensors."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+
+__all__ = ["Health"]
+
+_STANDS = 1.0
+"""Seconds for which something must be wrong before it is told: estimators change their minds."""
+_SILENT = 4.0
+"""Seconds in which others spoke and the GPS, which speaks twice a second, did not."""
+_GAP = 1.0
+"""Seconds between two messages that count at most: the rest is the link's silence, nobody's own."""
+_FIX = 3
+"""GPS fix types from this one on are positions in space."""
+_UNSURE = (100, 50, 20, 10, 5)
+"""Metres; said in steps, so that what grows slowly is not told anew with each metre."""
+_DOES_NOT_FIT = 0.8
+"""Variance, of 1, from which ArduPilot mistrusts a sensor (its FS_EKF_THRESH)."""
+_SHAKES = (60, 30)
+"""m/s² of vibration that are too much, and that people should know of."""
+_CLIPS = 10
+"""Samples beyond an accelerometer's range from one message to the next."""
+
+_HORIZONTAL = mavlink.ESTIMATOR_POS_HORIZ_REL | mavlink.ESTIMATOR_POS_HORIZ_ABS
+_CHARGES = {
+    mavlink.MAV_BATTERY_CHARGE_STATE_LOW: "low",
+    mavlink.MAV_BATTERY_CHARGE_STATE_CRITICAL: "critical",
+    mavlink.MAV_BATTERY_CHARGE_STATE_EMERGENCY: "about to be empty",
+    mavlink.MAV_BATTERY_CHARGE_STATE_FAILED: "failed",
+    mavlink.MAV_BATTERY_CHARGE_STATE_UNHEALTHY: "unhealthy",
+}
+_BATTERY_FAULTS = {
+    mavlink.MAV_BATTERY_FAULT_DEEP_DISCHARGE: "discharged too deeply",
+    mavlink.MAV_BATTERY_FAULT_SPIKES: "its voltage jumps",
+    mavlink.MAV_BATTERY_FAULT_CELL_FAIL: "a cell has failed",
+    mavlink.MAV_BATTERY_FAULT_OVER_CURRENT: "too much current",
+    mavlink.MAV_BATTERY_FAULT_OVER_TEMPERATURE: "too hot",
+    mavlink.MAV_BATTERY_FAULT_UNDER_TEMPERATURE: "too cold",
+    mavlink.MAV_BATTERY_FAULT_INCOMPATIBLE_VOLTAGE: "its voltage does not fit the vehicle",
+}
+_SENSORS = {
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO: "gyroscope",
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_GYRO2: "second gyroscope",
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL: "accelerometer",
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_ACCEL2: "second accelerometer",
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG: "compass",
+    mavlink.MAV_SYS_STATUS_SENSOR_3D_MAG2: "second compass",
+    mavlink.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE: "barometer",
+    mavlink.MAV_SYS_STATUS_SENSOR_GPS: "GPS",
+    mavlink.MAV_SYS_STATUS_SENSOR_OPTICAL_FLOW: "optical flow",
+    mavlink.MAV_SYS_STATUS_SENSOR_VISION_POSITION: "position by vision",
+    mavlink.MAV_SYS_STATUS_SENSOR_LASER_POSITION: "rangefinder",
+    mavlink.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS: "motor outputs",
+    mavlink.MAV_SYS_STATUS_SENSOR_RC_RECEIVER: "remote control",
+    mavlink.MAV_SYS_STATUS_GEOFENCE: "its own geofence",
+    mavlink.MAV_SYS_STATUS_AHRS: "attitude and heading",
+    mavlink.MAV_SYS_STATUS_TERRAIN: "terrain data",
+    mavlink.MAV_SYS_STATUS_LOGGING: "log",
+    mavlink.MAV_SYS_STATUS_SENSOR_BATTERY: "battery",
+    mavlink.MAV_SYS_STATUS_SENSOR_PROXIMITY: "proximity sensor",
+    mavlink.MAV_SYS_STATUS_OBSTACLE_AVOIDANCE: "obstacle avoidance",
+    mavlink.MAV_SYS_STATUS_SENSOR_PROPULSION: "propulsion",
+}
+
+
+class _Complaint(NamedTuple):
+    since: float
+    text: str
+
+
+class Health:
+    """Takes messages, each with the second of its arrival; ready to be asked at any moment."""
+
+    def __init__(self) -> None:
+        self._complaints: dict[str, _Complaint] = {}
+        self._fixed_at = -math.inf
+        self._heard_at: float | None = None
+        self._gps_silence = 0.0
+        self._clipped: int | None = None
+        self._charges_told = False
+        """The batteries speak for themselves."""
+        self._takers = {
+            "GPS_RAW_INT": self._gps,
+            "ESTIMATOR_STATUS": self._estimator,
+            "EKF_STATUS_REPORT": self._filter,
+            "BATTERY_STATUS": self._battery,
+            "VIBRATION": self._vibration,
+            "SYS_STATUS": self._sensors,
+        }
+
+    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Take note of a message, of whatever kind."""
+        if self._heard_at is not None:
+            self._gps_silence += min(now - self._heard_at, _GAP)
+        self._heard_at = now
+        taker = self._takers.get(message.get_type())
+        if taker is not None:
+            taker(message, now)
+
+    def faults(self, now: float) -> list[str]:
+        """What is wrong at `now`, one sentence each, its name first."""
+        told = [one.text for one in self._complaints.values() if now - one.since >= _STANDS]
+        if math.isfinite(self._fixed_at) and self._gps_silence > _SILENT:
+            told.insert(0, "GPS: it has fallen silent")
+        return list(dict.fromkeys(told))
+
+    def lost(self, now: float) -> bool:
+        """Whether the estimator itself says that it does not know where it is."""
+        complaint = self._complaints.get("lost")
+        return complaint is not None and now - complaint.since >= _STANDS
+
+    @property
+    def sure_of_position(self) -> bool:
+        """Whether the estimator and the GPS have no complaint about where it is."""
+        return not any(name in self._complaints for name in ("fix", "unsure", "lost", "glitch"))
+
+    def _note(self, name: str, text: str, now: float) -> None:
+        """Complain of `name`, or no more if there is no text."""
+        if not text:
+            self._complaints.pop(name, None)
+            return
+        before = self._complaints.get(name)
+        self._complaints[name] = _Complaint(now if before is None else before.since, text)
+
+    def _gps(self, message: Any, now: float) -> None:  # noqa: ANN401
+        self._gps_silence = 0.0
+        if message.fix_type >= _FIX:
+            self._fixed_at = now
+        # A vehicle that never had a fix flies by something else, or says itself why it does not.
+        lost = message.fix_type < _FIX and math.isfinite(self._fixed_at)
+        kind = "a fix in the plane only" if message.fix_type == _FIX - 1 else "no fix"
+        self._note("fix", f"GPS: {kind}" if lost else "", now)
+
+    def _estimator(self, message: Any, now: float) -> None:  # noqa: ANN401
+        # PX4 sets the bit of a constant position when all is well, and clears it when it is lost.
+        flags = message.flags & ~mavlink.ESTIMATOR_CONST_POS_MODE
+        self._flags(flags, now, glitch=mavlink.ESTIMATOR_GPS_GLITCH)
+        unsure = _step(message.pos_horiz_accuracy, _UNSURE)
+        self._note("unsure", unsure and f"estimator: position unsure by more than {unsure} m", now)
+        unsure = _step(message.pos_vert_accuracy, _UNSURE)
+        self._note("height", unsure and f"estimator: height unsure by more than {unsure} m", now)
+        misfits = {"compass": message.mag_ratio}
+        self._fit(misfits, 1.0, now)
+
+    def _filter(self, message: Any, now: float) -> None:  # noqa: ANN401
+        self._flags(message.flags, now, glitch=mavlink.EKF_GPS_GLITCHING)
+        misfits = {
+            "position": message.pos_horiz_variance,
+            "velocity": message.velocity_variance,
+            "height": message.pos_vert_variance,
+            "compass": message.compass_variance,
+        }
+        self._fit(misfits, _DOES_NOT_FIT, now)
+
+    def _flags(self, flags: int, now: float, *, glitch: int) -> None:
+        """The bits that both kinds of status have in common."""
+        lost = not flags & _HORIZONTAL or flags & mavlink.ESTIMATOR_CONST_POS_MODE
+        self._note("lost", "estimator: no position along the ground" if lost else "", now)
+        jumps = "estimator: GPS positions jump, and are not believed"
+        self._note("glitch", jumps if flags & glitch else "", now)
+        level = flags & mavlink.ESTIMATOR_ATTITUDE
+        self._note("attitude", "" if level else "estimator: attitude unknown", now)
+
+    def _fit(self, misfits: dict[str, float], limit: float, now: float) -> None:
+        for name, value in misfits.items():
+            text = f"estimator: what is measured of its {name} does not fit"
+            self._note(f"misfit {name}", text if value > limit else "", now)
+
+    def _battery(self, message: Any, now: float) -> None:  # noqa: ANN401
+        name = f"battery {message.id + 1}" if message.id else "battery"
+        self._charges_told |= message.charge_state != mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED
+        said = [_CHARGES[message.charge_state]] if message.charge_state in _CHARGES else []
+        said += [text for bit, text in _BATTERY_FAULTS.items() if message.fault_bitmask & bit]
+        self._note(name, f"{name}: {', '.join(said)}" if said else "", now)
+
+    def _vibration(self, message: Any, now: float) -> None:  # noqa: ANN401
+        shakes = _step(max(message.vibration_x, message.vibration_y, message.vibration_z), _SHAKES)
+        text = shakes and f"vibration: more than {shakes} m/s²"
+        self._note("vibration", text, now)
+        clipped = message.clipping_0 + message.clipping_1 + message.clipping_2
+        more = 0 if self._clipped is None else clipped - self._clipped
+        self._clipped = clipped
+        clips = "vibration: beyond what the accelerometers measure"
+        self._note("clipping", clips if more > _CLIPS else "", now)
+
+    def _sensors(self, message: Any, now: float) -> None:  # noqa: ANN401
+        bad = (
+            message.onboard_control_sensors_present
+            & message.onboard_control_sensors_enabled
+            & ~message.onboard_control_sensors_health
+        )
+        if self._charges_told:
+            bad &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
+        for bit, name in _SENSORS.items():
+            self._note(f"sensor {name}", f"{name}: unhealthy" if bad & bit else "", now)
+
+
+def _step(value: float, steps: tuple[int, ...]) -> str:
+    """The largest of `steps` that `value` exceeds, as text; empty if none, or no number."""
+    return next((str(step) for step in steps if value > step), "")

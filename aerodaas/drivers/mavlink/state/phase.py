@@ -1,0 +1,104 @@
+"""What the vehicle is doing: by its HEARTBEAT, held against what it was asked to do.
+
+A mode that nobody asked for is a pilot's, a ground station's, or the autopilot's own protection:
+from then on until it is disarmed nothing is sent that steers.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+
+from aerodaas.types.vehicle import VehicleMode
+
+__all__ = ["FlightMode", "FlightPhase"]
+
+_LAG = 2.5
+"""Seconds that HEARTBEATs may show the mode before after a change was accepted."""
+
+
+class FlightMode(enum.Enum):
+    """What the modes of both autopilots come to."""
+
+    GUIDED = "guided"
+    TAKE_OFF = "take off"
+    HOLD = "hold"
+    RETURN = "return"
+    LAND = "land"
+    OTHER = "other"
+    """Flown by a pilot, or by a mission of the autopilot's own."""
+
+
+_FOLLOWS = {
+    FlightMode.GUIDED: frozenset({FlightMode.GUIDED}),
+    FlightMode.TAKE_OFF: frozenset({FlightMode.TAKE_OFF, FlightMode.HOLD, FlightMode.GUIDED}),
+    FlightMode.HOLD: frozenset({FlightMode.HOLD}),
+    FlightMode.RETURN: frozenset({FlightMode.RETURN, FlightMode.LAND}),
+    FlightMode.LAND: frozenset({FlightMode.LAND}),
+}
+"""Modes that belong to each wish."""
+
+_SHOWN = {
+    FlightMode.GUIDED: VehicleMode.GUIDED,
+    FlightMode.TAKE_OFF: VehicleMode.TAKING_OFF,
+    FlightMode.HOLD: VehicleMode.HOLDING,
+    FlightMode.RETURN: VehicleMode.RETURNING,
+    FlightMode.LAND: VehicleMode.LANDING,
+    FlightMode.OTHER: VehicleMode.MANUAL,
+}
+
+
+class FlightPhase:
+    """The mode of one vehicle."""
+
+    def __init__(self) -> None:
+        self.armed = False
+        self.shown = FlightMode.OTHER
+        """What the latest HEARTBEAT said."""
+        self.wish: FlightMode | None = None
+        """What it was asked for last, until it is disarmed."""
+        self.seen = False
+        """Whether it has been seen doing that."""
+        self.taken: VehicleMode | None = None
+        """MANUAL or FAILSAFE once somebody else flies."""
+        self._before: frozenset[FlightMode] = frozenset()
+        """Modes that HEARTBEATs may go on to show for a moment after the wish."""
+        self._asked_at = -math.inf
+
+    @property
+    def mode(self) -> VehicleMode:
+        """The mode by the vehicle's own word."""
+        if not self.armed:
+            return VehicleMode.GROUNDED
+        return self.taken or _SHOWN[self.shown]
+
+    def ask(
+        self, wish: FlightMode, now: float, meanwhile: frozenset[FlightMode] = frozenset()
+    ) -> None:
+        """Take note that the vehicle is being asked for a mode; it may show others `meanwhile`."""
+        if wish is not self.wish:
+            follows = _FOLLOWS[self.wish] if self.wish is not None else frozenset()
+            self._before, self.seen = follows | {self.shown} | meanwhile, False
+        self.wish, self._asked_at = wish, now
+
+    def rest(self) -> None:
+        """Nothing is asked of it any more: it stands."""
+        self.wish, self.seen = None, False
+
+    def observe(self, shown: FlightMode, now: float, *, armed: bool, critical: bool) -> None:
+        """Take note of a HEARTBEAT."""
+        if not armed:
+            if self.armed:
+                self.wish = self.taken = None
+                self.seen = False
+            self.armed, self.shown = armed, shown
+            return
+        self.armed, self.shown = armed, shown
+        if self.wish is None or self.taken is not None:
+            return
+        if shown in _FOLLOWS[self.wish]:
+            self.seen = True
+            return
+        late = now - self._asked_at <= _LAG or not self.seen
+        if shown not in self._before or not late:
+            self.taken = VehicleMode.FAILSAFE if critical else VehicleMode.MANUAL

@@ -1,0 +1,123 @@
+"""What the mission is told of one vehicle, put together from all that the vehicle has said."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from aerodaas.drivers.mavlink.control.departure import Departure
+from aerodaas.drivers.mavlink.state.alignment import Alignment
+from aerodaas.drivers.mavlink.state.frames import LocalFrame
+from aerodaas.drivers.mavlink.state.phase import FlightPhase
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.state.touchdown import Touchdown
+from aerodaas.drivers.mavlink.wire.link import LinkCounts
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import Vector
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+
+__all__ = ["REASONS", "VehicleReport"]
+
+REASONS = 12.0
+"""Seconds that the autopilot's words may be old to count as the reason of what it does."""
+_LOST_AFTER = 1.5
+"""Seconds without any word, of a vehicle that speaks 40 times a second."""
+_FINDING = 1.0
+"""Seconds that a vehicle which is heard again has to say where it is."""
+_GRAVE = 3
+"""Severity of an error; smaller is graver."""
+
+
+class VehicleReport:
+    """The state of one vehicle by its own words; seconds are monotonic."""
+
+    def __init__(self, telemetry: Telemetry, phase: FlightPhase, touchdown: Touchdown) -> None:
+        self.departure: Departure | None = None
+        """Its take-offs; None before it is met."""
+        self.alignment: Alignment | None = None
+        """Where its frame lies in ours; None before it is connected."""
+        self.restarted = ""
+        """That the autopilot has started anew, until motors start again."""
+        self._telemetry = telemetry
+        self._phase = phase
+        self._touchdown = touchdown
+
+    def state(self, stamp: int, now: float, counts: LinkCounts) -> VehicleState:
+        """The newest state at `now`, which is `stamp` (nanoseconds) on the mission's clock."""
+        telemetry, lost = self._telemetry, self.lost(now)
+        # A silent link says nothing of the position: what was known with the last word counts,
+        # and its age tells. Only a vehicle that speaks can have lost its position.
+        age = now - telemetry.position_at
+        heard = telemetry.knows_place(now - self._silence(now)) and age <= _LOST_AFTER
+        known = heard or (lost and math.isfinite(age))
+        age = age if known else 0.0
+        frame = self.alignment.frame if self.alignment is not None else None
+        return VehicleState(
+            max(0, stamp - int(age * NANOSECONDS)),
+            self.odometry(frame, known=known),
+            telemetry.battery,
+            VehicleMode.LOST if lost else self.mode,
+            telemetry.armed,
+            telemetry.gps,
+            faults=tuple(self._faults(now)),
+            extra={
+                "autopilot_time": telemetry.boot_time,
+                "autopilot_clock": telemetry.clock,
+                "damaged_packets": counts.damaged,
+                "foreign_packets": counts.strangers,
+                "silence": telemetry.silence(now),
+            },
+            ended=self._touchdown.ended,
+        )
+
+    def odometry(self, frame: LocalFrame | None, *, known: bool) -> Odometry:
+        """Where it is in our frame; NaN unless that is `known`."""
+        telemetry, attitude = self._telemetry, self._telemetry.attitude
+        position: Vector = np.full(3, np.nan)
+        if known and frame is not None and telemetry.position is not None:
+            position = frame.position(telemetry.position)
+        return Odometry(
+            position,
+            LocalFrame.velocity(telemetry.velocity),
+            attitude.yaw,
+            attitude.roll,
+            attitude.pitch,
+            attitude.yaw_rate,
+        )
+
+    @property
+    def mode(self) -> VehicleMode:
+        """What it is doing, by its HEARTBEATs and by what became of our orders."""
+        if self._touchdown.falling:
+            return VehicleMode.FAILSAFE
+        if self._phase.taken is None and self.departure is not None:
+            if self.departure.withdrawing:
+                return VehicleMode.LANDING
+            if self.departure.climbs:
+                return VehicleMode.TAKING_OFF
+        return self._phase.mode
+
+    def lost(self, now: float) -> bool:
+        """Whether it has said nothing new for too long, or not yet where it is since then."""
+        telemetry = self._telemetry
+        back = telemetry.armed and now - telemetry.back_at < _FINDING
+        return self._silence(now) > _LOST_AFTER or (back and not telemetry.knows_place(now))
+
+    def _silence(self, now: float) -> float:
+        # Standing motors need no fresh telemetry to be believed: HEARTBEATs tell of them.
+        telemetry = self._telemetry
+        return telemetry.silence(now) if telemetry.armed else now - telemetry.heard_at
+
+    def _faults(self, now: float) -> list[str]:
+        telemetry = self._telemetry
+        faults = [self.restarted, self._touchdown.fault]
+        speaks = now - telemetry.heard_at <= _LOST_AFTER < now - telemetry.back_at
+        if speaks and self._silence(now) > _LOST_AFTER:
+            faults.append("telemetry: packets come, and say nothing new")
+        if self.alignment is not None:
+            faults.append(self.alignment.fault)
+        faults += telemetry.health.faults(now)
+        faults += telemetry.texts.recent(now, REASONS, _GRAVE)
+        return list(dict.fromkeys(fault for fault in faults if fault))

@@ -1,0 +1,239 @@
+"""The newest of everything that the vehicle has said."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from aerodaas.drivers.mavlink.microservices.events import EventReader
+from aerodaas.drivers.mavlink.microservices.texts import Texts
+from aerodaas.drivers.mavlink.state.frames import Attitude, attitude_from_frd
+from aerodaas.drivers.mavlink.state.health import Health
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.data import Battery, GpsFix
+from aerodaas.types.geometry import Vector
+
+__all__ = ["Sensors", "Telemetry"]
+
+_FRESH = 1.0
+"""Seconds after which a position or an attitude is none any more."""
+_FIX = 2
+"""GPS fix types from this one on are positions."""
+_FAR = 5.0
+"""Seconds: packets may overtake each other by less, and only a restart goes back by more."""
+_UNKNOWN_SATELLITES = 255
+_UNKNOWN_VOLTAGE = 65535
+
+
+class Sensors(NamedTuple):
+    """Bits of MAV_SYS_STATUS_SENSOR."""
+
+    present: int
+    enabled: int
+    health: int
+
+
+class Telemetry:
+    """Takes messages, each with the monotonic second of its arrival; in the autopilot's frames."""
+
+    def __init__(self) -> None:
+        self.heard_at = -math.inf
+        """Any message at all."""
+        self.back_at = -math.inf
+        """The first message after the latest silence."""
+        self.ticked_at = -math.inf
+        """The latest message whose stamp was newer than all before."""
+        self.beat_at = -math.inf
+        """The latest HEARTBEAT."""
+        self.custom_mode = 0
+        self.armed = False
+        self.critical = False
+        """Its own protection is at work."""
+        self.position: Vector | None = None
+        """NED metres from the autopilot's own origin."""
+        self.velocity: Vector = np.zeros(3)
+        self.position_at = -math.inf
+        self.attitude = Attitude()
+        self.attitude_at = -math.inf
+        self.home: Vector | None = None
+        """Where it was armed, NED metres."""
+        self.altitude: float | None = None
+        """Metres above mean sea level, by its own estimate."""
+        self.place: tuple[float, float] | None = None
+        """Latitude and longitude in degrees, by its own estimate."""
+        self.gps: GpsFix | None = None
+        self.battery = Battery(math.nan)
+        self.on_ground: bool | None = None
+        self.sensors: Sensors | None = None
+        """Bits of SYS_STATUS; None before it has come."""
+        self.health = Health()
+        """What is wrong, by its name."""
+        self.boot_time = math.nan
+        """Seconds of the autopilot's own clock since it started."""
+        self.clock = math.nan
+        """The same clock in seconds since the Unix epoch."""
+        self.reboots = 0
+        self._booting: bool | None = None
+        self.software = ""
+        self._stamps: dict[str, int] = {}
+        self.seen: dict[str, float] = {}
+        """When each kind of message came last."""
+        self.texts = Texts()
+        self.events = EventReader()
+        self._takers: dict[str, Callable[[Any, float], None]] = {
+            "HEARTBEAT": self._heartbeat,
+            "LOCAL_POSITION_NED": self._local_position,
+            "ATTITUDE": self._attitude,
+            "GLOBAL_POSITION_INT": self._global_position,
+            "GPS_RAW_INT": self._gps,
+            "SYS_STATUS": self._status,
+            "EXTENDED_SYS_STATE": self._landed,
+            "HOME_POSITION": self._home,
+            "SYSTEM_TIME": self._time,
+            "AUTOPILOT_VERSION": self._version,
+            "STATUSTEXT": self._text,
+            "EVENT": self._event,
+        }
+
+    def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Take note of a message of the vehicle."""
+        if now - self.heard_at > _FRESH:
+            self.back_at = now
+        self.heard_at = now
+        kind = message.get_type()
+        self.seen[kind] = now
+        if not self._fresh(kind, message, now):
+            return
+        self.health.take(message, now)
+        taker = self._takers.get(kind)
+        if taker is not None:
+            taker(message, now)
+
+    def silence(self, now: float) -> float:
+        """Seconds since it last said something new; stamps that stand still are nothing new."""
+        return now - min(self.heard_at, self.ticked_at)
+
+    def knows_place(self, now: float) -> bool:
+        """Tell whether it has said lately where it is and how it stands, and believes it itself."""
+        fresh = now - self.position_at < _FRESH and now - self.attitude_at < _FRESH
+        return fresh and not self.health.lost(now)
+
+    def _heartbeat(self, message: Any, now: float) -> None:  # noqa: ANN401
+        self.beat_at = now
+        self.custom_mode = message.custom_mode
+        # Terminated, it calls itself armed for ever, and no motor turns.
+        self.armed = (
+            bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+            and message.system_status != mavlink.MAV_STATE_FLIGHT_TERMINATION
+        )
+        self.critical = message.system_status in {
+            mavlink.MAV_STATE_CRITICAL,
+            mavlink.MAV_STATE_EMERGENCY,
+        }
+        booting = message.system_status == mavlink.MAV_STATE_BOOT
+        # The very first one may find it just starting, which is no new start.
+        if booting and self._booting is False:
+            self._restarted()
+        self._booting = booting
+
+    def _local_position(self, message: Any, now: float) -> None:  # noqa: ANN401
+        position = np.array([message.x, message.y, message.z], dtype=np.float64)
+        velocity = np.array([message.vx, message.vy, message.vz], dtype=np.float64)
+        if np.isfinite(position).all() and np.isfinite(velocity).all():
+            self.position, self.velocity, self.position_at = position, velocity, now
+
+    def _attitude(self, message: Any, now: float) -> None:  # noqa: ANN401
+        angles = (message.roll, message.pitch, message.yaw, message.yawspeed)
+        if all(map(math.isfinite, angles)):
+            self.attitude, self.attitude_at = attitude_from_frd(*angles), now
+
+    def _global_position(self, message: Any, _: float) -> None:  # noqa: ANN401
+        if message.lat == 0 and message.lon == 0:
+            # That is how an autopilot says that it does not know.
+            self.altitude = self.place = None
+            return
+        self.altitude = message.alt / 1e3
+        self.place = message.lat / 1e7, message.lon / 1e7
+
+    def _gps(self, message: Any, _: float) -> None:  # noqa: ANN401
+        if message.fix_type < _FIX:
+            self.gps = None
+            return
+        count = message.satellites_visible
+        self.gps = GpsFix(
+            message.lat / 1e7,
+            message.lon / 1e7,
+            (message.alt_ellipsoid or message.alt) / 1e3,
+            message.h_acc / 1e3,
+            message.v_acc / 1e3,
+            0 if count == _UNKNOWN_SATELLITES else count,
+        )
+
+    def _status(self, message: Any, _: float) -> None:  # noqa: ANN401
+        left = message.battery_remaining
+        voltage = message.voltage_battery
+        self.battery = Battery(
+            left / 100 if left >= 0 else math.nan,
+            voltage / 1e3 if voltage != _UNKNOWN_VOLTAGE else 0.0,
+            max(0, message.current_battery) / 100,
+        )
+        self.sensors = Sensors(
+            message.onboard_control_sensors_present,
+            message.onboard_control_sensors_enabled,
+            message.onboard_control_sensors_health,
+        )
+
+    def _landed(self, message: Any, _: float) -> None:  # noqa: ANN401
+        unknown = message.landed_state == mavlink.MAV_LANDED_STATE_UNDEFINED
+        grounded = message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
+        self.on_ground = None if unknown else grounded
+
+    def _home(self, message: Any, _: float) -> None:  # noqa: ANN401
+        home = np.array([message.x, message.y, message.z], dtype=np.float64)
+        self.home = home if np.isfinite(home).all() else None
+
+    def _time(self, message: Any, _: float) -> None:  # noqa: ANN401
+        self.clock = message.time_unix_usec / 1e6
+
+    def _fresh(self, kind: str, message: Any, now: float) -> bool:  # noqa: ANN401
+        """Mind the autopilot's own clock; False for a message no newer than the one before."""
+        stamp = getattr(message, "time_boot_ms", None)
+        if stamp is None:
+            return True
+        boot_time = stamp / 1e3
+        if boot_time < self.boot_time - _FAR:
+            self._restarted()
+        if not boot_time <= self.boot_time:
+            self.boot_time, self.ticked_at = boot_time, now
+        before = self._stamps.get(kind)
+        if before is not None and stamp <= before:
+            return False
+        self._stamps[kind] = stamp
+        return True
+
+    def _restarted(self) -> None:
+        """The autopilot has started anew: what it said before is of another life."""
+        self.reboots += 1
+        # Its first HEARTBEAT comes a second after its first other words, and no motor turns.
+        self.armed = False
+        self.boot_time = math.nan
+        self._stamps.clear()
+        self.position_at = self.attitude_at = -math.inf
+        self.home = self.place = self.altitude = self.gps = None
+        self.sensors = self.on_ground = None
+        self.health, self.events = Health(), EventReader()
+
+    def _version(self, message: Any, _: float) -> None:  # noqa: ANN401
+        version = message.flight_sw_version
+        self.software = ".".join(str(version >> shift & 0xFF) for shift in (24, 16, 8))
+
+    def _text(self, message: Any, now: float) -> None:  # noqa: ANN401
+        self.texts.take(message.text, message.severity, now, message.id, message.chunk_seq)
+
+    def _event(self, message: Any, now: float) -> None:  # noqa: ANN401
+        said = self.events.take(message.event, message.log_levels, message.sequence)
+        if said is not None:
+            self.texts.add(said.text, said.severity, now)

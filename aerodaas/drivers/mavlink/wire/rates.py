@@ -1,0 +1,57 @@
+"""The messages that we live by, asked for until they come: at first, and after a restart."""
+
+from __future__ import annotations
+
+import math
+
+from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
+from aerodaas.drivers.mavlink.microservices.commander import Commander, CommandResult
+from aerodaas.drivers.mavlink.state.telemetry import Telemetry
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+
+__all__ = ["RateKeeper"]
+
+_OVERDUE = 3.0
+"""Seconds without a message after which it is asked for again."""
+_PAUSE = 5.0
+"""Seconds between two requests for the same message."""
+
+
+class RateKeeper:
+    """Asks for one message after the other; an autopilot takes one such order at a time."""
+
+    def __init__(self, autopilot: Autopilot, commander: Commander) -> None:
+        self._autopilot = autopilot
+        self._commander = commander
+        self._asked_at = dict.fromkeys(autopilot.rates, -math.inf)
+        self._refused: set[int] = set()
+        self._reboots = 0
+        self._waiting = False
+
+    def turn(self, telemetry: Telemetry, now: float) -> None:
+        """Ask for the next message that is missing; called by the link's thread."""
+        if telemetry.reboots != self._reboots:
+            self._reboots = telemetry.reboots
+            self._asked_at = dict.fromkeys(self._asked_at, -math.inf)
+            self._refused.clear()
+        if self._waiting:
+            return
+        for message, rate in self._autopilot.rates.items():
+            name = mavlink.mavlink_map[message].msgname
+            first = self._asked_at[message] == -math.inf
+            missing = first or now - telemetry.seen.get(name, -math.inf) > _OVERDUE + 2.0 / rate
+            due = now - self._asked_at[message] > _PAUSE
+            if missing and due and message not in self._refused:
+                self._asked_at[message] = now
+                self._ask(message, rate, now)
+                return
+
+    def _ask(self, message: int, rate: float, now: float) -> None:
+        self._waiting = True
+
+        def done(outcome: CommandResult) -> None:
+            self._waiting = False
+            if not outcome.accepted and outcome.text != "no answer":
+                self._refused.add(message)
+
+        self._commander.give(self._autopilot.interval(message, rate), done, now=now)

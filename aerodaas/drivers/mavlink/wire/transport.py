@@ -1,0 +1,237 @@
+"""The wires: UDP, TCP and serial, none of which ever blocks for long."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import socket
+import termios
+import time
+import tty
+from typing import Protocol
+
+from aerodaas.types.errors import ConfigError, VehicleError
+
+__all__ = ["Peer", "Transport", "open_transport"]
+
+Peer = tuple[str, int] | None
+"""Who sent something; None where a wire has one other end only."""
+
+_LARGEST = 65535
+_AT_ONCE = 256
+"""Datagrams taken before others get their turn."""
+_RETRY = 1.0
+"""Seconds between attempts to reach a TCP server or a serial device again."""
+
+
+class Transport(Protocol):
+    """One wire."""
+
+    def fileno(self) -> int:
+        """File descriptor to wait for; -1 while the wire is cut."""
+        ...
+
+    def receive(self) -> list[tuple[bytes, Peer]]:
+        """What has arrived; never blocks."""
+        ...
+
+    def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
+        """Send to `peers`, where the wire has several other ends; loses what cannot be sent."""
+        ...
+
+    def close(self) -> None:
+        """Cut the wire."""
+        ...
+
+
+def open_transport(url: str, name: str) -> Transport:
+    """Open `url` for robot `name`.
+
+    Raises ConfigError for an address that is none, VehicleError for one that cannot be opened.
+    """
+    kind, _, rest = url.partition(":")
+    host, _, number = rest.rpartition(":")
+    if kind not in {"udpin", "udpout", "tcp", "serial"} or not host or not number.isdecimal():
+        raise ConfigError(
+            f"{name}: {url!r} is no address; write udpin:HOST:PORT, udpout:HOST:PORT, "
+            "tcp:HOST:PORT or serial:DEVICE:BAUD"
+        )
+    try:
+        if kind == "serial":
+            return _Serial(host, int(number))
+        if kind == "tcp":
+            return _Tcp(host, int(number))
+        return _Udp(host, int(number), listens=kind == "udpin")
+    except (OSError, OverflowError) as error:
+        raise VehicleError(f"{name}: {_explain(error, url, number)}") from None
+
+
+def _explain(error: Exception, url: str, number: str) -> str:
+    code = error.errno if isinstance(error, OSError) else None
+    reasons = {
+        errno.EADDRINUSE: (
+            f"port {number} is taken by another program; `ss -ulnp sport = :{number}` shows by "
+            "which (a ground station? have one of the two forward to the other)"
+        ),
+        errno.ECONNREFUSED: "nobody listens there; is the autopilot or its simulation running?",
+        errno.EACCES: "no permission (for a serial device: `sudo usermod -aG dialout $USER`)",
+        errno.EPERM: "no permission",
+        errno.ENOENT: "no such device; `ls /dev/serial/by-id` lists them",
+        errno.EADDRNOTAVAIL: "that is no address of this host; `ip address` lists them",
+    }
+    text = reasons.get(code or 0) or (str(error) or type(error).__name__)
+    return f"cannot open {url}: {text}"
+
+
+class _Udp:
+    def __init__(self, host: str, port: int, *, listens: bool) -> None:
+        self._listens = listens
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.settimeout(0.0)
+            if listens:
+                self._socket.bind((host, port))
+            else:
+                # Packets from elsewhere are none of ours, which the system sees to.
+                self._socket.connect((host, port))
+        except BaseException:
+            self._socket.close()
+            raise
+
+    def fileno(self) -> int:
+        return self._socket.fileno()
+
+    def receive(self) -> list[tuple[bytes, Peer]]:
+        arrived: list[tuple[bytes, Peer]] = []
+        for _ in range(_AT_ONCE):
+            try:
+                content, sender = self._socket.recvfrom(_LARGEST)
+            except ConnectionError:
+                # The system reports here that an earlier datagram found nobody at its port.
+                continue
+            except OSError:
+                break
+            arrived.append((content, sender))
+        return arrived
+
+    def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
+        if not self._listens:
+            with contextlib.suppress(OSError):
+                self._socket.send(packet)
+            return
+        for peer in peers:
+            if peer is not None:
+                with contextlib.suppress(OSError):
+                    self._socket.sendto(packet, peer)
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class _Tcp:
+    def __init__(self, host: str, port: int) -> None:
+        self._server = (host, port)
+        self._socket: socket.socket | None = self._connected()
+        self._tried_at = time.monotonic()
+
+    def _connected(self) -> socket.socket:
+        opened = socket.create_connection(self._server, timeout=_RETRY)
+        opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        opened.settimeout(0.0)
+        return opened
+
+    def fileno(self) -> int:
+        return -1 if self._socket is None else self._socket.fileno()
+
+    def receive(self) -> list[tuple[bytes, Peer]]:
+        if self._socket is None:
+            self._reconnect()
+            return []
+        try:
+            content = self._socket.recv(_LARGEST)
+        except BlockingIOError:
+            return []
+        except OSError:
+            content = b""
+        if content:
+            return [(content, None)]
+        self._drop()
+        return []
+
+    def _reconnect(self) -> None:
+        now = time.monotonic()
+        if now - self._tried_at >= _RETRY:
+            self._tried_at = now
+            with contextlib.suppress(OSError):
+                self._socket = self._connected()
+
+    def _drop(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
+        self._socket = None
+
+    def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
+        del peers
+        if self._socket is not None:
+            with contextlib.suppress(OSError):
+                self._socket.sendall(packet)
+
+    def close(self) -> None:
+        self._drop()
+
+
+class _Serial:
+    def __init__(self, device: str, baud: int) -> None:
+        self._device = device
+        speed = getattr(termios, f"B{baud}", None)
+        if speed is None:
+            raise OSError(errno.EINVAL, f"{baud} is no speed of a serial line, such as 57600")
+        self._speed: int = speed
+        self._file = self._opened()
+        self._tried_at = time.monotonic()
+
+    def _opened(self) -> int:
+        file = os.open(self._device, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        try:
+            tty.setraw(file)
+            attributes = termios.tcgetattr(file)
+            attributes[4] = attributes[5] = self._speed
+            termios.tcsetattr(file, termios.TCSANOW, attributes)
+        except termios.error as error:
+            os.close(file)
+            raise OSError(*error.args) from None
+        return file
+
+    def fileno(self) -> int:
+        return self._file
+
+    def receive(self) -> list[tuple[bytes, Peer]]:
+        if self._file < 0:
+            now = time.monotonic()
+            if now - self._tried_at >= _RETRY:
+                self._tried_at = now
+                with contextlib.suppress(OSError):
+                    self._file = self._opened()
+            return []
+        try:
+            content = os.read(self._file, _LARGEST)
+        except BlockingIOError:
+            return []
+        except OSError:
+            content = b""
+        if content:
+            return [(content, None)]
+        self.close()
+        return []
+
+    def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
+        del peers
+        if self._file >= 0:
+            with contextlib.suppress(OSError):
+                os.write(self._file, packet)
+
+    def close(self) -> None:
+        file, self._file = self._file, -1
+        if file >= 0:
+            os.close(file)

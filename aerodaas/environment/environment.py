@@ -1,0 +1,416 @@
+"""Environment and Robot: the handles by which an application builds its graph and flies it."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from aerodaas.actors.run.checks import check_environment
+from aerodaas.config.model import ComputeConfig, EnvironmentConfig, RobotConfig
+from aerodaas.config.options import current_options
+from aerodaas.config.overrides import located, overridden
+from aerodaas.config.plugins import load_plugin
+from aerodaas.dataflow.graph import Graph, NavigationEdge, refusal
+from aerodaas.dataflow.handles import Compute, Sensor
+from aerodaas.dataflow.interfaces import IAeroData, IEnvironment, INavigate, IRobot, ISensor
+from aerodaas.dataflow.names import PaperNames
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.environment import sharing
+from aerodaas.environment.run import Run
+from aerodaas.mission.commands import AddNavigation, Command, End, Pause, Resume, initial_commands
+from aerodaas.schedulers.analytics.base import AnalyticsScheduler
+from aerodaas.schedulers.analytics.registry import load_scheduler
+from aerodaas.schedulers.trajectory.base import NavigationEntry, TrajectoryScheduler
+from aerodaas.types.errors import ConfigError, GraphError, MissionError, UnknownIdError
+from aerodaas.types.identifiers import find_scoped
+
+__all__ = ["Environment", "Robot"]
+
+
+class Environment(PaperNames, IEnvironment):
+    """Robots, sensors and compute resources of an environment file, and one application's graph.
+
+    A relative path is looked up beside the application's file, then in the working directory.
+    `overrides` lays settings over the file, by `id.setting`: `{"camera.rate": 5}`.
+    Raises ConfigError for a file that is missing or malformed.
+    """
+
+    def __init__(
+        self,
+        path: str | Path = "environment.json",
+        overrides: Mapping[str, Any] | None = None,
+    ) -> None:
+        options = current_options.get()
+        self.path = _find(options.environment or Path(path), options.application)
+        settings = {**(overrides or {}), **options.overrides}
+        if options.seed is not None:
+            settings["simulation.seed"] = options.seed
+        if options.replay is None:
+            config = overridden(EnvironmentConfig.load(self.path), settings)
+        else:
+            from aerodaas.recording.replay.environment import (  # noqa: PLC0415 - only for a replay
+                replay_environment,
+            )
+
+            config = overridden(replay_environment(options.replay), options.overrides)
+        self.config: EnvironmentConfig = located(config, self.path.parent)
+        check_environment(self.config, str(options.replay or self.path))
+        self.env_data = self.config.model_dump(by_alias=True)
+        """The environment file's content, for analyses that want it."""
+        self.graph = Graph(sensor.full_id for sensor in self.config.all_sensors())
+        self.run: Run | None = None
+        self._flights = 0
+        self._flown = 0
+        """How much of the graph's navigation the flights that have ended were given."""
+        self._robots = {robot.id: Robot(self, robot) for robot in self.config.robots}
+        self._trajectory: TrajectoryScheduler | None = None
+        self._dispatch_with: AnalyticsScheduler | None = None
+        self._compute: list[ComputeConfig] | None = None
+
+    def has_env_sensors(self) -> bool:
+        """Return True if the environment has sensors."""
+        return bool(self.config.sensors)
+
+    def get_env_sensors(self) -> list[ISensor[Any]]:
+        """Return the sensors in the environment."""
+        return [Sensor(self.graph, sensor, None) for sensor in self.config.sensors]
+
+    def get_env_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
+        """Return a sensor of the environment, or a robot's by `robot/sensor`.
+
+        A robot's sensor may go by its short name where no other sensor has it. Raises
+        UnknownIdError for one that there is not, AmbiguousIdError where several robots have it.
+        """
+        sensors = {sensor.full_id: sensor for sensor in self.config.all_sensors()}
+        sensor = sensors[find_scoped("sensor", sensor_id, sensors)]
+        return Sensor(self.graph, sensor, sensor.robot)
+
+    def get_env_robots(self) -> list[IRobot]:
+        """Return all the robots available in the environment."""
+        return list(self._robots.values())
+
+    def get_robot_by_id(self, robot_id: str) -> Robot:
+        """Return the requested robot; raises UnknownIdError."""
+        if robot_id not in self._robots:
+            raise UnknownIdError("robot", robot_id, list(self._robots))
+        return self._robots[robot_id]
+
+    def is_robot_sensor_available(self, sensor_id: str) -> bool:
+        """Return True if a robot has the required onboard sensor, by `robot/sensor` or its id."""
+        sensors = [sensor for robot in self.config.robots for sensor in robot.sensors]
+        return any(sensor_id in {sensor.id, sensor.full_id} for sensor in sensors)
+
+    def get_robot_sensors(self) -> list[ISensor[Any]]:
+        """Return the sensors of all robots in the environment."""
+        return [sensor for robot in self._robots.values() for sensor in robot.get_sensors()]
+
+    def get_compute_resources(self) -> list[Any]:
+        """Return all the compute resources available: of the file, or of the cluster if "auto"."""
+        return [Compute(self.graph, resource) for resource in self.compute()]
+
+    def get_compute_resource_by_id(self, compute_id: str) -> Compute:
+        """Return the requested compute resource; raises UnknownIdError."""
+        for resource in self.compute():
+            if resource.id == compute_id:
+                return Compute(self.graph, resource)
+        raise UnknownIdError("compute resource", compute_id, [one.id for one in self.compute()])
+
+    def set_trajectory_scheduler(self, scheduler: INavigate) -> None:
+        """Plug in the trajectory scheduler; raises ConfigError if it is none.
+
+        In flight, all that is queued is planned anew by it.
+        """
+        if not isinstance(scheduler, TrajectoryScheduler):
+            kind = type(scheduler).__name__
+            raise ConfigError(f"a trajectory scheduler is a TrajectoryScheduler, not {kind}")
+        if self.run is not None and self.graph.flying:
+            self.run.use_scheduler(scheduler)
+        self._trajectory = scheduler
+
+    def set_analytics_scheduler(self, scheduler: Any) -> None:  # noqa: ANN401 - as the interface
+        """Plug in the analytics scheduler: a name, `module:Class`, or an instance.
+
+        Raises UnknownIdError or SchedulerError if it cannot be used.
+        """
+        self._dispatch_with = load_scheduler(scheduler)
+
+    def compute(self) -> list[ComputeConfig]:
+        """The compute resources; asks the cluster where the file says "auto"."""
+        if self._compute is None:
+            if self.config.compute == "auto":
+                from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
+                    ray_cluster as cluster,
+                )
+
+                cluster.connect(current_options.get().address)
+                self._compute = cluster.discover()
+            else:
+                self._compute = list(self.config.compute)
+        return self._compute
+
+    def trajectory_scheduler(self) -> TrajectoryScheduler:
+        """The scheduler plugged in, or the one that the environment file names."""
+        if self._trajectory is None:
+            name = self.config.schedulers.trajectory
+            self.set_trajectory_scheduler(load_plugin("trajectory_schedulers", name)(self))
+        assert self._trajectory is not None  # noqa: S101 - set just now
+        return self._trajectory
+
+    def analytics_scheduler(self) -> AnalyticsScheduler | None:
+        """The scheduler plugged in, or the one that the environment file names, if any."""
+        override = current_options.get().scheduler
+        if override is not None:
+            return load_scheduler(override)
+        if self._dispatch_with is None and self.config.schedulers.analytics is not None:
+            self._dispatch_with = load_scheduler(self.config.schedulers.analytics)
+        return self._dispatch_with
+
+    def navigation_waiting(self) -> list[NavigationEntry]:
+        """What a scheduler was given before the mission."""
+        return [] if self._trajectory is None else list(self._trajectory.entries)
+
+    def navigation_added(self, entry: NavigationEntry) -> bool:
+        """Take navigation that a scheduler was given; False before the mission starts."""
+        if entry.robot is not None:
+            self.get_robot_by_id(entry.robot)
+        flying = list(dict.fromkeys(edge.robot for edge in self.graph.navigation))
+        if not self.graph.flying:
+            # One that is called for no robot may yet be meant for the only one that will fly.
+            if len(flying) > 1:
+                _addressee(entry, flying)
+            return False
+        robot = _addressee(entry, flying)
+        self._require_flying(robot)
+        if entry.navigation.stream is None:
+            self.command(
+                robot,
+                AddNavigation(
+                    entry.navigation, entry.index, entry.deadline, clear_first=entry.clear_first
+                ),
+            )
+        else:
+            self.fly_by(_edge(robot, entry))
+        return True
+
+    def fly_by(self, edge: NavigationEdge) -> None:
+        """Record navigation of a robot; in flight, have the robot take it at once.
+
+        Raises GraphError for what cannot be added in flight, MissionError for what the mission
+        refuses.
+        """
+        graph = self.graph
+        self._require_flying(edge.robot)
+        graph.navigation.append(edge)
+        if graph.on_growth is None:
+            return
+        try:
+            graph.on_growth()
+            for command in initial_commands([edge]):
+                self.command(edge.robot, command)
+        except BaseException:
+            graph.navigation.remove(edge)
+            raise
+
+    def _require_flying(self, robot: str) -> None:
+        graph = self.graph
+        if graph.flying and robot not in {one.robot for one in graph.navigation}:
+            raise GraphError(
+                f"{robot} cannot join a mission in flight: call navigate() for every robot "
+                "that is to fly before start_mission(), or fly it when this mission has ended"
+            )
+
+    def command(self, robot: str, command: Command) -> None:
+        """Tell a flying robot something; raises MissionError if it does not fly or refuses."""
+        if self.run is None or robot not in {one.robot for one in self.graph.navigation}:
+            raise MissionError(f"{robot} is not flying: call start_mission(wait=False) first")
+        answer = self.run.command(robot, command)
+        if not answer.accepted:
+            raise MissionError(f"{robot}: {answer.text}")
+
+    def launch(self) -> Run:
+        """Start the mission of every robot that navigates; once."""
+        if self.run is None:
+            for guest in current_options.get().guests:
+                sharing.welcome(guest, self)
+            self._start()
+        assert self.run is not None  # noqa: S101 - started just now
+        return self.run
+
+    def launch_again(self) -> Run:
+        """Start the first mission, or once that has ended the next one; else the one that flies.
+
+        The next mission flies what was given to it since the last one ended, and the streams of
+        those before; where nothing was given, it flies the same again.
+        """
+        if self.run is None or not self.run.over:
+            return self.launch()
+        self.run.wait()
+        edges = self.graph.navigation
+        if self._flown < len(edges) or self.trajectory_scheduler().entries:
+            old, new = edges[: self._flown], edges[self._flown :]
+            edges[:] = [edge for edge in old if edge.navigation.stream is not None] + new
+        self._start()
+        return self.run
+
+    def _start(self) -> None:
+        self._place_entries()
+        self._flights += 1
+        run = self.run = Run(self, self._flights)
+        run.on_end.append(self._note_flown)
+        try:
+            run.start()
+        except BaseException:
+            self.run = None
+            raise
+
+    def _note_flown(self) -> None:
+        self._flown = len(self.graph.navigation)
+
+    def _place_entries(self) -> None:
+        """Hand what was added to the scheduler to the robot that it is meant for.
+
+        Raises GraphError where several fly and nothing says for which.
+        """
+        entries = self.trajectory_scheduler().entries
+        named = [edge.robot for edge in self.graph.navigation]
+        named += [entry.robot for entry in entries if entry.robot is not None]
+        robots = list(dict.fromkeys(named))
+        if robots:
+            self.graph.navigation += [_edge(_addressee(one, robots), one) for one in entries]
+            entries.clear()
+
+
+class Robot(PaperNames, IRobot):
+    """One drone of an environment."""
+
+    def __init__(self, environment: Environment, config: RobotConfig) -> None:
+        self._environment = environment
+        self.config = config
+        self.robot_id = config.id
+        self._start_hooks: list[Callable[[], None]] = []
+        self._end_hooks: list[Callable[[], None]] = []
+
+    def has_sensors(self) -> bool:
+        """Return True if the robot has any onboard sensors."""
+        return bool(self.config.sensors)
+
+    def get_sensors(self) -> list[ISensor[Any]]:
+        """Return all the sensors on board."""
+        graph = self._environment.graph
+        return [Sensor(graph, sensor, self.robot_id) for sensor in self.config.sensors]
+
+    def get_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
+        """Return the requested sensor; raises UnknownIdError."""
+        for sensor in self.config.sensors:
+            if sensor_id in {sensor.id, sensor.full_id}:
+                return Sensor(self._environment.graph, sensor, self.robot_id)
+        known = [sensor.id for sensor in self.config.sensors]
+        raise UnknownIdError(f"sensor of {self.robot_id}", sensor_id, known)
+
+    def is_navigable(self) -> bool:
+        """Return True if the robot is navigable: its driver takes setpoints."""
+        capabilities = load_plugin("drivers", self.config.driver)(
+            self.config, self._environment.config
+        ).capabilities
+        return bool(capabilities.position_setpoints or capabilities.velocity_setpoints)
+
+    def navigate(self, data: IAeroData[Any]) -> None:
+        """Fly by this navigation: waypoints, or a stream of navigation; in flight, from now on.
+
+        Raises GraphError if `data` is neither, or if this robot is not in the mission that flies,
+        and MissionError for what the mission refuses in flight.
+        """
+        navigation = data
+        if not isinstance(data, IAeroData):
+            raise refusal(
+                f"{self.robot_id} navigates by AeroListData([Waypoint(…), …]), AeroNavigation or a "
+                f"stream of navigation, not by {type(data).__name__}"
+            )
+        if not isinstance(navigation, AeroNavigation):
+            navigation = self._environment.trajectory_scheduler().generate_navigation(data)
+        stream = navigation.stream
+        if stream is not None and not issubclass(stream.item, AeroNavigation):
+            raise GraphError(
+                f"{self.robot_id} cannot navigate by {stream.name}, which carries "
+                f"{stream.item.__name__}; put a follow analysis between"
+            )
+        if stream is not None and stream.graph is not self._environment.graph:
+            raise GraphError(f"{stream.name} belongs to another Environment than {self.robot_id}")
+        self._environment.fly_by(NavigationEdge(self.robot_id, navigation))
+
+    def start_mission(self, hook: Callable[[], None] | None = None, *, wait: bool = True) -> None:
+        """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
+
+        With `wait=False`, return as soon as it flies; as a guest of another application, which
+        flies, at once. While the mission flies, this waits for it; after it has ended, it flies
+        anew: what was given to `navigate` since, or where that is nothing, the same again. Raises
+        the project's errors; whatever happens, the drone is landed and the recording closed first.
+        """
+        for each in [*self._start_hooks, *([hook] if hook else [])]:
+            each()
+        if sharing.offer(self._environment):
+            return
+        run = self._environment.launch_again()
+        run.on_end += [each for each in self._end_hooks if each not in run.on_end]
+        if wait:
+            run.wait()
+
+    def end_mission(self) -> None:
+        """End the mission: land here; the hooks of `on_end` run once it is over."""
+        self._environment.command(self.robot_id, End())
+
+    def pause_mission(self) -> None:
+        """Pause the ongoing mission by putting the drone in hover mode."""
+        self._environment.command(self.robot_id, Pause())
+
+    def resume_mission(self) -> None:
+        """Resume the ongoing mission."""
+        self._environment.command(self.robot_id, Resume())
+
+    def wait(self) -> None:
+        """Return when the mission has ended; raises what it ended with."""
+        self._environment.launch().wait()
+
+    def on_start(self, hook: Callable[[], None]) -> Callable[[], None]:
+        """Register a hook to run before take-off; usable as a decorator."""
+        self._start_hooks.append(hook)
+        return hook
+
+    def on_end(self, hook: Callable[[], None]) -> Callable[[], None]:
+        """Register a hook to run after the mission has ended; usable as a decorator."""
+        self._end_hooks.append(hook)
+        return hook
+
+
+def _addressee(entry: NavigationEntry, flying: list[str]) -> str:
+    """The robot that navigation is meant for; raises GraphError where several could be."""
+    if entry.robot is not None:
+        return entry.robot
+    if len(flying) != 1:
+        place = f"\n  at {entry.line}" if entry.line else ""
+        raise GraphError(
+            f"{' and '.join(flying)} fly, and nothing says which of them this is for: write "
+            f"add_navigation(…, robot=drone), clear_navigation(robot=drone) or "
+            f"drone.navigate(…){place}"
+        )
+    return flying[0]
+
+
+def _edge(robot: str, entry: NavigationEntry) -> NavigationEdge:
+    stream = entry.navigation.stream
+    clear_on = stream.name if entry.clear_first and stream is not None else None
+    return NavigationEdge(robot, entry.navigation, entry.index, entry.deadline, clear_on)
+
+
+def _find(path: Path, application: Path | None) -> Path:
+    if path.is_absolute():
+        return path
+    main = getattr(sys.modules.get("__main__"), "__file__", None)
+    beside = application or (Path(main) if main else None)
+    candidates = [beside.parent / path] if beside is not None else []
+    for candidate in [*candidates, path]:
+        if candidate.exists():
+            return candidate
+    return path

@@ -1,0 +1,387 @@
+"""One run of an application: from its graph to a landed drone and a closed recording."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import threading
+import time
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from aerodaas.actors.run.checks import check_served
+from aerodaas.config.model import EnvironmentConfig, TaskConfig
+from aerodaas.config.options import RunOptions, current_options
+from aerodaas.environment.signals import TerminatedError, raise_on_termination
+from aerodaas.mission.commands import Answer, Command, End
+from aerodaas.types.clock import seconds
+from aerodaas.types.errors import (
+    AeroDaaSError,
+    ConfigError,
+    GraphError,
+    MissionError,
+    RecordingError,
+)
+from aerodaas.types.identifiers import told
+from aerodaas.types.status import MissionState
+
+if TYPE_CHECKING:
+    from aerodaas.actors.base import ActorReport
+    from aerodaas.actors.run.application import Application
+    from aerodaas.actors.run.flight import Flight, FlightState
+    from aerodaas.actors.run.plan import FlightPlan
+    from aerodaas.environment.environment import Environment
+    from aerodaas.recording.replay.timeline import ReplayTimeline
+    from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+
+__all__ = ["Run"]
+
+_POLL_SECONDS = 0.1
+_BEAT_SECONDS = 1.0
+_LANDING_SECONDS = 60.0
+"""Wall time that an interrupted run gives its drones to land."""
+_RECORDING = "flight.mcap"
+_STEPPED = {"simulated", "replayed"}
+"""Drivers of vehicles whose time is ours."""
+
+
+class Run:
+    """The flight of one environment's robots; made by `Environment.launch`."""
+
+    def __init__(self, environment: Environment, number: int = 1) -> None:
+        """The flight `number` of this environment, counted from 1."""
+        self.options = current_options.get()
+        self.config = environment.config
+        self.graph = environment.graph
+        self.on_end: list[Callable[[], None]] = []
+        self.recording = _recording_path(self.options, self.config, number)
+        self.state: FlightState | None = None
+        self._environment = environment
+        self._flight: Flight | None = None
+        self._over = False
+        self._finished = threading.Event()
+        self._polling = threading.Lock()
+        self._began = time.monotonic()
+        self._launched = self._began
+
+    @property
+    def lockstep(self) -> bool:
+        """True where mission time moves as fast as the machine goes."""
+        simulated = all(robot.driver in _STEPPED for robot in self.config.robots)
+        wanted = self.options.lockstep
+        if wanted and not simulated:
+            raise ConfigError('--speed max needs every robot to be simulated; use "--speed 1"')
+        return simulated and self.options.speed is None if wanted is None else wanted
+
+    def start(self) -> None:
+        """Start all actors; raises the project's errors, with nothing left running."""
+        from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
+            ray_cluster as cluster,
+        )
+        from aerodaas.actors.run.live import LiveReader  # noqa: PLC0415
+        from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
+        from aerodaas.terminal.console import StartupView  # noqa: PLC0415
+
+        # Before Ray, which takes seconds: what is wrong with the graph should be told at once.
+        check_served("--live-address", self.options.live)
+        check_served("--view-address", self.options.page)
+        plan = self._plan()
+        if self.recording is not None and self.recording.exists():
+            raise RecordingError(
+                f"{self.recording} already exists and is not overwritten; "
+                "give --record another path or move the file away"
+            )
+        if (self.options.live or self.options.page) and self.recording is None:
+            raise ConfigError(
+                '--live and --view serve what is recorded; set "recording.enabled" to true'
+            )
+        cluster.begin(self.options.address)
+        from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads while Ray starts
+
+        with StartupView(self.options) as starting:
+            starting.step("starting Ray")
+            cluster.connect(self.options.address)
+            raise_on_termination()
+            provenance = Provenance.collect(
+                app=self.options.application, config=self.config, speed=self._speed_text()
+            )
+            options = self.options
+            flight = Flight(plan, self.recording, provenance, options.live, options.page)
+            try:
+                flight.launch(starting.step)
+            except BaseException:
+                flight.stop()
+                raise
+        self._flight = flight
+        self._launched = time.monotonic()
+        session = plan.session
+
+        def read(stream: str) -> LiveReader:
+            publisher = flight.publisher(stream)
+            if publisher is None:
+                raise GraphError(
+                    f"{stream} does not run: call get_data_stream() before start_mission()"
+                )
+            return LiveReader(session, stream, *publisher, lambda: self._over)
+
+        self.graph.reader = read
+        self.graph.on_growth = self.grow
+        for callback in self.graph.on_launch:
+            callback()
+        threading.Thread(target=self._keep_alive, name="heartbeat", daemon=True).start()
+        atexit.register(self.abandon)
+
+    def command(self, robot: str, command: Command) -> Answer:
+        """Tell a robot's mission something; raises MissionError once the run is over."""
+        if self._flight is None or self._finished.is_set():
+            raise MissionError(f"{robot} is no longer flying")
+        return self._flight.command(robot, command)
+
+    @property
+    def over(self) -> bool:
+        """True once every mission has ended."""
+        return self._over
+
+    def grow(self) -> None:
+        """Start what the application has added to the graph since; raises why that cannot be."""
+        from aerodaas.actors.run.plan import (  # noqa: PLC0415 - ray only where it is needed
+            make_plan,
+        )
+
+        flight = self._flying("nothing can be added")
+        self._change_models()
+        flight.learn(self._application())
+        flight.grow(
+            make_plan(
+                flight.plan.session,
+                self.graph,
+                self._environment.compute(),
+                self._environment.trajectory_scheduler(),
+                self._environment.analytics_scheduler(),
+            )
+        )
+
+    def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
+        """Have all robots plan by `scheduler` from now on; raises MissionError once it is over."""
+        flight = self._flying("no scheduler can be set")
+        flight.learn(self._application(scheduler))
+        flight.use_scheduler(scheduler)
+
+    def _flying(self, hence: str) -> Flight:
+        if self._flight is None or self._over:
+            raise MissionError(f"the mission is over: {hence}")
+        return self._flight
+
+    def look(self, newest: int = 200) -> FlightState:
+        """Return the present state, with the `newest` latencies of each robot."""
+        assert self._flight is not None  # noqa: S101 - launched
+        with self._polling:
+            self.state = self._flight.poll(newest)
+        self._over = self.state.over
+        return self.state
+
+    def _keep_alive(self) -> None:
+        """Tell the drones that the application lives, whatever it is busy with."""
+        while not self._finished.wait(_BEAT_SECONDS):
+            # Whoever waits for the run meets the same error and deals with it.
+            with contextlib.suppress(AeroDaaSError):
+                self.look()
+
+    def reports(self) -> dict[str, ActorReport]:
+        """The newest report of each actor, by its name."""
+        assert self._flight is not None  # noqa: S101 - launched
+        return self._flight.reports()
+
+    def wait(self) -> None:
+        """Watch until every mission has ended; raises what they ended with.
+
+        Ctrl-C lands the drones first; after a second one they land without us.
+        """
+        if self._finished.is_set():
+            return
+        assert self._flight is not None  # noqa: S101 - launched
+        try:
+            self._watch(float("inf"))
+        except KeyboardInterrupt:
+            self._land("interrupted from the keyboard")
+            raise
+        except SystemExit as error:
+            self._land(
+                error.reason if isinstance(error, TerminatedError) else "the application exits"
+            )
+            raise
+        except AeroDaaSError:
+            self._land("the run failed")
+            raise
+        finally:
+            self._finish()
+        self._raise_problems()
+
+    def _plan(self) -> FlightPlan:
+        from aerodaas.actors.run.plan import make_plan  # noqa: PLC0415
+        from aerodaas.actors.session import Session  # noqa: PLC0415
+        from aerodaas.mission.rehearsal import rehearse  # noqa: PLC0415 - loads geometry
+
+        self._check_world()
+        self._take_tasks()
+        speed = None if self.lockstep else (self.options.speed or 1.0)
+        scheduler = self._environment.trajectory_scheduler()
+        dispatch_with = self._environment.analytics_scheduler()
+        self._change_models()
+        application = self._application()
+        session = Session(
+            self.config, speed, replay_timeline=self._replay_timeline(), application=application
+        )
+        compute = self._environment.compute()
+        joins = self.options.address or os.environ.get("RAY_ADDRESS")
+        plan = make_plan(session, self.graph, compute, scheduler, dispatch_with, here=not joins)
+        for spec in (one for group in plan.drones for one in group):
+            rehearse(spec.robot, spec.initial, self.config, spec.scheduler)
+        return plan
+
+    def _application(self, *others: object) -> Application:
+        """What the application defines by now, that of `others` included.
+
+        Raises GraphError, by name, for what cannot be sent.
+        """
+        from aerodaas.actors.run.application import capture, require_sendable  # noqa: PLC0415
+
+        environment = self._environment
+        used = (environment.trajectory_scheduler(), environment.analytics_scheduler(), *others)
+        plugins = [one for one in used if one is not None]
+        application = capture(self.graph, self.config, *plugins)
+        require_sendable(self.graph, *plugins)
+        return application
+
+    def _check_world(self) -> None:
+        """Raise ConfigError for a broken scenario here rather than in some actor."""
+        from aerodaas.simulation.scenario import load_scenario  # noqa: PLC0415 - only here
+
+        if any(robot.driver == "simulated" for robot in self.config.robots):
+            load_scenario(self.config.simulation.world)
+
+    def _replay_timeline(self) -> ReplayTimeline:
+        from aerodaas.recording.replay.timeline import ReplayTimeline  # noqa: PLC0415 - only where it flies
+
+        if self.options.replay is None:
+            return ReplayTimeline()
+        from aerodaas.recording.replay.timeline_reader import (  # noqa: PLC0415 - loads decoders
+            read_replay_timeline,
+        )
+
+        return read_replay_timeline(self.options.replay)
+
+    def _change_models(self) -> None:
+        """Give every detector the model that the command line asks for."""
+        from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415 - only here
+
+        if self.options.model is not None:
+            for node in self.graph.nodes.values():
+                if isinstance(node.work, OnnxDetector):
+                    node.work = node.work.with_model(self.options.model)
+
+    def _take_tasks(self) -> None:
+        """Add what the application says of its analyses to what the environment file does."""
+        schedulers = self.config.schedulers
+        own = {
+            node.id: task
+            for node in self.graph.nodes.values()
+            if isinstance(task := getattr(node.work, "task", None), TaskConfig)
+            and told(node.id, schedulers.tasks) is None
+        }
+        schedulers = schedulers.model_copy(update={"tasks": {**own, **schedulers.tasks}})
+        self.config = self.config.model_copy(update={"schedulers": schedulers})
+
+    def _speed_text(self) -> str:
+        return "max" if self.lockstep else f"{self.options.speed or 1.0:g}"
+
+    def _watch(self, until: float) -> None:
+        from aerodaas.terminal.console import FlightView  # noqa: PLC0415
+
+        assert self._flight is not None  # noqa: S101 - launched
+        with FlightView(self.options, self.config) as watching:
+            while time.monotonic() < until:
+                state = self.look()
+                watching.update(state)
+                if state.over:
+                    return
+                time.sleep(_POLL_SECONDS)
+
+    def _land(self, reason: str) -> None:
+        """Have every drone land, and give it the time to do so."""
+        assert self._flight is not None  # noqa: S101 - launched
+        try:
+            for robot in dict.fromkeys(edge.robot for edge in self.graph.navigation):
+                self._flight.command(robot, End(reason))
+            self._watch(time.monotonic() + _LANDING_SECONDS)
+        except AeroDaaSError:
+            return
+
+    def _finish(self) -> None:
+        from aerodaas.terminal.console import (  # noqa: PLC0415
+            show_headless,
+            show_left,
+            show_results,
+            show_speed,
+        )
+
+        assert self._flight is not None  # noqa: S101 - launched
+        self._finished.set()
+        self._over = True
+        self.graph.on_growth = None
+        atexit.unregister(self.abandon)
+        flown = time.monotonic() - self._launched
+        with self._polling:
+            if self._flight.flying:
+                self._flight.leave()
+                show_left(self._flight.recording)
+                return
+            self._flight.stop()
+        for hook in self.on_end:
+            hook()
+        stamps = [robot.status.stamp for robot in self.state.robots.values()] if self.state else []
+        show_speed(
+            self.options, seconds(max(stamps, default=0)), flown, self._launched - self._began
+        )
+        show_results(self.options, self._flight.recording)
+        if self._flight.headless:
+            show_headless(self._flight.headless, self._flight.recording)
+
+    def abandon(self) -> None:
+        """Land and stop: the application has ended without waiting."""
+        if not self._finished.is_set() and self._flight is not None and self._flight.reachable:
+            self._land("the application ended")
+            self._finish()
+
+    def _raise_problems(self) -> None:
+        assert self._flight is not None  # noqa: S101 - launched
+        problems = [str(report.error) for report in self._flight.reports().values() if report.error]
+        problems += [
+            line
+            for report in self._flight.reports().values()
+            for line in (*report.values.get("last_errors", ()), *report.problems)
+        ]
+        robots = self.state.robots if self.state else {}
+        problems += [
+            f"{name}: mission aborted: {robot.status.reason}"
+            for name, robot in robots.items()
+            if robot.status.state is MissionState.ABORTED
+        ]
+        if problems:
+            raise MissionError("; ".join(dict.fromkeys(problems)))
+
+
+def _recording_path(options: RunOptions, config: EnvironmentConfig, number: int) -> Path | None:
+    if not config.recording.enabled:
+        return None
+    wanted = options.record or (Path(config.recording.path) if config.recording.path else None)
+    if wanted is None:
+        name = options.application.stem if options.application else config.name
+        now = datetime.now().astimezone()
+        wanted = Path("runs") / f"{name}-{now:%Y%m%d-%H%M%S}"
+    path = wanted if wanted.suffix == ".mcap" else wanted / _RECORDING
+    # One environment may fly several times.
+    return path if number == 1 else path.with_stem(f"{path.stem}-{number}")

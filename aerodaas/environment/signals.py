@@ -1,0 +1,40 @@
+"""A run that is told to end lands first: SIGTERM and SIGHUP are met as Ctrl-C is."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+from types import FrameType
+
+__all__ = ["TerminatedError", "raise_on_termination"]
+
+
+class TerminatedError(SystemExit):
+    """The process was asked to end: by a service manager, or by a terminal that was closed.
+
+    Its `code` is what a shell returns for a program that this signal ended.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(128 + number)
+        self.reason = f"received {signal.Signals(number).name}"
+
+
+def raise_on_termination() -> None:
+    """Raise TerminatedError in the main thread from now on; elsewhere, change nothing.
+
+    To be called once Ray has started, for its own handlers end the process at once.
+    """
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, _raise)
+
+
+def _raise(number: int, _: FrameType | None) -> None:
+    if number == signal.SIGHUP:
+        # Nobody reads what is written from now on, and writing to a closed terminal fails.
+        sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for good
+    raise TerminatedError(number)

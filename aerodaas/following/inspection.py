@@ -1,0 +1,209 @@
+"""Inspecting a tower: approach to a stand-off, climb along it, come down; pure, on stamps alone.
+
+The tower stands; where, is estimated from all sightings. Motion along the line of sight is braked
+so that the drone stops at the stand-off, and away from it the drone moves at once. Whatever goes
+wrong, an unseen tower or the time, ends in the descent, and the descent in the end.
+"""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from aerodaas.following.clearance import Clearance
+from aerodaas.following.command_shaper import CommandShaper
+from aerodaas.following.follow_controller import Observation
+from aerodaas.following.follow_settings import FollowLimits
+from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.following.target_motion import TargetMotion
+from aerodaas.types.braking import braking_speed
+from aerodaas.types.clock import seconds
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import wrap_angle
+from aerodaas.types.waypoints import DEFAULT_PRIORITY, VelocityCommand
+
+__all__ = ["InspectionController", "InspectionPhase", "InspectionPlan"]
+
+_LONGEST_STEP = 0.5
+_CONFIRMED = 3
+"""Sightings before the drone sets out."""
+_MEMORY = 2.0
+"""Seconds within which they must fall."""
+_FRESH = 1.0
+"""Seconds after a sighting in which the drone still moves towards the tower."""
+_CLOSE = 0.5
+_LEVEL = 0.3
+"""Metres from the stand-off and from a height that count as there."""
+_REACTION = 0.6
+"""Seconds from a picture to the drone's answer."""
+_SEARCH_RATE = 0.3
+_FARTHER = 1.25
+"""Times its known distance; a tower that seems farther is seen in part."""
+
+
+@dataclass(frozen=True, slots=True)
+class InspectionPlan:
+    """What to fly; metres, m/s, seconds. Raises ConfigError for numbers that cannot be."""
+
+    stand_off: float = 8.0
+    """Along the ground from the tower's near side; never less."""
+    base: float = 2.0
+    """Height at which the climb begins and the descent ends."""
+    top: float = 35.0
+    interval: float = 2.0
+    """Height between two pictures."""
+    speed: float = 1.5
+    """Of the approach."""
+    climb: float = 1.0
+    patience: float = 20.0
+    """Without a sight of the tower until the inspection ends."""
+    longest: float = 600.0
+    """From the beginning to the descent, at most."""
+    farthest: float = 100.0
+    """A tower farther away is left alone."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        for name in self.__slots__:
+            value = getattr(self, name)
+            if not 0.0 < value < math.inf:
+                raise ConfigError(f"inspection: {name} must be above 0, not {value}")
+        if self.top <= self.base:
+            raise ConfigError(f"inspection: top must lie above base={self.base}, not at {self.top}")
+
+
+class InspectionPhase(str, enum.Enum):
+    """How far the inspection has come."""
+
+    WAITING = "waiting"
+    """No tower has been seen, or only in a frame or two: there is nothing to command."""
+    APPROACHING = "approaching"
+    CLIMBING = "climbing"
+    DESCENDING = "descending"
+    DONE = "done"
+
+
+class InspectionController:
+    """Flies one inspection by `plan`."""
+
+    def __init__(self, plan: InspectionPlan, priority: int = DEFAULT_PRIORITY) -> None:
+        """Wait for a tower."""
+        self.plan = plan
+        self.priority = priority
+        self.phase = InspectionPhase.WAITING
+        self.reason = ""
+        """Why the climb ended before the top; empty if it did not."""
+        self.picture_due: float | None = None
+        """Height in metres of the picture to be taken of the frame last stepped; None for none."""
+        self.motion = TargetMotion(acceleration=0.0, speed=0.0)
+        limits = FollowLimits(plan.speed, plan.speed, max(plan.climb, 0.5), 0.8, 1.0, 2.0)
+        self._shaper = CommandShaper(limits)
+        self._clearance = Clearance(limits, plan.stand_off)
+        self._sightings: list[int] = []
+        self._began = self._seen = 0
+        self._stamp: int | None = None
+        self._next_picture = plan.base
+
+    def step(self, seen: Observation) -> VelocityCommand | None:
+        """Command for one frame; None while there is nothing to inspect, and without odometry."""
+        self.picture_due = None
+        if self._stamp is not None and seen.stamp <= self._stamp:
+            return None
+        dt = 0.1 if self._stamp is None else seconds(seen.stamp - self._stamp)
+        self._stamp = seen.stamp
+        self._take_in(seen)
+        self._clearance.see(seen.surfaces, seen.at_capture, dt)
+        now = seen.now or seen.at_capture
+        if self.phase is InspectionPhase.WAITING or now is None:
+            return None
+        relative = self.motion.relative_to(now, seen.stamp)
+        position = np.array([*now.position, now.yaw])
+        if relative is None or not np.isfinite(position).all():
+            return self._shaper.shape(np.zeros(3), 0.0, dt, self.priority)
+        distance, bearing = relative[0].distance, relative[0].bearing
+        if seen.sighting is not None and seen.sighting.bound:
+            distance = min(distance, seen.sighting.distance)
+        self._advance(distance, now.height, seen.stamp)
+        unseen = seconds(seen.stamp - self._seen)
+        free = self._clearance.speed(relative[0], now)
+        along = min(self._along(distance, unseen), free)
+        wanted = [along * math.cos(bearing), along * math.sin(bearing), self._climb(now.height)]
+        yaw_rate = 1.5 * wrap_angle(bearing)
+        if self.phase is InspectionPhase.APPROACHING and unseen > _MEMORY:
+            yaw_rate = math.copysign(_SEARCH_RATE, bearing)
+        if self.phase is InspectionPhase.DONE:
+            wanted, yaw_rate = [0.0, 0.0, 0.0], 0.0
+        step, braking = min(dt, _LONGEST_STEP), self._shaper.towards(bearing) > free
+        velocity = np.array(wanted)
+        return self._shaper.shape(velocity, yaw_rate, step, self.priority, braking=braking)
+
+    def _take_in(self, seen: Observation) -> None:
+        sighting = seen.sighting
+        if sighting is None or not 0.0 <= sighting.distance <= self.plan.farthest:
+            return
+        if self._seems_farther(sighting, seen):
+            return
+        self._seen = seen.stamp
+        if sighting.bound or seen.at_capture is None:
+            return
+        self.motion.observe(sighting, seen.at_capture, seen.stamp)
+        if self.phase is InspectionPhase.WAITING:
+            recent = [at for at in self._sightings if seconds(seen.stamp - at) <= _MEMORY]
+            self._sightings = [*recent, seen.stamp]
+            if not recent:
+                self.motion.reset()
+                self.motion.observe(sighting, seen.at_capture, seen.stamp)
+            if len(self._sightings) >= _CONFIRMED:
+                self.phase, self._began = InspectionPhase.APPROACHING, seen.stamp
+
+    def _seems_farther(self, sighting: RelativeTarget, seen: Observation) -> bool:
+        """Tell whether a sighting must be of a part of the tower: it stands, and seemed nearer."""
+        if self.phase is InspectionPhase.WAITING or sighting.bound or seen.at_capture is None:
+            return False
+        known = self.motion.relative_to(seen.at_capture, seen.stamp)
+        return known is not None and sighting.distance > _FARTHER * known[0].distance
+
+    def _advance(self, distance: float, height: float, stamp: int) -> None:
+        plan = self.plan
+        in_place = abs(distance - plan.stand_off) <= _CLOSE
+        in_place &= abs(height - plan.base) <= _LEVEL
+        if self.phase is InspectionPhase.APPROACHING and in_place:
+            self.phase = InspectionPhase.CLIMBING
+        if self.phase is InspectionPhase.CLIMBING:
+            if height >= self._next_picture - _LEVEL:
+                self.picture_due = height
+                self._next_picture += plan.interval
+            if height >= plan.top - _LEVEL:
+                self.phase = InspectionPhase.DESCENDING
+        if self.phase in {InspectionPhase.APPROACHING, InspectionPhase.CLIMBING}:
+            if seconds(stamp - self._seen) > plan.patience:
+                self._end("the tower is out of sight")
+            elif seconds(stamp - self._began) > plan.longest:
+                self._end(f"it has taken {plan.longest:g} s")
+        if self.phase is InspectionPhase.DESCENDING and height <= plan.base + _LEVEL:
+            self.phase = InspectionPhase.DONE
+
+    def _end(self, reason: str) -> None:
+        self.phase, self.reason = InspectionPhase.DESCENDING, reason
+
+    def _along(self, distance: float, unseen: float) -> float:
+        """Speed towards the tower, m/s; negative where it is too near."""
+        room = distance - self.plan.stand_off
+        if room < 0:
+            return max(2.0 * room, -self.plan.speed)
+        if unseen > _FRESH or self.phase is not InspectionPhase.APPROACHING:
+            return 0.0
+        return min(self.plan.speed, braking_speed(room, 0.5, _REACTION), 0.8 * room)
+
+    def _climb(self, height: float) -> float:
+        plan = self.plan
+        if self.phase is InspectionPhase.APPROACHING:
+            # From up there the foot of a near tower is out of the picture.
+            return max(min(plan.base - height, 0.8 * plan.climb), -plan.climb)
+        target = plan.top if self.phase is InspectionPhase.CLIMBING else plan.base
+        way = target - height
+        speed = min(plan.climb, braking_speed(abs(way), 0.5, _REACTION) + 0.1)
+        return math.copysign(min(speed, 2.0 * abs(way) + 0.05), way)

@@ -1,0 +1,131 @@
+"""Checks of a mission's incoming navigation: from the application, remote user and live streams."""
+
+from __future__ import annotations
+
+from collections.abc import Sized
+from dataclasses import replace
+
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.mission.commands import (
+    AddNavigation,
+    Answer,
+    ClearNavigation,
+    CloseStream,
+    OpenStream,
+    StreamItem,
+)
+from aerodaas.mission.log import MissionLog
+from aerodaas.mission.navigator import Navigator
+from aerodaas.types.clock import seconds
+from aerodaas.types.data import Header
+from aerodaas.types.errors import InvalidWaypointError
+from aerodaas.types.waypoints import SchedulingType
+
+__all__ = ["CommandHandler"]
+
+DONE = Answer(accepted=True)
+"""Acceptance without further text."""
+
+
+class CommandHandler:
+    """Checks navigation, passes it to the navigator, and tracks which streams are open."""
+
+    def __init__(self, navigator: Navigator, log: MissionLog) -> None:
+        """Feed `navigator`; refusals go to `log`."""
+        self.last_word = 0
+        """Mission clock of the last navigation message, nanoseconds."""
+        self._navigator = navigator
+        self._log = log
+        self._streams: dict[str, OpenStream] = {}
+        self._groups = 0
+
+    @property
+    def is_fed(self) -> bool:
+        """Whether a live stream may still deliver navigation."""
+        return any(stream.feeds for stream in self._streams.values())
+
+    def handle(
+        self,
+        command: AddNavigation | StreamItem | OpenStream | CloseStream | ClearNavigation,
+        now: int,
+    ) -> Answer:
+        """Execute a navigation command at `now` (mission clock, nanoseconds)."""
+        match command:
+            case AddNavigation():
+                return self._add(command, now)
+            case StreamItem():
+                return self._receive(command, now)
+            case OpenStream():
+                self._streams[command.name] = command
+                self.last_word = now
+            case CloseStream():
+                self._streams.pop(command.name, None)
+            case ClearNavigation():
+                self._clear(now)
+        return DONE
+
+    def _clear(self, now: int) -> None:
+        self._navigator.clear()
+        self.last_word = now
+
+    def _add(self, command: AddNavigation, now: int) -> Answer:
+        if command.clear_first:
+            self._clear(now)
+            if command.navigation.stream is None and not len(command.navigation):
+                return DONE
+        by_hand = OpenStream("", index=command.index, deadline=command.deadline)
+        return self._take(command.navigation, by_hand, now, command.cause)
+
+    def _receive(self, message: StreamItem, now: int) -> Answer:
+        stream = self._streams.get(message.name)
+        if stream is None:
+            return Answer(accepted=False, text=f"no stream called {message.name!r} is open")
+        item = message.item
+        if item is None or (isinstance(item, Sized) and not len(item)):
+            return DONE
+        if stream.clear_first:
+            self._clear(now)
+            stream = self._streams[stream.name] = replace(stream, clear_first=False)
+        if not isinstance(item, AeroNavigation):
+            return DONE
+        if stream.priority is not None:
+            kind, scheduling = item.navigation_type, item.scheduling_type
+            item = AeroNavigation(kind, item, scheduling, priority=stream.priority)
+        if message.index is not None:
+            stream = replace(stream, index=message.index)
+        return self._take(item, stream, now, message.cause, replaces=message.replaces)
+
+    def _take(
+        self,
+        navigation: AeroNavigation,
+        stream: OpenStream,
+        now: int,
+        cause: Header | None,
+        *,
+        replaces: bool = True,
+    ) -> Answer:
+        if navigation.stream is not None:
+            text = "navigation that is a stream is opened with OpenStream, not added"
+            return Answer(accepted=False, text=text)
+        if not len(navigation):
+            return Answer(accepted=False, text="the navigation is empty: there is nothing to fly")
+        for velocity in navigation.commands:
+            self._navigator.obey(velocity, now, cause)
+        taken, refused = self._navigator.admit(
+            navigation.waypoints, seconds(now), stream.deadline, stream.name if replaces else ""
+        )
+        self._groups += not stream.name
+        ordered = navigation.scheduling_type is SchedulingType.ORDERED and stream.ordered
+        group = (stream.name or f"group {self._groups}") if ordered else None
+        try:
+            self._navigator.add(
+                taken, group=group, index=stream.index, source=stream.name, cause=cause
+            )
+        except InvalidWaypointError as error:
+            return Answer(accepted=False, text=str(error))
+        for waypoint_id, reason in refused.items():
+            self._log.give_up(now, waypoint_id, reason)
+        accepted = bool(taken or navigation.commands)
+        if accepted:
+            self.last_word = now
+        return Answer(accepted, "; ".join(refused.values()), refused)

@@ -1,0 +1,83 @@
+"""One leg of a flight: departure to a waypoint, arrival, hover, and detection of a stalled leg."""
+
+from __future__ import annotations
+
+import enum
+import math
+
+import numpy as np
+
+from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.types.clock import seconds
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import Vector, wrap_angle
+from aerodaas.types.vehicle import PositionSetpoint
+
+__all__ = ["Leg", "LegPhase", "setpoint_towards"]
+
+_TURNING_DISTANCE = 1.0
+"""Metres from a place within which the direction to it no longer defines the yaw."""
+_FACING = 0.2
+"""Yaw error in radians that counts as facing the requested direction."""
+_PROGRESS = 0.1
+"""Metres of approach that count as progress: more than the position's noise."""
+
+
+class LegPhase(enum.Enum):
+    """Phases of a leg."""
+
+    UNDER_WAY = enum.auto()
+    HOVERING = enum.auto()
+    DONE = enum.auto()
+    STALLED = enum.auto()
+    """The drone has made no progress for longer than the stall time-out."""
+
+
+def setpoint_towards(
+    place: Vector, position: Vector, yaw: float | None, speed: float
+) -> PositionSetpoint:
+    """Return a setpoint to `place` (ENU metres), facing along the path if `yaw` is None."""
+    way = place - position
+    if yaw is None and math.hypot(way[0], way[1]) > _TURNING_DISTANCE:
+        yaw = math.atan2(way[1], way[0])
+    return PositionSetpoint(place, yaw, speed)
+
+
+class Leg:
+    """The flight to one stop of the queue, and the hover there."""
+
+    def __init__(
+        self, stop: QueuedWaypoint, now: int, arrival_radius: float, stall_timeout: float
+    ) -> None:
+        """Start towards `stop` at `now` (ns); radius in metres, time-out in seconds."""
+        stop.under_way = True
+        self.stop = stop
+        self._arrival_radius = arrival_radius
+        self._stall_timeout = stall_timeout
+        self._nearest = math.inf
+        self._nearer_at = now
+
+    def advance(self, odometry: Odometry, now: int, elapsed: float) -> LegPhase:
+        """Update with the odometry, `elapsed` seconds after the last call, and return the phase."""
+        stop = self.stop
+        distance = float(np.linalg.norm(stop.waypoint.position - odometry.position))
+        if stop.arrived:
+            stop.remaining_hover -= elapsed
+        stop.arrived = stop.arrived or (
+            distance <= self._arrival_radius and self._is_facing(odometry.yaw)
+        )
+        if stop.arrived:
+            return LegPhase.DONE if stop.remaining_hover <= 0.0 else LegPhase.HOVERING
+        if distance < self._nearest - _PROGRESS:
+            self._nearest, self._nearer_at = distance, now
+        stalled = seconds(now - self._nearer_at) > self._stall_timeout
+        return LegPhase.STALLED if stalled else LegPhase.UNDER_WAY
+
+    def setpoint(self, place: Vector, position: Vector, cruise_speed: float) -> PositionSetpoint:
+        """Fly on to `place`, the waypoint or a corner on the way there, as the waypoint says."""
+        waypoint = self.stop.waypoint
+        return setpoint_towards(place, position, waypoint.yaw, waypoint.speed or cruise_speed)
+
+    def _is_facing(self, yaw: float) -> bool:
+        asked = self.stop.waypoint.yaw
+        return asked is None or abs(wrap_angle(asked - yaw)) < _FACING

@@ -1,0 +1,70 @@
+"""A mission's log: waypoints given up, alerts, distance flown."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Alert, Header
+from aerodaas.types.geometry import Vector
+
+__all__ = ["MissionLog", "words"]
+
+_STRIDE = 0.5
+"""Metres from the last counted position before a stride counts; far above the odometry's noise,
+which would add up to metres in a minute's hover."""
+
+
+_AGAIN = 10 * NANOSECONDS
+"""Nanoseconds after which the same alert is raised again."""
+
+
+@dataclass
+class MissionLog:
+    """Alerts, abandoned waypoints and distance of one mission."""
+
+    source: str
+    """Source of the alerts' headers."""
+    visited: list[str] = field(default_factory=list)
+    given_up: dict[str, str] = field(default_factory=dict)
+    """Reason by waypoint id."""
+    distance: float = 0.0
+    """Metres flown, counted in strides of half a metre."""
+    _counted_at: Vector | None = None
+    alerts: list[Alert] = field(default_factory=list)
+    """Every alert of the mission, oldest first."""
+    _told: dict[tuple[str, str], int] = field(default_factory=dict)
+    """Mission clock at which each kind and subject was last raised, nanoseconds."""
+
+    def fly(self, position: Vector) -> None:
+        """Add the distance to `position`, ENU metres."""
+        if self._counted_at is None:
+            self._counted_at = position
+            return
+        way = float(np.linalg.norm(position - self._counted_at))
+        if way >= _STRIDE:
+            self.distance += way
+            self._counted_at = position
+
+    def alert(self, now: int, kind: str, text: str) -> None:
+        """Raise an alert; a repetition that differs only in its figures waits for `_AGAIN`."""
+        subject = kind, words(text)
+        told_at = self._told.get(subject)
+        if told_at is not None and now - told_at < _AGAIN:
+            return
+        self._told[subject] = now
+        header = Header(len(self.alerts), now, self.source)
+        self.alerts.append(Alert(header, kind, text))
+
+    def give_up(self, now: int, waypoint_id: str, reason: str) -> None:
+        """Record that a waypoint will not be visited, and raise an alert."""
+        self.given_up[waypoint_id] = reason
+        self.alert(now, "given_up", reason)
+
+
+def words(text: str) -> str:
+    """The text with its numbers masked: alerts with equal results have the same subject."""
+    return re.sub(r"\d+(\.\d+)?", "#", text)

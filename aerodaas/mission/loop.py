@@ -1,0 +1,142 @@
+"""The setpoint loop: read the vehicle, update the mission, clamp, send, and record the setpoint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, TakeOff, Wait
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.safety.setpoint_filter import Neighbour, SetpointFilter
+from aerodaas.types.clock import NANOSECONDS, seconds
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.status import MissionState, SetpointRecord
+from aerodaas.types.vehicle import (
+    PositionSetpoint,
+    Setpoint,
+    Vehicle,
+    VehicleMode,
+    VehicleState,
+    VelocitySetpoint,
+)
+
+__all__ = ["SetpointLoop"]
+
+_REPEAT = NANOSECONDS
+"""Nanoseconds after which an action without effect is requested again."""
+
+_PERIOD = 0.05
+"""Seconds assumed between turns, for the first one."""
+
+_DOING = {
+    TakeOff: frozenset({VehicleMode.TAKING_OFF, VehicleMode.GUIDED, VehicleMode.HOLDING}),
+    Land: frozenset({VehicleMode.LANDING, VehicleMode.GROUNDED}),
+    Return: frozenset({VehicleMode.RETURNING, VehicleMode.LANDING, VehicleMode.GROUNDED}),
+}
+"""Vehicle modes in which an action is already being carried out."""
+
+
+class SetpointLoop:
+    """The setpoint loop of one drone, turned by its actor 20 times a second."""
+
+    def __init__(self, vehicle: Vehicle, mission: Mission) -> None:
+        """Fly `vehicle` by `mission`, within the mission's limits."""
+        self.vehicle = vehicle
+        self.mission = mission
+        self.guard = SetpointFilter(
+            mission.limits,
+            mission.home,
+            position_setpoints=vehicle.capabilities.position_setpoints,
+        )
+        self.state: VehicleState | None = None
+        """The newest vehicle state read."""
+        self._before: int | None = None
+        self._last_action: type[Action] | None = None
+        self._asked_at = 0
+
+    def turn(self, now: int, neighbours: Iterable[Neighbour] = ()) -> SetpointRecord:
+        """Take one turn at mission time `now` (ns); returns the setpoints requested and sent.
+
+        `neighbours` are the other drones to keep away from. Raises VehicleError only if the vehicle
+        has never given a state.
+        """
+        state = self._read()
+        checking = self.mission.state is MissionState.PREFLIGHT
+        objections = self.vehicle.preflight() if checking else ()
+        action = self.mission.update(state, now, objections)
+        try:
+            return self._carry_out(action, state, now, neighbours)
+        except VehicleError as error:
+            self.mission.vehicle_refused(str(error))
+            return SetpointRecord(now, None, None)
+        finally:
+            self._last_action = type(action)
+            self._before = now
+
+    def _read(self) -> VehicleState:
+        try:
+            self.state = self.vehicle.read()
+        except VehicleError:
+            if self.state is None:
+                raise
+            self.state = replace(self.state, mode=VehicleMode.LOST)
+        return self.state
+
+    def _carry_out(
+        self,
+        action: Action,
+        state: VehicleState,
+        now: int,
+        neighbours: Iterable[Neighbour],
+    ) -> SetpointRecord:
+        if isinstance(action, Fly):
+            record = self._send(action.setpoint, state, now, neighbours)
+            return replace(record, cause=action.cause)
+        if isinstance(action, Hold):
+            stay: Setpoint = VelocitySetpoint(np.zeros(3))
+            if action.position is not None and self.vehicle.capabilities.position_setpoints:
+                stay = PositionSetpoint(action.position)
+            return self._send(stay, state, now, neighbours)
+        self.guard.forget()
+        if not isinstance(action, Wait):
+            self._ask(action, state, now)
+        return SetpointRecord(now, None, None)
+
+    def _ask(self, action: TakeOff | Land | Return, state: VehicleState, now: int) -> None:
+        """Request the action once, then every second while the vehicle's mode does not show it."""
+        new = self._last_action is not type(action)
+        overdue = state.mode not in _DOING[type(action)] and now - self._asked_at >= _REPEAT
+        if not (new or overdue):
+            return
+        self._asked_at = now
+        if isinstance(action, TakeOff):
+            self.vehicle.take_off(action.height)
+        elif isinstance(action, Return):
+            self.vehicle.return_home()
+        else:
+            self.vehicle.land()
+
+    def _send(
+        self,
+        asked: Setpoint,
+        state: VehicleState,
+        now: int,
+        neighbours: Iterable[Neighbour],
+    ) -> SetpointRecord:
+        duration = _PERIOD if self._before is None else seconds(now - self._before)
+        clamped = self.guard.clamp(asked, state.odometry, duration, neighbours)
+        sent = self.vehicle.send(clamped.setpoint)
+        names = clamped.clipped_by
+        if sent is not clamped.setpoint and not _same(sent, clamped.setpoint):
+            names = (*names, "vehicle")
+        return SetpointRecord(now, asked, sent, names)
+
+
+def _same(one: Setpoint, other: Setpoint) -> bool:
+    if isinstance(one, VelocitySetpoint) and isinstance(other, VelocitySetpoint):
+        return np.allclose(one.velocity, other.velocity) and one.yaw_rate == other.yaw_rate
+    if isinstance(one, PositionSetpoint) and isinstance(other, PositionSetpoint):
+        return np.allclose(one.position, other.position) and one.speed == other.speed
+    return False

@@ -1,0 +1,593 @@
+"""The mission of one drone: commands and vehicle states in, one action per turn out.
+
+A mission is pure: it reads no clock, never sleeps and starts no thread, so that the drone's actor,
+a test and a study all fly it with the same result. Long computations, such as plans, are submitted
+to a `Planner`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from aerodaas.config.model import RobotConfig
+from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, TakeOff, Wait
+from aerodaas.mission.command_handler import DONE, CommandHandler
+from aerodaas.mission.commands import (
+    AddNavigation,
+    Answer,
+    ClearNavigation,
+    CloseStream,
+    Command,
+    End,
+    OpenStream,
+    Pause,
+    Resume,
+    ReturnHome,
+    Start,
+    StreamItem,
+)
+from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards
+from aerodaas.mission.log import MissionLog, words
+from aerodaas.mission.navigator import LiveCommand, Navigator
+from aerodaas.mission.planner import Planner
+from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.safety.detour import Detour
+from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.mission.safety.motors import Motors, MotorWatch
+from aerodaas.mission.safety.supervisor import CALM, FailsafeAction, Fault, Supervisor, has_position
+from aerodaas.mission.state_machine import TERMINAL, MissionStateMachine
+from aerodaas.schedulers.trajectory.base import PlanningContext
+from aerodaas.types.braking import stopping_point
+from aerodaas.types.clock import NANOSECONDS, seconds
+from aerodaas.types.data import Alert
+from aerodaas.types.energy import EnergyMeter, EnergyModel
+from aerodaas.types.geometry import GeodeticOrigin, Vector, body_to_enu
+from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.vehicle import VehicleMode, VehicleState, VelocitySetpoint
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["Mission"]
+
+_ON_GROUND = frozenset({MissionState.IDLE, MissionState.PREFLIGHT})
+_LEAVING = frozenset({MissionState.RETURNING, MissionState.LANDING})
+_DRIFT = 0.5
+"""Ground speed in m/s below which a landing may begin; above it, the drone overshoots home."""
+_FORECAST_PERIOD = NANOSECONDS
+_FORECAST_PATIENCE = 10 * NANOSECONDS
+"""Nanoseconds for which the forecast must find the battery too small before an alert is raised."""
+_FORECAST_MARGIN = 1.1
+"""Factor by which the plan must exceed the available charge to be reported: gauge and model are no
+more accurate than that."""
+_SETTLED = frozenset({VehicleMode.HOLDING, VehicleMode.GUIDED})
+
+
+class Mission:
+    """One flight, from take-off to landing.
+
+    The drone's actor calls `update` 20 times a second::
+
+        action = mission.update(vehicle.read(), clock.now())
+
+    and carries the action out (`aerodaas.mission.loop.SetpointLoop` does both). Commands may be
+    handled between turns, by the same thread.
+    """
+
+    def __init__(
+        self,
+        robot: RobotConfig,
+        planner: Planner,
+        *,
+        takeoff: Vector,
+        origin: GeodeticOrigin | None = None,
+        wind: Vector | None = None,
+        obeyed: bool = True,
+    ) -> None:
+        """Plan with `planner` for a drone that stands at `takeoff`, ENU metres.
+
+        `origin` pins global waypoints; `wind` (ENU m/s) is for the energy model. `obeyed` is False
+        for a recorded vehicle, which lands when it landed in the recording. Raises ConfigError for
+        an invalid geofence.
+        """
+        self.limits = limits = robot.limits
+        self.fence = Geofence(limits.geofence)
+        self.home = takeoff.astype(np.float64)
+        self._options = robot.mission
+        self._obeyed = obeyed
+        self._machine = MissionStateMachine()
+        self._log = MissionLog(f"{robot.id}/mission")
+        self._meter = EnergyMeter(
+            EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
+        )
+        self._supervisor = Supervisor(limits, self.home, self.fence, self._meter)
+        self._navigator = Navigator(
+            planner,
+            self.fence,
+            home=self.home,
+            max_range=limits.max_range,
+            origin=origin,
+            command_timeout=limits.command_timeout,
+            resume_after=robot.mission.resume_after,
+        )
+        self._detour = Detour(self.fence, limits.arrival_radius)
+        self._command_handler = CommandHandler(self._navigator, self._log)
+        self._assessment = CALM
+        self._plan_fault = ""
+        self._forecast_due = 0
+        self._forecast_told = False
+        self._short_since: int | None = None
+        """Mission clock since which every forecast has found the battery too small for the plan."""
+        self._paused = False
+        self._last: VehicleState | None = None
+        self._now = 0
+        self._turned_at = 0
+        self._elapsed = 0.0
+        self._leg: Leg | None = None
+        self._motors = MotorWatch(self.home)
+        self._anchor: Vector | None = None
+        """Position that the drone holds."""
+        self._return_height: float | None = None
+
+    @property
+    def state(self) -> MissionState:
+        """The current state."""
+        return self._machine.state
+
+    @property
+    def finished(self) -> bool:
+        """Whether the mission is over, completed or not."""
+        return self.state in TERMINAL
+
+    @property
+    def alerts(self) -> Sequence[Alert]:
+        """All alerts for the operator, oldest first; the sequence only grows."""
+        return self._log.alerts
+
+    @property
+    def status(self) -> MissionStatus:
+        """The mission's complete status."""
+        stops = list(self._navigator.queue)
+        served = bool(stops) and self._leg is not None and self._leg.stop is stops[0]
+        waypoints = tuple(stop.waypoint for stop in stops)
+        texts = [finding.text for finding in self._assessment.findings]
+        return MissionStatus(
+            self._now,
+            self.state,
+            self._machine.reason,
+            waypoints[0] if served else None,
+            waypoints[1:] if served else waypoints,
+            tuple(self._log.visited),
+            tuple(self._log.given_up),
+            self._log.distance,
+            tuple(text for text in (*texts, self._navigator.fault, self._plan_fault) if text),
+        )
+
+    def handle(self, command: Command, now: int) -> Answer:
+        """Execute `command` at `now` (mission clock, ns) or answer why not; raises nothing.
+
+        An exception from a command or a stream's item fails that command alone, and raises an
+        alert.
+        """
+        self._now = max(self._now, now)
+        try:
+            return self._obey(command)
+        except Exception as error:  # noqa: BLE001 - a sender's objects may raise anything
+            source = f"an item of {command.name}" if isinstance(command, StreamItem) else ""
+            what = source or type(command).__name__
+            text = f"{what} failed: {type(error).__name__}: {error}"
+            self._log.alert(self._now, "command_failed", text)
+            return Answer(accepted=False, text=text)
+
+    def _obey(self, command: Command) -> Answer:
+        if self.finished:
+            return Answer(accepted=False, text=f"the mission is over: {self.state.value}")
+        match command:
+            case AddNavigation() | StreamItem() if self.state in _LEAVING:
+                return Answer(accepted=False, text=f"the drone is {self.state.value} by now")
+            case AddNavigation() | StreamItem() | OpenStream() | CloseStream() | ClearNavigation():
+                return self._command_handler.handle(command, self._now)
+            case _:
+                return self._control(command)
+
+    def _control(self, command: Start | Pause | Resume | ReturnHome | End) -> Answer:
+        match command:
+            case Start():
+                return self._start()
+            case Pause():
+                return self._pause()
+            case Resume():
+                return self._resume()
+            case ReturnHome():
+                return self._leave(MissionState.RETURNING, command.reason)
+            case End():
+                return self._leave(MissionState.LANDING, command.reason)
+
+    def _start(self) -> Answer:
+        if self.state is not MissionState.IDLE:
+            return Answer(accepted=False, text="the mission has already been started")
+        self._to(MissionState.PREFLIGHT)
+        return DONE
+
+    def _pause(self) -> Answer:
+        if self.state in _LEAVING:
+            return Answer(accepted=False, text=f"a drone that is {self.state.value} goes on")
+        self._paused = True
+        return DONE
+
+    def _resume(self) -> Answer:
+        if not self._paused:
+            return Answer(accepted=False, text="the mission is not paused")
+        self._paused = False
+        self._command_handler.last_word = self._now
+        if self.state is MissionState.PAUSED:
+            self._to(MissionState.HOLDING, "resumed")
+        return DONE
+
+    def _leave(self, state: MissionState, reason: str) -> Answer:
+        if self.state in _ON_GROUND:
+            self._to(MissionState.ABORTED, f"{reason} before take-off")
+        elif self.state is MissionState.LANDING:
+            # The reason for the landing stays as it was.
+            asked = state is MissionState.LANDING
+            return Answer(accepted=asked, text="the drone is already landing")
+        else:
+            self._to(state, reason)
+        return DONE
+
+    def update(self, state: VehicleState, now: int, objections: Sequence[str] = ()) -> Action:
+        """Take one turn of the loop and return the action to carry out.
+
+        `objections` are the vehicle's own reasons against a take-off (`Vehicle.preflight`); they
+        matter in the PREFLIGHT state only.
+        """
+        self._observe(state, now)
+        if self.state is MissionState.IDLE or self.finished:
+            return Wait()
+        if self.state is MissionState.PREFLIGHT:
+            return self._preflight(state, objections)
+        if self._motors_stopped(state):
+            return Wait()
+        self._protect(state)
+        if self.state in _LEAVING and self._lost_for_good():
+            return Wait()
+        turns = {
+            MissionState.TAKING_OFF: self._take_off,
+            MissionState.PAUSED: self._hover,
+            MissionState.RETURNING: self._return,
+            MissionState.LANDING: self._land,
+            MissionState.ABORTED: self._release,
+        }
+        return turns.get(self.state, self._fly)(state)
+
+    def replan(self) -> None:
+        """Plan the whole queue again, because the trajectory scheduler has been replaced."""
+        self._navigator.replan()
+
+    def vehicle_refused(self, text: str) -> None:
+        """Record that the vehicle refused an action; `text` is the vehicle's message."""
+        if self.state is MissionState.TAKING_OFF:
+            self._to(MissionState.ABORTED, f"the vehicle refused to take off: {text}")
+        self._log.alert(self._now, "refused", text)
+
+    def _observe(self, state: VehicleState, now: int) -> None:
+        self._elapsed = seconds(now - self._turned_at) if self._last is not None else 0.0
+        self._now = self._turned_at = now
+        last, self._last = self._last, state
+        on_ground = state.mode is VehicleMode.GROUNDED or not has_position(state)
+        if last is None or on_ground or not has_position(last):
+            return
+        self._log.fly(state.odometry.position)
+        self._meter.observe(
+            state.battery.fraction, state.odometry.velocity, seconds(state.stamp - last.stamp)
+        )
+
+    def _motors_stopped(self, state: VehicleState) -> bool:
+        """Whether the motors have stopped; if so, end the mission."""
+        motors = self._motors.observe(state, self._now)
+        leaving, reason = self.state in _LEAVING, self._machine.reason
+        if motors is Motors.RUNNING:
+            return False
+        if motors in {Motors.IDLE, Motors.NEVER_LIFTED}:
+            grounded = state.mode is VehicleMode.GROUNDED
+            if leaving and grounded:
+                self._to(MissionState.ABORTED, f"{reason} before take-off")
+            return leaving and grounded
+        if motors is Motors.SETTLING:
+            return True
+        if motors is Motors.LANDED and (leaving or not self._obeyed):
+            if leaving:
+                self._to(MissionState.LANDED, reason)
+            return True
+        east, north, up = self._motors.place
+        where = f"at E {east:.1f}, N {north:.1f}, up {up:.1f} m"
+        if motors is Motors.LANDED:
+            why = f": {'; '.join(state.faults)}" if state.faults else ""
+            kind, text = "landed", f"landed of its own accord {where}{why}"
+        else:
+            kind, text = "motors_stopped", f"motors stopped in flight {where}"
+        self._to(MissionState.ABORTED, text)
+        self._log.alert(self._now, kind, text)
+        return True
+
+    def _lost_for_good(self) -> bool:
+        """Whether the link has been lost for `return_timeout` or longer; if so, end the mission."""
+        silent = self._supervisor.silent_for(self._now)
+        lost = silent >= self.limits.return_timeout
+        if lost:
+            reason = f"the vehicle is lost: no word from it for {silent:.0f} s"
+            self._to(MissionState.ABORTED, reason)
+            self._log.alert(self._now, "vehicle_lost", reason)
+        return lost
+
+    def _preflight(self, state: VehicleState, objections: Sequence[str]) -> Action:
+        self._plan(state)
+        self._forecast(state)
+        reasons = self._supervisor.objections(state)
+        waits = self._command_handler.is_fed or self._options.on_complete == "hold"
+        if not (waits or len(self._navigator.queue)):
+            refused = "; ".join(self._log.given_up.values())
+            reasons.append(f"there is nothing to fly{': ' if refused else ''}{refused}")
+        waited = seconds(self._now - self._machine.since)
+        if not reasons and objections and waited >= self.limits.preflight_timeout:
+            reasons = list(objections)
+        if reasons:
+            self._to(MissionState.ABORTED, f"take-off refused: {'; '.join(reasons)}")
+            self._log.alert(self._now, "takeoff_refused", self._machine.reason)
+        elif objections:
+            self._to(MissionState.PREFLIGHT, f"not ready: {'; '.join(objections)}")
+        else:
+            self._to(MissionState.TAKING_OFF)
+            return TakeOff(self.limits.takeoff_height)
+        return Wait()
+
+    def _protect(self, state: VehicleState) -> None:
+        before = {_subject(finding) for finding in self._assessment.findings}
+        self._assessment = self._supervisor.assess(state, self._now)
+        demand, reason = self._assessment.demand, self._assessment.gravest.text
+        for finding in self._assessment.findings:
+            # The reason for a takeover or a lost position already names the faults behind it.
+            named = demand is not FailsafeAction.NOTHING and finding.text in reason
+            told = named and finding.kind == "vehicle"
+            if _subject(finding) not in before and not told:
+                self._log.alert(self._now, finding.kind, finding.text)
+        if demand is FailsafeAction.RELEASE:
+            self._to(MissionState.ABORTED, reason)
+        elif demand is FailsafeAction.LAND and self.state is not MissionState.LANDING:
+            self._to(MissionState.LANDING, reason)
+        elif demand is FailsafeAction.RETURN and self.state not in _LEAVING:
+            self._to(MissionState.RETURNING, reason)
+
+    def _take_off(self, state: VehicleState) -> Action:
+        self._plan(state)
+        tolerance = max(self.limits.arrival_radius, 0.1 * self.limits.takeoff_height)
+        height = state.odometry.height - float(self.home[2])
+        if state.mode in _SETTLED and height >= self.limits.takeoff_height - tolerance:
+            self._to(MissionState.HOLDING)
+            self._command_handler.last_word = self._now
+            return self._fly(state)
+        if seconds(self._now - self._machine.since) > self.limits.takeoff_timeout:
+            self._to(MissionState.LANDING, "the take-off took too long")
+            return Land()
+        return TakeOff(self.limits.takeoff_height)
+
+    def _fly(self, state: VehicleState) -> Action:
+        if self._paused:
+            self._to(MissionState.PAUSED)
+            return self._hover(state)
+        if self._assessment.demand is FailsafeAction.HOLD:
+            self._to(MissionState.HOLDING, self._assessment.gravest.text)
+            return self._hover(state)
+        self._plan(state)
+        self._forecast(state)
+        served = self._navigator.served(self._now)
+        if isinstance(served, QueuedWaypoint):
+            return self._serve(served, state)
+        self._leg = None
+        if served is not None:
+            return self._follow(served, state)
+        return self._idle(state)
+
+    def _serve(self, stop: QueuedWaypoint, state: VehicleState) -> Action:
+        if self._awaits_plan(stop):
+            self._to(MissionState.HOLDING, "waiting for a plan")
+            return self._hover(state)
+        diverted = MissionState.DIVERTED if self._navigator.queue.interrupted else None
+        if self._leg is None or self._leg.stop is not stop:
+            self._navigator.queue.leave_place()
+            self._leg = Leg(
+                stop, self._now, self.limits.arrival_radius, self._options.stall_timeout
+            )
+            self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
+        position = state.odometry.position
+        phase = self._leg.advance(state.odometry, self._now, self._elapsed)
+        place = self._detour.towards(stop.waypoint.position, position)
+        if place is None or phase in {LegPhase.DONE, LegPhase.STALLED}:
+            self._finish(stop, phase)
+            return self._fly(state)
+        if phase is LegPhase.HOVERING:
+            self._to(diverted or MissionState.LOITERING, f"at {stop.id}")
+        else:
+            self._to(diverted or MissionState.ENROUTE, f"flying to {stop.id}")
+        self._anchor = None
+        return Fly(self._leg.setpoint(place, position, self.limits.cruise_speed), stop.cause)
+
+    def _awaits_plan(self, stop: QueuedWaypoint) -> bool:
+        """Whether to hold for the plan under way rather than set out for `stop`."""
+        if not self._navigator.waits_for_plan or stop.under_way:
+            return False
+        timeout = self._options.plan_timeout
+        if self.state is not MissionState.HOLDING:
+            return True
+        if seconds(self._now - self._machine.since) < timeout:
+            return True
+        text = f"no plan within {timeout:g} s: flying the order given"
+        if self._navigator.fault != text:
+            self._navigator.fault = text
+            self._log.alert(self._now, "scheduler", text)
+        return False
+
+    def _finish(self, stop: QueuedWaypoint, phase: LegPhase) -> None:
+        if phase is LegPhase.DONE:
+            self._log.visited.append(stop.id)
+        else:
+            stalled = phase is LegPhase.STALLED
+            why = (
+                "the drone comes no nearer" if stalled else "no way inside the geofence leads there"
+            )
+            reason = f"{stop.id} cannot be reached: {why}"
+            self._log.give_up(self._now, stop.id, reason)
+        self._navigator.finish(stop)
+
+    def _follow(self, live: LiveCommand, state: VehicleState) -> Action:
+        waiting = len(self._navigator.queue) > 0
+        if self._now >= live.expires:
+            self._to(MissionState.DIVERTED if waiting else MissionState.HOLDING, "no fresh command")
+            return self._hover(state)
+        self._to(MissionState.DIVERTED if waiting else MissionState.FOLLOWING, "following commands")
+        self._anchor = None
+        command = live.command
+        velocity = body_to_enu(command.velocity, state.odometry.yaw)
+        return Fly(VelocitySetpoint(velocity, command.yaw_rate), live.cause)
+
+    def _idle(self, state: VehicleState) -> Action:
+        options, limits = self._options, self.limits
+        if self._command_handler.is_fed:
+            quiet = seconds(self._now - self._command_handler.last_word)
+            if quiet <= limits.command_timeout + limits.silence_return:
+                self._to(MissionState.HOLDING, "waiting for navigation")
+                return self._hover(state)
+            self._to(MissionState.RETURNING, f"navigation has been silent for {quiet:.0f} s")
+            return self._return(state)
+        if options.on_complete == "hold":
+            self._to(MissionState.HOLDING, "all waypoints are visited")
+            return self._hover(state)
+        if options.on_complete == "land":
+            self._to(MissionState.LANDING, "all waypoints are visited")
+            return Land()
+        self._to(MissionState.RETURNING, "all waypoints are visited")
+        return self._return(state)
+
+    def _hover(self, state: VehicleState) -> Action:
+        self._leg = None
+        if not has_position(state):
+            return Hold(None)
+        if self._anchor is None:
+            odometry = state.odometry
+            self._anchor = stopping_point(
+                odometry.position, odometry.velocity, self.limits.max_acceleration
+            )
+        return Hold(self._anchor)
+
+    def _return(self, state: VehicleState) -> Action:
+        self._leg = None
+        if self._assessment.demand in {FailsafeAction.HOLD, FailsafeAction.RETURN} and (
+            state.mode is VehicleMode.LOST or not has_position(state)
+        ):
+            return Return()
+        position = state.odometry.position
+        if self._return_height is None:
+            lowest = float(self.home[2]) + self.limits.takeoff_height
+            self._return_height = max(float(position[2]), lowest)
+        above = np.array([self.home[0], self.home[1], self._return_height])
+        way = above - position
+        late = seconds(self._now - self._machine.since) > self.limits.return_timeout
+        drift = math.hypot(*state.odometry.velocity[:2])
+        arrived = math.hypot(way[0], way[1]) <= self.limits.arrival_radius
+        if late or (arrived and drift <= _DRIFT):
+            reason = self._machine.reason
+            self._to(
+                MissionState.LANDING, f"the return took too long; {reason}" if late else reason
+            )
+            return Land()
+        place = self._detour.towards(above, position)
+        if place is None:
+            self._to(MissionState.LANDING, "no way inside the geofence leads home")
+            return Land()
+        return Fly(setpoint_towards(place, position, None, self.limits.cruise_speed))
+
+    def _land(self, state: VehicleState) -> Action:
+        del state
+        self._leg = None
+        return Land()
+
+    @staticmethod
+    def _release(_: VehicleState) -> Action:
+        return Wait()
+
+    def _plan(self, state: VehicleState) -> None:
+        if not has_position(state):
+            return
+        limits = self.limits
+        situation = PlanningContext(
+            seconds(self._now),
+            state.odometry.position,
+            self.home,
+            state.battery.fraction,
+            limits.cruise_speed,
+            energy=self._meter.model,
+            reserve=limits.battery_land,
+        )
+        fault = self._navigator.fault
+        plan = self._navigator.plan(situation)
+        if plan is None:
+            return
+        for waypoint_id in plan:
+            self._log.give_up(
+                self._now, waypoint_id, f"the scheduler left {waypoint_id} out of its plan"
+            )
+        if self._navigator.fault and self._navigator.fault != fault:
+            self._log.alert(self._now, "scheduler", self._navigator.fault)
+
+    def _forecast(self, state: VehicleState) -> None:
+        """Compare the battery with the charge that the rest of the plan needs.
+
+        On the ground a shortfall raises an alert at once. In the air it must last for
+        `_FORECAST_PATIENCE`: the battery gauge is coarse and a climb is expensive, so that a single
+        estimate is unreliable.
+        """
+        if self._now < self._forecast_due or not has_position(state):
+            return
+        self._forecast_due = self._now + _FORECAST_PERIOD
+        route = [self._as_flown(stop) for stop in self._navigator.queue]
+        needed = self._meter.route(
+            state.odometry.position, route, self.home, self.limits.cruise_speed
+        )
+        available = state.battery.fraction - self.limits.battery_land
+        if not (route and needed > max(0.0, available) * _FORECAST_MARGIN):
+            self._plan_fault, self._short_since = "", None
+            return
+        self._plan_fault = (
+            f"at this rate the plan and the way home need {_share(needed)} of a battery, and "
+            f"{_share(max(0.0, available))} is there to spend: the drone returns when only the way "
+            "home is left"
+        )
+        if self._short_since is None:
+            self._short_since = self._now
+        surely = (
+            self.state is MissionState.PREFLIGHT
+            or self._now - self._short_since >= _FORECAST_PATIENCE
+        )
+        if surely and not self._forecast_told:
+            self._forecast_told = True
+            self._log.alert(self._now, "unreachable_plan", self._plan_fault)
+
+    def _as_flown(self, stop: QueuedWaypoint) -> Waypoint:
+        """The rest of a stop: its remaining hover, at no more than the permitted speed."""
+        speed = min(stop.waypoint.speed or self.limits.cruise_speed, self.limits.max_speed)
+        return replace(stop.waypoint, speed=speed, hover_duration=max(0.0, stop.remaining_hover))
+
+    def _to(self, state: MissionState, reason: str = "") -> None:
+        self._machine.to(state, self._now, reason)
+
+
+def _share(charge: float) -> str:
+    most = 9.99
+    return f"{charge:.0%}" if charge <= most else f"more than {most:.0%}"
+
+
+def _subject(finding: Fault) -> tuple[str, str]:
+    """Key by which findings are the same: several faults of the vehicle share one kind."""
+    return finding.kind, words(finding.text) if finding.kind == "vehicle" else ""

@@ -1,0 +1,210 @@
+"""The queue of waypoints: priorities, groups that keep their order, preemption without loss.
+
+Each priority has its own list, and the most urgent non-empty list is served. A preempted list keeps
+its place: the waypoint that was under way stays at its head with its remaining hover time, so that
+an interrupted plan resumes where it was left. There is no other store; emptying the queue therefore
+discards interrupted plans too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from aerodaas.types.data import Header
+from aerodaas.types.errors import InvalidWaypointError
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["QueuedWaypoint", "WaypointQueue"]
+
+
+@dataclass(slots=True, eq=False)
+class QueuedWaypoint:
+    """A waypoint in the queue and its progress."""
+
+    waypoint: Waypoint
+    group: str | None = None
+    """Stops of one group keep their order."""
+    pinned: bool = False
+    """Put at an index by the application: planning moves other stops around it."""
+    source: str = ""
+    """Stream that it came from; empty for none."""
+    cause: Header | None = None
+    """Header of the measurement that it was made from."""
+    remaining_hover: float = 0.0
+    """Seconds left to hover."""
+    under_way: bool = False
+    """The drone has set out for it."""
+    arrived: bool = False
+    """The drone has arrived and hovers there."""
+
+    @property
+    def id(self) -> str:
+        """The waypoint's id."""
+        return self.waypoint.id
+
+
+class WaypointQueue:
+    """Waypoints in local ENU, ordered by priority."""
+
+    def __init__(self) -> None:
+        """Start empty."""
+        self._levels: dict[int, list[QueuedWaypoint]] = {}
+        self.epoch = 0
+        """Number of times that the queue was emptied; a plan of an older epoch is void."""
+
+    def add(
+        self,
+        waypoints: Iterable[Waypoint],
+        *,
+        group: str | None = None,
+        index: int | None = None,
+        source: str = "",
+        cause: Header | None = None,
+    ) -> None:
+        """Queue `waypoints`, each in the list of its priority.
+
+        With `index`, they follow that many stops of their list, and stay there. A waypoint with the
+        id of one that the same `source` (not the empty one) queued replaces it: its target has
+        moved. Raises InvalidWaypointError for an id that is already queued by another source and
+        for a negative index; nothing is queued then.
+        """
+        arriving = list(waypoints)
+        self._check(arriving, index, source)
+        offset: dict[int, int] = {}
+        for waypoint in arriving:
+            hover = waypoint.hover_duration
+            stop = QueuedWaypoint(waypoint, group, index is not None, source, cause, hover)
+            known = self.find(waypoint.id)
+            if known is not None and known.waypoint.priority == waypoint.priority:
+                level = self._levels[waypoint.priority]
+                stop.under_way = known.under_way
+                level[level.index(known)] = stop
+                continue
+            if known is not None:
+                self.remove(known.id)
+            level = self._levels.get(waypoint.priority, [])
+            if index is None:
+                level.append(stop)
+            else:
+                # An index comes from remote users, and may be larger than a list can count.
+                place = min(index + offset.get(waypoint.priority, 0), len(level))
+                offset[waypoint.priority] = offset.get(waypoint.priority, 0) + 1
+                level.insert(place, stop)
+                self._leave(level[1:])
+            self._levels[waypoint.priority] = level
+
+    def _check(self, arriving: list[Waypoint], index: int | None, source: str) -> None:
+        if index is not None and index < 0:
+            message = f"an index counts from the next waypoint and is not negative, not {index}"
+            raise InvalidWaypointError(message)
+        seen: set[str] = set()
+        for waypoint in arriving:
+            known = self.find(waypoint.id)
+            taken = known is not None and (not source or known.source != source)
+            if taken or waypoint.id in seen:
+                message = f"a waypoint called {waypoint.id!r} is already queued; use another id"
+                raise InvalidWaypointError(message)
+            seen.add(waypoint.id)
+
+    @property
+    def level(self) -> int | None:
+        """Priority of the list being served; None when the queue is empty."""
+        return min(self._levels, default=None)
+
+    @property
+    def head(self) -> QueuedWaypoint | None:
+        """The stop to serve now."""
+        return self._levels[min(self._levels)][0] if self._levels else None
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether a less urgent list with a stop under way waits."""
+        return any(stop.under_way for stops in self._ordered_levels()[1:] for stop in stops)
+
+    def __iter__(self) -> Iterator[QueuedWaypoint]:
+        """Iterate over the stops in their current order of service."""
+        for stops in self._ordered_levels():
+            yield from stops
+
+    def __len__(self) -> int:
+        """Count the stops."""
+        return sum(map(len, self._levels.values()))
+
+    def find(self, waypoint_id: str) -> QueuedWaypoint | None:
+        """Return the stop of this id; None if it is not queued."""
+        return next((stop for stop in self if stop.id == waypoint_id), None)
+
+    def remove(self, waypoint_id: str) -> QueuedWaypoint | None:
+        """Remove and return a served or abandoned stop; None if it is not queued."""
+        for priority, stops in self._levels.items():
+            for stop in stops:
+                if stop.id == waypoint_id:
+                    stops.remove(stop)
+                    if not stops:
+                        del self._levels[priority]
+                    return stop
+        return None
+
+    def clear(self) -> list[str]:
+        """Empty the queue and return the removed ids."""
+        forgotten = [stop.id for stop in self]
+        self._levels.clear()
+        self.epoch += 1
+        return forgotten
+
+    def leave_place(self) -> None:
+        """Mark that the drone has left its stop; remaining hover times are kept."""
+        self._leave(self)
+
+    def movable(self) -> list[QueuedWaypoint]:
+        """Stops of the list being served that a plan may reorder."""
+        level = self._ordered_levels()[0] if self._levels else []
+        return [stop for stop in level if not (stop.pinned or stop.arrived)]
+
+    def reorder(self, level: int, asked: Iterable[str], order: Sequence[str]) -> list[str]:
+        """Put the `level` list into the planned `order`; returns the ids given up.
+
+        `asked` are the ids that the plan was made for: one that `order` leaves out is given up,
+        while stops queued since follow behind. Groups keep their internal order in the places that
+        the plan gives to the group; pinned stops keep their index.
+        """
+        stops = self._levels.get(level, [])
+        free = {stop.id: stop for stop in stops if not (stop.pinned or stop.arrived)}
+        wanted = set(order)
+        given_up = [key for key in asked if key in free and key not in wanted]
+        planned = [free[key] for key in order if key in free]
+        for key in (*order, *given_up):
+            free.pop(key, None)
+        planned = self._keep_groups([*planned, *free.values()], stops)
+        kept = [stop for stop in stops if stop.id not in given_up]
+        moved = iter(planned)
+        fixed = {index: stop for index, stop in enumerate(stops) if stop.pinned or stop.arrived}
+        result: list[QueuedWaypoint] = []
+        while len(result) < len(kept):
+            stop = fixed.pop(len(result), None) or next(moved, None)
+            result.append(stop if stop is not None else fixed.pop(min(fixed)))
+        if result:
+            self._levels[level] = result
+        else:
+            self._levels.pop(level, None)
+        return given_up
+
+    @staticmethod
+    def _keep_groups(
+        planned: list[QueuedWaypoint], stops: list[QueuedWaypoint]
+    ) -> list[QueuedWaypoint]:
+        chosen = set(planned)
+        members: dict[str, Iterator[QueuedWaypoint]] = {
+            group: iter([stop for stop in stops if stop.group == group and stop in chosen])
+            for group in {stop.group for stop in planned if stop.group is not None}
+        }
+        return [next(members[stop.group]) if stop.group else stop for stop in planned]
+
+    def _ordered_levels(self) -> list[list[QueuedWaypoint]]:
+        return [self._levels[priority] for priority in sorted(self._levels)]
+
+    @staticmethod
+    def _leave(stops: Iterable[QueuedWaypoint]) -> None:
+        for stop in stops:
+            stop.arrived = False

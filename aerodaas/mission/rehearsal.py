@@ -1,0 +1,92 @@
+"""Check of the navigation known before take-off, on a mission that never starts.
+
+Every error that can be found without the vehicle is reported here, before any actor starts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, LimitsConfig, RobotConfig
+from aerodaas.mission.commands import AddNavigation, Answer, Command
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
+from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+from aerodaas.types.energy import EnergyModel
+from aerodaas.types.errors import ConfigError, MissionError
+from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.waypoints import Waypoint, WaypointType
+
+__all__ = ["give", "rehearse"]
+
+_ENDLESS = 1e6
+"""Metres: floor and ceiling of an unbounded fence."""
+
+
+def give(robot: str, commands: Iterable[Command], handle: Callable[[Command], Answer]) -> None:
+    """Hand `commands` to a robot's mission; raises MissionError for the first one refused."""
+    for command in commands:
+        answer = handle(command)
+        if not answer.accepted or answer.refused:
+            raise MissionError(f"{robot}: {answer.text or '; '.join(answer.refused.values())}")
+
+
+def rehearse(
+    robot: RobotConfig,
+    commands: Iterable[Command],
+    environment: EnvironmentConfig,
+    scheduler: TrajectoryScheduler,
+) -> None:
+    """Raise MissionError for navigation that the mission would refuse or the battery cannot cover.
+
+    A real vehicle may stand elsewhere than the environment says: whether waypoints relative to it
+    lie within the fence is checked by its actor. Raises ConfigError for an invalid fence.
+    """
+    commands = list(commands)
+    home = environment.home
+    takeoff, wind = np.array(robot.start), np.array(environment.simulation.wind)
+    origin = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
+    known = robot.driver == "simulated" or not any(map(_is_relative, commands))
+    planner = InlinePlanner(scheduler)
+    try:
+        mission = Mission(
+            robot if known else _unfenced(robot), planner, takeoff=takeoff, origin=origin, wind=wind
+        )
+    except ConfigError as error:
+        raise ConfigError(f"robot {robot.id}: limits.{error}") from None
+    give(robot.id, commands, lambda command: mission.handle(command, 0))
+    model, limits = EnergyModel(robot.limits.endurance, wind), robot.limits
+    for waypoint in _waypoints(commands):
+        speed = min(waypoint.speed or limits.cruise_speed, limits.max_speed)
+        place = waypoint.resolve(takeoff, origin).position
+        back = min(limits.cruise_speed, limits.max_speed)
+        needed = model.leg(takeoff, place, speed) + model.way_home(place, takeoff, back)
+        if needed > 1.0 - limits.battery_land:
+            raise MissionError(f"{robot.id}: waypoint {waypoint.id!r}: {_too_far(needed, limits)}")
+
+
+def _too_far(needed: float, limits: LimitsConfig) -> str:
+    return (
+        f"the way there and home takes {needed:.0%} of a full battery, and "
+        f"{1.0 - limits.battery_land:.0%} is there to spend (limits: endurance "
+        f"{limits.endurance:g} s, cruise_speed {limits.cruise_speed:g} m/s, battery_land "
+        f"{limits.battery_land:g}): fly faster, or nearer"
+    )
+
+
+def _waypoints(commands: Iterable[Command]) -> Iterable[Waypoint]:
+    for command in commands:
+        if isinstance(command, AddNavigation):
+            yield from command.navigation.waypoints
+
+
+def _is_relative(command: Command) -> bool:
+    return any(one.waypoint_type is WaypointType.RELATIVE for one in _waypoints([command]))
+
+
+def _unfenced(robot: RobotConfig) -> RobotConfig:
+    endless = GeofenceConfig(floor=-_ENDLESS, ceiling=_ENDLESS)
+    limits = robot.limits.model_copy(update={"geofence": endless})
+    return robot.model_copy(update={"limits": limits})

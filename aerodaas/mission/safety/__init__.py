@@ -1,0 +1,1 @@
+"""Flight safety: limits, geofence, failsafes, and consistency checks of a drone's state."""

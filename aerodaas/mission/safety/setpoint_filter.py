@@ -1,0 +1,242 @@
+"""The final safety filter on every setpoint: limits that clamp, boundaries to stop before.
+
+Boundaries (geofence, range, other drones) bound the speed towards them by the remaining braking
+distance, a control barrier: whatever the previous setpoints, the drone can still stop in time, and
+standing still is always allowed. Motion along a boundary or away from it is left alone, so that a
+drone that was blown outside can come back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from aerodaas.config.model import LimitsConfig
+from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.types.braking import braking_speed, limit_length, velocity_towards
+from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import Vector
+from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
+
+__all__ = ["FilteredSetpoint", "Neighbour", "SetpointFilter"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Neighbour:
+    """Another drone's position (ENU metres) and velocity (ENU m/s)."""
+
+    position: Vector
+    velocity: Vector
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FilteredSetpoint:
+    """A setpoint that is safe to send, and the names of the limits that changed it."""
+
+    setpoint: Setpoint
+    clipped_by: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Bound:
+    """At most `speed` m/s along the unit vector `towards`."""
+
+    name: str
+    towards: Vector
+    speed: float
+
+
+class SetpointFilter:
+    """Clamps the setpoints of one drone to its limits."""
+
+    def __init__(
+        self, limits: LimitsConfig, home: Vector, *, position_setpoints: bool = True
+    ) -> None:
+        """Guard a drone that took off at `home` (ENU metres).
+
+        Without `position_setpoints`, position setpoints become velocities towards their targets.
+        """
+        self.limits = limits
+        self.home = home
+        self.fence = Geofence(limits.geofence)
+        self._position_setpoints = position_setpoints
+        self._yaw_rate = math.radians(limits.max_yaw_rate)
+        self._last: Vector | None = None
+
+    def clamp(
+        self,
+        setpoint: Setpoint,
+        odometry: Odometry,
+        duration: float,
+        neighbours: Iterable[Neighbour] = (),
+    ) -> FilteredSetpoint:
+        """Make `setpoint` safe to follow for `duration` seconds from the drone's odometry.
+
+        A setpoint with a number that is not finite becomes standing still (`not_finite`).
+        """
+        if not _finite(setpoint):
+            self._last = np.zeros(3)
+            return FilteredSetpoint(VelocitySetpoint(np.zeros(3)), ("not_finite",))
+        if not (np.isfinite(odometry.position).all() and np.isfinite(odometry.velocity).all()):
+            return self._blind(setpoint)
+        if isinstance(setpoint, PositionSetpoint):
+            return self._clamp_position(setpoint, odometry, neighbours)
+        velocity, names = self._limit(setpoint.velocity)
+        before = odometry.velocity if self._last is None else self._last
+        change = limit_length(velocity - before, self.limits.max_acceleration * duration)
+        if not np.array_equal(change, velocity - before):
+            velocity, names = self._limit(before + change)[0], [*names, "max_acceleration"]
+        velocity, bounds = self._stop_before_boundaries(velocity, odometry, neighbours)
+        yaw_rate = float(np.clip(setpoint.yaw_rate, -self._yaw_rate, self._yaw_rate))
+        if yaw_rate != setpoint.yaw_rate:
+            names.append("max_yaw_rate")
+        self._last = velocity
+        return FilteredSetpoint(VelocitySetpoint(velocity, yaw_rate), (*names, *bounds))
+
+    def forget(self) -> None:
+        """Start the next acceleration from the measured velocity, after an interruption."""
+        self._last = None
+
+    def _clamp_position(
+        self, asked: PositionSetpoint, odometry: Odometry, neighbours: Iterable[Neighbour]
+    ) -> FilteredSetpoint:
+        names: list[str] = []
+        target = self.home + limit_length(asked.position - self.home, self.limits.max_range)
+        if not np.allclose(target, asked.position, atol=1e-6):
+            names.append("max_range")
+        inside = self.fence.nearest_allowed(target)
+        if not np.allclose(inside, target, atol=1e-6):
+            names.append("geofence")
+        target = inside
+        limits = self.limits
+        wished = asked.speed or limits.cruise_speed
+        velocity = velocity_towards(
+            replace(asked, position=target),
+            odometry.position,
+            odometry.yaw,
+            speed=wished,
+            deceleration=limits.max_acceleration,
+            reaction_time=limits.reaction_time,
+            yaw_rate=self._yaw_rate,
+        )
+        speed = self._speed_towards(target - odometry.position, wished)
+        if speed < wished:
+            names.append("max_climb" if speed < limits.max_speed else "max_speed")
+        free = limit_length(velocity.velocity, speed)
+        bounded, bounds = self._stop_before_boundaries(free, odometry, neighbours)
+        if bounds or not self._position_setpoints:
+            self._last = bounded
+            return FilteredSetpoint(VelocitySetpoint(bounded, velocity.yaw_rate), (*names, *bounds))
+        self._last = None
+        return FilteredSetpoint(PositionSetpoint(target, asked.yaw, speed), tuple(names))
+
+    def _blind(self, setpoint: Setpoint) -> FilteredSetpoint:
+        """Allow only turning on the spot: without a position no boundary can be kept."""
+        self._last = np.zeros(3)
+        still = VelocitySetpoint(np.zeros(3))
+        moves = isinstance(setpoint, PositionSetpoint) or bool(setpoint.velocity.any())
+        return FilteredSetpoint(still, ("no_position",) if moves else ())
+
+    def _limit(self, velocity: Vector) -> tuple[Vector, list[str]]:
+        names: list[str] = []
+        limited = velocity.astype(np.float64)
+        horizontal = limit_length(velocity[:2], self.limits.max_speed)
+        if not np.array_equal(horizontal, velocity[:2]):
+            names.append("max_speed")
+        climb = float(np.clip(velocity[2], -self.limits.max_climb, self.limits.max_climb))
+        if climb != velocity[2]:
+            names.append("max_climb")
+        limited[:2], limited[2] = horizontal, climb
+        return limited, names
+
+    def _speed_towards(self, way: Vector, speed: float) -> float:
+        """The highest speed along `way` within both the horizontal and the vertical speed limit."""
+        length = float(np.linalg.norm(way))
+        level, upright = math.hypot(way[0], way[1]), abs(float(way[2]))
+        if level > 0.0:
+            speed = min(speed, self.limits.max_speed * length / level)
+        if upright > 0.0:
+            speed = min(speed, self.limits.max_climb * length / upright)
+        return speed
+
+    def _stop_before_boundaries(
+        self, velocity: Vector, odometry: Odometry, neighbours: Iterable[Neighbour]
+    ) -> tuple[Vector, list[str]]:
+        bounds = self._bounds(odometry, neighbours)
+        names: list[str] = []
+        sweeps = 4  # alternating projections; scaling down below removes the remainder
+        for _ in range(sweeps):
+            for bound in bounds:
+                excess = float(velocity @ bound.towards) - bound.speed
+                if excess > 0.0:
+                    velocity = velocity - excess * bound.towards
+                    if bound.name not in names:
+                        names.append(bound.name)
+        for bound in bounds:
+            closing = float(velocity @ bound.towards)
+            if closing > bound.speed:
+                velocity = velocity * (bound.speed / closing)
+        return velocity, names
+
+    def _bounds(self, odometry: Odometry, neighbours: Iterable[Neighbour]) -> list[_Bound]:
+        position = odometry.position
+        bounds = [*self._fence_bounds(odometry), *self._height_bounds(odometry)]
+        outwards = position - self.home
+        away = float(np.linalg.norm(outwards))
+        if away > 0.0:
+            room = self.limits.max_range - away
+            bounds.append(self._bound("max_range", outwards / away, room, odometry))
+        for neighbour in neighbours:
+            way = neighbour.position - position
+            distance = float(np.linalg.norm(way))
+            # Both drones brake, so each may use half of the room between them.
+            room = (distance - self.limits.separation) / 2
+            if self.limits.separation > 0.0 and distance > 0.0:
+                bounds.append(self._bound("separation", way / distance, room, odometry))
+        return bounds
+
+    def _fence_bounds(self, odometry: Odometry) -> list[_Bound]:
+        fence, position = self.fence, odometry.position
+        if fence.area is None:
+            return []
+        if not fence.inside(position):
+            way = position[:2] - fence.nearest_allowed(position)[:2]
+            return [_Bound("geofence", _level(way / np.linalg.norm(way)), 0.0)]
+        limits = self.limits
+        reach = fence.margin + limits.max_speed * (
+            2 * limits.reaction_time + limits.max_speed / (2 * limits.max_acceleration)
+        )
+        towards, distances = fence.edges_near(position, reach)
+        return [
+            self._bound("geofence", _level(way), float(distance) - fence.margin, odometry)
+            for way, distance in zip(towards, distances, strict=True)
+        ]
+
+    def _height_bounds(self, odometry: Odometry) -> tuple[_Bound, _Bound]:
+        upwards = np.array([0.0, 0.0, 1.0])
+        height = float(odometry.position[2])
+        return (
+            self._bound("ceiling", upwards, self.fence.ceiling - height, odometry),
+            self._bound("floor", -upwards, height - self.fence.floor, odometry),
+        )
+
+    def _bound(self, name: str, towards: Vector, room: float, odometry: Odometry) -> _Bound:
+        """Bound the speed by the room that is left after the vehicle's reaction time."""
+        limits = self.limits
+        flown_on = max(0.0, float(odometry.velocity @ towards)) * limits.reaction_time
+        speed = braking_speed(room - flown_on, limits.max_acceleration, limits.reaction_time)
+        return _Bound(name, towards, speed)
+
+
+def _level(way: Vector) -> Vector:
+    return np.array([way[0], way[1], 0.0])
+
+
+def _finite(setpoint: Setpoint) -> bool:
+    if isinstance(setpoint, VelocitySetpoint):
+        return bool(np.isfinite(setpoint.velocity).all()) and math.isfinite(setpoint.yaw_rate)
+    scalars = [value for value in (setpoint.yaw, setpoint.speed) if value is not None]
+    return bool(np.isfinite(setpoint.position).all()) and all(map(math.isfinite, scalars))

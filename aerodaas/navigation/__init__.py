@@ -1,1 +1,0 @@
-"""The mission layer: queue, state machine, safety."""

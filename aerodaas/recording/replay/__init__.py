@@ -1,0 +1,1 @@
+"""Players of a recording: cameras, vehicles, and the timeline of a flight."""

@@ -1,0 +1,172 @@
+"""Cameras that play the pictures of an MCAP recording, ours or another's."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from dataclasses import replace
+
+from aerodaas.cameras.base import Picture
+from aerodaas.cameras.settings import camera_model, camera_settings, required_path
+from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
+from aerodaas.recording.pictures import Shot, decoded_ahead, picture_topics, shots
+from aerodaas.recording.reader import Recording
+from aerodaas.types.data import Odometry
+from aerodaas.types.errors import RecordingError, SourceError
+from aerodaas.types.geometry import CameraModel
+
+__all__ = ["McapCamera", "ReplayedCamera"]
+
+_log = logging.getLogger(__name__)
+
+
+class McapCamera:
+    """Plays a recording's pictures at the pace at which they were taken, from the first one on.
+
+    Settings: `path` of the MCAP file, `topic` where it holds pictures of several cameras,
+    `loop`, and the lens and mount of `CameraConfig`. Reads Foxglove's CompressedImage,
+    CompressedVideo (H.264) and RawImage, and ROS 2's sensor_msgs/CompressedImage and Image.
+    """
+
+    settings_model = CameraConfig
+
+    def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
+        """Check the settings of `sensor`; raises ConfigError."""
+        del environment
+        self._settings = camera_settings(sensor)
+        self._path = required_path(sensor, self._settings, "MCAP recording")
+        self._model: CameraModel | None = None
+        self._recording: Recording | None = None
+        self._topic = ""
+        self._shots: Iterator[Shot] = iter(())
+        self._next: Shot | None = None
+        self._offset: int | None = None
+        self._skipped = 0
+
+    @property
+    def model(self) -> CameraModel | None:
+        """Calibration for the size of the newest picture; None before `open`."""
+        return self._model
+
+    @property
+    def finished(self) -> bool:
+        """True once the last picture was given; never for a recording that loops."""
+        return self._next is None
+
+    @property
+    def skipped(self) -> int:
+        """Pictures that are broken, or older than the one before."""
+        return self._skipped
+
+    def open(self) -> None:
+        """Open the recording; raises SourceError if it has no pictures that can be decoded."""
+        try:
+            self._recording = Recording.open(self._path)
+        except RecordingError as error:
+            raise SourceError(str(error)) from None
+        self._topic = self._choose(self._recording)
+        self._rewind()
+        for shot in shots(self._recording, [self._topic]):
+            image = shot.image()
+            if image is not None:
+                self._model = camera_model(self._settings, image.shape[1], image.shape[0])
+                return
+        raise SourceError(f"none of the pictures on {self._topic} of {self._path} can be decoded")
+
+    def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
+        """Return the newest picture due at `stamp`; None if it was given or is broken."""
+        del pose
+        due: Shot | None = None
+        while self._next is not None and self._due_at(self._next, stamp) <= stamp:
+            due = self._next
+            self._advance(stamp)
+        if due is None:
+            return None
+        image = due.image()
+        if image is None:
+            self._skipped += 1
+            _log.warning("%s: skipped a broken picture on %s", self._path, self._topic)
+            return None
+        self._model = camera_model(self._settings, image.shape[1], image.shape[0])
+        picture = Picture(image, stamp, self._topic, due.odometry, due.depth())
+        return self._picture(picture, due)
+
+    def close(self) -> None:
+        """Close the recording."""
+        if self._recording is not None:
+            self._recording.close()
+            self._recording = None
+
+    def _picture(self, picture: Picture, shot: Shot) -> Picture:
+        del shot
+        return picture
+
+    def _due_at(self, shot: Shot, stamp: int) -> int:
+        """Mission time at which a picture is due; the first one is due at once."""
+        if self._offset is None:
+            self._offset = stamp - shot.record.captured
+        return shot.record.captured + self._offset
+
+    def _advance(self, stamp: int) -> None:
+        last = self._next
+        for shot in self._shots:
+            if last is not None and shot.record.captured < last.record.captured:
+                self._skipped += 1
+                continue
+            self._next = shot
+            return
+        self._next = None
+        self._begin_again(stamp)
+
+    def _begin_again(self, stamp: int) -> None:
+        if self._settings.loop:
+            self._rewind()
+            # A moment later, so that a recording of a single picture is not for ever due.
+            self._offset = stamp + 1 - self._next.record.captured if self._next else None
+
+    def _rewind(self) -> None:
+        if self._recording is not None:
+            self._shots = self._play(shots(self._recording, [self._topic]))
+            self._next = next(self._shots, None)
+
+    def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:
+        return found
+
+    def _choose(self, recording: Recording) -> str:
+        topics = picture_topics(recording)
+        if self._settings.topic in topics:
+            return str(self._settings.topic)
+        known = ", ".join(topics) or "none"
+        if self._settings.topic is not None:
+            raise SourceError(
+                f"{self._path} has no pictures on {self._settings.topic}; it has: {known}"
+            )
+        if len(topics) != 1:
+            raise SourceError(f'{self._path}: name the pictures\' "topic"; it has: {known}')
+        return topics[0]
+
+
+class ReplayedCamera(McapCamera):
+    """Plays a recording of this project at its own mission times, with the odometry recorded.
+
+    With `loop`, it does not say that it has finished, as the recorded camera never did.
+    """
+
+    @property
+    def finished(self) -> bool:
+        """True once the last picture was given, of a camera that came to an end in flight, too."""
+        return super().finished and not self._settings.loop
+
+    def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:
+        # Every picture is shown, as fast as pictures can be had: decoding is what takes longest.
+        return decoded_ahead(found)
+
+    def _due_at(self, shot: Shot, stamp: int) -> int:
+        del stamp
+        return shot.header.stamp
+
+    def _begin_again(self, stamp: int) -> None:
+        """Mission time does not begin again."""
+
+    def _picture(self, picture: Picture, shot: Shot) -> Picture:
+        return replace(picture, stamp=shot.header.stamp)

@@ -1,0 +1,128 @@
+"""A vehicle that plays the states of a recording and obeys nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.plugins import load_plugin
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.states import vehicle_states
+from aerodaas.types.errors import ConfigError, VehicleError
+from aerodaas.types.vehicle import Capabilities, Setpoint, VehicleMode, VehicleState
+
+__all__ = ["ReplayedVehicle"]
+
+_ON_ITS_OWN = {VehicleMode.GROUNDED, VehicleMode.TAKING_OFF, VehicleMode.FAILSAFE}
+"""Modes in which the recorded vehicle took no setpoints."""
+_WAITING = {"idle", "preflight"}
+
+
+class ReplayedVehicle:
+    """Shows at each mission time the state recorded then; implements `vehicle.PlayedVehicle`.
+
+    Settings: `path` of the recording, and `driver` and `settings` of the recorded robot, whose
+    capabilities it claims. Commands change nothing; setpoints are taken where the recorded
+    vehicle would have taken them.
+    """
+
+    def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
+        """Check the settings of `robot`; raises ConfigError."""
+        known = {"path", "driver", "settings"}
+        if not {"path"} <= set(robot.settings) <= known:
+            raise ConfigError(f'robot {robot.id}: a replayed vehicle has the settings "path", '
+                              '"driver" and "settings"')  # fmt: skip
+        self._id = robot.id
+        self._path = str(robot.settings["path"])
+        self._capabilities = _capabilities(robot, environment)
+        self._states: Iterator[tuple[int, VehicleState]] = iter(())
+        self._now = 0
+        self._ready_at = 0
+        self._current: VehicleState | None = None
+        self._next: tuple[int, VehicleState] | None = None
+        self._last = 0
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What the recorded vehicle's driver offered."""
+        return self._capabilities
+
+    @property
+    def finished(self) -> bool:
+        """True once the recording has nothing more to show."""
+        return self._next is None and self._now > self._last
+
+    def connect(self, timeout: float = 10.0) -> None:  # noqa: ARG002 - a file does not make us wait
+        """Open the recording; raises RecordingError, or VehicleError if the robot isn't in it."""
+        self._recording = Recording.open(self._path)
+        self._ready_at = self._when_ready()
+        self._states = vehicle_states(self._recording, self._id)
+        first = next(self._states, None)
+        if first is None:
+            raise VehicleError(f"{self._path} holds no states of {self._id}; did it fly then?")
+        self._last, self._current = first
+        self._next = next(self._states, None)
+
+    def advance_to(self, stamp: int) -> None:
+        """Show the newest state recorded up to mission time `stamp`, in nanoseconds."""
+        self._now = stamp
+        while self._next is not None and self._next[0] <= stamp:
+            self._last, self._current = self._next
+            self._next = next(self._states, None)
+
+    def read(self) -> VehicleState:
+        """Return the state shown; raise VehicleError if not connected."""
+        if self._current is None:
+            raise VehicleError(f"{self._id} is not connected; call connect first")
+        return self._current
+
+    def preflight(self) -> list[str]:
+        """Objections for as long as the recorded mission met some."""
+        return [] if self._now >= self._ready_at else ["the recorded vehicle was not ready yet"]
+
+    def send(self, setpoint: Setpoint) -> Setpoint:
+        """Return `setpoint`; raise VehicleError where the recorded vehicle would have refused."""
+        mode = self.read().mode
+        if mode in _ON_ITS_OWN:
+            raise VehicleError(f"{self._id} takes no setpoints while {mode.value}")
+        return setpoint
+
+    def take_off(self, height: float) -> None:
+        """Do nothing: it takes off when it did."""
+
+    def hold(self) -> None:
+        """Do nothing."""
+
+    def return_home(self) -> None:
+        """Do nothing."""
+
+    def land(self) -> None:
+        """Do nothing."""
+
+    def close(self) -> None:
+        """Close the recording."""
+        if self._current is not None:
+            self._recording.close()
+            self._current = None
+
+    def _when_ready(self) -> int:
+        """Mission time at which the recorded mission stopped waiting for the vehicle.
+
+        What held it up is not among the states.
+        """
+        for record in self._recording.records(schemas=("aerodaas.MissionStatus",)):
+            if record.value["robot"] == self._id and record.value["state"] not in _WAITING:
+                return record.stamp
+        return 0
+
+
+def _capabilities(robot: RobotConfig, environment: EnvironmentConfig) -> Capabilities:
+    driver = robot.settings.get("driver")
+    if driver is None:
+        return Capabilities("replayed", obeys=False)
+    recorded = robot.model_copy(
+        update={"driver": driver, "settings": robot.settings.get("settings", {})}
+    )
+    capabilities: Capabilities = load_plugin("drivers", driver)(recorded, environment).capabilities
+    return replace(capabilities, obeys=False)

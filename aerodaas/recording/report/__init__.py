@@ -1,0 +1,1 @@
+"""Reports on a recording: figures, plots, pages, and comparison of two flights."""

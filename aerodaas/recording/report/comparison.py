@@ -1,0 +1,84 @@
+"""Two flights side by side in one page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from aerodaas.recording.report.page.document import document, paragraph, picture, section, table
+from aerodaas.recording.report.page.figures import Plot
+from aerodaas.recording.report.page.flight import origin_line
+from aerodaas.recording.report.page.tables import figures
+from aerodaas.recording.report.report import Report, read_report
+from aerodaas.types.errors import RecordingError
+
+__all__ = ["comparison_page", "write_comparison"]
+
+
+def write_comparison(first: str | Path, second: str | Path, page: str | Path) -> Path:
+    """Write one HTML page that sets two recordings side by side; returns its path.
+
+    Raises RecordingError if a recording cannot be read, or the page cannot be written.
+    """
+    page = Path(page)
+    text = comparison_page(
+        f"{Path(first)}", read_report(first), f"{Path(second)}", read_report(second)
+    )
+    try:
+        page.parent.mkdir(parents=True, exist_ok=True)
+        page.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"cannot write the comparison to {page}: {error.strerror}") from None
+    return page
+
+
+def comparison_page(first_name: str, first: Report, second_name: str, second: Report) -> str:
+    """The HTML page: figures with their differences, latencies, then each plot twice."""
+    head = [
+        paragraph(f"{letter}: {name} ({origin_line(report.summary)})")
+        for letter, name, report in (("A", first_name, first), ("B", second_name, second))
+    ]
+    rows = table(["", "A", "B", "B less A"], _figure_rows(first, second))
+    parts = [section("Figures", rows, wide=True)]
+    if first.summary.latencies or second.summary.latencies:
+        titles = ["stream", "median A (ms)", "median B (ms)", "99th perc. A", "99th perc. B"]
+        rows = table(titles, _latency_rows(first, second))
+        parts.append(section("Latency since capture", rows, wide=True))
+    parts += _plots(first.plots, second.plots)
+    titles_ = dict.fromkeys((first.summary.title, second.summary.title))
+    return document(" and ".join(titles_) + ", compared", head, parts)
+
+
+def _figure_rows(first: Report, second: Report) -> Iterator[tuple[object, ...]]:
+    one, other = figures(first.summary), figures(second.summary)
+    for name in dict.fromkeys([*one, *other]):
+        a, b = one.get(name, ""), other.get(name, "")
+        numbers = isinstance(a, int | float) and isinstance(b, int | float)
+        yield name, a, b, (b - a) if numbers else ""  # type: ignore[operator]
+
+
+def _latency_rows(first: Report, second: Report) -> Iterator[tuple[object, ...]]:
+    one, other = first.summary.latencies, second.summary.latencies
+    for stream in dict.fromkeys([*one, *other]):
+        a, b = one.get(stream), other.get(stream)
+        yield (
+            stream,
+            a.median_ms if a else "",
+            b.median_ms if b else "",
+            a.p99_ms if a else "",
+            b.p99_ms if b else "",
+        )
+
+
+def _plots(first: list[Plot], second: list[Plot]) -> Iterator[str]:
+    """Each plot of A, with that of B beside it."""
+    pairs: dict[str, list[Plot | None]] = {}
+    for side, plots in enumerate((first, second)):
+        for plot in plots:
+            pairs.setdefault(plot.name, [None, None])[side] = plot
+    for pair in pairs.values():
+        title = next(plot.title for plot in pair if plot is not None)
+        for letter, one in zip("AB", pair, strict=True):
+            nothing = paragraph("Nothing was recorded.")
+            shown = nothing if one is None else picture(one.png, one.description)
+            yield section(f"{letter}: {title}", shown)

@@ -1,0 +1,312 @@
+"""A recording as arrays: what reports, comparisons and notebooks ask of a flight."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.recording.reader import Record, Recording
+from aerodaas.types.clock import seconds
+
+__all__ = [
+    "Band",
+    "Load",
+    "RecordedDecision",
+    "RecordedDetection",
+    "RecordedFlight",
+    "RobotFlight",
+    "StreamLatency",
+]
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Band:
+    """A mission state from one moment to the next, mission seconds."""
+
+    state: str
+    start: float
+    end: float
+    reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedDetection:
+    """One object found in one frame."""
+
+    stamp: int
+    """Of the frame, mission nanoseconds."""
+    source: str
+    """The frame's camera."""
+    label: str
+    score: float
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedDecision:
+    """One word of the analytics scheduler about one task."""
+
+    time: float
+    """Mission seconds."""
+    analysis: str
+    action: str
+    """`edge`, `cloud` and `drop` are decisions; `done`, `late` and the like what came of them."""
+
+
+@dataclass
+class Load:
+    """What a process, or a machine, was busy with over time."""
+
+    time: list[float] = field(default_factory=list)
+    """Mission seconds."""
+    cpu: list[float] = field(default_factory=list)
+    """Cores in use by a process; share of all cores, 0 to 1, of a machine."""
+    memory: list[float] = field(default_factory=list)
+    """Megabytes of a process; share, 0 to 1, of a machine."""
+
+
+@dataclass
+class RobotFlight:
+    """One robot's flight."""
+
+    states: list[tuple[float, float, float, float, float]] = field(default_factory=list)
+    """Mission seconds, east, north and up in metres, battery 0 to 1."""
+    bands: list[Band] = field(default_factory=list)
+    plan: dict[str, tuple[float, float, float]] = field(default_factory=dict)
+    """Every waypoint that was ever planned, by id, local ENU metres."""
+    visited: tuple[str, ...] = ()
+    given_up: tuple[str, ...] = ()
+    distance: float = 0.0
+    """Metres flown, by the mission's own count."""
+    fence: list[tuple[float, float]] = field(default_factory=list)
+    clipped: Counter[str] = field(default_factory=Counter)
+    """Setpoints that were changed, by the limit that did it."""
+
+    @property
+    def time(self) -> Floats:
+        """Mission seconds of the states, shape (N,)."""
+        return self._columns[:, 0]
+
+    @property
+    def position(self) -> Floats:
+        """ENU metres, shape (N, 3)."""
+        return self._columns[:, 1:4]
+
+    @property
+    def battery(self) -> Floats:
+        """Charge left, 0 to 1, shape (N,)."""
+        return self._columns[:, 4]
+
+    @property
+    def outcome(self) -> str:
+        """The mission's last state and its reason."""
+        if not self.bands:
+            return "unknown: no mission was recorded"
+        last = self.bands[-1]
+        return f"{last.state}: {last.reason}" if last.reason else last.state
+
+    def state_at(self, time: Floats) -> list[str]:
+        """Mission state at each of these mission seconds."""
+        if not self.bands:
+            return [""] * len(time)
+        starts = [band.start for band in self.bands]
+        places = np.clip(np.searchsorted(starts, time, side="right") - 1, 0, None)
+        return [self.bands[place].state for place in places]
+
+    @property
+    def _columns(self) -> Floats:
+        return np.array(self.states, dtype=np.float64).reshape(-1, 5)
+
+
+@dataclass
+class StreamLatency:
+    """What the messages of one stream took, in milliseconds of the host's clock."""
+
+    total: list[float] = field(default_factory=list)
+    """From capture to publishing."""
+    overhead: list[float] = field(default_factory=list)
+    """The part of it in which nobody worked: on the way between actors, or waiting for one."""
+    wait: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    """From the previous actor's publishing to this one's receiving, by actor."""
+    work: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    """From receiving to publishing, by actor."""
+
+
+@dataclass
+class RecordedFlight:
+    """Everything in a recording but the pictures."""
+
+    robots: dict[str, RobotFlight] = field(default_factory=lambda: defaultdict(RobotFlight))
+    latencies: dict[str, StreamLatency] = field(default_factory=lambda: defaultdict(StreamLatency))
+    """By stream."""
+    frames: Counter[str] = field(default_factory=Counter)
+    """Frames by camera."""
+    frame_stamps: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
+    """Mission nanoseconds of the frames, by camera."""
+    sightings: list[RecordedDetection] = field(default_factory=list)
+    detections: Counter[str] = field(default_factory=Counter)
+    """Objects found, by label."""
+    decisions: Counter[str] = field(default_factory=Counter)
+    """Scheduler decisions, by action."""
+    outcomes: list[RecordedDecision] = field(default_factory=list)
+    reasons: Counter[tuple[str, str]] = field(default_factory=Counter)
+    """Scheduler decisions and outcomes, by action and reason."""
+    utility: dict[str, float] = field(default_factory=dict)
+    """What the analytics scheduler gained: `QoS`, and `QoE`, the bonuses of its windows."""
+    loads: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
+    """By actor."""
+    machines: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
+    """By machine."""
+    gpus: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
+    """Graphics processors, as machines, by machine and number."""
+    alerts: list[tuple[float, str, str]] = field(default_factory=list)
+    """Mission seconds, kind, text."""
+    drops: dict[str, int] = field(default_factory=dict)
+    """Messages lost on their way to the recorder, by stream."""
+
+    @classmethod
+    def read(cls, recording: Recording) -> RecordedFlight:
+        """Read a recording in one pass; what it lacks stays empty."""
+        flight = cls()
+        for record in recording.records(schemas=_READERS):
+            # Another version's message: the rest of the flight is still worth showing.
+            with suppress(KeyError, TypeError, ValueError, AttributeError):
+                _READERS[record.schema](flight, record)
+        for robot in flight.robots.values():
+            robot.bands = list(_closed(robot))
+        return flight
+
+
+def _closed(robot: RobotFlight) -> Iterator[Band]:
+    """The bands, each up to the start of the next, the last up to the last state."""
+    ends = [band.start for band in robot.bands[1:]]
+    if robot.bands:
+        last = robot.states[-1][0] if robot.states else 0.0
+        ends.append(max(last, robot.bands[-1].end))
+    for band, end in zip(robot.bands, ends, strict=True):
+        yield replace(band, end=end)
+
+
+def _state(flight: RecordedFlight, record: Record) -> None:
+    value = record.value
+    at = value["odometry"]["position"]
+    row = (seconds(value["stamp"]), at["x"], at["y"], at["z"], value["battery"]["fraction"])
+    numbers = [float("nan") if number is None else float(number) for number in row]
+    flight.robots[value["robot"]].states.append((*numbers,))  # type: ignore[arg-type]
+
+
+def _mission(flight: RecordedFlight, record: Record) -> None:
+    value = record.value
+    robot = flight.robots[value["robot"]]
+    now = seconds(value["stamp"])
+    if not robot.bands or robot.bands[-1].state != value["state"]:
+        robot.bands.append(Band(value["state"], now, now, value["reason"]))
+    else:
+        last = robot.bands[-1]
+        robot.bands[-1] = Band(last.state, last.start, now, value["reason"] or last.reason)
+    robot.visited = tuple(value["visited"])
+    robot.given_up = tuple(value["given_up"])
+    robot.distance = float(value["distance"])
+
+
+def _plan(flight: RecordedFlight, record: Record) -> None:
+    robot = flight.robots[record.value["robot"]]
+    for waypoint in record.value["waypoints"]:
+        robot.plan[waypoint["id"]] = (waypoint["x"], waypoint["y"], waypoint["z"])
+
+
+def _fence(flight: RecordedFlight, record: Record) -> None:
+    flight.robots[record.value["robot"]].fence = [(x, y) for x, y in record.value["polygon"]]
+
+
+def _setpoint(flight: RecordedFlight, record: Record) -> None:
+    flight.robots[record.value["robot"]].clipped.update(record.value["clipped_by"])
+
+
+def _latency(flight: RecordedFlight, record: Record) -> None:
+    if len(record.value["hops"]) == 1:
+        return
+    latency = flight.latencies[record.value["stream"]]
+    latency.total.append(float(record.value["total_ms"]))
+    for hop in record.value["hops"]:
+        latency.wait[hop["node"]].append(float(hop["wait_ms"]))
+        latency.work[hop["node"]].append(float(hop["work_ms"]))
+    latency.overhead.append(sum(float(hop["wait_ms"]) for hop in record.value["hops"]))
+
+
+def _frame(flight: RecordedFlight, record: Record) -> None:
+    flight.frames[record.value["source"]] += 1
+    flight.frame_stamps[record.value["source"]].append(record.value["stamp"])
+
+
+def _detections(flight: RecordedFlight, record: Record) -> None:
+    value = record.value
+    flight.detections.update(item["label"] for item in value["items"])
+    flight.sightings.extend(
+        RecordedDetection(value["stamp"], value["source"], item["label"], item["score"])
+        for item in value["items"]
+    )
+
+
+def _decision(flight: RecordedFlight, record: Record) -> None:
+    value = record.value
+    flight.decisions[value["action"]] += 1
+    flight.reasons[value["action"], value["reason"]] += 1
+    totals = {"QoS": "qos_total", "QoE": "qoe_total"}
+    values = value["values"]
+    flight.utility |= {name: values[key] for name, key in totals.items() if key in values}
+    analysis = value["task"].rpartition("#")[0]
+    flight.outcomes.append(RecordedDecision(seconds(value["stamp"]), analysis, value["action"]))
+
+
+def _alert(flight: RecordedFlight, record: Record) -> None:
+    value: dict[str, Any] = record.value
+    flight.alerts.append((seconds(value["stamp"]), value["kind"], value["text"]))
+
+
+def _drops(flight: RecordedFlight, record: Record) -> None:
+    flight.drops[record.value["stream"]] = int(record.value["total"])
+
+
+def _vitals(flight: RecordedFlight, record: Record) -> None:
+    value = record.value
+    now = seconds(value["stamp"])
+    if "cpu_cores" in value:
+        load = flight.loads[value["actor"]]
+        load.time.append(now)
+        load.cpu.append(value["cpu_cores"])
+        load.memory.append(value["memory_mb"])
+    machine = flight.machines[value["machine"]]
+    # Each of a machine's actors tells of it; one reading a moment is enough.
+    if not machine.time or now > machine.time[-1]:
+        machine.time.append(now)
+        machine.cpu.append(value["machine_cpu"])
+        machine.memory.append(value["machine_memory"])
+        for number, gpu in enumerate(value.get("gpus", ())):
+            load = flight.gpus[f"{value['machine']} {number}"]
+            load.time.append(now)
+            load.cpu.append(gpu["busy"])
+            load.memory.append(gpu["memory"])
+
+
+_READERS: dict[str, Callable[[RecordedFlight, Record], None]] = {
+    "aerodaas.VehicleState": _state,
+    "aerodaas.MissionStatus": _mission,
+    "aerodaas.Plan": _plan,
+    "aerodaas.Geofence": _fence,
+    "aerodaas.Setpoint": _setpoint,
+    "aerodaas.Latency": _latency,
+    "aerodaas.Frame": _frame,
+    "aerodaas.Detections": _detections,
+    "aerodaas.Decision": _decision,
+    "aerodaas.Alert": _alert,
+    "aerodaas.Drops": _drops,
+    "aerodaas.Vitals": _vitals,
+}

@@ -1,0 +1,126 @@
+"""The moments of a flight that are worth a picture."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.recording.pictures import detections_by_frame, frames
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedDetection, RecordedFlight
+from aerodaas.recording.report.overlay import draw_detections
+from aerodaas.types.clock import NANOSECONDS, seconds
+
+__all__ = ["Moment", "MomentPicture", "key_moments", "picture_moments"]
+
+_MOST = 12
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """A frame to be shown, and why."""
+
+    stamp: int
+    """Mission nanoseconds of the frame."""
+    source: str
+    """Its camera."""
+    reason: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MomentPicture:
+    """A moment with its frame, boxes drawn."""
+
+    moment: Moment
+    image: NDArray[np.uint8]
+
+    @property
+    def caption(self) -> str:
+        """When, and why."""
+        return f"{seconds(self.moment.stamp):.1f} s: {self.moment.reason}"
+
+
+def key_moments(flight: RecordedFlight, most: int = _MOST) -> list[Moment]:
+    """Choose at most `most` frames, in order of time.
+
+    What was seen first and best comes first, then alerts, then changes of the mission's state;
+    what is left is spread evenly over the flight.
+    """
+    chosen: dict[tuple[str, int], Moment] = {}
+    for stamp, source, reason in _candidates(flight, most):
+        stamps = flight.frame_stamps.get(source, [])
+        place = min(bisect_left(stamps, stamp), len(stamps) - 1)
+        if place < 0 or len(chosen) >= most:
+            continue
+        moment = Moment(stamps[place], source, reason)
+        chosen.setdefault((source, moment.stamp), moment)
+    return sorted(chosen.values(), key=lambda moment: (moment.stamp, moment.source))
+
+
+def picture_moments(recording: Recording, moments: list[Moment]) -> list[MomentPicture]:
+    """Fetch the frames of `moments` and draw what was found in them; those without are left out."""
+    wanted = {(moment.source, moment.stamp): moment for moment in moments}
+    stamps = {moment.stamp for moment in moments}
+    found = detections_by_frame(recording)
+    pictures = []
+    for frame in frames(recording, stamps=stamps):
+        key = (frame.header.source, frame.header.stamp)
+        if key in wanted:
+            image = frame.image.copy()
+            draw_detections(image, found.get(key, ()))
+            pictures.append(MomentPicture(wanted[key], image))
+    return pictures
+
+
+def _candidates(flight: RecordedFlight, most: int) -> Iterator[tuple[int, str, str]]:
+    """Stamp, camera and reason, the most telling first."""
+    yield from _sightings(flight, max(1, most // 4))
+    yield from _alerts(flight)
+    yield from _states(flight)
+    for camera, stamps in flight.frame_stamps.items():
+        for place in np.linspace(0, len(stamps) - 1, most).astype(int):
+            yield stamps[place], camera, camera
+
+
+def _sightings(flight: RecordedFlight, labels: int) -> Iterator[tuple[int, str, str]]:
+    """The first and the surest sighting of each of the first few labels."""
+    first: dict[str, RecordedDetection] = {}
+    best: dict[str, RecordedDetection] = {}
+    for sighting in flight.sightings:
+        first.setdefault(sighting.label, sighting)
+        if sighting.score > best.setdefault(sighting.label, sighting).score:
+            best[sighting.label] = sighting
+    for reason, found in (("first", first), ("surest", best)):
+        for label, sighting in list(found.items())[:labels]:
+            yield sighting.stamp, sighting.source, f"{reason} {label}"
+
+
+def _alerts(flight: RecordedFlight) -> Iterator[tuple[int, str, str]]:
+    """The first alert of each kind, with the first camera."""
+    told: set[str] = set()
+    for time, kind, text in flight.alerts:
+        if kind not in told and flight.frame_stamps:
+            told.add(kind)
+            yield round(time * NANOSECONDS), next(iter(flight.frame_stamps)), f"alert: {text}"
+
+
+def _states(flight: RecordedFlight) -> Iterator[tuple[int, str, str]]:
+    """Where each robot's mission changed its state; a state met before comes after the new ones."""
+    for name, robot in flight.robots.items():
+        met: set[str] = set()
+        again = []
+        for camera in [one for one in flight.frame_stamps if one.startswith(f"{name}/")][:1]:
+            for band in robot.bands:
+                state = band.state.replace("_", " ")
+                text = f"{state}: {band.reason}" if band.reason else state
+                moment = (round(band.start * NANOSECONDS), camera, text)
+                if band.state in met:
+                    again.append(moment)
+                else:
+                    met.add(band.state)
+                    yield moment
+        yield from again

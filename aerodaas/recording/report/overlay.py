@@ -1,0 +1,63 @@
+"""Boxes, keypoints and words drawn into a picture, as Foxglove would lay them over it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.recording.report.palette import label_colour
+from aerodaas.types.data import Detection
+
+__all__ = ["draw_detections", "draw_line"]
+
+_FONT = cv2.FONT_HERSHEY_SIMPLEX
+_VISIBLE = 0.3
+"""Keypoints of less confidence are not drawn."""
+_REFERENCE = 640
+"""Width in pixels at which lines are two pixels wide and letters half the font's size."""
+
+Image = NDArray[np.uint8]
+
+
+def draw_detections(image: Image, found: Iterable[Detection]) -> None:
+    """Draw each detection into `image` (BGR, in place), in the colour of its label."""
+    scale = image.shape[1] / _REFERENCE
+    width = max(1, round(2 * scale))
+    for item in found:
+        colour = _bgr(label_colour(item.label))
+        left, top, right, bottom = (round(edge) for edge in item.box)
+        cv2.rectangle(image, (left, top), (right, bottom), (0, 0, 0), 2 * width)
+        cv2.rectangle(image, (left, top), (right, bottom), colour, width)
+        if item.keypoints is not None:
+            for u, v, confidence in item.keypoints.tolist():
+                if confidence >= _VISIBLE:
+                    cv2.circle(image, (round(u), round(v)), 2 * width, colour, -1)
+        track = f" #{item.track_id}" if item.track_id is not None else ""
+        text = f"{item.label}{track} {item.score:.2f}"
+        _write(image, text, (left, top - round(5 * scale)), 0.5 * scale)
+
+
+def draw_line(image: Image, text: str) -> None:
+    """Write one line of text into the lower left corner of `image`, in place."""
+    scale = image.shape[1] / _REFERENCE
+    _write(image, text, (round(6 * scale), image.shape[0] - round(8 * scale)), 0.5 * scale)
+
+
+def _write(image: Image, text: str, at: tuple[int, int], size: float) -> None:
+    """Write white on black, inside the picture; the font knows ASCII only."""
+    text = text.encode("ascii", "replace").decode()
+    weight = max(1, round(2 * size))
+    (width, height), below = cv2.getTextSize(text, _FONT, size, weight)
+    x = min(max(0, at[0]), max(0, image.shape[1] - width))
+    y = min(max(height + below, at[1]), image.shape[0] - below)
+    corners = (x, y - height - below // 2), (x + width, y + below)
+    cv2.rectangle(image, *corners, (0, 0, 0), -1)
+    cv2.putText(image, text, (x, y), _FONT, size, (255, 255, 255), weight, cv2.LINE_AA)
+
+
+def _bgr(colour: str) -> tuple[int, int, int]:
+    red, green, blue = (int(colour[index : index + 2], 16) for index in (1, 3, 5))
+    return blue, green, red

@@ -1,0 +1,122 @@
+"""What the plots share: size, type and legends that serve a phone, a page and a screen alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FixedLocator, FuncFormatter
+
+from aerodaas.recording.report.flight import RobotFlight
+from aerodaas.recording.report.palette import OKABE_ITO, STATE_COLOURS
+
+__all__ = [
+    "CYCLE",
+    "WIDTH",
+    "colours_of",
+    "grid",
+    "legend",
+    "log_milliseconds",
+    "mark",
+    "name_states",
+    "new_figure",
+    "shade_states",
+    "words",
+]
+
+WIDTH = 4.8
+"""Inches; a phone shows less than four, on which 10 points stay readable."""
+
+CYCLE: tuple[tuple[str, str], ...] = tuple(
+    (OKABE_ITO[colour], line)
+    for line in ("-", "--", ":")
+    for colour in ("blue", "vermilion", "green", "orange", "purple", "sky", "black")
+)
+"""Colour and line style of the first, second, … line of a plot; no two alike."""
+
+_NARROW = 0.11
+"""Share of the time axis below which a state's band is too narrow for its name."""
+_DECADES = (1, 2, 5)
+
+
+def new_figure(height: float) -> Figure:
+    """A figure of the common width, `height` inches high."""
+    return Figure(figsize=(WIDTH, height), layout="constrained")
+
+
+def grid(axes: Axes, axis: str = "both") -> None:
+    """Light lines behind the data."""
+    axes.grid(visible=True, axis=axis, color="0.9")  # type: ignore[arg-type]
+    axes.set_axisbelow(True)
+
+
+def legend(figure: Figure, handles: list[Artist], columns: int = 2) -> None:
+    """A legend below the plot."""
+    if handles:
+        figure.legend(
+            handles=handles,
+            loc="outside lower center",
+            ncols=columns,
+            frameon=False,
+            fontsize=9,
+            columnspacing=1.2,
+        )
+
+
+def words(name: str) -> str:
+    """A name as a person writes it."""
+    return name.replace("_", " ")
+
+
+def colours_of(states: Iterable[str]) -> list[tuple[str, str]]:
+    """Each colour once, with the names of all states that it stands for."""
+    names: dict[str, list[str]] = {}
+    for state in dict.fromkeys(states):
+        names.setdefault(STATE_COLOURS.get(state, "black"), []).append(words(state))
+    return [(colour, " / ".join(group)) for colour, group in names.items()]
+
+
+def mark(label: str, face: str, shape: str = "o") -> Line2D:
+    """A legend's entry for a mark."""
+    return Line2D([], [], linestyle="", marker=shape, color="black", mfc=face, label=label)
+
+
+def shade_states(axes: Axes, robot: RobotFlight) -> list[Artist]:
+    """Colour the time axis by the mission's states; returns the legend's entries."""
+    for band in robot.bands:
+        colour = STATE_COLOURS.get(band.state, "black")
+        axes.axvspan(band.start, band.end, color=colour, alpha=0.25, linewidth=0)
+    return [
+        Patch(color=colour, alpha=0.35, label=names)
+        for colour, names in colours_of(band.state for band in robot.bands)
+    ]
+
+
+def name_states(axes: Axes, robot: RobotFlight) -> None:
+    """Write the states' names into bands that are wide enough."""
+    span = robot.time[-1] - robot.time[0]
+    for band in robot.bands:
+        if band.end - band.start < _NARROW * span:
+            continue
+        axes.text(
+            (band.start + band.end) / 2,
+            0.04,
+            words(band.state),
+            transform=axes.get_xaxis_transform(),
+            ha="center",
+            fontsize=8,
+        )
+
+
+def log_milliseconds(axes: Axes) -> None:
+    """Label an x axis that holds logarithms of milliseconds with the milliseconds."""
+    low, high = axes.get_xlim()
+    steps = _DECADES if high - low < len(_DECADES) else (1,)
+    marks = [step * 10.0**decade for decade in range(-3, 6) for step in steps]
+    axes.xaxis.set_major_locator(FixedLocator([float(np.log10(each)) for each in marks]))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{10**value:g}"))

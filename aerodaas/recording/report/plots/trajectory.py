@@ -1,0 +1,226 @@
+"""The flight from above and from the side."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from numpy.typing import NDArray
+
+from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
+from aerodaas.recording.report.palette import STATE_COLOURS, label_colour
+from aerodaas.recording.report.plots.style import colours_of, grid, legend, mark, new_figure
+from aerodaas.types.clock import seconds
+
+__all__ = ["profile_figure", "trajectory_figure"]
+
+_STAYING = 0.6
+"""Metres within which a drone is taken to stay where it is …"""
+_LONG = 1.5
+"""… if it does so for this many seconds."""
+_GROUND = frozenset({"idle", "preflight", "taking_off", "landing", "landed", "aborted"})
+_SHAPES = "sDv^P*X"
+"""Marks of the first, second, … label seen."""
+_APART = 1.0
+"""Metres between the marks of one label: a thing seen 15 times a second is marked once."""
+
+Floats = NDArray[np.float64]
+
+
+def trajectory_figure(flight: RecordedFlight) -> Figure:
+    """The flight from above: path in the colours of its states, waypoints, take-off, fence.
+
+    A ring around a waypoint shows a state in which the drone stayed there. Small marks beside
+    the path show where the drone was when it saw something.
+    """
+    figure = new_figure(5.4)
+    axes = figure.add_subplot()
+    states: dict[str, None] = {}
+    seen: list[Artist] = []
+    for name, robot in flight.robots.items():
+        _draw_plan(axes, robot)
+        states |= dict.fromkeys(_draw_path(axes, robot))
+        seen += _draw_sightings(axes, flight, name, robot)
+        if len(robot.position):
+            east, north, _ = robot.position[0]
+            axes.plot(east, north, "^", color="black", markersize=17, mfc="none", zorder=5)
+            label = f"take-off, {name}" if len(flight.robots) > 1 else "take-off"
+            _label(axes, east, north, label, below=True)
+    marks = _visited_mark(flight)
+    if any(set(robot.plan) - set(robot.visited) for robot in flight.robots.values()):
+        marks.append(mark("waypoint, not visited", "white"))
+    if any(robot.fence for robot in flight.robots.values()):
+        marks.append(Line2D([], [], linestyle="--", color="black", label="geofence"))
+    axes.set_aspect("equal", adjustable="datalim")
+    axes.set(xlabel="East of home (m)", ylabel="North of home (m)")
+    axes.margins(0.08)
+    grid(axes)
+    legend(figure, [*_state_lines(states), *marks, *seen])
+    return figure
+
+
+def profile_figure(flight: RecordedFlight) -> Figure:
+    """The flight from the side: height over the way flown, one row for each robot."""
+    robots = {name: robot for name, robot in flight.robots.items() if robot.states}
+    figure = new_figure(1.1 + 1.9 * max(1, len(robots)))
+    rows = figure.subplots(max(1, len(robots)), 1, squeeze=False)[:, 0]
+    states: dict[str, None] = {}
+    for (name, robot), axes in zip(robots.items(), rows, strict=False):
+        way = _way(robot.position)
+        for begin, end, state in _pieces(robot):
+            axes.plot(
+                way[begin:end],
+                robot.position[begin:end, 2],
+                color=STATE_COLOURS.get(state, "black"),
+                linewidth=2.5,
+            )
+            states[state] = None
+        for name_, distance, height in _passed(robot, way):
+            axes.plot(distance, height, "o", color="black", markersize=7, zorder=4)
+            _label(axes, distance, height, name_)
+        suffix = f" of {name}" if len(robots) > 1 else ""
+        axes.set_ylabel(f"Height{suffix} (m)")
+        axes.margins(x=0.02, y=0.22)
+        grid(axes)
+    rows[-1].set_xlabel("Way flown over the ground (m)")
+    legend(figure, [*_state_lines(states), *_visited_mark(flight)])
+    return figure
+
+
+def _visited_mark(flight: RecordedFlight) -> list[Artist]:
+    visited = any(robot.visited for robot in flight.robots.values())
+    return [mark("waypoint, visited", "black")] if visited else []
+
+
+def _state_lines(states: dict[str, None]) -> list[Artist]:
+    return [
+        Line2D([], [], color=colour, linewidth=4, label=names)
+        for colour, names in colours_of(states)
+    ]
+
+
+def _pieces(robot: RobotFlight) -> Iterator[tuple[int, int, str]]:
+    """Stretches of one state, each a point longer, so that the line has no gaps."""
+    states = np.array(robot.state_at(robot.time))
+    if not len(states):
+        return
+    cuts = np.flatnonzero(states[1:] != states[:-1]) + 1
+    for begin, end in zip([0, *cuts], [*cuts, len(states)], strict=True):
+        yield int(begin), int(end) + 1, str(states[begin])
+
+
+def _way(position: Floats) -> Floats:
+    """Metres over the ground up to each point; noise while hovering does not count."""
+    way = np.zeros(len(position))
+    anchor = 0
+    for index in range(1, len(position)):
+        step = float(np.linalg.norm(position[index, :2] - position[anchor, :2]))
+        if step >= _STAYING / 2:
+            way[index], anchor = way[anchor] + step, index
+        else:
+            way[index] = way[anchor]
+    return way
+
+
+def _passed(robot: RobotFlight, way: Floats) -> Iterator[tuple[str, float, float]]:
+    """Name, way flown and height of each waypoint visited, where the drone came closest."""
+    begin = 0
+    for number, name in enumerate(robot.visited, start=1):
+        if name not in robot.plan or begin >= len(robot.position):
+            continue
+        away = np.linalg.norm(robot.position[begin:] - np.array(robot.plan[name]), axis=1)
+        # Of the first time that it came close: a later leg may pass by the same place.
+        close = away <= max(_STAYING, float(np.nanmin(away)))
+        first = int(np.argmax(close))
+        stay = int(np.argmin(np.append(close[first:], False)))
+        near = begin + first + int(np.argmin(away[first : first + stay]))
+        yield f"{number}. {name}", float(way[near]), float(robot.position[near, 2])
+        begin = near
+
+
+def _draw_plan(axes: Axes, robot: RobotFlight) -> None:
+    if robot.fence:
+        ring = np.array([*robot.fence, robot.fence[0]])
+        axes.plot(ring[:, 0], ring[:, 1], "--", color="black", linewidth=1.2)
+    order = {name: str(number) for number, name in enumerate(robot.visited, start=1)}
+    for name, (east, north, _) in robot.plan.items():
+        face = "black" if name in order else "white"
+        axes.plot(east, north, "o", color="black", mfc=face, markersize=7, zorder=4)
+        _label(axes, east, north, f"{order[name]}. {name}" if name in order else name)
+
+
+def _draw_path(axes: Axes, robot: RobotFlight) -> list[str]:
+    """Draw the path and return the states met."""
+    met = []
+    for begin, end, state in _pieces(robot):
+        piece = robot.position[begin:end, :2]
+        colour = STATE_COLOURS.get(state, "black")
+        extent = float(np.ptp(piece, axis=0).max())
+        met.append(state)
+        long = robot.time[min(end, len(robot.time)) - 1] - robot.time[begin] >= _LONG
+        if extent < _STAYING and long and state not in _GROUND:
+            axes.plot(*piece.mean(axis=0), "o", color=colour, markersize=14, zorder=2)
+            continue
+        axes.plot(piece[:, 0], piece[:, 1], color=colour, linewidth=2.5, zorder=3)
+        if extent > _STAYING:
+            _arrow(axes, piece, colour)
+    return met
+
+
+def _draw_sightings(
+    axes: Axes, flight: RecordedFlight, name: str, robot: RobotFlight
+) -> list[Artist]:
+    """Mark where the drone was when it saw something; returns the legend's entries."""
+    if not len(robot.time):
+        return []
+    places: dict[str, list[Floats]] = {}
+    for sighting in flight.sightings:
+        if not sighting.source.startswith(f"{name}/"):
+            continue
+        index = int(np.searchsorted(robot.time, seconds(sighting.stamp)))
+        place = robot.position[min(index, len(robot.position) - 1), :2]
+        known = places.setdefault(sighting.label, [])
+        if all(float(np.linalg.norm(place - other)) >= _APART for other in known):
+            known.append(place)
+    entries: list[Artist] = []
+    for (label, spots), shape in zip(places.items(), _SHAPES, strict=False):
+        points = np.array(spots)
+        colour = label_colour(label)
+        axes.plot(
+            points[:, 0],
+            points[:, 1],
+            shape,
+            color=colour,
+            markeredgecolor="black",
+            markersize=7,
+            zorder=4,
+        )
+        entries.append(mark(f"drone saw: {label}", colour, shape))
+    return entries
+
+
+def _arrow(axes: Axes, piece: Floats, colour: str) -> None:
+    """An arrow head half-way along a path, by the way flown."""
+    way = np.cumsum(np.linalg.norm(np.diff(piece, axis=0), axis=1))
+    middle = int(np.searchsorted(way, way[-1] / 2))
+    # Over a tenth of the way, so that noise of the position does not turn it.
+    reach = max(1, len(piece) // 20)
+    tail, head = piece[max(0, middle - reach)], piece[min(len(piece) - 1, middle + reach)]
+    style = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 25, "linewidth": 0}
+    axes.annotate("", head, tail, arrowprops=style, zorder=3)
+
+
+def _label(axes: Axes, x: float, y: float, text: str, *, below: bool = False) -> None:
+    axes.annotate(
+        text,
+        (x, y),
+        xytext=(8, -14 if below else 7),
+        textcoords="offset points",
+        zorder=6,
+        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1},
+        fontsize=10,
+    )

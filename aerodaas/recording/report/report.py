@@ -1,0 +1,87 @@
+"""From a recording to the files that people look at."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.recording.report.moments import MomentPicture, key_moments, picture_moments
+from aerodaas.recording.report.page.figures import Plot, plots_of
+from aerodaas.recording.report.page.flight import flight_page
+from aerodaas.recording.report.sheet import contact_sheet
+from aerodaas.recording.report.summary import FlightSummary
+from aerodaas.types.errors import RecordingError
+
+__all__ = ["Report", "ReportFiles", "read_report", "write_report"]
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """A recording, worked out."""
+
+    summary: FlightSummary
+    plots: list[Plot]
+    moments: list[MomentPicture]
+
+
+@dataclass(frozen=True, slots=True)
+class ReportFiles:
+    """What `write_report` has written; pictures for which there was no data are missing."""
+
+    summary: FlightSummary
+    page: Path
+    summary_json: Path
+    summary_text: Path
+    plots: tuple[Path, ...]
+
+
+def read_report(recording: str | Path) -> Report:
+    """Work out what there is to say and to show about a recording.
+
+    Raises RecordingError if it cannot be read, or holds no flight.
+    """
+    with Recording.open(recording) as opened:
+        flight = RecordedFlight.read(opened)
+        if not flight.robots and not flight.latencies:
+            raise RecordingError(f"{recording} holds no flight: no vehicle states and no latencies")
+        moments = picture_moments(opened, key_moments(flight))
+        summary = FlightSummary.of(opened, flight)
+    return Report(summary, plots_of(flight), moments)
+
+
+def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
+    """Write `report.html`, `summary.json`, `summary.txt` and the plots as PNG into `folder`.
+
+    An earlier report in `folder` is replaced. Raises RecordingError if the recording cannot be
+    read, holds no flight, or the folder cannot be written.
+    """
+    report, folder = read_report(recording), Path(folder)
+    files = ReportFiles(
+        report.summary,
+        folder / "report.html",
+        folder / "summary.json",
+        folder / "summary.txt",
+        tuple(folder / f"{plot.name}.png" for plot in report.plots),
+    )
+    contents = {path: plot.png for path, plot in zip(files.plots, report.plots, strict=True)}
+    if report.moments:
+        _, sheet = cv2.imencode(".png", contact_sheet(report.moments))
+        contents[folder / "moments.png"] = sheet.tobytes()
+    summary = report.summary
+    contents |= {
+        files.page: flight_page(summary, report.plots, report.moments).encode(),
+        files.summary_json: (json.dumps(summary.as_dict(), indent=2) + "\n").encode(),
+        files.summary_text: f"{summary}\n".encode(),
+    }
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, data in contents.items():
+            path.write_bytes(data)
+    except OSError as error:
+        raise RecordingError(f"cannot write the report to {folder}: {error.strerror}") from None
+    return files

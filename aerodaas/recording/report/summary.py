@@ -1,0 +1,172 @@
+"""A flight in figures, for people and as JSON."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass, field
+from datetime import datetime, timezone
+from typing import Any
+
+import numpy as np
+from typing_extensions import Self
+
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.flight import RecordedFlight, RobotFlight, StreamLatency
+from aerodaas.types.clock import NANOSECONDS
+
+__all__ = ["FlightSummary", "LatencyFigures", "RobotFigures"]
+
+
+@dataclass(frozen=True, slots=True)
+class LatencyFigures:
+    """From capture to publishing, milliseconds of the host's clock."""
+
+    count: int
+    median_ms: float
+    p99_ms: float
+    overhead_ms: float
+    """Median of the part in which nobody worked: on the way, or waiting for an actor."""
+
+
+@dataclass(frozen=True, slots=True)
+class RobotFigures:
+    """One robot's flight in figures."""
+
+    outcome: str
+    """Last mission state and its reason."""
+    duration_s: float
+    """Mission seconds from taking off to landed, or to the end of the recording."""
+    distance_m: float
+    waypoints_planned: int
+    waypoints_visited: int
+    waypoints_given_up: int
+    max_height_m: float | None
+    battery_used: float | None
+    """Share of the full charge, 0 to 1."""
+    setpoints_clipped: dict[str, int]
+    """Setpoints that a limit changed, by limit."""
+
+    @property
+    def course(self) -> str:
+        """How far it flew, in one line."""
+        visited = f"{self.waypoints_visited} of {self.waypoints_planned} waypoints, "
+        used = self.battery_used
+        return (
+            f"{visited if self.waypoints_planned else ''}{self.distance_m:.1f} m in "
+            f"{self.duration_s:.1f} s{'' if used is None else f', {100 * used:.0f} % of battery'}"
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class FlightSummary:
+    """A recording in figures."""
+
+    title: str
+    duration_s: float
+    """Mission seconds recorded."""
+    complete: bool
+    """The recording was closed properly."""
+    robots: dict[str, RobotFigures]
+    frames: dict[str, int]
+    """Frames by camera."""
+    latencies: dict[str, LatencyFigures]
+    """By stream."""
+    detections: dict[str, int] = field(default_factory=dict)
+    """Objects found in single frames, by label."""
+    decisions: dict[str, int] = field(default_factory=dict)
+    """Scheduler decisions, by action."""
+    reasons: dict[str, int] = field(default_factory=dict)
+    """Scheduler decisions and outcomes, by `action: reason`."""
+    utility: dict[str, float] = field(default_factory=dict)
+    """What the analytics scheduler gained: `QoS` and `QoE`."""
+    alerts: list[dict[str, Any]] = field(default_factory=list)
+    drops: dict[str, int] = field(default_factory=dict)
+    """Messages that did not reach the recorder, by stream."""
+    provenance: dict[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, recording: Recording, flight: RecordedFlight) -> Self:
+        """Work out the figures of a flight read from `recording`."""
+        return cls(
+            title=recording.provenance.get("name") or recording.path.stem,
+            duration_s=round(recording.duration, 3),
+            complete=recording.complete and not recording.damaged,
+            robots={name: _robot(robot) for name, robot in flight.robots.items()},
+            frames=dict(flight.frames),
+            latencies={name: _latency(it) for name, it in flight.latencies.items()},
+            detections=dict(flight.detections),
+            decisions=dict(flight.decisions),
+            reasons={f"{did}: {why}": n for (did, why), n in flight.reasons.most_common()},
+            utility={name: round(value, 3) for name, value in flight.utility.items()},
+            alerts=[{"time_s": at, "kind": kind, "text": t} for at, kind, t in flight.alerts],
+            drops=dict(flight.drops),
+            provenance=dict(recording.provenance),
+        )
+
+    @property
+    def begun(self) -> str:
+        """Date and time of day at which it began, with the zone; empty where nobody knows."""
+        try:
+            seconds = int(self.provenance["epoch_ns"]) / NANOSECONDS
+            began = datetime.fromtimestamp(seconds, timezone.utc).astimezone()
+        except (KeyError, ValueError, OverflowError, OSError):
+            return ""
+        return f"{began:%Y-%m-%d %H:%M:%S %Z}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything, for JSON."""
+        return asdict(self)
+
+    def __str__(self) -> str:
+        """A few lines for a person."""
+        lines = [f"{self.title}: {self.duration_s:.1f} s recorded"]
+        if not self.complete:
+            lines[0] += " (cut off: the file was not closed or is damaged)"
+        for name, robot in self.robots.items():
+            lines.append(f"  {name}: {robot.outcome}; {robot.course}")
+        for camera, count in self.frames.items():
+            rate = f", {count / self.duration_s:.1f} per second" if self.duration_s else ""
+            lines.append(f"  {camera}: {count} frames{rate}")
+        for stream, latency in self.latencies.items():
+            lines.append(
+                f"  {stream}: {latency.median_ms:.1f} ms median, {latency.p99_ms:.1f} ms "
+                "99th percentile since capture"
+            )
+        if self.decisions:
+            lines.append(f"  {_scheduler_text(self)}")
+        lines += [f"  alert at {it['time_s']:.1f} s: {it['text']}" for it in self.alerts]
+        lines += [f"  dropped {count} of {stream}" for stream, count in self.drops.items()]
+        return "\n".join(lines)
+
+
+def _scheduler_text(summary: FlightSummary) -> str:
+    counts = ", ".join(f"{count} {action}" for action, count in summary.decisions.items())
+    gained = ", ".join(f"{name} utility {value:.0f}" for name, value in summary.utility.items())
+    return f"analytics scheduler: {counts}{'; ' if gained else ''}{gained}"
+
+
+def _latency(latency: StreamLatency) -> LatencyFigures:
+    median, late = np.percentile(latency.total, [50, 99])
+    overhead = float(np.median(latency.overhead))
+    return LatencyFigures(
+        len(latency.total), round(float(median), 3), round(float(late), 3), round(overhead, 3)
+    )
+
+
+def _robot(robot: RobotFlight) -> RobotFigures:
+    on_ground = {"idle", "preflight", "landed", "aborted"}
+    flown = sum(band.end - band.start for band in robot.bands if band.state not in on_ground)
+    heights = robot.position[:, 2]
+    known = robot.battery[np.isfinite(robot.battery)]
+    highest = float(np.nanmax(heights)) if np.isfinite(heights).any() else math.nan
+    return RobotFigures(
+        outcome=robot.outcome,
+        duration_s=round(flown, 3),
+        distance_m=round(robot.distance, 3),
+        waypoints_planned=len(robot.plan.keys() | robot.visited),
+        waypoints_visited=len(set(robot.visited)),
+        waypoints_given_up=len(robot.given_up),
+        max_height_m=round(highest, 3) if math.isfinite(highest) else None,
+        battery_used=round(float(known[0] - known[-1]), 4) if len(known) else None,
+        setpoints_clipped=dict(robot.clipped),
+    )

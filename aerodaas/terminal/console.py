@@ -1,0 +1,229 @@
+"""What a run shows on the terminal: getting ready, the live view, and where the results lie."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.status import Status
+from typing_extensions import Self
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.options import RunOptions
+from aerodaas.terminal.live import MissionView
+from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
+from aerodaas.types.clock import seconds
+from aerodaas.types.errors import RecordingError
+from aerodaas.types.identifiers import is_internal
+
+if TYPE_CHECKING:
+    from aerodaas.actors.run.flight import FlightState
+
+__all__ = ["FlightView", "StartupView", "show_headless", "show_left", "show_results", "show_speed"]
+
+_ALERTS_SHOWN = 4
+
+
+class StartupView:
+    """Says what a run is waiting for until it flies."""
+
+    def __init__(self, options: RunOptions) -> None:
+        self._console = Console(highlight=False)
+        self._shown = options.view
+        self._stack = ExitStack()
+        self._status: Status | None = None
+
+    def __enter__(self) -> Self:
+        if self._shown and self._console.is_terminal:
+            self._status = self._stack.enter_context(self._console.status("starting"))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+
+    def step(self, text: str) -> None:
+        """Something has become ready, or is under way."""
+        if self._status is not None:
+            self._status.update(text)
+
+
+class FlightView:
+    """Shows a flight as it goes on."""
+
+    def __init__(self, options: RunOptions, config: EnvironmentConfig) -> None:
+        self._title = options.application.stem if options.application else config.name
+        self._view = MissionView() if options.view else None
+        self._errors = Console(stderr=True, highlight=False, soft_wrap=True)
+        self._printed: set[tuple[str, int, int]] = set()
+        """Alerts, by source, number and stamp."""
+        self._began = time.monotonic()
+        self._before: tuple[float, dict[str, int]] = (0.0, {})
+        self._rates: dict[str, float] = {}
+
+    def __enter__(self) -> Self:
+        if self._view is not None:
+            self._view.__enter__()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if self._view is not None:
+            self._view.__exit__(kind, error, traceback)
+
+    def update(self, state: FlightState) -> None:
+        """Show the flight as it is now."""
+        if self._view is None:
+            self._print_alerts(state)
+            return
+        stamps = [robot.status.stamp for robot in state.robots.values()]
+        now = seconds(max(stamps, default=0))
+        self._measure_rates(state, now)
+        self._view.update(
+            Snapshot(
+                title=self._title,
+                mission_time=now,
+                wall_time=time.monotonic() - self._began,
+                robots=tuple(
+                    RobotSnapshot(name, robot.status, robot.state)
+                    for name, robot in state.robots.items()
+                ),
+                streams=(*self._streams(state), *_commands(state)),
+                alerts=tuple(alert.text for alert in state.alerts[-_ALERTS_SHOWN:]),
+                scheduler=_scheduler_text(state),
+            )
+        )
+
+    def _print_alerts(self, state: FlightState) -> None:
+        """Without a view, a line for each alert as it comes."""
+        for alert in state.alerts:
+            key = alert.header.source, alert.header.id, alert.header.stamp
+            if key not in self._printed:
+                self._printed.add(key)
+                time_text = f"{seconds(alert.header.stamp):.1f} s"
+                self._errors.print(f"{time_text} {alert.header.source}: {alert.text}", markup=False)
+
+    def _measure_rates(self, state: FlightState, now: float) -> None:
+        counts = {
+            stream: sent.count
+            for report in state.reports.values()
+            for stream, sent in report.sent.items()
+        }
+        before, earlier = self._before
+        if counts == earlier or now <= before:
+            return
+        # Over the whole flight so far: in lockstep a short stretch of wall time says little.
+        self._rates = {stream: count / now for stream, count in counts.items()}
+        self._before = now, counts
+
+    def _streams(self, state: FlightState) -> list[StreamSnapshot]:
+        dropped: dict[str, int] = {}
+        for report in state.reports.values():
+            for name, count in report.streams.items():
+                stream = name.partition(">")[0]
+                dropped[stream] = max(dropped.get(stream, 0), count.dropped)
+        return [
+            StreamSnapshot(
+                stream, self._rates.get(stream), sent.median_ms, sent.p99_ms, dropped.get(stream, 0)
+            )
+            for name, report in state.reports.items()
+            if name.startswith(("sensor/", "analytics/"))
+            for stream, sent in report.sent.items()
+            if not is_internal(stream)
+        ]
+
+
+def _scheduler_text(state: FlightState) -> str:
+    """How the analytics scheduler fares; empty before it has decided anything."""
+    report = state.reports.get("dispatcher")
+    values = report.values if report is not None else {}
+    ended = sum(values.get("outcomes", {}).values())
+    if not ended:
+        return ""
+    outcomes = ", ".join(
+        f"{count} {name}" for name, count in values["outcomes"].items() if name != "done"
+    )
+    windows = [sum(counts) for counts in zip(*values["qoe_windows"].values(), strict=True)]
+    share = 100 * values["outcomes"].get("done", 0) / ended
+    head = f"{values['scheduler']}: {share:.0f} % of {ended} in time"
+    parts = [f"{head}, {outcomes}" if outcomes else head, f"utility {values['qos_total']:.0f}"]
+    if windows:
+        parts.append(f"QoE {values['qoe_total']:.0f} ({windows[0]} of {windows[1]} windows)")
+    if values["edge_down"]:
+        parts.append(f"down: {', '.join(values['edge_down'])}")
+    return "; ".join(parts)
+
+
+def _commands(state: FlightState) -> list[StreamSnapshot]:
+    rows = []
+    for name, robot in state.robots.items():
+        if robot.latencies:
+            ordered = sorted(robot.latencies)
+            high = ordered[int(0.99 * (len(ordered) - 1))]
+            rows.append(
+                StreamSnapshot(
+                    f"{name}: capture to command", None, statistics.median(ordered), high
+                )
+            )
+    return rows
+
+
+def show_speed(options: RunOptions, mission: float, wall: float, start: float) -> None:
+    """Say how long a mission of `mission` seconds took on the wall, and its start before that."""
+    if options.view and wall > 0:
+        factor = f"{mission / wall:.1f} times as fast as the clock"
+        line = f"flew {mission:.1f} s in {wall:.1f} s, {factor}; ready after {start:.1f} s"
+        Console(highlight=False, soft_wrap=True).print(line)
+
+
+def show_left(recording: Path | None) -> None:
+    """Say what becomes of drones that still fly when the application ends."""
+    where = f"; its recording: {_shown(recording)}" if recording else ""
+    line = f"a drone is still flying: it comes down by itself, and its processes end then{where}"
+    Console(highlight=False, soft_wrap=True, stderr=True).print(line, markup=False)
+
+
+def show_headless(head: str, recording: Path | None) -> None:
+    """Say how a run ended whose cluster has lost its head, at the address `head`."""
+    where = f"; its recording: {_shown(recording)}" if recording else ""
+    line = (
+        f"the cluster's head at {head} is out of reach: what runs here for this flight ends by "
+        f"itself within half a minute{where}"
+    )
+    Console(highlight=False, soft_wrap=True, stderr=True).print(line, markup=False)
+
+
+def show_results(options: RunOptions, recording: Path | None) -> None:
+    """Write plots and summary of a closed recording, and say where everything lies."""
+    if recording is None:
+        return
+    from aerodaas.recording.report.report import (  # noqa: PLC0415 - matplotlib is slow to load
+        write_report,
+    )
+
+    console = Console(highlight=False, soft_wrap=True)
+    try:
+        report = write_report(recording, recording.parent)
+    except RecordingError as error:
+        console.print(f"no report: {error}", markup=False)
+        return
+    if options.view:
+        console.print(str(report.summary), markup=False)
+    places = {"recording": recording, "report": report.page, "summary": report.summary_text}
+    width = max(map(len, places))
+    for name, path in places.items():
+        console.print(f"{name:>{width}}  {_shown(path)}", markup=False)
+
+
+def _shown(path: Path) -> str:
+    absolute = path.resolve()
+    here = Path.cwd()
+    return str(absolute.relative_to(here) if absolute.is_relative_to(here) else absolute)

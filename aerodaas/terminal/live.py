@@ -1,0 +1,126 @@
+"""The live view of a mission: a panel on a terminal, lines elsewhere."""
+
+from __future__ import annotations
+
+import time
+from types import TracebackType
+
+from rich.console import Console, Group
+from rich.live import Live
+from rich.panel import Panel
+from rich.rule import Rule
+from rich.text import Text
+from typing_extensions import Self
+
+from aerodaas.terminal.lines import robot_line
+from aerodaas.terminal.panels import alerts_panel, clock_text, robot_panel, streams_panel
+from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot
+from aerodaas.types.status import MissionState
+
+__all__ = ["MissionView"]
+
+_REDRAW = 0.1
+_LINE_EVERY = 5.0
+_WIDEST = 100
+_LONGEST_PATH = 2000
+_STEP = 0.1
+"""Metres between the points of the drawn path."""
+
+
+class MissionView:
+    """Shows snapshots of a mission as they come; as often as you like, it redraws sparingly.
+
+    On a terminal it draws a panel in place; into a pipe or a file it prints one line for each
+    robot every few seconds and whenever a mission's state changes.
+    """
+
+    def __init__(self, console: Console | None = None) -> None:
+        """Draw on `console`, or standard output."""
+        self._console = console or Console(highlight=False)
+        self._live: Live | None = None
+        self._last: Snapshot | None = None
+        self._drawn = -_LINE_EVERY
+        self._states: dict[str, MissionState] = {}
+        self._alerts = 0
+        self._paths: dict[str, list[tuple[float, float]]] = {}
+
+    def __enter__(self) -> Self:
+        if self._console.is_terminal:
+            self._live = Live(console=self._console, auto_refresh=False)
+            self._live.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        """Leave the last picture on the terminal."""
+        if self._live is not None:
+            if self._last is not None:
+                self._live.update(self.render(self._last), refresh=True)
+            self._live.stop()
+        elif self._last is not None:
+            self._print(self._last)
+
+    def update(self, snapshot: Snapshot) -> None:
+        """Show `snapshot`."""
+        self._last = snapshot
+        for robot in snapshot.robots:
+            self._remember(robot)
+        now = time.monotonic()
+        if self._live is not None:
+            if now - self._drawn >= _REDRAW:
+                self._drawn = now
+                self._live.update(self.render(snapshot), refresh=True)
+        else:
+            states = {robot.name: robot.mission.state for robot in snapshot.robots if robot.mission}
+            if states != self._states or now - self._drawn >= _LINE_EVERY:
+                self._drawn = now
+                self._states = states
+                self._print(snapshot)
+
+    def render(self, snapshot: Snapshot) -> Panel:
+        """The picture of a snapshot, at least 72 columns wide."""
+        ascii_only = not self._console.encoding.lower().startswith("utf")
+        parts = [
+            robot_panel(robot, self._paths.get(robot.name, ()), ascii_only=ascii_only)
+            for robot in snapshot.robots
+        ]
+        # rich draws a rule without a title in Unicode even where the terminal cannot.
+        rule = Rule(style="dim", characters="-" if ascii_only else "─")
+        if snapshot.streams:
+            parts += [rule, streams_panel(snapshot.streams)]
+        if snapshot.scheduler:
+            parts += [rule, Text(snapshot.scheduler)]
+        if snapshot.alerts:
+            parts += [rule, alerts_panel(snapshot.alerts)]
+        return Panel(
+            Group(*parts),
+            title=Text(snapshot.title, "bold"),
+            title_align="left",
+            subtitle=clock_text(snapshot),
+            subtitle_align="right",
+            width=min(self._console.width, _WIDEST),
+        )
+
+    def _remember(self, robot: RobotSnapshot) -> None:
+        if robot.vehicle is None:
+            return
+        east, north, _ = (float(axis) for axis in robot.vehicle.odometry.position)
+        path = self._paths.setdefault(robot.name, [])
+        if path and abs(path[-1][0] - east) + abs(path[-1][1] - north) < _STEP:
+            return
+        path.append((east, north))
+        if len(path) > _LONGEST_PATH:
+            del path[1::2]
+
+    def _print(self, snapshot: Snapshot) -> None:
+        for robot in snapshot.robots:
+            self._console.print(robot_line(snapshot, robot), markup=False, soft_wrap=True)
+        if snapshot.scheduler:
+            self._console.print(snapshot.scheduler, markup=False, soft_wrap=True)
+        for alert in snapshot.alerts[self._alerts :]:
+            self._console.print(f"alert: {alert}", markup=False, soft_wrap=True)
+        self._alerts = max(self._alerts, len(snapshot.alerts))

@@ -1,0 +1,174 @@
+"""The parts of the terminal view, each a function from what is known to something rich draws."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from aerodaas.terminal.plan import braille_plan
+from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
+from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.vehicle import VehicleState
+
+__all__ = [
+    "alerts_panel",
+    "clock_text",
+    "place_text",
+    "robot_panel",
+    "streams_panel",
+    "waypoints_text",
+]
+
+_STYLES = {
+    MissionState.ABORTED: "bold white on red",
+    MissionState.DIVERTED: "bold black on yellow",
+    MissionState.LANDED: "bold black on green",
+    MissionState.RETURNING: "bold black on magenta",
+}
+_CHARGE_COLOURS = ((0.2, "red"), (0.4, "yellow"), (math.inf, "green"))
+_BAR = 22
+_PLAN_COLUMNS, _PLAN_ROWS = 24, 8
+_ALERTS = 3
+
+
+def clock_text(snapshot: Snapshot) -> str:
+    """Mission time, its factor and wall time."""
+    minutes, seconds = divmod(snapshot.mission_time, 60)
+    return (
+        f"mission {int(minutes)}:{seconds:04.1f}   {snapshot.factor:.1f}x real time   "
+        f"wall {snapshot.wall_time:.0f} s"
+    )
+
+
+def place_text(vehicle: VehicleState) -> str:
+    """East, north and up of home in metres."""
+    # Adding zero turns -0.0 into 0.0.
+    east, north, up = (round(float(axis), 1) + 0.0 for axis in vehicle.odometry.position)
+    return f"E {east:.1f}  N {north:.1f}  up {up:.1f} m"
+
+
+def waypoints_text(mission: MissionStatus) -> tuple[float, str]:
+    """Share of the waypoints visited, 0 to 1, and the same in words."""
+    visited, known = mission.waypoint_counts
+    return mission.progress, f"{visited} of {known} waypoints" if known else "no waypoints"
+
+
+def robot_panel(
+    robot: RobotSnapshot, path: Sequence[tuple[float, float]], *, ascii_only: bool
+) -> RenderableType:
+    """Mission, position and battery of a robot, beside a plan of its flight."""
+    facts = Table.grid(padding=(0, 1), expand=True)
+    facts.add_column(style="dim", width=9, no_wrap=True)
+    facts.add_column(ratio=1, no_wrap=True)
+    mission, vehicle = robot.mission, robot.vehicle
+    facts.add_row(Text(robot.name, "bold not dim"), _state(mission))
+    facts.add_row("", Text(mission.reason if mission else "", "italic"))
+    facts.add_row("waypoint", _waypoint(mission, vehicle))
+    facts.add_row("position", _position(vehicle))
+    facts.add_row("battery", _battery(vehicle))
+    facts.add_row("progress", _progress(mission))
+    facts.add_row("flown", f"{mission.distance:.1f} m" if mission else "")
+    facts.add_row("faults", _faults(mission, vehicle))
+    if ascii_only:
+        return facts
+    ahead = () if mission is None else (*mission.pending, mission.target)
+    places = [(at.x, at.y) for at in ahead if at is not None]
+    beside = Table.grid(padding=(0, 1), expand=True)
+    beside.add_column(ratio=1)
+    beside.add_column(width=_PLAN_COLUMNS)
+    beside.add_row(facts, braille_plan(path, places, columns=_PLAN_COLUMNS, rows=_PLAN_ROWS))
+    return beside
+
+
+def streams_panel(streams: Sequence[StreamSnapshot]) -> RenderableType:
+    """Rate, latency and drops of each stream."""
+    table = Table(box=None, expand=True, pad_edge=False, header_style="dim")
+    table.add_column("stream", ratio=1, no_wrap=True)
+    for heading in ("per second", "median ms", "p99 ms", "dropped"):
+        table.add_column(heading, justify="right", width=10, no_wrap=True)
+    for stream in streams:
+        dropped = Text(str(stream.drops), "yellow" if stream.drops else "")
+        table.add_row(
+            stream.name,
+            _number(stream.rate),
+            _number(stream.median_ms),
+            _number(stream.p99_ms),
+            dropped,
+        )
+    return table
+
+
+def alerts_panel(alerts: Sequence[str]) -> RenderableType:
+    """The last few alerts."""
+    return Group(*(Text(f"! {alert}", "yellow", no_wrap=True) for alert in alerts[-_ALERTS:]))
+
+
+def _state(mission: MissionStatus | None) -> Text:
+    if mission is None:
+        return Text("waiting for the first word", "dim")
+    style = _STYLES.get(mission.state, "bold black on bright_blue")
+    return Text.assemble((f" {mission.state.value.replace('_', ' ').upper()} ", style))
+
+
+def _waypoint(mission: MissionStatus | None, vehicle: VehicleState | None) -> str:
+    if mission is None or mission.target is None:
+        return "-"
+    target = mission.target
+    text = f"{target.id} ({target.x:.1f}, {target.y:.1f}, {target.z:.1f})"
+    if vehicle is not None:
+        away = float(np.linalg.norm(target.position - vehicle.odometry.position))
+        text += f", {away:.1f} m away"
+    return text
+
+
+def _position(vehicle: VehicleState | None) -> str:
+    if vehicle is None:
+        return "-"
+    speed = math.hypot(*vehicle.odometry.velocity)
+    return f"{place_text(vehicle)}, {speed:.1f} m/s"
+
+
+def _battery(vehicle: VehicleState | None) -> RenderableType:
+    if vehicle is None:
+        return "-"
+    charge = vehicle.battery.fraction
+    if math.isnan(charge):
+        return "unknown"
+    style = next(colour for most, colour in _CHARGE_COLOURS if charge <= most)
+    return _bar(charge, f"{100 * charge:.0f} %", style)
+
+
+def _progress(mission: MissionStatus | None) -> RenderableType:
+    if mission is None:
+        return "-"
+    share, text = waypoints_text(mission)
+    return _bar(share, text, "bright_blue")
+
+
+def _faults(mission: MissionStatus | None, vehicle: VehicleState | None) -> Text:
+    faults = (*(mission.faults if mission else ()), *(vehicle.faults if vehicle else ()))
+    return Text("; ".join(faults), "red") if faults else Text("none", "dim")
+
+
+def _bar(share: float, text: str, style: str) -> RenderableType:
+    row = Table.grid(padding=(0, 1))
+    row.add_column(width=_BAR)
+    row.add_column(no_wrap=True)
+    bar = ProgressBar(
+        total=1.0,
+        completed=min(max(share, 0.0), 1.0),
+        complete_style=style,
+        finished_style=style,
+    )
+    row.add_row(bar, text)
+    return row
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.1f}"

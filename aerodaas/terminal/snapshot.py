@@ -1,0 +1,59 @@
+"""What the terminal view shows: the mission at one moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from aerodaas.types.status import MissionStatus
+from aerodaas.types.vehicle import VehicleState
+
+__all__ = ["RobotSnapshot", "Snapshot", "StreamSnapshot"]
+
+
+@dataclass(frozen=True, slots=True)
+class RobotSnapshot:
+    """One robot; None where nothing has been heard of it yet."""
+
+    name: str
+    mission: MissionStatus | None = None
+    vehicle: VehicleState | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class StreamSnapshot:
+    """One stream."""
+
+    name: str
+    rate: float | None = None
+    """Items per mission second."""
+    median_ms: float | None = None
+    """From capture to publishing, milliseconds of the host's clock."""
+    p99_ms: float | None = None
+    drops: int = 0
+    """Items that were overtaken by newer ones before they were read."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """The whole mission at one moment."""
+
+    title: str
+    mission_time: float
+    """Mission seconds."""
+    wall_time: float
+    """Seconds on the host since the mission clock started."""
+    robots: tuple[RobotSnapshot, ...] = ()
+    streams: tuple[StreamSnapshot, ...] = ()
+    alerts: tuple[str, ...] = ()
+    """One line each, newest last; the view shows the last few."""
+    scheduler: str = ""
+    """How the analytics scheduler fares, one line; empty without one."""
+    speed: float | None = None
+    """Mission seconds per wall second; None: worked out from the two times."""
+
+    @property
+    def factor(self) -> float:
+        """Mission seconds per wall second."""
+        if self.speed is not None:
+            return self.speed
+        return self.mission_time / self.wall_time if self.wall_time > 0 else 0.0

@@ -1,0 +1,167 @@
+"""What a running mission says about itself: states, setpoints, decisions, message envelopes."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import Generic, NamedTuple, TypeVar
+
+from aerodaas.types.data import Header
+from aerodaas.types.records import fast_pickle
+from aerodaas.types.vehicle import Setpoint
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = [
+    "Decision",
+    "Message",
+    "MissionState",
+    "MissionStatus",
+    "ReceivedMessage",
+    "SetpointRecord",
+    "TraceSpan",
+]
+
+E = TypeVar("E")
+
+
+class MissionState(str, enum.Enum):
+    """The 13 states of a mission (the paper's stat-stream)."""
+
+    IDLE = "idle"
+    """Nothing has been asked yet."""
+    PREFLIGHT = "preflight"
+    """Checking whether a take-off is safe."""
+    TAKING_OFF = "taking_off"
+    HOLDING = "holding"
+    """In the air, waiting for navigation."""
+    ENROUTE = "enroute"
+    """Flying to the next waypoint of the plan."""
+    LOITERING = "loitering"
+    """Staying at a waypoint for its hover duration."""
+    FOLLOWING = "following"
+    """Flying by velocity commands from analytics."""
+    DIVERTED = "diverted"
+    """Serving more urgent navigation; the plan resumes afterwards."""
+    PAUSED = "paused"
+    RETURNING = "returning"
+    LANDING = "landing"
+    LANDED = "landed"
+    """On the ground after a flight; the mission is over."""
+    ABORTED = "aborted"
+    """Over without having been completed: refused, taken over or lost; the reason says which."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class MissionStatus:
+    """The mission at one moment."""
+
+    stamp: int
+    """Mission clock, nanoseconds."""
+    state: MissionState
+    reason: str = ""
+    """Why the mission is in this state, one sentence."""
+    target: Waypoint | None = None
+    """Waypoint being flown to or loitered at, local ENU."""
+    pending: tuple[Waypoint, ...] = ()
+    """Waypoints still to be visited after the target, in planned order."""
+    visited: tuple[str, ...] = ()
+    """Ids of the waypoints reached, in order."""
+    given_up: tuple[str, ...] = ()
+    """Ids of the waypoints that the scheduler or the safety layer refused."""
+    distance: float = 0.0
+    """Metres flown since take-off."""
+    faults: tuple[str, ...] = ()
+    """What the safety layer complains about at present."""
+
+    @property
+    def waypoint_counts(self) -> tuple[int, int]:
+        """How many waypoints were visited, and how many are known; one visited twice is one."""
+        visited = set(self.visited)
+        ahead = {waypoint.id for waypoint in (self.target, *self.pending) if waypoint is not None}
+        return len(visited), len(visited | ahead)
+
+    @property
+    def progress(self) -> float:
+        """Share of the known waypoints that have been visited, 0 to 1."""
+        visited, known = self.waypoint_counts
+        return visited / known if known else 0.0
+
+
+class ReceivedMessage(NamedTuple):
+    """Something that reached a mission by stream."""
+
+    stream: str
+    source: str
+    """Of the measurement that it was made from."""
+    stamp: int
+    """Of that measurement."""
+    at: int
+    """Mission clock when it was heard."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class SetpointRecord:
+    """One turn of the setpoint loop: what the mission asked for and what the vehicle was sent."""
+
+    stamp: int
+    asked: Setpoint | None
+    sent: Setpoint | None
+    clipped_by: tuple[str, ...] = ()
+    """Names of the limits that changed it, such as `max_speed` or `geofence`."""
+    cause: Header | None = None
+    """Measurement that the command behind this setpoint was made from, for latency."""
+    heard: tuple[ReceivedMessage, ...] = ()
+    """Navigation and commands that came since the last turn, in the order in which they counted."""
+    planned: bool = False
+    """Whether a plan had come from the trajectory scheduler."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """One decision of an analytics scheduler, with its reason."""
+
+    stamp: int
+    task: str
+    """Analysis and frame, `node#frame`; `node#camera:frame` where it watches several cameras."""
+    action: str
+    """`edge`, `cloud`, `drop` are decisions, `retry` is one of the dispatcher's; `done`, `late`,
+    `timeout`, `failed` and `dropped` (it never came to its turn) are how a task ended."""
+    reason: str = ""
+    values: dict[str, float] = field(default_factory=dict)
+    """Figures behind it: milliseconds, or utility in the environment file's own unit."""
+
+
+class TraceSpan(NamedTuple):
+    """One actor's share in a message's way, in nanoseconds of `clock.host_time_ns`."""
+
+    node: str
+    received: int
+    published: int
+    state: int | None = None
+    """Mission clock of the vehicle's state that it went by; None if it asked for none."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message(Generic[E]):
+    """The envelope that streams carry."""
+
+    stream: str
+    seq: int
+    """Counts the messages of this stream; a gap seen by a reader is a drop."""
+    stamp: int
+    """Mission clock when published, nanoseconds."""
+    header: Header
+    """The measurement that this was made from."""
+    captured: int
+    """`clock.host_time_ns` at that measurement's capture."""
+    spans: tuple[TraceSpan, ...]
+    item: E | None
+    """None: processed, with nothing to say."""
+
+    @property
+    def latency_ns(self) -> int:
+        """Nanoseconds from capture to the last actor's publishing."""
+        return (self.spans[-1].published - self.captured) if self.spans else 0

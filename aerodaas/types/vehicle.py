@@ -1,0 +1,197 @@
+"""What every drone looks like to the mission: state in, setpoints out, one protocol.
+
+A driver (`aerodaas.drivers`) implements `Vehicle` for one kind of drone and converts frames and
+units once. Nothing above a driver knows which kind it flies.
+"""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass, field
+from typing import Protocol, TypeAlias, runtime_checkable
+
+from aerodaas.types.clock import Clock
+from aerodaas.types.data import Battery, GpsFix, Odometry
+from aerodaas.types.geometry import Vector
+from aerodaas.types.records import fast_pickle
+
+__all__ = [
+    "Capabilities",
+    "ClockedVehicle",
+    "FlightEnd",
+    "PlayedVehicle",
+    "PositionSetpoint",
+    "Setpoint",
+    "SteppedVehicle",
+    "Vehicle",
+    "VehicleMode",
+    "VehicleState",
+    "VelocitySetpoint",
+]
+
+
+class VehicleMode(str, enum.Enum):
+    """What the vehicle is doing by its own word."""
+
+    GROUNDED = "grounded"
+    TAKING_OFF = "taking_off"
+    GUIDED = "guided"
+    """Following our setpoints."""
+    HOLDING = "holding"
+    RETURNING = "returning"
+    LANDING = "landing"
+    MANUAL = "manual"
+    """A pilot has taken over; we must not send."""
+    FAILSAFE = "failsafe"
+    """The vehicle's own protection has taken over; we must not send."""
+    LOST = "lost"
+    """No word from the vehicle within its link time-out."""
+
+
+class FlightEnd(str, enum.Enum):
+    """How a flight ended, by the word of a driver that can tell."""
+
+    LANDED = "landed"
+    """It came down gently and stands, asked to or by itself, at whatever height."""
+    FELL = "fell"
+    """Its motors stopped in the air, or it hit the ground."""
+    UNHEARD = "unheard"
+    """It came down while nothing was heard of it, and stands."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class PositionSetpoint:
+    """Fly to a place: ENU metres, yaw in radians (None keeps the present yaw), speed in m/s."""
+
+    position: Vector
+    yaw: float | None = None
+    speed: float | None = None
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class VelocitySetpoint:
+    """Fly at a velocity: ENU m/s, yaw rate in rad/s counter-clockwise."""
+
+    velocity: Vector
+    yaw_rate: float = 0.0
+
+
+Setpoint: TypeAlias = PositionSetpoint | VelocitySetpoint
+
+
+@dataclass(frozen=True, slots=True)
+class Capabilities:
+    """What a driver offers; can be asked before connecting."""
+
+    driver: str
+    position_setpoints: bool = True
+    velocity_setpoints: bool = True
+    global_position: bool = True
+    returns_home: bool = True
+    """Has a return mode of its own."""
+    max_speed: float = 10.0
+    """m/s that the vehicle itself can do horizontally."""
+    max_climb: float = 3.0
+    """m/s that the vehicle itself can do vertically."""
+    alone: str = "its own failsafe is what remains"
+    """What the vehicle does once the driver's process is gone, for people."""
+    obeys: bool = True
+    """False for a recorded vehicle, which flies as it flew whatever it is told."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class VehicleState:
+    """The newest knowledge about a vehicle."""
+
+    stamp: int
+    """Mission clock of the odometry, in nanoseconds."""
+    odometry: Odometry
+    battery: Battery
+    mode: VehicleMode
+    armed: bool
+    gps: GpsFix | None = None
+    truth: Odometry | None = None
+    """The simulator's exact state; None for a real vehicle. Only simulated sensors may use it."""
+    faults: tuple[str, ...] = ()
+    """What the vehicle complains about at present, one sentence each."""
+    extra: dict[str, float] = field(default_factory=dict)
+    """Further figures by name in SI units, such as temperature or link quality."""
+    ended: FlightEnd | None = None
+    """How the latest flight ended; None before and during one, and if the driver cannot tell."""
+
+
+@runtime_checkable
+class Vehicle(Protocol):
+    """One drone. Every method returns at once unless it says otherwise."""
+
+    @property
+    def capabilities(self) -> Capabilities:
+        """What this driver offers."""
+        ...
+
+    def connect(self, timeout: float = 10.0) -> None:
+        """Connect within `timeout` seconds, or raise VehicleError that says why not."""
+        ...
+
+    def read(self) -> VehicleState:
+        """Return the newest state; raise VehicleError if not connected."""
+        ...
+
+    def preflight(self) -> list[str]:
+        """Reasons for which a take-off would be refused now; empty when ready."""
+        ...
+
+    def take_off(self, height: float) -> None:
+        """Arm and climb to `height` metres above the ground; progress shows in `read`."""
+        ...
+
+    def send(self, setpoint: Setpoint) -> Setpoint:
+        """Send one setpoint and return it as it was sent, after clipping."""
+        ...
+
+    def hold(self) -> None:
+        """Stop and stay."""
+        ...
+
+    def return_home(self) -> None:
+        """Return to the place of take-off and land there."""
+        ...
+
+    def land(self) -> None:
+        """Land here; the vehicle disarms on the ground."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the vehicle; it must stay safe on its own."""
+        ...
+
+
+@runtime_checkable
+class SteppedVehicle(Vehicle, Protocol):
+    """A vehicle whose time is ours: a simulation."""
+
+    def advance_to(self, stamp: int) -> None:
+        """Simulate up to mission time `stamp`, in nanoseconds."""
+        ...
+
+
+@runtime_checkable
+class ClockedVehicle(Vehicle, Protocol):
+    """A vehicle whose time is its own, and whose states are stamped by the mission's clock."""
+
+    def use_clock(self, clock: Clock) -> None:
+        """Stamp states by `clock` from now on; called when the mission starts."""
+        ...
+
+
+@runtime_checkable
+class PlayedVehicle(SteppedVehicle, Protocol):
+    """A recorded vehicle, which comes to an end."""
+
+    @property
+    def finished(self) -> bool:
+        """True once there is nothing more to show."""
+        ...

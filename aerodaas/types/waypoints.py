@@ -1,0 +1,189 @@
+"""What a drone can be told: waypoints and velocity commands."""
+
+from __future__ import annotations
+
+import enum
+import math
+from dataclasses import dataclass, fields, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from aerodaas.types.errors import InvalidWaypointError
+from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.records import fast_pickle
+
+__all__ = [
+    "DEFAULT_PRIORITY",
+    "NavigationItem",
+    "NavigationType",
+    "SchedulingType",
+    "VelocityCommand",
+    "Waypoint",
+    "WaypointType",
+]
+
+DEFAULT_PRIORITY = 5
+"""Priority of navigation that states none; smaller is more urgent, as in the paper."""
+
+
+class WaypointType(str, enum.Enum):
+    """What a waypoint's x, y and z mean."""
+
+    RELATIVE = "relative"
+    """Metres east, north and up of the place where this robot took off."""
+    LOCAL = "local"
+    """Metres east, north and up of the environment's home."""
+    GLOBAL = "global"
+    """Latitude and longitude in WGS84 degrees, altitude in metres above the ellipsoid."""
+
+
+class NavigationType(str, enum.Enum):
+    """Where navigation comes from."""
+
+    DISTANCE_DRIVEN = "distance_driven"
+    """Waypoints known beforehand."""
+    ANALYTICS_DRIVEN = "analytics_driven"
+    """Waypoints or velocities that analytics makes in flight."""
+
+
+class SchedulingType(str, enum.Enum):
+    """Whether a trajectory scheduler may change the order of waypoints."""
+
+    ORDERED = "ordered"
+    UNORDERED = "unordered"
+
+
+def _require_finite(owner: str, **values: float | None) -> None:
+    for name, value in values.items():
+        if value is not None and not (
+            isinstance(value, int | float | np.floating) and math.isfinite(value)
+        ):
+            message = f"{owner}: {name} must be a finite number, not {value!r}"
+            raise InvalidWaypointError(message)
+
+
+def _require_names(owner: str, waypoint_id: object, priority: object) -> None:
+    if not isinstance(waypoint_id, str) or not waypoint_id:
+        raise InvalidWaypointError(f"{owner}: an id is a text that is not empty")
+    if not isinstance(priority, int | np.integer):
+        raise InvalidWaypointError(f"{owner}: priority must be a whole number, not {priority!r}")
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class Waypoint:
+    """A place to fly to, and what to do there.
+
+    Raises InvalidWaypointError for numbers that are not finite or out of range.
+    """
+
+    id: str
+    x: float
+    """Metres east, or latitude in degrees for a global waypoint."""
+    y: float
+    """Metres north, or longitude in degrees for a global waypoint."""
+    z: float
+    """Metres up, or altitude in metres for a global waypoint."""
+    hover_duration: float = 0.0
+    """Seconds to stay after arrival."""
+    waypoint_type: WaypointType | str = WaypointType.RELATIVE
+    yaw: float | None = None
+    """Radians counter-clockwise from east on arrival; None keeps the direction of flight."""
+    speed: float | None = None
+    """m/s on the way there; None takes the robot's cruise speed."""
+    priority: int = DEFAULT_PRIORITY
+    """Smaller is more urgent; a more urgent waypoint preempts the plan."""
+    deadline: float | None = None
+    """Seconds of mission time by which to arrive; None for no deadline."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers and turn the type's name into a WaypointType."""
+        owner = f"waypoint {self.id!r}"
+        _require_names(owner, self.id, self.priority)
+        _require_finite(owner, **{name: getattr(self, name) for name in _NUMBERS})
+        try:
+            object.__setattr__(self, "waypoint_type", WaypointType(self.waypoint_type))
+        except ValueError:
+            choices = ", ".join(kind.value for kind in WaypointType)
+            message = f"{owner}: waypoint_type must be one of {choices}, not {self.waypoint_type!r}"
+            raise InvalidWaypointError(message) from None
+        if self.hover_duration < 0:
+            message = f"{owner}: hover_duration must not be negative, not {self.hover_duration}"
+            raise InvalidWaypointError(message)
+        if self.speed is not None and self.speed <= 0:
+            message = f"{owner}: speed must be positive, not {self.speed}"
+            raise InvalidWaypointError(message)
+        north_pole, date_line = 90.0, 180.0
+        if self.waypoint_type is WaypointType.GLOBAL and (
+            abs(self.x) > north_pole or abs(self.y) > date_line
+        ):
+            message = f"{owner}: ({self.x}, {self.y}) is no latitude and longitude in degrees"
+            raise InvalidWaypointError(message)
+
+    def resolve(self, takeoff: Vector, origin: GeodeticOrigin | None) -> Waypoint:
+        """The same waypoint in the local ENU frame of the environment.
+
+        `takeoff` is where this robot took off, ENU metres. Raises InvalidWaypointError if a
+        global waypoint meets an environment without a geodetic home.
+        """
+        if self.waypoint_type is WaypointType.LOCAL:
+            return self
+        if self.waypoint_type is WaypointType.RELATIVE:
+            x, y, z = np.array([self.x, self.y, self.z]) + takeoff
+        elif origin is None:
+            message = f"waypoint {self.id!r} is global, but the environment file gives no home"
+            raise InvalidWaypointError(message)
+        else:
+            x, y, z = origin.to_local(self.x, self.y, self.z)
+        return replace(self, x=float(x), y=float(y), z=float(z), waypoint_type=WaypointType.LOCAL)
+
+    @property
+    def position(self) -> Vector:
+        """x, y and z as an array of shape (3,)."""
+        return np.array([self.x, self.y, self.z], dtype=np.float64)
+
+
+_NUMBERS = tuple(
+    field.name
+    for field in fields(Waypoint)
+    if field.name in {"x", "y", "z", "hover_duration", "yaw", "speed", "deadline"}
+)
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
+class VelocityCommand:
+    """A velocity asked for by analytics, in the level body frame (FLU).
+
+    It is valid for `valid_for` seconds from arrival at the drone; after that the drone holds.
+    Raises InvalidWaypointError for numbers that are not finite.
+    """
+
+    forward: float = 0.0
+    """m/s."""
+    left: float = 0.0
+    """m/s."""
+    up: float = 0.0
+    """m/s."""
+    yaw_rate: float = 0.0
+    """rad/s, counter-clockwise."""
+    priority: int = DEFAULT_PRIORITY
+    valid_for: float = 0.5
+    """Seconds."""
+
+    def __post_init__(self) -> None:
+        """Refuse numbers that are not finite and a validity that is not positive."""
+        names = ("forward", "left", "up", "yaw_rate", "valid_for")
+        _require_finite("velocity command", **{name: getattr(self, name) for name in names})
+        if self.valid_for <= 0:
+            message = f"velocity command: valid_for must be positive, not {self.valid_for}"
+            raise InvalidWaypointError(message)
+
+    @property
+    def velocity(self) -> Vector:
+        """Forward, left and up as an array of shape (3,), m/s."""
+        return np.array([self.forward, self.left, self.up], dtype=np.float64)
+
+
+NavigationItem: TypeAlias = Waypoint | VelocityCommand

@@ -1,0 +1,1 @@
+"""The published analytics schedulers, and the orders and estimates that they share."""

@@ -1,0 +1,113 @@
+"""DEMS: DEM whose idle edge steals work back from tasks that wait to leave for the cloud."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from aerodaas.schedulers.analytics.base import MILLISECOND, STOLEN, Decision, Task, WakeAt
+from aerodaas.schedulers.analytics.published.dem import Dem
+
+__all__ = ["Dems"]
+
+MARGIN = 10 * MILLISECOND
+"""Taken off a task's latest start, for the scheduler's own overhead."""
+PUBLISHED_GATE = 132 * MILLISECOND
+"""Room before the head's latest start that the published code wants before it steals."""
+
+
+class Dems(Dem):
+    """Lets cloud-bound tasks wait until their latest start, so that the edge may steal them.
+
+    Tasks that lose money in the cloud wait as well, only to be stolen. When the edge is idle, the
+    tasks that wait are tried by gain over the cloud per edge time, those that lose money in the
+    cloud first; the first that fits without making a queued task miss is run.
+
+    `published=True`: as in the published code, a constant of 132 ms gates stealing and a
+    candidate that does not fit inherits the rank of the one before it.
+    """
+
+    def __init__(self, *, published: bool = False) -> None:
+        super().__init__(published=published)
+        self.tentative: dict[Task, tuple[int, str]] = {}
+        """Tasks waiting to leave: their latest start, and why they are bound for the cloud."""
+
+    def to_cloud(
+        self, task: Task, now: int, reason: str = "no room on the edge"
+    ) -> Iterable[Decision]:
+        """Let the task wait until its latest start in the cloud, or on the edge."""
+        profile = task.profile
+        pays = profile.cloud_gain > 0 and self.resources.cloud_slots > 0
+        if pays and now + self.cloud_time(task) > task.deadline:
+            return [self.drop(task, now, "no time left for the cloud")]
+        leave = task.deadline - MARGIN - (self.cloud_time(task) if pays else profile.edge_time)
+        if leave <= now:
+            return self.leave(task, now, reason)
+        self.tentative[task] = (leave, reason)
+        return [WakeAt(leave)]
+
+    def leave(self, task: Task, now: int, reason: str) -> Iterable[Decision]:
+        """The task can wait no longer."""
+        if task.profile.cloud_gain > 0 and self.resources.cloud_slots:
+            return [self.send(task, reason)]
+        return [self.drop(task, now, "not stolen, and the cloud costs more than it is worth")]
+
+    def timer(self, now: int) -> Iterable[Decision]:
+        """Send or drop the tasks whose latest start has come."""
+        due = [task for task, (leave, _) in self.tentative.items() if leave <= now]
+        decisions: list[Decision] = []
+        for task in due:
+            _, reason = self.tentative.pop(task)
+            decisions.extend(self.leave(task, now, reason))
+        return decisions
+
+    def executor_idle(self, now: int) -> Iterable[Decision]:
+        """Steal what fits before the queue, else run its head."""
+        stolen = self._steal(now)
+        if stolen is None:
+            return super().executor_idle(now)
+        del self.tentative[stolen]
+        return [self.run(stolen, now, STOLEN)]
+
+    def observe(self) -> Mapping[str, float]:
+        """The queues' lengths."""
+        return {**super().observe(), "tentative queue": len(self.tentative)}
+
+    def _steal(self, now: int) -> Task | None:
+        room = self._room(now)
+        if self.published and self.queue:
+            if room < PUBLISHED_GATE:
+                return None
+            return self._steal_as_published(now, room)
+        for task in sorted(self.tentative, key=_rank):
+            if task.profile.edge_time <= room and now + task.profile.edge_time <= task.deadline:
+                return task
+        return None
+
+    def _steal_as_published(self, now: int, room: int) -> Task | None:
+        best: Task | None = None
+        best_rank = rank = (False, 0.0)
+        for task in self.tentative:
+            profile = task.profile
+            if profile.edge_time <= room and now + profile.edge_time <= task.deadline:
+                rank = (profile.cloud_gain < 0, -_rank(task)[1])
+            if rank > best_rank:
+                best, best_rank = task, rank
+        return best
+
+    def _room(self, now: int) -> int:
+        """Time that can be put before the queue without making a task in it miss."""
+        room = 1 << 62
+        finish = now
+        for task in self.queue:
+            finish += task.profile.edge_time
+            spare = task.deadline - finish
+            if spare >= 0:
+                room = min(room, spare)
+        return room
+
+
+def _rank(task: Task) -> tuple[bool, float]:
+    """Tasks that lose money in the cloud first, then by gain over the cloud per edge time."""
+    profile = task.profile
+    advantage = (profile.edge_gain - profile.cloud_gain) / profile.edge_time
+    return (profile.cloud_gain > 0, -advantage)

@@ -1,0 +1,209 @@
+"""Area coverage: a field becomes parallel sweeps of the camera, joined into one way.
+
+The area is cut into strips as wide as the camera's picture on the ground less the overlap
+(boustrophedon sweeps: Choset, "Coverage of Known Spaces", Autonomous Robots 9, 2000). Turns cost
+time, so the best angle is mostly that with the fewest strips: along the longest edges.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from shapely import affinity
+from shapely.geometry.base import BaseGeometry
+
+from aerodaas.types.errors import SchedulerError
+from aerodaas.types.free_path import Place, free_path
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["Coverage", "cover", "footprint"]
+
+_ANGLE_STEP = 15
+"""Degrees between the angles tried beside those of the area's edges."""
+_SAME = 1e-6
+"""Metres within which two places are one."""
+_TURN = 3.0
+"""Metres of straight flight that the braking and turning between two strips is worth."""
+
+
+@dataclass(frozen=True)
+class Coverage:
+    """The way over an area."""
+
+    waypoints: tuple[Waypoint, ...]
+    """Local ENU, in order."""
+    angle: float
+    """Direction of the sweeps, radians counter-clockwise from east."""
+    length: float
+    """Metres from the first waypoint to the last."""
+    sweeps: int
+
+
+def footprint(height: float, horizontal_fov: float, aspect: float = 16 / 9) -> tuple[float, float]:
+    """Width and depth in metres of the ground that a camera looking straight down sees.
+
+    `height` is in metres, `horizontal_fov` in radians, `aspect` is width over height in pixels.
+    """
+    width = 2.0 * height * math.tan(horizontal_fov / 2.0)
+    return width, width / aspect
+
+
+def cover(
+    outline: Sequence[Place],
+    *,
+    height: float,
+    width: float,
+    overlap: float = 0.2,
+    holes: Iterable[Sequence[Place]] = (),
+    no_fly: Iterable[Sequence[Place]] = (),
+    clearance: float = 0.0,
+    start: Place | None = None,
+    angle: float | None = None,
+    speed: float | None = None,
+) -> Coverage:
+    """Plan the way over the area inside `outline` (ENU metres) at `height` metres.
+
+    `width` is that of the camera's footprint across the sweep; neighbouring strips share
+    `overlap` (0 to 1) of it. `holes` need not be seen but may be flown over; `no_fly` zones are
+    flown around with `clearance` metres. `start` is where the drone comes from; without `angle`
+    (radians), the one with the shortest way is taken. Raises SchedulerError for an area that is
+    none, or that no-fly zones cut in pieces that cannot all be reached.
+    """
+    if not 0.0 <= overlap < 1.0 or width <= 0.0:
+        raise SchedulerError(
+            "coverage needs a positive width and an overlap of 0 to less than 1, "
+            f"not {width} and {overlap}"
+        )
+    zones = [_polygon(zone, "no-fly zone") for zone in no_fly]
+    forbidden = shapely.union_all(zones).buffer(clearance, join_style="mitre")
+    wanted = _polygon(outline, "area").difference(forbidden)
+    for hole in holes:
+        wanted = wanted.difference(_polygon(hole, "hole"))
+    if wanted.is_empty:
+        raise SchedulerError("no-fly zones and holes leave nothing of the area to cover")
+    flyable = _polygon(outline, "area").difference(forbidden)
+    spacing = width * (1.0 - overlap)
+    angles = _angles(outline) if angle is None else [angle]
+    best: tuple[float, float, list[Place], int] | None = None
+    for candidate in angles:
+        strips = _strips(wanted, candidate, spacing, width)
+        way = _join(strips, flyable, start)
+        if way is None:
+            continue
+        cost = _length(way) + _TURN * len(strips)
+        if best is None or cost < best[0] - 1e-9:
+            best = cost, candidate, way, len(strips)
+    if best is None:
+        raise SchedulerError("no-fly zones cut the area in pieces that cannot all be reached")
+    _, chosen, way, sweeps = best
+    waypoints = tuple(
+        Waypoint(f"sweep{number}", x, y, height, waypoint_type="local", speed=speed)
+        for number, (x, y) in enumerate(way, start=1)
+    )
+    return Coverage(waypoints, chosen, _length(way), sweeps)
+
+
+def _polygon(outline: Sequence[Place], what: str) -> shapely.Polygon:
+    corners = 3
+    polygon = shapely.Polygon(outline) if len(outline) >= corners else shapely.Polygon()
+    if polygon.is_empty or not polygon.is_valid or polygon.area == 0.0:
+        raise SchedulerError(f"the {what} {list(outline)} encloses no area or crosses itself")
+    return polygon
+
+
+def _angles(outline: Sequence[Place]) -> list[float]:
+    edges = zip(outline, [*outline[1:], outline[0]], strict=True)
+    along = {round(math.atan2(b[1] - a[1], b[0] - a[0]) % math.pi, 6) for a, b in edges}
+    spread = {round(math.radians(degrees), 6) for degrees in range(0, 180, _ANGLE_STEP)}
+    return sorted(along | spread)
+
+
+def _strips(
+    wanted: BaseGeometry, angle: float, spacing: float, width: float
+) -> list[tuple[Place, Place]]:
+    """Middle lines of the strips, spread evenly over the area's extent across the sweeps.
+
+    Each is drawn out to where the strip, as wide as the camera sees, leaves the area.
+    """
+    turned = affinity.rotate(wanted, -angle, origin=(0, 0), use_radians=True)
+    left, bottom, right, top = turned.bounds
+    count = max(1, math.ceil((top - bottom - width) / spacing - 1e-9) + 1)
+    spread = np.linspace(bottom + width / 2, top - width / 2, count)
+    middles = spread if count > 1 else np.array([(bottom + top) / 2])
+    strips: list[tuple[Place, Place]] = []
+    for middle in middles:
+        band = shapely.box(left - 1.0, middle - width / 2, right + 1.0, middle + width / 2)
+        seen = turned.intersection(band)
+        for part in _merged_extents(seen):
+            ends = shapely.LineString([(part[0], middle), (part[1], middle)])
+            flown = affinity.rotate(ends, angle, origin=(0, 0), use_radians=True)
+            a, b = ((float(x), float(y)) for x, y in flown.coords)
+            strips.append((a, b))
+    return strips
+
+
+def _merged_extents(seen: BaseGeometry) -> list[tuple[float, float]]:
+    """Extents of the parts of a band along the sweep, joined where they overlap."""
+    extents = sorted(
+        (part.bounds[0], part.bounds[2])
+        for part in shapely.get_parts(seen)
+        if part.geom_type == "Polygon"
+    )
+    merged: list[tuple[float, float]] = []
+    for low, high in extents:
+        if merged and low <= merged[-1][1]:
+            merged[-1] = merged[-1][0], max(high, merged[-1][1])
+        else:
+            merged.append((low, high))
+    return merged
+
+
+def _join(
+    strips: list[tuple[Place, Place]], flyable: BaseGeometry, start: Place | None
+) -> list[Place] | None:
+    """Fly the strips one after the other, always the one whose end is nearest, around obstacles."""
+    left = list(strips)
+    way: list[Place] = []
+    here = start
+    while left:
+        origin = here if here is not None else left[0][0]
+        _, number, backwards = min(
+            (math.dist(origin, strip[side]), number, side)
+            for number, strip in enumerate(left)
+            for side in (0, 1)
+        )
+        strip = left.pop(number)
+        entry, leave = (strip[1], strip[0]) if backwards else strip
+        if way and not _append(way, flyable, entry):
+            return None
+        way = way or [entry]
+        if not _append(way, flyable, leave):
+            return None
+        here = way[-1]
+    return way
+
+
+def _append(way: list[Place], flyable: BaseGeometry, target: Place) -> bool:
+    """Go on to `target`, or to the flyable place nearest to it; False where there is no way."""
+    if not shapely.covers(flyable, shapely.Point(target)):
+        nearest = shapely.shortest_line(flyable, shapely.Point(target))
+        x, y = shapely.get_coordinates(nearest)[0]
+        target = float(x), float(y)
+    if not shapely.covers(flyable, shapely.Point(way[-1])):
+        nearest = shapely.shortest_line(flyable, shapely.Point(way[-1]))
+        x, y = shapely.get_coordinates(nearest)[0]
+        way[-1] = float(x), float(y)
+    path = free_path(flyable, way[-1], target)
+    if path is None:
+        return False
+    way.extend(place for place in path[1:] if math.dist(place, way[-1]) > _SAME)
+    return True
+
+
+def _length(way: list[Place]) -> float:
+    return math.fsum(math.dist(a, b) for a, b in pairwise(way))

@@ -1,0 +1,138 @@
+"""Each kind of export is told from the file and decoded to the same boxes."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from onnx import TensorProto
+from synthetic_models import constant_model, patchwork_model
+
+from aerodaas.analytics.detection.detector import OnnxDetector
+from aerodaas.types.data import Detections, Frame, Header
+
+NAMES = "{0: 'vest', 1: 'person'}"
+CELLS = 8 * 8 + 4 * 4 + 2 * 2  # 64 x 64 pixels at strides of 8, 16 and 32
+
+
+def frame(height: int = 64, width: int = 64) -> Frame:
+    """A black frame."""
+    return Frame(Header(7, 99, "tello/cam"), np.zeros((height, width, 3), np.uint8))
+
+
+def detect(path: Path, picture: Frame | None = None) -> Detections:
+    """Detect as an actor would: the detector travels there by value."""
+    detector: OnnxDetector = pickle.loads(pickle.dumps(OnnxDetector(path)))  # noqa: S301
+    detector.open()
+    return detector.detect([picture or frame()])[0]
+
+
+def ultralytics_output(extra: int = 0, dtype: type = np.float32) -> NDArray[Any]:
+    """Two overlapping persons, a vest at the same place, and nothing elsewhere."""
+    raw: NDArray[Any] = np.zeros((1, 4 + 2 + extra, CELLS), dtype)
+    raw[0, :6, 10] = [32, 32, 20, 40, 0.1, 0.9]
+    raw[0, :6, 11] = [33, 33, 20, 40, 0.1, 0.8]
+    raw[0, :6, 12] = [32, 30, 10, 12, 0.7, 0.2]
+    return raw
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float16])
+def test_ultralytics_without_nms(tmp_path: Path, dtype: type) -> None:
+    """The weaker of two overlapping boxes of one class goes; another class stays."""
+    element = TensorProto.FLOAT16 if dtype is np.float16 else TensorProto.FLOAT
+    path = constant_model(
+        tmp_path / "a.onnx",
+        [ultralytics_output(dtype=dtype)],
+        element=element,
+        metadata={"names": NAMES, "task": "detect"},
+    )
+    found = detect(path)
+    assert [(item.label, round(item.score, 2)) for item in found] == [
+        ("person", 0.9),
+        ("vest", 0.7),
+    ]
+    assert found[0].box == pytest.approx((22, 12, 42, 52))
+    assert found.header == Header(7, 99, "tello/cam")
+
+
+def test_pose_gives_keypoints_in_the_frames_pixels(tmp_path: Path) -> None:
+    """Keypoints are mapped like boxes: a frame twice as large has them twice as far out."""
+    raw = ultralytics_output(extra=2 * 3)
+    raw[0, 6:, 10] = [30, 20, 0.9, 34, 50, 0.5]
+    metadata = {"names": NAMES, "task": "pose", "kpt_shape": "[2, 3]"}
+    path = constant_model(tmp_path / "a.onnx", [raw], metadata=metadata)
+    found = detect(path, frame(128, 128))
+    assert found[0].box == pytest.approx((44, 24, 84, 104))
+    assert found[0].keypoints == pytest.approx(np.array([[60, 40, 0.9], [68, 100, 0.5]]))
+
+
+def test_keypoints_without_confidence_count_as_certain(tmp_path: Path) -> None:
+    """Two numbers a keypoint are filled up to three."""
+    metadata = {"names": NAMES, "task": "pose", "kpt_shape": "[3, 2]"}
+    path = constant_model(tmp_path / "a.onnx", [ultralytics_output(extra=6)], metadata=metadata)
+    keypoints = detect(path)[0].keypoints
+    assert keypoints is not None
+    assert keypoints.shape == (3, 3)
+    assert (keypoints[:, 2] == 1).all()
+
+
+@pytest.mark.parametrize("keypoints", [0, 2])
+def test_built_in_nms(tmp_path: Path, keypoints: int) -> None:
+    """Rows of corners, score and class pass as they are; unused rows are left out."""
+    rows = np.zeros((1, 300, 6 + 3 * keypoints), np.float32)
+    rows[0, 0, :6] = [22, 12, 42, 52, 0.9, 1]
+    rows[0, 1, :6] = [23, 13, 43, 53, 0.8, 1]
+    rows[0, 2, :6] = [1, 1, 9, 9, 0.7, 5]
+    metadata = {"names": NAMES, "end2end": "True"}
+    if keypoints:
+        metadata |= {"task": "pose", "kpt_shape": f"[{keypoints}, 3]"}
+    detector = OnnxDetector(constant_model(tmp_path / "a.onnx", [rows], metadata=metadata))
+    detector.open()
+    found = detector.detect([frame()])[0]
+    assert [item.label for item in found] == ["person", "person"], "the model has done its NMS"
+    assert detector.invalid == 1, "class 5 does not exist"
+
+
+def test_yolov5(tmp_path: Path) -> None:
+    """Three boxes a cell: the score is objectness times class."""
+    raw = np.zeros((1, 3 * CELLS, 7), np.float32)
+    raw[0, 100] = [32, 32, 20, 40, 0.9, 0.1, 0.8]
+    raw[0, 101] = [10, 10, 8, 8, 0.5, 0.5, 0.1]
+    path = constant_model(tmp_path / "a.onnx", [raw], metadata={"names": NAMES, "stride": "32"})
+    (found,) = detect(path)
+    assert found.label == "person"
+    assert found.score == pytest.approx(0.72)
+    assert found.box == pytest.approx((22, 12, 42, 52))
+
+
+@pytest.mark.parametrize("decoded", [False, True])
+def test_yolox(tmp_path: Path, decoded: bool) -> None:  # noqa: FBT001
+    """Grid and stride are applied, unless the export has done it."""
+    raw = np.zeros((1, CELLS, 7), np.float32)
+    raw[0, :, :2] = 0.5
+    cell = 64 + 5  # row 1, column 1 of stride 16
+    raw[0, cell] = [1.0, 1.0, np.log(20 / 16), np.log(40 / 16), 0.9, 0.1, 0.9]
+    if decoded:
+        raw[0, :, :2] = np.random.default_rng(0).uniform(0, 64, (CELLS, 2))
+        raw[0, cell, :4] = [32, 32, 20, 40]
+    path = constant_model(tmp_path / "a.onnx", [raw])
+    (found,) = detect(path)
+    assert found.label == "1", "no names in the file, and not COCO's number of classes"
+    assert found.box == pytest.approx((22, 12, 42, 52), abs=1e-3)
+
+
+def test_dynamic_shapes_take_batches_and_leave_out_padding(tmp_path: Path) -> None:
+    """A model of any size gets a rectangle of the frame's form, and two frames at once."""
+    detector = OnnxDetector(patchwork_model(tmp_path / "a.onnx", classes=80), size=128)
+    detector.open()
+    bright = Frame(Header(0, 0, "cam"), np.full((72, 128, 3), 255, np.uint8))
+    dark = Frame(Header(1, 0, "cam"), np.zeros((72, 128, 3), np.uint8))
+    results = detector.detect([dark, bright])
+    assert [found.header.id for found in results] == [1, 0]
+    white = pytest.approx((20, 8, 60, 48))  # the frame starts at row 12 of 96
+    assert [any(item.box == white for item in found) for found in results] == [False, True]
+    assert detector.detect([bright])[0].items == results[1].items

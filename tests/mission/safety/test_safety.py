@@ -1,0 +1,257 @@
+"""The setpoint guard: never above a limit, never through a fence, never stuck outside."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from flights import KinematicVehicle
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from aerodaas.config.model import GeofenceConfig, LimitsConfig
+from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.mission.safety.setpoint_filter import Neighbour, SetpointFilter
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Odometry
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VehicleMode, VelocitySetpoint
+
+L_SHAPE = [(-15.0, -15.0), (15.0, -15.0), (15.0, 0.0), (0.0, 0.0), (0.0, 15.0), (-15.0, 15.0)]
+HOLE = [(-9.0, -9.0), (-5.0, -9.0), (-5.0, -5.0), (-9.0, -5.0)]
+LIMITS = LimitsConfig(
+    max_speed=4.0,
+    max_range=18.0,
+    geofence=GeofenceConfig(polygon=L_SHAPE, no_fly=[HOLE], ceiling=12.0, floor=1.0),
+)
+
+numbers = st.floats(-60, 60)
+anything = st.floats(allow_nan=True, allow_infinity=True)
+velocities = st.builds(
+    lambda x, y, z, turn: VelocitySetpoint(np.array([x, y, z]), turn),
+    *[st.floats(-10, 10)] * 4,
+)
+positions = st.builds(
+    lambda x, y, z, speed: PositionSetpoint(np.array([x, y, z]), None, speed),
+    numbers,
+    numbers,
+    st.floats(-5, 30),
+    st.none() | st.floats(0.1, 20),
+)
+wild = st.builds(lambda x, y, z, r: VelocitySetpoint(np.array([x, y, z]), r), *[anything] * 4)
+
+
+def at(*position: float, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Odometry:
+    """Odometry of a drone that is here."""
+    return Odometry(np.array(position), np.array(velocity), 0.0)
+
+
+@given(setpoint=velocities | positions | wild, before=velocities)
+@settings(max_examples=100, deadline=None)
+def test_no_limit_is_ever_exceeded(setpoint: Setpoint, before: VelocitySetpoint) -> None:
+    """What is sent is finite and within speed, climb, turn and acceleration, and says so."""
+    guard = SetpointFilter(LIMITS, np.zeros(3))
+    odometry = at(-3.0, -3.0, 5.0)
+    first = guard.clamp(before, odometry, 0.05)
+    sent = guard.clamp(setpoint, odometry, 0.05)
+    if isinstance(sent.setpoint, PositionSetpoint):
+        assert guard.fence.contains(sent.setpoint.position)
+        assert sent.setpoint.speed is not None
+        assert sent.setpoint.speed <= math.hypot(LIMITS.max_speed, LIMITS.max_climb) + 1e-9
+        return
+    velocity = sent.setpoint.velocity
+    assert np.isfinite(velocity).all()
+    assert math.hypot(velocity[0], velocity[1]) <= LIMITS.max_speed + 1e-9
+    assert abs(velocity[2]) <= LIMITS.max_climb + 1e-9
+    assert abs(sent.setpoint.yaw_rate) <= math.radians(LIMITS.max_yaw_rate) + 1e-9
+    if isinstance(setpoint, VelocitySetpoint) and isinstance(first.setpoint, VelocitySetpoint):
+        change = np.linalg.norm(velocity - first.setpoint.velocity)
+        bounded = {"geofence", "floor", "ceiling", "max_range", "not_finite"}
+        if not bounded & set(sent.clipped_by):
+            assert change <= LIMITS.max_acceleration * 0.05 + 1e-9
+        if not np.array_equal(velocity, setpoint.velocity):
+            assert sent.clipped_by
+
+
+@given(setpoints=st.lists(velocities | positions | wild, min_size=1, max_size=5))
+@settings(max_examples=25, deadline=None)
+@example(setpoints=[VelocitySetpoint(np.array([10.0, 10.0, -10.0]))])
+@example(setpoints=[PositionSetpoint(np.array([10.0, -10.0, 5.0]), None, 20.0)])
+@example(
+    setpoints=[
+        VelocitySetpoint(np.array([0.0, 4.0, -1.0])),
+        VelocitySetpoint(np.array([-4.0, 2.0, 0.0])),
+        VelocitySetpoint(np.array([-2.0, 0.0, -2.0])),
+    ]
+)
+def test_no_sequence_of_setpoints_gets_through_the_fence(setpoints: list[Setpoint]) -> None:
+    """A drone with a sluggish response, flown for seconds each way, stays inside all the time."""
+    guard = SetpointFilter(LIMITS, np.array([0.0, 0.0, 0.0]))
+    vehicle = KinematicVehicle((-3.0, -3.0, 0.0))
+    vehicle.position[2] = 5.0
+    vehicle.mode = VehicleMode.GUIDED
+    now = 0
+    for setpoint in setpoints:
+        for _ in range(50):
+            clamped = guard.clamp(setpoint, vehicle.read().odometry, 0.05)
+            vehicle.send(clamped.setpoint)
+            now += NANOSECONDS // 20
+            vehicle.advance_to(now)
+            assert guard.fence.inside(vehicle.position), vehicle.position
+            assert 0.95 < vehicle.position[2] < 12.05
+            assert np.linalg.norm(vehicle.position) < LIMITS.max_range + 0.05
+
+
+def test_the_fence_stops_before_the_edge_and_lets_slide_along_it() -> None:
+    """The drone brakes to the margin; the part of its velocity along the edge is untouched."""
+    guard = SetpointFilter(LIMITS, np.zeros(3))
+    ahead = guard.clamp(VelocitySetpoint(np.array([4.0, 0, 0])), at(14.0, -7.0, 5.0), 10.0)
+    assert ahead.clipped_by == ("geofence",)
+    assert isinstance(ahead.setpoint, VelocitySetpoint)
+    assert 0.0 < ahead.setpoint.velocity[0] < 1.5
+    along = guard.clamp(VelocitySetpoint(np.array([3.0, -1.0, 0])), at(14.5, -7.0, 5.0), 10.0)
+    assert isinstance(along.setpoint, VelocitySetpoint)
+    assert along.setpoint.velocity == pytest.approx([0.0, -1.0, 0.0], abs=1e-9)
+
+
+def test_outside_the_fence_only_the_way_back_is_open() -> None:
+    """A drone that was blown outside may come back, and may not go further."""
+    guard = SetpointFilter(LIMITS, np.zeros(3))
+    outside = at(17.0, -7.0, 5.0)
+    back = guard.clamp(VelocitySetpoint(np.array([-2.0, 0, 0])), outside, 10.0)
+    assert isinstance(back.setpoint, VelocitySetpoint)
+    assert back.setpoint.velocity[0] == -2.0
+    on = guard.clamp(VelocitySetpoint(np.array([2.0, 1.0, 0])), outside, 10.0)
+    assert isinstance(on.setpoint, VelocitySetpoint)
+    assert on.setpoint.velocity == pytest.approx([0.0, 1.0, 0.0], abs=1e-9)
+    home = guard.clamp(PositionSetpoint(np.array([-3.0, -3.0, 5.0])), outside, 0.05)
+    assert isinstance(home.setpoint, PositionSetpoint)
+
+
+def test_setpoints_that_are_not_finite_become_standing_still() -> None:
+    """NaN never reaches a vehicle."""
+    guard = SetpointFilter(LIMITS, np.zeros(3))
+    for setpoint in (
+        VelocitySetpoint(np.array([math.nan, 0, 0])),
+        PositionSetpoint(np.array([0, math.inf, 0])),
+        PositionSetpoint(np.zeros(3), math.nan),
+    ):
+        clamped = guard.clamp(setpoint, at(-3.0, -3.0, 5.0), 0.05)
+        assert clamped.clipped_by == ("not_finite",)
+        assert isinstance(clamped.setpoint, VelocitySetpoint)
+        assert not clamped.setpoint.velocity.any()
+
+
+def test_without_a_position_the_drone_does_not_move() -> None:
+    """No boundary can be kept, so nothing but standing still is sent."""
+    guard = SetpointFilter(LIMITS, np.zeros(3))
+    lost = at(math.nan, 0.0, 0.0)
+    clamped = guard.clamp(VelocitySetpoint(np.array([1.0, 0, 0])), lost, 0.05)
+    assert clamped.clipped_by == ("no_position",)
+    assert isinstance(clamped.setpoint, VelocitySetpoint)
+    assert clamped.setpoint.velocity.tolist() == [0.0, 0.0, 0.0]
+    somewhere = guard.clamp(PositionSetpoint(np.zeros(3)), lost, 0.05)
+    assert somewhere.clipped_by == ("no_position",)
+    assert isinstance(somewhere.setpoint, VelocitySetpoint)
+    assert somewhere.setpoint.velocity.tolist() == [0.0, 0.0, 0.0]
+    standing = guard.clamp(VelocitySetpoint(np.zeros(3), 0.3), lost, 0.05)
+    assert standing.clipped_by == ()
+
+
+WIDE = LimitsConfig(max_speed=4.0, max_climb=1.5, max_range=1000.0, max_yaw_rate=60.0)
+
+
+@pytest.mark.parametrize(
+    ("place", "speed", "names"),
+    [
+        ((50.0, 0.0, 5.0), 3.0, ()),
+        ((50.0, 0.0, 5.0), 5.0, ("max_speed",)),
+        ((0.0, 0.0, 50.0), 3.0, ("max_climb",)),
+        ((0.0, 2000.0, 5.0), 3.0, ("max_range",)),
+        ((0.0, 0.0, 200.0), 1.0, ("geofence",)),
+    ],
+)
+def test_what_is_changed_of_a_place_is_named(
+    place: tuple[float, float, float], speed: float, names: tuple[str, ...]
+) -> None:
+    """By the limit that changed it, of range, height or speed."""
+    guard = SetpointFilter(WIDE, np.zeros(3))
+    clamped = guard.clamp(PositionSetpoint(np.array(place), None, speed), at(0, 0, 5.0), 0.05)
+    assert clamped.clipped_by == names
+    assert isinstance(clamped.setpoint, PositionSetpoint)
+
+
+@pytest.mark.parametrize(
+    ("asked", "sent"), [(0.5, 0.5), (-0.5, -0.5), (2.0, 1.047), (-2.0, -1.047)]
+)
+def test_a_turn_is_passed_on_up_to_its_limit(asked: float, sent: float) -> None:
+    """60 degrees a second, either way, while the drone flies on."""
+    guard = SetpointFilter(WIDE, np.zeros(3))
+    clamped = guard.clamp(VelocitySetpoint(np.array([1.0, 0, 0]), asked), at(0, 0, 5.0), 10.0)
+    assert isinstance(clamped.setpoint, VelocitySetpoint)
+    assert clamped.setpoint.yaw_rate == pytest.approx(sent, abs=1e-3)
+    assert clamped.setpoint.velocity == pytest.approx([1.0, 0.0, 0.0])
+    assert clamped.clipped_by == (("max_yaw_rate",) if asked != sent else ())
+
+
+@pytest.mark.parametrize(
+    ("separation", "other", "free"),
+    [(0.5, 0.4, False), (0.5, 40.0, True), (0.0, 0.4, True), (0.5, 0.0, True)],
+)
+def test_a_neighbour_within_the_separation_is_not_come_nearer(
+    separation: float,
+    other: float,
+    free: bool,  # noqa: FBT001
+) -> None:
+    """Half a metre counts as well as three; none at all, or the very same place, bounds nothing."""
+    limits = WIDE.model_copy(update={"separation": separation})
+    guard = SetpointFilter(limits, np.zeros(3))
+    near = Neighbour(np.array([other, 0.0, 5.0]), np.zeros(3))
+    clamped = guard.clamp(VelocitySetpoint(np.array([1.0, 0, 0])), at(0, 0, 5.0), 10.0, [near])
+    assert isinstance(clamped.setpoint, VelocitySetpoint)
+    assert clamped.setpoint.velocity[0] == pytest.approx(1.0 if free else 0.0)
+    assert clamped.clipped_by == (() if free else ("separation",))
+
+
+def test_two_drones_keep_their_distance() -> None:
+    """Flown straight at each other, both stop with the set distance between them."""
+    limits = LimitsConfig(separation=3.0, max_speed=4.0)
+    homes = [np.array([0.0, 0.0, 0.0]), np.array([30.0, 0.0, 0.0])]
+    guards = [SetpointFilter(limits, home) for home in homes]
+    drones = [KinematicVehicle((0.0, 0.0, 5.0)), KinematicVehicle((30.0, 1.0, 5.0))]
+    for drone in drones:
+        drone.mode = VehicleMode.GUIDED
+    now, nearest, names = 0, math.inf, set[str]()
+    for _ in range(400):
+        states = [drone.read().odometry for drone in drones]
+        targets = [states[1].position, states[0].position]
+        for me, guard in enumerate(guards):
+            other = Neighbour(states[1 - me].position, states[1 - me].velocity)
+            asked = PositionSetpoint(targets[me], None, 4.0)
+            clamped = guard.clamp(asked, states[me], 0.05, [other])
+            drones[me].send(clamped.setpoint)
+            names |= set(clamped.clipped_by)
+        now += NANOSECONDS // 20
+        for drone in drones:
+            drone.advance_to(now)
+        nearest = min(nearest, float(np.linalg.norm(drones[0].position - drones[1].position)))
+    assert 2.9 < nearest < 3.5
+    assert "separation" in names
+
+
+def test_a_fence_that_is_none_is_refused() -> None:
+    """Outlines that cross themselves and margins that fill the fence are configuration errors."""
+    bow = [(0.0, 0.0), (10.0, 10.0), (10.0, 0.0), (0.0, 10.0)]
+    with pytest.raises(ConfigError, match="crosses itself"):
+        Geofence(GeofenceConfig(polygon=bow))
+    with pytest.raises(ConfigError, match="no room"):
+        Geofence(GeofenceConfig(polygon=[(0, 0), (1, 0), (1, 1), (0, 1)], margin=0.6))
+
+
+@given(numbers, numbers, st.floats(-5, 30))
+@settings(deadline=None)
+def test_the_nearest_allowed_place_is_allowed(x: float, y: float, z: float) -> None:
+    """Whatever is asked, the place that is flown to lies inside."""
+    fence = Geofence(LIMITS.geofence)
+    assert fence.contains(fence.nearest_allowed(np.array([x, y, z])))

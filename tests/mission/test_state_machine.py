@@ -1,0 +1,42 @@
+"""The mission's states: what may follow what, since when, and why."""
+
+from __future__ import annotations
+
+import pytest
+
+from aerodaas.mission.state_machine import TRANSITIONS, MissionStateMachine, mermaid
+from aerodaas.types.errors import MissionError
+from aerodaas.types.status import MissionState
+
+
+def test_a_change_is_dated_and_has_its_reason() -> None:
+    """The same state again keeps its date, and its reason unless there is a new one."""
+    machine = MissionStateMachine()
+    assert (machine.state, machine.reason, machine.since) == (MissionState.IDLE, "", 0)
+    assert machine.to(MissionState.PREFLIGHT, 5, "not ready") is True
+    assert machine.to(MissionState.PREFLIGHT, 7) is False
+    assert (machine.reason, machine.since) == ("not ready", 5)
+    assert machine.to(MissionState.PREFLIGHT, 9, "no GPS") is False
+    assert (machine.reason, machine.since) == ("no GPS", 5)
+    assert machine.to(MissionState.TAKING_OFF, 11) is True
+    assert (machine.reason, machine.since) == ("", 11)
+
+
+@pytest.mark.parametrize("state", MissionState)
+def test_only_what_is_listed_may_follow(state: MissionState) -> None:
+    """Anything else is refused, and the state stays as it was."""
+    for following in set(MissionState) - TRANSITIONS[state] - {state}:
+        machine = MissionStateMachine()
+        machine.state = state
+        with pytest.raises(MissionError, match=f"{state.value} cannot become {following.value}"):
+            machine.to(following, 1)
+        assert machine.state is state
+
+
+def test_the_diagram_shows_each_transition_once_and_where_missions_end() -> None:
+    """In the order of the states, so that it changes with them only."""
+    lines = mermaid().splitlines()
+    assert lines[:2] == ["stateDiagram-v2", "    [*] --> idle"]
+    assert lines[2:4] == ["    idle --> preflight", "    idle --> aborted"]
+    assert lines[-2:] == ["    landed --> [*]", "    aborted --> [*]"]
+    assert len(lines) == len(set(lines)) == 4 + sum(map(len, TRANSITIONS.values()))

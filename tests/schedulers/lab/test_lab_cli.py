@@ -1,0 +1,61 @@
+"""`aerodaas lab` on the command line."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from aerodaas.cli.lab import app
+
+_MINE = """
+from aerodaas.schedulers.analytics import AnalyticsScheduler, Drop
+
+class Mine(AnalyticsScheduler):
+    def task_arrived(self, task, now):
+        return [Drop(task)]
+"""
+
+
+def _run(*arguments: str) -> tuple[int, str]:
+    outcome = CliRunner().invoke(app, list(arguments), env={"COLUMNS": "220"})
+    return outcome.exit_code, outcome.output
+
+
+def test_a_comparison_with_ones_own_class(tmp_path: Path) -> None:
+    """A table, plots and a JSON file."""
+    mine = tmp_path / "mine.py"
+    mine.write_text(_MINE)
+    out, plots = tmp_path / "out.json", tmp_path / "plots"
+    code, text = _run(
+        *("run", "-w", "2D-P", "-s", f"dems,{mine}:Mine", "--seeds", "2", "--duration", "5"),
+        *("--jobs", "1", "--json", str(out), "--plots", str(plots)),
+    )
+    assert code == 0, text
+    assert "dems" in text
+    assert "of bound" in text
+    found = json.loads(out.read_text())[0]["schedulers"]
+    assert found[f"{mine}:Mine"]["means"]["completion"]["value"] == 0
+    assert len(list(plots.glob("*.png"))) == 4
+
+
+def test_the_list_names_what_there_is() -> None:
+    """Schedulers with their idea, models with their figures."""
+    code, text = _run("list")
+    assert code == 0
+    assert "margin" in text
+    assert "DEO" in text
+
+
+def test_mistakes_are_explained() -> None:
+    """Exit status 2 and a sentence."""
+    for arguments, words in (
+        (("-s", "nope"), "no analytics scheduler is called 'nope'"),
+        (("-w", "9Z"), "no workload is called '9Z'"),
+        (("--network", "fog"), "no network is called 'fog'"),
+        (("--times", "normal"), "nominal, lognormal or gamma"),
+    ):
+        code, text = _run("run", "--seeds", "1", "--duration", "2", "--jobs", "1", *arguments)
+        assert code == 2
+        assert words in text

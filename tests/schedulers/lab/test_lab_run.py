@@ -1,0 +1,143 @@
+"""The simulator, the score and the runs over seeds."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+
+from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal, Resources, Task
+from aerodaas.schedulers.analytics.published.cloud_only import CloudOnly
+from aerodaas.schedulers.analytics.published.edge_only import Fifo
+from aerodaas.schedulers.analytics.registry import load_scheduler
+from aerodaas.schedulers.lab.metrics import mean_of, score
+from aerodaas.schedulers.lab.network import Network
+from aerodaas.schedulers.lab.plots import plot_bars, plot_observations, plot_timeline
+from aerodaas.schedulers.lab.run import run_lab
+from aerodaas.schedulers.lab.sample import SamplePath
+from aerodaas.schedulers.lab.simulator import simulate
+from aerodaas.schedulers.lab.times import ExecutionTimes
+from aerodaas.schedulers.lab.workload import Workload
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.errors import SchedulerError, UnknownIdError
+
+SHORT = Workload.named("2D-A", 10 * NANOSECONDS)
+VARYING = ExecutionTimes("lognormal", 0.15)
+
+
+def test_the_score_of_a_case_worked_by_hand() -> None:
+    """Two in time on the edge, one late, one dropped; a window of QoE won, one lost."""
+    goal = QoeGoal(50, 0.5, NANOSECONDS)
+    profile = Profile("m", 100, 300 * MILLISECOND, 200 * MILLISECOND, 300 * MILLISECOND, 2, 9, goal)
+    arrivals = (0, 1000, 1400, 1410)
+    tasks = [
+        Task(number, profile, ms * MILLISECOND, ms * MILLISECOND + profile.deadline)
+        for number, ms in enumerate(arrivals)
+    ]
+    # The third takes 350 instead of 200; the fourth has no time left when it ends at 1750.
+    edge = [200 * MILLISECOND, 200 * MILLISECOND, 350 * MILLISECOND, 200 * MILLISECOND]
+    path = SamplePath(tasks, edge, [1] * 4, Network())
+    found = score(tasks, simulate(path, Fifo()))
+    assert (found.tasks, found.done, found.late, found.dropped) == (4, 2, 1, 1)
+    assert found.qos == 98 + 98 - 2
+    assert found.qoe == 50
+    assert found.cost == 6
+    assert found.edge_busy == 750 * MILLISECOND
+    assert found.completion == 0.5
+    assert found.done_by_model == {"m": 2}
+
+
+def test_cloud_slots_limit_what_runs_at_once() -> None:
+    """With 4 slots the cloud is never busier than that, and fewer tasks finish than with 32."""
+    path = SamplePath.draw(Workload.named("4D-A", 10 * NANOSECONDS), 0, 0, VARYING, Network())
+    few = score(path.tasks, simulate(path, CloudOnly(), Resources(cloud_slots=4)))
+    many = score(path.tasks, simulate(path, CloudOnly()))
+    assert few.cloud_busy <= 4 * 12 * NANOSECONDS
+    assert few.done < many.done
+
+
+def test_a_run_leaves_the_scheduler_as_it_was() -> None:
+    """The instance is a recipe: simulating twice with it gives the same."""
+    path = SamplePath.draw(SHORT, 0, 1, VARYING, Network())
+    scheduler = load_scheduler("margin")
+    first = score(path.tasks, simulate(path, scheduler))
+    assert score(path.tasks, simulate(path, scheduler)) == first
+
+
+def test_seeds_give_identical_results_however_they_are_spread() -> None:
+    """Here, over two processes, and through a map of the caller's own."""
+    arguments = (SHORT, ["ec_edf", "margin"], [3, 1])
+    alone = run_lab(*arguments, times=VARYING, jobs=1)
+    together = run_lab(*arguments, times=VARYING, jobs=2)
+    elsewhere = run_lab(*arguments, times=VARYING, spread=map)
+    assert alone == together == elsewhere
+    assert alone.scores["margin"][0] != alone.scores["margin"][1]
+
+
+def test_schedulers_meet_the_same_sample_path() -> None:
+    """Another scheduler beside it does not change a scheduler's result."""
+    one = run_lab(SHORT, ["dems"], [0], times=VARYING, bound=False, jobs=1)
+    two = run_lab(SHORT, ["ec_edf", "dems"], [0], times=VARYING, bound=False, jobs=1)
+    assert one.scores["dems"] == two.scores["dems"]
+
+
+def test_a_fleet_is_the_sum_of_its_edges() -> None:
+    """Four drones over two edges make as many tasks as four on one, done more often."""
+    fleet = Workload.named("4D-A/2", 10 * NANOSECONDS)
+    one = Workload.named("4D-A", 10 * NANOSECONDS)
+    spread = run_lab(fleet, ["edf"], [0], bound=False, jobs=1).scores["edf"][0]
+    crowded = run_lab(one, ["edf"], [0], bound=False, jobs=1).scores["edf"][0]
+    assert spread.tasks == crowded.tasks
+    assert spread.done > crowded.done
+
+
+def test_progress_and_figures() -> None:
+    """Each part is reported; figures are shares and rates with intervals."""
+    seen: list[tuple[int, int]] = []
+    result = run_lab(
+        SHORT, ["ec_edf"], [0, 1], jobs=1, progress=lambda done, all_: seen.append((done, all_))
+    )
+    assert seen == [(1, 2), (2, 2)]
+    figures = result.figures("ec_edf")
+    assert 0 < figures["of bound"].value <= 1
+    assert figures["completion"].margin >= 0
+    assert result.as_json()["schedulers"]["ec_edf"]["means"]["completion"]["value"] < 1
+
+
+@pytest.mark.parametrize(
+    ("schedulers", "seeds", "error"),
+    [
+        ([], [0], SchedulerError),
+        (["dems"], [], SchedulerError),
+        (["dems", "dems"], [0], SchedulerError),
+        (["nope"], [0], UnknownIdError),
+    ],
+)
+def test_runs_that_make_no_sense_are_refused(
+    schedulers: list[str], seeds: list[int], error: type[Exception]
+) -> None:
+    """Before anything is simulated."""
+    with pytest.raises(error):
+        run_lab(SHORT, schedulers, seeds)
+
+
+def test_means_and_intervals() -> None:
+    """Of 1, 2, 3: mean 2, standard deviation 1, t(2) = 4.303: 2.484; a single value has none."""
+    mean = mean_of([1, 2, 3])
+    assert mean.value == 2
+    assert mean.margin == pytest.approx(4.303 / math.sqrt(3))
+    assert math.isnan(mean_of([5]).margin)
+
+
+def test_plots_are_drawn(tmp_path: Path) -> None:
+    """All three, for a network with an outage, without a display."""
+    network = Network.named("outage", SHORT.duration)
+    result = run_lab(SHORT, ["cld", "margin"], [0, 1], network=network, jobs=1)
+    plot_bars(result, tmp_path / "bars.png")
+    path = SamplePath.draw(SHORT, 0, 0, VARYING, network)
+    traces = {name: simulate(path, load_scheduler(name), record=True) for name in ("cld", "margin")}
+    plot_timeline(traces["margin"], tmp_path / "timeline.png", "margin", 2, 6)
+    plot_observations(traces, path, tmp_path / "over_time.png")
+    sizes = [(tmp_path / f"{n}.png").stat().st_size for n in ("bars", "timeline", "over_time")]
+    assert min(sizes) > 5000

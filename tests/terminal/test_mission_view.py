@@ -1,0 +1,142 @@
+"""The terminal view, on terminals of all kinds and on none."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+
+from aerodaas.terminal.live import MissionView
+from aerodaas.terminal.plan import braille_plan
+from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
+from aerodaas.types.data import Battery, Odometry
+from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.types.waypoints import Waypoint
+
+PLACES = st.tuples(st.floats(-1e5, 1e5), st.floats(-1e5, 1e5))
+
+
+def snapshot(
+    time: float, state: MissionState = MissionState.ENROUTE, alerts: tuple[str, ...] = ()
+) -> Snapshot:
+    """A drone on its way north."""
+    target = Waypoint("north", 0.0, 10.0, 1.5)
+    mission = MissionStatus(
+        0, state, "to [north]", target, (Waypoint("east", 10.0, 0.0, 1.5),), ("start",)
+    )
+    odometry = Odometry(np.array([-0.01, time, 1.5]), np.array([0.0, 1.0, 0.0]), 1.57)
+    vehicle = VehicleState(0, odometry, Battery(0.5), VehicleMode.GUIDED, armed=True)
+    streams = (StreamSnapshot("tello/camera", 14.9, 2.0, 3.0, 7), StreamSnapshot("tello/follow"))
+    return Snapshot(
+        "Farm [Survey]",
+        time,
+        time / 10,
+        (RobotSnapshot("tello", mission, vehicle),),
+        streams,
+        alerts,
+    )
+
+
+def drawn(width: int, encoding: str = "utf-8") -> str:
+    """The panel as a terminal of this width and encoding receives it."""
+    raw = io.BytesIO()
+    console = Console(
+        file=io.TextIOWrapper(raw, encoding=encoding),
+        width=width,
+        force_terminal=True,
+        color_system=None,
+        legacy_windows=False,
+    )
+    with MissionView(console) as view:
+        for time in range(6):
+            now = snapshot(float(time), alerts=("battery_low: at 20 %",))
+            view.update(replace(now, scheduler="Dems: 93 % of 120 in time"))
+    console.file.flush()
+    return raw.getvalue().decode(encoding)
+
+
+@pytest.mark.parametrize("width", [80, 100, 200])
+def test_panel_shows_what_matters(width: int) -> None:
+    """State, waypoint, position, battery, rates, latency, drops, alerts, time and speed."""
+    text = drawn(width)
+    for words in (
+        "Farm [Survey]",
+        "ENROUTE",
+        "to [north]",
+        "north (0.0, 10.0, 1.5), 5.0 m away",
+        "E 0.0  N 5.0  up 1.5 m, 1.0 m/s",
+        "50 %",
+        "1 of 3 waypoints",
+        "14.9",
+        "Dems: 93 % of 120 in time",
+        "battery_low: at 20 %",
+        "mission 0:05.0",
+        "10.0x real time",
+        "○",
+        "●",
+    ):
+        assert words in text
+
+
+@pytest.mark.parametrize("width", [40, 80])
+def test_panel_keeps_to_the_width(width: int) -> None:
+    """No line wraps."""
+    console = Console(file=io.StringIO(), width=width, force_terminal=True, color_system=None)
+    console.print(MissionView(console).render(snapshot(3.0)))
+    assert isinstance(console.file, io.StringIO)
+    assert max(len(line) for line in console.file.getvalue().splitlines()) <= width
+
+
+def test_panel_on_a_terminal_without_unicode() -> None:
+    """A serial console gets ASCII."""
+    text = drawn(80, "ascii")
+    assert "ENROUTE" in text
+    assert "50 %" in text
+
+
+def test_pipe_gets_a_line_at_each_change_of_state() -> None:
+    """No control characters, no flood: between changes only the clock makes lines."""
+    out = io.StringIO()
+    with MissionView(Console(file=out, width=80)) as view:
+        for time in range(50):
+            view.update(snapshot(time / 10))
+        view.update(snapshot(5.0, MissionState.LOITERING, ("battery_low: at 20 %",)))
+    lines = out.getvalue().splitlines()
+    assert "\x1b" not in out.getvalue()
+    assert len(lines) == 4
+    assert lines[0].startswith("[    0.0 s] tello enroute: to [north], E 0.0  N 0.0  up 1.5 m")
+    assert "loitering" in lines[1]
+    assert lines[2] == "alert: battery_low: at 20 %"
+
+
+def test_nothing_known_yet() -> None:
+    """Before the first word of a robot there is a picture already."""
+    console = Console(file=io.StringIO(), width=80, force_terminal=True)
+    with MissionView(console) as view:
+        view.update(Snapshot("Farm", 0.0, 0.0, (RobotSnapshot("tello"),)))
+    assert isinstance(console.file, io.StringIO)
+    assert "waiting for the first word" in console.file.getvalue()
+
+
+@given(st.lists(PLACES, max_size=20), st.lists(PLACES, max_size=5))
+def test_plan_always_fits(
+    path: list[tuple[float, float]], goals: list[tuple[float, float]]
+) -> None:
+    """Whatever is flown, the plan keeps its size and shows where the drone is."""
+    text = braille_plan(path, goals, columns=10, rows=4).plain
+    lines = text.split("\n")
+    assert [len(line) for line in lines] == [10] * 4
+    assert ("●" in text) == bool(path)
+
+
+def test_plan_has_north_up_and_east_right() -> None:
+    """A flight to the north-east ends at the top right."""
+    lines = braille_plan([(0, 0), (10, 10)], [(10, 0)], columns=8, rows=4).plain.split("\n")
+    assert lines[0][-1] == "●"
+    assert lines[-1][-1] == "○"

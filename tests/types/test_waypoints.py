@@ -1,0 +1,140 @@
+"""Waypoints and commands: what no vehicle could fly is refused, the rest stays what it was."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerodaas import (
+    AeroListData,
+    AeroNavigation,
+    NavigationType,
+    PriorityQueue,
+    SchedulingType,
+    VelocityCommand,
+    Waypoint,
+    WaypointType,
+)
+from aerodaas.types.errors import InvalidWaypointError
+from aerodaas.types.geometry import GeodeticOrigin
+
+finite = st.floats(-1e4, 1e4)
+bad = st.sampled_from([math.nan, math.inf, -math.inf])
+waypoints = st.builds(
+    Waypoint,
+    st.text(min_size=1, max_size=8),
+    finite,
+    finite,
+    finite,
+    hover_duration=st.floats(0, 100),
+    waypoint_type=st.sampled_from(["relative", "local"]),
+    yaw=st.none() | finite,
+    speed=st.none() | st.floats(0.01, 20),
+    priority=st.integers(-5, 20),
+    deadline=st.none() | st.floats(0, 1e4),
+)
+
+
+@given(waypoints)
+def test_waypoints_survive_the_way_to_another_process(waypoint: Waypoint) -> None:
+    """Pickling is the identity."""
+    assert pickle.loads(pickle.dumps(waypoint)) == waypoint  # noqa: S301 - our own bytes
+
+
+@given(waypoints, st.tuples(finite, finite, finite))
+def test_resolving_ends_in_the_local_frame(
+    waypoint: Waypoint, takeoff: tuple[float, float, float]
+) -> None:
+    """Relative places move with the take-off, local ones stay; once resolved, nothing changes."""
+    resolved = waypoint.resolve(np.array(takeoff), None)
+    moved = waypoint.waypoint_type is WaypointType.RELATIVE
+    np.testing.assert_allclose(
+        resolved.position, waypoint.position + (np.array(takeoff) if moved else 0), atol=1e-9
+    )
+    assert resolved.waypoint_type is WaypointType.LOCAL
+    assert resolved.resolve(np.array([9.0, 9.0, 9.0]), None) == resolved
+    assert (resolved.id, resolved.priority, resolved.speed) == (
+        waypoint.id,
+        waypoint.priority,
+        waypoint.speed,
+    )
+
+
+@given(finite, finite, st.floats(0, 120))
+def test_a_global_waypoint_is_where_its_degrees_are(east: float, north: float, up: float) -> None:
+    """Degrees made from a place lead back to it."""
+    origin = GeodeticOrigin(13.0, 77.5, 900.0)
+    latitude, longitude, altitude = origin.to_geodetic(np.array([east, north, up]))
+    waypoint = Waypoint("g", latitude, longitude, altitude, waypoint_type="global")
+    resolved = waypoint.resolve(np.zeros(3), origin)
+    np.testing.assert_allclose(resolved.position, [east, north, up], atol=1e-3)
+    with pytest.raises(InvalidWaypointError, match="gives no home"):
+        waypoint.resolve(np.zeros(3), None)
+
+
+@given(bad, st.sampled_from(["x", "y", "z", "hover_duration", "yaw", "speed", "deadline"]))
+def test_numbers_that_are_none_are_refused_by_name(value: float, field: str) -> None:
+    """NaN and infinities name the waypoint and the field."""
+    values: dict[str, Any] = {"x": 0.0, "y": 0.0, "z": 0.0, field: value}
+    with pytest.raises(InvalidWaypointError, match=f"waypoint 'w': {field} must be a finite"):
+        Waypoint("w", **values)
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"x": "1"}, "x must be a finite number, not '1'"),
+        ({"hover_duration": -1}, "hover_duration must not be negative"),
+        ({"speed": 0}, "speed must be positive"),
+        ({"waypoint_type": "lunar"}, "must be one of relative, local, global, not 'lunar'"),
+        ({"x": 91, "waypoint_type": "global"}, "is no latitude and longitude"),
+        ({"y": 181, "waypoint_type": "global"}, "is no latitude and longitude"),
+    ],
+)
+def test_values_that_cannot_be_flown(values: dict[str, Any], message: str) -> None:
+    """Each is refused with a reason."""
+    with pytest.raises(InvalidWaypointError, match=message):
+        Waypoint("w", **{"x": 0, "y": 0, "z": 1, **values})
+
+
+@given(bad, st.sampled_from(["forward", "left", "up", "yaw_rate", "valid_for"]))
+def test_velocities_that_are_none_are_refused(value: float, field: str) -> None:
+    """A controller's NaN never reaches a drone."""
+    with pytest.raises(InvalidWaypointError, match=field):
+        VelocityCommand(**dict[str, Any]({field: value}))
+
+
+@given(st.lists(waypoints, unique_by=lambda waypoint: waypoint.id, max_size=6))
+def test_navigation_keeps_its_items_in_order(items: list[Waypoint]) -> None:
+    """A navigation is the list that it was made of; a priority given is that of each item."""
+    navigation = AeroNavigation(NavigationType.DISTANCE_DRIVEN, items)
+    assert list(navigation) == navigation.getData() == navigation.waypoints == items
+    assert navigation.commands == []
+    urgent: PriorityQueue[Waypoint] = PriorityQueue(AeroListData(items), priority=1)
+    assert [item.priority for item in urgent] == [1] * len(items)
+    assert [item.position.tolist() for item in urgent.waypoints] == [
+        item.position.tolist() for item in items
+    ]
+
+
+def test_a_priority_queue_keeps_whether_it_may_be_reordered() -> None:
+    """Wrapping navigation changes its priority only."""
+    survey = AeroNavigation("distance_driven", [Waypoint("a", 1, 2, 3)], "unordered")  # type: ignore[arg-type]
+    queue: PriorityQueue[Waypoint] = PriorityQueue(survey, priority=2)
+    assert queue.scheduling_type is SchedulingType.UNORDERED
+    assert queue.priority == 2
+
+
+def test_what_is_no_navigation_is_refused() -> None:
+    """Neither other things nor two waypoints of one id."""
+    with pytest.raises(InvalidWaypointError, match=r"takes waypoints and velocity commands"):
+        AeroNavigation(NavigationType.DISTANCE_DRIVEN, [(1, 2, 3)])  # type: ignore[list-item]
+    twice = [Waypoint("a", 1, 2, 3), Waypoint("a", 2, 2, 3)]
+    with pytest.raises(InvalidWaypointError, match="two waypoints are called 'a'"):
+        AeroNavigation(NavigationType.DISTANCE_DRIVEN, twice)

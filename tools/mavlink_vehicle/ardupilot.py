@@ -1,0 +1,186 @@
+"""The emulated ArduCopter, with the habits that were seen in flight."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.vehicle import VehicleMode
+from tools.mavlink_vehicle.firmware import Firmware, Result
+from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
+from tools.mavlink_vehicle.options import AutopilotOptions
+from tools.mavlink_vehicle.store import ParameterStore
+
+__all__ = ["EmulatedArduPilot"]
+
+_OK, _FAILED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_FAILED
+_STABILIZE, _GUIDED, _LOITER, _RETURN, _LAND, _BRAKE = 0, 4, 5, 6, 9, 17
+_MODES = {_STABILIZE, 2, 3, _GUIDED, _LOITER, _RETURN, 7, _LAND, 16, _BRAKE}
+_NEED_PLACE = {_GUIDED, _LOITER, _RETURN, _BRAKE}
+_TIMEOUT = 3.0
+"""GUID_TIMEOUT: seconds without setpoints after which it stops."""
+_STATION_LOST = 5.0
+_CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+_GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
+_POSITION = mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
+_PRESENT, _ENABLED = 0x5371FC0F, 0x5361BC0F
+"""SYS_STATUS' bits of what is always there, and of what is switched on without a position."""
+_LEAST = 0.5
+"""Metres of a take-off."""
+
+
+class EmulatedArduPilot(Firmware):
+    """Take-off above home in guided mode, nothing sent that nobody asked for, reasons as texts."""
+
+    number: ClassVar[int] = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
+    default_rates: ClassVar[dict[int, float]] = {}
+    unheard_of: ClassVar[frozenset[int]] = frozenset(
+        {
+            mavlink.MAVLINK_MSG_ID_ALTITUDE,
+            mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS,
+            mavlink.MAVLINK_MSG_ID_HIL_STATE_QUATERNION,
+        }
+    )
+    interval_refused: ClassVar[int] = mavlink.MAV_RESULT_DENIED
+    dead_reckoning: ClassVar[float] = 7.4
+    version: ClassVar[int] = 0x04070000
+    capabilities: ClassVar[int] = 0xFBEF
+
+    def __init__(
+        self, options: AutopilotOptions, flight: MavFlight, say: Callable[[Any], None]
+    ) -> None:
+        values = {
+            "BATT_FS_LOW_ACT": 0.0,
+            "FS_EKF_ACTION": 1.0,
+            "FS_GCS_ENABLE": 0.0,
+            "FENCE_ENABLE": 0.0,
+            "FENCE_ACTION": 1.0,
+            "FENCE_TYPE": 7.0,
+            "FENCE_ALT_MAX": 100.0,
+            "SYSID_MYGCS": 255.0,
+        }
+        super().__init__(options, flight, say, ParameterStore(values, set(), bytewise=False))
+        self._mode = _STABILIZE
+        self._station_at: float | None = None
+
+    @property
+    def custom_mode(self) -> int:
+        """The mode's number."""
+        return self._mode
+
+    @property
+    def guided(self) -> bool:
+        """Guided."""
+        return self._mode == _GUIDED
+
+    def forget_mode(self) -> None:
+        """Stabilize."""
+        self._mode = _STABILIZE
+
+    def hear_heartbeat(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Somebody else's HEARTBEAT."""
+        if message.get_srcSystem() == int(self.parameters.values["SYSID_MYGCS"]):
+            self._station_at = self.now
+
+    @property
+    def sensors(self) -> tuple[int, int, int]:
+        """GPS counts as healthy without a fix, too; the arming checks are listed as present."""
+        seen = _GPS if self.ready else 0
+        placed = _POSITION if self.knows_place else 0
+        enabled = _ENABLED | seen | placed
+        healthy = enabled & ~_CHECK | (_CHECK if self.ready else 0)
+        return _PRESENT | seen, enabled, healthy
+
+    def go_blind(self) -> None:
+        """Land, by FS_EKF_ACTION."""
+        self.text("EKF variance")
+        self.text("EKF Failsafe: changed to LAND Mode")
+        self._mode = _LAND
+        self.failsafe = True
+        self.motions.append("land")
+        self.flight.land()
+
+    def command(self, number: int, values: tuple[float, ...], frame: int | None) -> Result:
+        """Modes and take-off."""
+        if number == mavlink.MAV_CMD_DO_SET_MODE:
+            return self._set_mode(int(values[1]))
+        if number == mavlink.MAV_CMD_DO_REPOSITION and frame is not None:
+            # Whatever way it is told to face, it faces as it did.
+            return self.go_to(math.nan, *values[4:]) if self.guided else _FAILED
+        if number == mavlink.MAV_CMD_NAV_TAKEOFF:
+            relative = {None, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT}
+            fits = self.armed and self.guided and frame in relative
+            if not fits or self.flight.flying or values[6] < _LEAST:
+                return _FAILED
+            self.lift(values[6])
+            return _OK
+        modes = {mavlink.MAV_CMD_NAV_LAND: _LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _RETURN}
+        if number in modes:
+            return self._set_mode(modes[number])
+        return mavlink.MAV_RESULT_UNSUPPORTED
+
+    def _set_mode(self, mode: int) -> Result:
+        if mode not in _MODES:
+            return _FAILED
+        if mode in _NEED_PLACE and not self.ready:
+            self.text("Mode change failed: requires position")
+            return _FAILED
+        if mode == self._mode:
+            return _OK
+        self._mode = mode
+        self.failsafe = False
+        deeds = {
+            _RETURN: ("return", self.flight.return_home),
+            _LAND: ("land", self.flight.land),
+            _BRAKE: ("hold", self.flight.hold),
+            _GUIDED: ("hold", self.flight.hold),
+        }
+        if mode in deeds and self.flight.flying:
+            name, deed = deeds[mode]
+            self.motions.append(name)
+            deed()
+        return _OK
+
+    def take_over(self) -> None:
+        """A pilot flips the switch: loiter."""
+        self._mode = _LOITER
+        self.flight.hold()
+
+    def enter_return(self) -> None:
+        """Return to launch, by its own protection."""
+        self._set_mode(_RETURN)
+        self.failsafe = True
+
+    def breach(self) -> None:
+        """By FENCE_ACTION, if FENCE_ENABLE: 1 return, 2 land, 4 brake."""
+        values = self.parameters.values
+        if values["FENCE_ENABLE"] == 0.0:
+            return
+        self.text("Fence Breached")
+        mode = {1.0: _RETURN, 2.0: _LAND, 4.0: _BRAKE}.get(values["FENCE_ACTION"])
+        if mode is not None:
+            self._set_mode(mode)
+            self.failsafe = True
+
+    def protect(self) -> None:
+        """Stop when setpoints do; return when the ground station is lost."""
+        target = self.flight.target
+        if self.guided and target is not None and self.now - self._setpoint_at > _TIMEOUT:
+            if target.position is None:
+                self.flight.hold()
+            else:
+                self.flight.target = GuidedTarget(target.position, None, target.yaw, None)
+        lost = self._station_at is not None and self.now - self._station_at > _STATION_LOST
+        enabled = self.parameters.values["FS_GCS_ENABLE"] > 0.0
+        if lost and enabled and self._mode not in {_RETURN, _LAND}:
+            self.text("GCS Failsafe")
+            self.enter_return()
+
+    def refuse_arming(self) -> None:
+        """PreArm texts."""
+        if not self.ready:
+            self.text("PreArm: Need Position Estimate")
+        if self.flight.mode is not VehicleMode.GROUNDED:
+            self.text("Arm: not landed")

@@ -1,0 +1,117 @@
+"""Backgrounds that no renderer draws: what is behind a thing must not matter.
+
+Overlapping shapes of every size ("dead leaves": Lee, Mumford and Huang, 2001) have the
+statistics of natural pictures, and light falls in patches as below trees.
+"""
+
+from __future__ import annotations
+
+import colorsys
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from tools.training.looks import hi_vis
+
+__all__ = ["backdrop", "compose", "field"]
+
+Picture = NDArray[np.uint8]
+
+
+def field(shape: tuple[int, int], cells: float, rng: np.random.Generator) -> NDArray[np.float32]:
+    """Smooth random field (height, width) about 0, of some `cells` bumps across."""
+    height, width = shape
+    size = max(2, round(cells)), max(2, round(cells * height / width))
+    coarse = rng.standard_normal((size[1], size[0]), dtype=np.float32)
+    return np.asarray(
+        cv2.resize(coarse, (width, height), interpolation=cv2.INTER_CUBIC), np.float32
+    )
+
+
+def backdrop(shape: tuple[int, int], rng: np.random.Generator) -> Picture:
+    """Return a picture (height, width, 3) of nothing in particular."""
+    height, width = shape
+    picture = np.empty((height, width, 3), np.float32)
+    top, bottom = _tone(rng), _tone(rng)
+    share = np.linspace(0, 1, height, dtype=np.float32)[:, None, None]
+    picture[:] = top * (1 - share) + bottom * share
+    canvas = np.clip(picture, 0, 255).astype(np.uint8)
+    kinds = int(rng.integers(5))
+    for _ in range(int(rng.integers(10, 120))):
+        _leaf(canvas, kinds, rng)
+    result = canvas.astype(np.float32)
+    for cells in rng.choice([4.0, 12.0, 40.0, 110.0, 250.0], 2, replace=False):
+        result *= 1.0 + rng.uniform(0.0, 0.28) * field(shape, cells, rng)[..., None]
+    return np.clip(result, 0, 255).astype(np.uint8)
+
+
+def _tone(rng: np.random.Generator) -> NDArray[np.float32]:
+    """Colour of earth, walls, leaves or sky, seldom a garish one; BGR, 0 to 255."""
+    if rng.random() < 0.06:  # noqa: PLR2004 - seldom
+        red, green, blue = hi_vis(rng)
+    else:
+        hue = rng.choice([rng.uniform(0.02, 0.16), rng.uniform(0.2, 0.4), rng.uniform()])
+        red, green, blue = colorsys.hsv_to_rgb(hue, rng.beta(1.2, 2.5), rng.uniform(0.03, 1.0))
+    return np.array([blue, green, red], np.float32) * 255
+
+
+def _leaf(canvas: Picture, kinds: int, rng: np.random.Generator) -> None:
+    """Draw one shape; sizes fall off as in pictures of the world."""
+    height, width = canvas.shape[:2]
+    radius = 0.012 * width / rng.uniform(0.03, 1.0) ** 0.9
+    centre = rng.uniform((0, 0), (width, height))
+    colour = _tone(rng).tolist()
+    kind = kinds if kinds < 4 else rng.integers(4)  # noqa: PLR2004 - the fifth is a mixture
+    if kind == 0:
+        axes = (int(radius) + 1, int(radius * rng.uniform(0.2, 1.0)) + 1)
+        middle = (int(centre[0]), int(centre[1]))
+        cv2.ellipse(canvas, middle, axes, rng.uniform(0, 180), 0, 360, colour, -1)
+        return
+    if kind == 1:
+        angles = np.sort(rng.uniform(0, 2 * np.pi, rng.integers(3, 8)))
+        reach = radius * rng.uniform(0.4, 1.2, len(angles))[:, None]
+        points = centre + reach * np.stack([np.cos(angles), np.sin(angles)], -1)
+    else:
+        # Planks, trunks, kerbs and walls: upright ones more often.
+        long, wide = radius * rng.uniform(1.0, 4.0), radius * rng.uniform(0.1, 1.0)
+        angle = rng.normal(np.pi / 2, 0.1) if rng.integers(2) else rng.uniform(0, np.pi)
+        along = np.array([np.cos(angle), np.sin(angle)])
+        across = np.array([-along[1], along[0]]) * wide
+        ends = centre - along * long, centre + along * long
+        points = np.array([ends[0] - across, ends[1] - across, ends[1] + across, ends[0] + across])
+        if kind == 3:  # noqa: PLR2004 - stripes
+            for k in range(0, 8, 2):
+                low, high = (ends[0] + (ends[1] - ends[0]) * (k + i) / 8 for i in range(2))
+                piece = np.array([low - across, high - across, high + across, low + across])
+                cv2.fillConvexPoly(canvas, piece.astype(np.int32), colour)
+            return
+    cv2.fillPoly(canvas, [points.astype(np.int32)], colour)
+
+
+def compose(picture: Picture, wanted: NDArray[np.bool_], rng: np.random.Generator) -> Picture:
+    """Change a picture around the `wanted` pixels, their texture, and the light on all.
+
+    `wanted` (height, width) are the pixels of what is labelled.
+    """
+    shape = picture.shape[:2]
+    result = picture.astype(np.float32)
+    mask = cv2.GaussianBlur(wanted.astype(np.float32), (3, 3), 0)[..., None]
+    choice = rng.random()
+    if choice < 0.45:  # noqa: PLR2004 - a large share, wholly or from some height down or up
+        behind = backdrop(shape, rng).astype(np.float32)
+        keep = mask
+        if choice < 0.15:  # noqa: PLR2004
+            patch = field(shape, rng.uniform(2, 5), rng)
+            keep = np.maximum(mask, (patch > rng.uniform(-0.8, 0.8)).astype(np.float32)[..., None])
+        result = result * keep + behind * (1.0 - keep)
+    if rng.random() < 0.6:  # noqa: PLR2004 - folds of cloth, dirt, reflections
+        folds = rng.uniform(0, 0.22) * field(shape, rng.uniform(10, 60), rng)
+        folds += rng.uniform(0, 0.16) * field(shape, rng.uniform(60, 200), rng)
+        result *= 1.0 + mask * folds[..., None]
+    if rng.random() < 0.3:  # noqa: PLR2004 - light through leaves
+        light = field(shape, rng.uniform(3, 14), rng)
+        edge = np.clip((light - rng.uniform(-0.5, 0.7)) * rng.uniform(1.5, 6), 0, 1)
+        dark, bright = rng.uniform(0.25, 0.8), rng.uniform(1.0, 1.7)
+        result *= (dark + (bright - dark) * edge)[..., None]
+    return np.clip(result, 0, 255).astype(np.uint8)

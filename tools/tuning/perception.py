@@ -1,0 +1,126 @@
+"""What a follower sees by: the true boxes with a detector's faults, or a detector on renders."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from aerodaas.analytics.base import Analytics, Context
+from aerodaas.simulation.world import Thing, World
+from aerodaas.types.clock import seconds
+from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry
+from aerodaas.types.geometry import CameraModel, rotation_from_rpy
+
+__all__ = ["DetectorPerception", "Perception", "TruthPerception", "box_in_picture"]
+
+_OUTLINE = np.array([0.92, 0.95])
+"""Width and height of a person's or vest's outline in parts of the box in space around it."""
+_SMALLEST = 4.0
+"""Pixels; no detector finds less."""
+
+Edges = tuple[float, float, float, float]
+
+
+class Perception(Protocol):
+    """Looks from a pose at a time."""
+
+    def look(
+        self, header: Header, pose: Odometry, believed: Odometry, context: Context
+    ) -> Detections:
+        """Boxes seen at `header.stamp` from the true `pose`; `believed` is the odometry told."""
+        ...
+
+
+def box_in_picture(
+    thing: Thing, label: str, time: float, camera: CameraModel, pose: Odometry
+) -> Edges | None:
+    """Left, top, right and bottom of a thing's box, not clipped; None if it is behind."""
+    turn = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
+    for box in thing.boxes(time):
+        if box.label == label:
+            corners = (box.corners - pose.position) @ turn
+            pixels = np.array([camera.project(corner) for corner in corners])
+            if (pixels[:, 2] <= 0).any():
+                return None
+            left, top = pixels[:, :2].min(axis=0)
+            right, bottom = pixels[:, :2].max(axis=0)
+            return float(left), float(top), float(right), float(bottom)
+    return None
+
+
+class TruthPerception:
+    """Exact boxes of one thing, with noise of their edges and misses, by seed."""
+
+    def __init__(
+        self,
+        thing: Thing,
+        label: str,
+        camera: CameraModel,
+        *,
+        seed: int,
+        noise: float = 0.02,
+        misses: float = 0.03,
+    ) -> None:
+        """`noise` is a standard deviation in parts of the box's height, `misses` a share."""
+        self._thing, self._label, self._camera = thing, label, camera
+        self._noise, self._misses = noise, misses
+        self._random = np.random.default_rng(seed)
+
+    def look(
+        self, header: Header, pose: Odometry, believed: Odometry, context: Context
+    ) -> Detections:
+        """Return the box, unless it is missed or out of the picture."""
+        del context
+        camera = self._camera
+        edges = box_in_picture(self._thing, self._label, seconds(header.stamp), camera, pose)
+        errors = self._random.normal(0, self._noise, 4)
+        missed = self._random.random() < self._misses
+        items = []
+        if edges is not None and not missed:
+            size = [camera.width, camera.height] * 2
+            low, high = np.array(edges[:2]), np.array(edges[2:])
+            middle, half = (low + high) / 2, _OUTLINE * (high - low) / 2
+            outline = np.concatenate([middle - half, middle + half])
+            noisy = np.clip(outline + errors * (edges[3] - edges[1]), 0, size)
+            left, top, right, bottom = noisy.tolist()
+            if min(right - left, bottom - top) > _SMALLEST:
+                items.append(Detection((left, top, right, bottom), self._label, 0.9))
+        return Detections(header, tuple(items), camera.width, camera.height, camera, believed)
+
+
+class DetectorPerception:
+    """A detector that looks at rendered pictures."""
+
+    def __init__(
+        self,
+        world: World,
+        camera: CameraModel,
+        detector: Analytics[Detections],
+        *,
+        depth_range: float | None = None,
+    ) -> None:
+        """Open the renderer and the detector; the camera measures depth up to `depth_range` m."""
+        # panda3d takes its time to load.
+        from aerodaas.simulation.depth import renderer_for  # noqa: PLC0415
+
+        self._renderer = renderer_for(world, camera, depth_range)
+        self._camera = camera
+        self._detector = detector
+        self.frame: Frame | None = None
+        """As last seen."""
+        detector.open()
+
+    def look(
+        self, header: Header, pose: Odometry, believed: Odometry, context: Context
+    ) -> Detections:
+        """Render and detect."""
+        image = self._renderer.render(seconds(header.stamp), pose)
+        self.frame = Frame(header, image, self._camera, believed, self._renderer.depth())
+        found = self._detector.process(self.frame, context)
+        return found if found is not None else Detections.of(self.frame, ())
+
+    def close(self) -> None:
+        """Free the renderer and the detector."""
+        self._renderer.close()
+        self._detector.close()
