@@ -100,9 +100,9 @@ class DroneActor(StreamActor):
         self._controllers: dict[str, VehicleController] = {}
         self._reports: dict[str, RobotReport] = {}
         """How each robot fares: replaced by the loop, never changed."""
-        self._calls = LoopCalls(self._wake)
+        self._calls = LoopCalls(self._wake, self._publish_reports)
         self._publisher = BackgroundPublisher(self._unpublished)
-        self._gate = GrowthGate(self._serve)
+        self._gate = GrowthGate(self._calls.serve)
         self._due: dict[str, int] = {}
         self._late = 0
         self._refused: tuple[str, ...] = ()
@@ -218,11 +218,6 @@ class DroneActor(StreamActor):
         if self.subscriber is not None:
             self.subscriber.wake()
 
-    def _serve(self) -> None:
-        """Obey the commands that have come since, between two turns."""
-        if self._calls.serve():
-            self._publish_reports()
-
     def _run(self) -> None:
         self._heard = time.monotonic()
         lock = RunLock()
@@ -249,7 +244,7 @@ class DroneActor(StreamActor):
             wait = self.session.host_seconds(max(0, due - self.clock.now()))
             for message in self.subscriber.receive(wait):
                 self._take(message, self.clock.now())
-            self._serve()
+            self._calls.serve()
             now = self.clock.now()
             if now < due:
                 continue
@@ -309,7 +304,7 @@ class DroneActor(StreamActor):
         while not self.stopping:
             clear = self._barrier.clear(drain=drain)
             messages = self.subscriber.receive(0.0 if clear else 0.5)
-            self._serve()
+            self._calls.serve()
             for message in messages:
                 self._acknowledge(message)
                 if not message.stream.startswith(ACKS):

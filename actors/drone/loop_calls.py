@@ -9,6 +9,7 @@ import queue
 from collections.abc import Callable
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as FutureTimeoutError
+from functools import partial
 from typing import Any, TypeVar
 
 from aerodaas.types.errors import MissionError
@@ -25,9 +26,16 @@ class LoopOverError(MissionError):
 class LoopCalls:
     """A queue of calls, carried out in the order in which they came."""
 
-    def __init__(self, wake: Callable[[], None]) -> None:
-        """`wake` lets the loop, which may be asleep, come to `serve` at once; any thread's."""
+    def __init__(self, wake: Callable[[], None], publish: Callable[[], None] | None = None) -> None:
+        """Start empty.
+
+        Args:
+            wake: Lets the loop, which may be asleep, come to `serve` at once; called in any thread.
+            publish: Lets others read what the calls have changed; called in the loop's thread
+                before any of them is answered, so that a caller reads the effect of its own call.
+        """
         self._wake = wake
+        self._publish = publish
         self._calls: queue.SimpleQueue[tuple[Callable[[], Any], Future[Any]]] = queue.SimpleQueue()
         self._over = ""
 
@@ -54,19 +62,20 @@ class LoopCalls:
 
     def serve(self) -> int:
         """Make the calls that wait, in the loop's thread; returns how many there were."""
-        made = 0
+        answers: list[Callable[[], None]] = []
         while (taken := self._next()) is not None:
             call, answer = taken
             if not answer.set_running_or_notify_cancel():
                 continue
-            made += 1
             try:
-                result = call()
+                answers.append(partial(answer.set_result, call()))
             except Exception as error:  # noqa: BLE001 - the caller's failure, never the loop's
-                answer.set_exception(error)
-            else:
-                answer.set_result(result)
-        return made
+                answers.append(partial(answer.set_exception, error))
+        if answers and self._publish is not None:
+            self._publish()
+        for give in answers:
+            give()
+        return len(answers)
 
     def close(self, why: str) -> None:
         """The loop is over, for the reason `why`: whoever waits or comes later is told so."""

@@ -66,9 +66,10 @@ class PlannerExecutor(Executor):
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - the base's
         """End the actor, and the calls that wait for it."""
         del wait, cancel_futures
+        # First what waits, or the next of it would begin as soon as the actor is dead.
+        self._caller.shutdown(wait=False, cancel_futures=True)
         with contextlib.suppress(Exception):
             ray.kill(self._actor)
-        self._caller.shutdown(wait=False, cancel_futures=True)
 
     def _call(self, function: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
         try:

@@ -123,6 +123,26 @@ def test_a_command_that_raises_is_its_senders_failure() -> None:
         calls.ask(lambda: 8, 5.0)
 
 
+def test_what_a_call_changed_is_published_before_it_is_answered() -> None:
+    """A caller that reads afterwards reads its own call's effect, in a loop however slow."""
+    value, published = [0], [0]
+
+    def publish() -> None:
+        time.sleep(0.05)
+        published[0] = value[0]
+
+    def add() -> None:
+        value[0] += 1
+
+    calls = LoopCalls(lambda: None, publish)
+    loop = threading.Thread(target=lambda: _serve_until(calls, 3))
+    loop.start()
+    for count in range(1, 4):
+        calls.ask(add, 5.0)
+        assert published == [count]
+    loop.join()
+
+
 def test_a_command_that_nobody_came_to_is_not_obeyed_later() -> None:
     """Its sender was told that it was withdrawn."""
     made: list[int] = []
