@@ -11,13 +11,14 @@ import math
 import threading
 import time
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount, failure_line
+from aerodaas.actors.dispatch.recent_frames import FrameReference, MissingFrame, RecentFrames
 from aerodaas.actors.drone.mission_link import StreamLink
 from aerodaas.actors.run.replayed import RecordedWork
-from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
+from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session, next_due
 from aerodaas.actors.stream_names import ACKS
 from aerodaas.actors.streams import Publisher
 from aerodaas.actors.triggers import Triggers, TriggerSpec
@@ -66,6 +67,8 @@ class NodeSpec:
     """True under a dispatcher, which waits for an answer to each task."""
     wakes: tuple[str, ...]
     """Streams on which a dormant analysis is woken."""
+    frames: tuple[str, ...] = ()
+    """Streams of the frames that its tasks name."""
 
 
 class AnalyticsActor(StreamActor):
@@ -177,6 +180,7 @@ class _Worker:
         # States come last: each is published before what is measured in it, so that whoever
         # has an item in hand finds its state, too.
         self.depths = {
+            **dict.fromkeys(node.frames, FRAME_DEPTH),
             **node.inputs,
             **dict.fromkeys(node.wakes, _WAKE_DEPTH),
             node.state: states,
@@ -199,6 +203,7 @@ class _Worker:
         self._asked: int | None = None
         """Stamp of the state that the present item is worked on by."""
         self._recorded = RecordedWork(actor.session, node.stream, node.robot)
+        self._frames = RecentFrames(node.frames)
 
     def open(self) -> None:
         session = self._actor.session
@@ -237,9 +242,23 @@ class _Worker:
             self._complain(error)
 
     def _run_inputs(self) -> None:
-        for message in self._receive(0.5):
-            if message.stream in self.node.inputs:
+        waiting = deque(self._receive(0.5))
+        while waiting:
+            message = waiting.popleft()
+            if message.stream not in self.node.inputs:
+                continue
+            if not isinstance(message.item, FrameReference):
                 self._work(message)
+                continue
+            if self._frames.find(message.item) is None:
+                # Published before the task was, it may have arrived since the last look.
+                waiting.extend(self._receive(0.0))
+            frame = self._frames.find(message.item)
+            if frame is not None:
+                self._work(replace(message, item=frame.item))
+            else:
+                missing = MissingFrame(message.item)
+                self._results.derive(missing, message, host_time_ns(), message.stamp)
 
     def _run_external(self) -> None:
         """In lockstep an external source ticks with the drone's states."""
@@ -278,6 +297,7 @@ class _Worker:
             messages += self.subscriber.receive(0.0)
         for message in messages:
             self._actor.follow(message.stamp)
+            self._frames.note(message)
             if self._link is not None:
                 self._link.note(message)
             if message.stream == self.node.state and message.item is not None:

@@ -27,6 +27,7 @@ from aerodaas.actors.dispatch.decisions import Counts, DecisionLog
 from aerodaas.actors.dispatch.estimates import Estimates
 from aerodaas.actors.dispatch.executor_pool import ExecutorPool
 from aerodaas.actors.dispatch.guarded_scheduler import GuardedDispatch
+from aerodaas.actors.dispatch.recent_frames import FrameReferences, MissingFrame
 from aerodaas.actors.dispatch.remote_executor import Executor, RemoteResult
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.actors.stream_names import ACKS, DECISIONS, done_stream, task_stream
@@ -46,6 +47,7 @@ from aerodaas.schedulers.analytics.base import (
 )
 from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
+from aerodaas.types.data import Frame
 from aerodaas.types.status import Message
 
 __all__ = ["DispatcherActor", "Managed"]
@@ -101,6 +103,11 @@ class DispatcherActor(StreamActor):
         self._replaced = False
         self._numbers = itertools.count()
         self._frames: dict[int, Message[Any]] = {}
+        self._references = FrameReferences()
+        self._held: deque[Message[Any]] = deque()
+        """Lockstep: frames that wait until every task about those before them has ended."""
+        self._carried = 0
+        """Tasks on the edge whose frame was published again, for its executor had it no more."""
         self._results: dict[int, Message[Any]] = {}
         self._timers: list[int] = []
         self._edge_since = 0
@@ -184,11 +191,17 @@ class DispatcherActor(StreamActor):
     # What happens.
 
     def _take(self, message: Message[Any]) -> None:
-        now = self._time(message.stamp)
         managed = self._by_done.get(message.stream)
         if managed is not None:
-            self._edge_answered(managed, message, now)
+            self._edge_answered(managed, message, self._time(message.stamp))
             return
+        self._references.note(message)
+        if self.session.lockstep:
+            self._held.append(message)
+        else:
+            self._arrive(message, self._time())
+
+    def _arrive(self, message: Message[Any], now: int) -> None:
         for one in self._managed:
             if message.stream in one.inputs:
                 self._frame_arrived(one, message, now)
@@ -220,7 +233,11 @@ class DispatcherActor(StreamActor):
         task = self._dispatch.running
         if task is None or task.profile.model != managed.stream:
             return
-        if self._frames[task.id].header != message.header:
+        frame = self._frames[task.id]
+        if frame.header != message.header:
+            return
+        if isinstance(message.item, MissingFrame):
+            self._send_task(task, frame.item)
             return
         self._results[task.id] = message
         if not self.session.lockstep:
@@ -319,15 +336,23 @@ class DispatcherActor(StreamActor):
         self._replace(f"left {self._log.label(oldest)} undecided beyond its deadline", now)
 
     def _settle(self) -> None:
-        """Lockstep: let the scheduler's own time run on until every task is decided."""
-        if self._dispatch.running is not None:
-            return
-        while self._dispatch.undecided and self._dispatch.running is None:
-            if not self._timers:
+        """Lockstep: let each frame arrive once every task about those before it has ended.
+
+        What a host takes for an execution, or how far a camera is ahead of it, must not count.
+        Meanwhile the scheduler's own time runs on from timer to timer.
+        """
+        while self._dispatch.running is None:
+            if not self._dispatch.undecided:
+                if not self._held:
+                    return
+                message = self._held.popleft()
+                self._arrive(message, self._time(message.stamp))
+            elif self._timers:
+                self._now = max(self._now, heapq.heappop(self._timers))
+                self._guarded("timer", self._now)
+            else:
                 self._replace("left tasks undecided without asking to be woken", self._now)
                 return
-            self._now = max(self._now, heapq.heappop(self._timers))
-            self._guarded("timer", self._now)
 
     def _guarded(self, event: str, *args: Any) -> None:  # noqa: ANN401
         """Tell the scheduler; one that raises, talks nonsense or is slow is replaced."""
@@ -389,9 +414,13 @@ class DispatcherActor(StreamActor):
 
     def run_edge(self, task: Task, now: int) -> None:
         """Give a task to its analysis' executor on the edge."""
-        frame = self._frames[task.id]
         self._edge_since = now
-        self._tasks[task.profile.model].derive(frame.item, frame, host_time_ns(), frame.stamp)
+        self._send_task(task, self._references.item(self._frames[task.id]))
+
+    def _send_task(self, task: Task, item: object) -> None:
+        frame = self._frames[task.id]
+        self._carried += isinstance(item, Frame)
+        self._tasks[task.profile.model].derive(item, frame, host_time_ns(), frame.stamp)
 
     def run_cloud(self, task: Task, now: int) -> None:
         """Send a task to the cloud."""
@@ -477,6 +506,7 @@ class DispatcherActor(StreamActor):
             "scheduler": type(self._dispatch.scheduler).__name__,
             "replaced": self._replaced,
             "edge_down": sorted(self._dispatch.down),
+            "frames_carried": self._carried,
             "cloud_slots": self._dispatch.resources.cloud_slots,
             "reserve_ms": self._way.reserve(1 << 62) / 1e6,
             "sites": self._cloud.values() if self._cloud is not None else {},

@@ -253,6 +253,7 @@ class _Planner:
             acknowledges=self.acknowledgements(node.id) == 0 and not managed,
             answers_always=managed,
             wakes=tuple(trigger_stream(node.id, waker.id) for waker in wakers),
+            frames=tuple(node.inputs) if managed else (),
         )
 
     def depth(self, stream: str) -> int:

@@ -18,10 +18,12 @@ from aerodaas import (
     Waypoint,
 )
 from aerodaas.analytics.base import Context
+from aerodaas.types.data import Readings
 
 __all__ = [
     "Above",
     "Broken",
+    "FrameNumbers",
     "Jitter",
     "ProcessId",
     "Ticker",
@@ -48,6 +50,19 @@ class Weave(NavigableAnalytics):
         command = VelocityCommand(1.0, 0.2 * float(item.velocity[1]), climb, 0.4)
         near = float(item.position[0]) < 8.0
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command] if near else [])
+
+
+class FrameNumbers(Analytics[Readings]):
+    """Says which frame it was given; under an analytics scheduler, where there is one."""
+
+    scheduled: ClassVar[bool] = True
+    produces: ClassVar[type] = Readings
+
+    def process(self, item: Frame, context: Context) -> Readings:
+        """The frame's number, and its stamp."""
+        assert item.image.any()
+        dawdle()
+        return Readings(context.now(), {"number": item.header.id, "stamp": item.header.stamp})
 
 
 class Jitter(Analytics[float]):

@@ -13,6 +13,7 @@ from typing import Any
 import psutil
 import pytest
 import schedulers_at_fault
+from analyses import FrameNumbers
 from flying import Flyer, hop, robot
 
 from aerodaas import AeroStreamData, Environment
@@ -132,6 +133,37 @@ def test_an_execution_on_the_edge_has_four_times_its_time(edge_time: int, patien
     assert actor._patience_with(profile) == patience * MILLISECOND
 
 
+@pytest.mark.parametrize("speed", [None, 1.0], ids=["lockstep", "real time"])
+def test_tasks_name_their_frames(flyer: Flyer, speed: float | None) -> None:
+    """Each analysis works on the frame that its task is about, and no frame is published again.
+
+    In lockstep what an execution takes of the host's time counts for nothing: no task waits.
+    """
+
+    def build(env: Environment) -> None:
+        env.set_analytics_scheduler("edf")
+        drone = env.get_robot_by_id("drone")
+        camera = drone.get_sensor_by_id("camera").get_data_stream()
+        for name in ("model", "other"):
+            analysis = FrameNumbers()
+            analysis.name = name
+            analysis.deploy(env.get_compute_resource_by_id("edge")).analyse(camera)
+        drone.navigate(hop((3, 0), hover=3))
+
+    content = _environment(10.0, edge_time=20, deadline=400)
+    content["schedulers"]["tasks"]["other"] = {"benefit": 10, "edge_time": 20, "deadline": 400}
+    run = flyer.fly(build, content, speed=speed)
+    assert run.recording is not None
+    with Recording.open(run.recording) as recording:
+        results = list(recording.records(schemas=["aerodaas.Value"]))
+        assert len(results) > 20
+        assert all(one.value["value"]["values"]["stamp"] == one.captured for one in results)
+    assert run.reports()["dispatcher"].values["frames_carried"] == 0
+    if speed is None:
+        ends = [one for one in _decisions(run) if one["action"] != "edge"]
+        assert {(one["action"], one["values"]["waited_ms"]) for one in ends} == {("done", 0.0)}
+
+
 @pytest.mark.slow
 def test_an_executor_that_dies_is_restarted_and_its_task_tried_again(flyer: Flyer) -> None:
     """With 20 s to go, the running task waits for the restart, runs once more and is done."""
@@ -147,6 +179,7 @@ def test_an_executor_that_dies_is_restarted_and_its_task_tried_again(flyer: Flye
     values = run.reports()["dispatcher"].values
     assert values["retried"] == 1
     assert values["edge_down"] == []
+    assert values["frames_carried"] >= 1
     assert ends["failed"] == 0
     again = next(one for one in _decisions(run) if one["action"] == "retry")
     assert again["reason"] == "its executor on the edge died"
