@@ -17,7 +17,6 @@ from typing import Any
 from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount, failure_line
 from aerodaas.actors.dispatch.recent_frames import FrameReference, MissingFrame, RecentFrames
 from aerodaas.actors.drone.mission_link import StreamLink
-from aerodaas.actors.run.replayed import RecordedWork
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session, next_due
 from aerodaas.actors.stream_names import ACKS
 from aerodaas.actors.streams import Publisher
@@ -200,9 +199,6 @@ class _Worker:
         """Stamp of the measurement that woke it; None while it sleeps."""
         self._states: deque[tuple[int, VehicleState]] = deque(maxlen=states)
         self._now = 0
-        self._asked: int | None = None
-        """Stamp of the state that the present item is worked on by."""
-        self._recorded = RecordedWork(actor.session, node.stream, node.robot)
         self._frames = RecentFrames(node.frames)
 
     def open(self) -> None:
@@ -315,22 +311,20 @@ class _Worker:
         received = host_time_ns()
         awake = self._awake(message.header.stamp)
         result = None
-        if message.item is not None and awake and self._recorded.includes(message.header):
-            self._recorded.turn_to(message.header)
+        if message.item is not None and awake:
             result = self._process(message.item, message.header.stamp)
         if result is not None:
             self._triggers.fire(result, message, self._stamp(message), self._complain)
-        # An answer without a result tells a replay that this item was worked on.
+        # An answer without a result tells the recording that this item was worked on, and when.
         if awake or self._actor.session.lockstep or self.node.answers_always:
-            stamp = self._stamp(message)
-            self._results.derive(result, message, received, stamp, self._asked)
+            self._results.derive(result, message, received, self._stamp(message))
         self._acknowledge(message)
 
     def _stamp(self, message: Message[Any]) -> int:
         return message.stamp if self._actor.session.lockstep else self._actor.clock.now()
 
     def _process(self, item: Any, now: int) -> Any:  # noqa: ANN401
-        self._now, self._asked = now, None
+        self._now = now
         began = self._at_work_since = time.perf_counter()
         try:
             return self.node.work.process(item, self)
@@ -381,13 +375,9 @@ class _Worker:
 
     def vehicle(self) -> VehicleState | None:
         """The newest state; in lockstep at the item's own time, however far we have flown since."""
-        recorded = self._recorded.vehicle()
-        if recorded is not None:
-            return recorded
         lockstep = self._actor.session.lockstep
-        known = (one for one in reversed(self._states) if one[0] <= self._now or not lockstep)
-        self._asked, state = next(known, (None, None))
-        return state
+        states = reversed(self._states)
+        return next((s for at, s in states if at <= self._now or not lockstep), None)
 
     def alert(self, alert: Alert) -> None:
         # In lockstep only the messages know the time, not the actor's clock.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import uuid
+from bisect import bisect_right
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 from aerodaas.actors.run.application import Application
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.recording.replay.timeline import ReplayTimeline, later
 from aerodaas.types.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
 
 __all__ = [
@@ -15,8 +16,8 @@ __all__ = [
     "CONTROL_RATE",
     "FRAME_DEPTH",
     "MESSAGE_DEPTH",
+    "NEVER",
     "Session",
-    "is_due",
     "next_due",
 ]
 
@@ -24,6 +25,8 @@ FRAME_DEPTH = 8
 """Frames that may wait for a reader that wants them all; each is megabytes of shared memory."""
 MESSAGE_DEPTH = 32
 """Other messages that may wait for a reader that wants them all."""
+NEVER = 2**63 - 1
+"""A stamp that does not come."""
 CONTROL_RATE = 20.0
 """Turns of the setpoint loop in a second: ten times what PX4 asks for in offboard mode."""
 CONTROL_PERIOD_NS = int(NANOSECONDS / CONTROL_RATE)
@@ -40,20 +43,21 @@ class Session:
     """Prefix of the run's stream names; unique on a host."""
     origin_ns: int = field(default_factory=host_time_ns)
     """Host time at which mission time is zero."""
-    replay_timeline: ReplayTimeline = field(default_factory=ReplayTimeline)
-    """In a replay, what the recorded flight did when."""
+    timetables: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    """Stamps in nanoseconds, in order, at which sources are due that go by no rate."""
     application: Application = field(default_factory=Application)
     """What the application's own files define."""
 
     def next_due(self, source: str, rate: float, after: int) -> int:
-        """The first stamp later than `after` at which `source`, of `rate` Hz, is due."""
-        stamps = self.replay_timeline.readings.get(source)
-        return next_due(rate, after) if stamps is None else later(stamps, after)
+        """The first stamp later than `after` at which `source`, of `rate` Hz, is due.
 
-    def next_turn(self, robot: str, after: int) -> int:
-        """The first stamp later than `after` at which the setpoint loop of `robot` turns."""
-        turns = self.replay_timeline.turns.get(robot)
-        return next_due(CONTROL_RATE, after) if turns is None else later(turns, after)
+        NEVER once its timetable, if it has one, is over.
+        """
+        stamps = self.timetables.get(source)
+        if stamps is None:
+            return next_due(rate, after)
+        place = bisect_right(stamps, after)
+        return stamps[place] if place < len(stamps) else NEVER
 
     def is_due(self, source: str, rate: float, stamp: int) -> bool:
         """Tell whether `source`, of `rate` Hz, is due at `stamp`."""
@@ -91,11 +95,6 @@ def next_due(rate: float, after: int) -> int:
     while _stamp(rate, index) <= after:
         index += 1
     return _stamp(rate, index)
-
-
-def is_due(rate: float, stamp: int) -> bool:
-    """Tell whether `stamp` lies on the grid of something with `rate` Hz."""
-    return next_due(rate, stamp - 1) == stamp
 
 
 def _stamp(rate: float, index: int) -> int:

@@ -27,6 +27,7 @@ from aerodaas.actors.session import (
     CONTROL_PERIOD_NS,
     CONTROL_RATE,
     MESSAGE_DEPTH,
+    NEVER,
     Session,
     next_due,
 )
@@ -39,7 +40,6 @@ from aerodaas.actors.stream_names import (
 )
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.mission.safety.setpoint_filter import Neighbour
-from aerodaas.recording.replay.timeline import NEVER
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.clock import LockstepClock
 from aerodaas.types.errors import AeroDaaSError
@@ -264,20 +264,20 @@ class DroneActor(StreamActor):
         assert isinstance(self.clock, LockstepClock)  # noqa: S101 - the session says so
         self._barrier = Barrier(self._conduct.windows)
         self._due = {source: self._next_due(source, -1) for source in self._conduct.rates}
-        turns = {name: self.session.next_turn(name, -1) for name in self._controllers}
+        due = 0
         while not self._over():
             self._gate.visit(lambda: self._await(drain=True))
             readings = [controller.next_reading for controller in self._controllers.values()]
-            now = min([*turns.values(), *self._due.values(), *readings])
+            now = min([due, *self._due.values(), *readings])
             if now == NEVER:
                 break
             self.clock.advance_to(now)
-            for name, controller in self._controllers.items():
+            for controller in self._controllers.values():
                 controller.advance_to(now)
-                controller.listen(now)
-                if now == turns[name]:
+                if now == due:
                     self._turn(controller, now)
-                    turns[name] = self.session.next_turn(name, now)
+            if now == due:
+                due = next_due(CONTROL_RATE, now)
             self._measure(now)
             self._publish_reports()
             self._await(drain=False)

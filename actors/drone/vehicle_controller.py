@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,8 +13,7 @@ from aerodaas.actors.base import failure_line
 from aerodaas.actors.drone.background_publisher import BackgroundPublisher
 from aerodaas.actors.drone.planner import PlannerExecutor
 from aerodaas.actors.drone.robot_report import Latencies
-from aerodaas.actors.run.replayed import ReplayedArrivals, WatchedPlanner, as_planned
-from aerodaas.actors.session import Session
+from aerodaas.actors.session import NEVER, Session
 from aerodaas.actors.stream_names import (
     reply_stream,
     request_stream,
@@ -36,16 +35,15 @@ from aerodaas.mission.commands import (
 )
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
+from aerodaas.mission.planner import BackgroundPlanner, InlinePlanner, Planner, solve
 from aerodaas.mission.rehearsal import give
 from aerodaas.mission.safety.setpoint_filter import Neighbour
-from aerodaas.recording.replay.timeline import NEVER
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.geometry import GeodeticOrigin
-from aerodaas.types.status import Message, MissionStatus, ReceivedMessage, SetpointRecord
+from aerodaas.types.status import Message, MissionStatus, SetpointRecord
 from aerodaas.types.vehicle import (
     ClockedVehicle,
     PlayedVehicle,
@@ -108,11 +106,6 @@ class VehicleController:
         self._turned = -1
         self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
         self._due = {sensor.id: self._next_due(sensor, -1) for sensor in spec.sensors}
-        self._arrivals = ReplayedArrivals(
-            session.replay_timeline.heard.get(self.id, ()), spec.commands
-        )
-        self._heard: list[ReceivedMessage] = []
-        """Since the last turn."""
         self._failures = 0
         """Turns in a row that raised."""
         self._blamed: set[tuple[str, type[Exception]]] = set()
@@ -128,7 +121,7 @@ class VehicleController:
         robot, environment = self.spec.robot, self._session.environment
         takeoff = self.vehicle.read().odometry.position
         home = environment.home
-        self._planner = WatchedPlanner(self.make_planner(self.spec.scheduler))
+        self._planner = self.make_planner(self.spec.scheduler)
         self.mission = Mission(
             robot,
             self._planner,
@@ -146,7 +139,7 @@ class VehicleController:
         """What plans by `scheduler`; may take seconds to start."""
         # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
         if self._session.lockstep:
-            return as_planned(scheduler, self._session.replay_timeline.plans.get(self.id, ()))
+            return InlinePlanner(scheduler)
         if not scheduler.isolated:
             return BackgroundPlanner(scheduler)
         patience = _PLANS_PATIENCE * self.spec.robot.mission.plan_timeout
@@ -188,10 +181,10 @@ class VehicleController:
 
     def use_planner(self, planner: Planner) -> None:
         """Plan by `planner` from now on, beginning with what is queued."""
-        former, self._planner.planner = self._planner.planner, planner
+        former, self._planner = self._planner, planner
+        self.mission.use_planner(planner)
         if isinstance(former, BackgroundPlanner):
             former.close()
-        self.mission.replan()
 
     def advance_to(self, stamp: int) -> None:
         """Move a simulated vehicle's time on."""
@@ -223,10 +216,7 @@ class VehicleController:
         self._alerts.append(Alert(Header(len(self._alerts), now, self.id), kind, text))
 
     def take(self, message: Message[Any], now: int) -> None:
-        """Pass on what came by stream: navigation, or a command of a trigger.
-
-        In a replay, it counts when it did in the recorded flight: `listen` passes it on.
-        """
+        """Pass on what came by stream: navigation, or a command of a trigger."""
         try:
             self._take(message, now)
         except Exception as error:  # noqa: BLE001 - the item's failure, never the loop's
@@ -237,24 +227,15 @@ class VehicleController:
             return
         if message.stream in self.spec.navigation:
             self.latencies.append((host_time_ns() - message.captured) / 1e6)
-        if message.stream in (*self.spec.navigation, *self.spec.commands):
-            self._arrivals.add(message, now)
-            if not self._session.lockstep:
-                self.listen(now + 1)
+            command = StreamItem(message.stream, message.item, message.header)
+            self._obey(command, now, f"an item of {message.stream}")
+        elif message.stream in self.spec.commands:
+            item: Any = message.item
+            self._obey(item, now, f"an item of {message.stream}")
         elif message.stream in self._replies and isinstance(message.item, Request):
             answer = self._obey(message.item.command, now, f"a request on {message.stream}")
             reply = Reply(message.item.number, answer)
             self._publish(self._replies[message.stream], reply, now)
-
-    def listen(self, now: int) -> None:
-        """Have the mission hear what counts before `now`."""
-        for message, at in self._arrivals.before(now):
-            item: Any = message.item
-            header = message.header
-            self._heard.append(ReceivedMessage(message.stream, header.source, header.stamp, at))
-            steers = message.stream in self.spec.navigation
-            command = StreamItem(message.stream, item, header) if steers else item
-            self._obey(command, at, f"an item of {message.stream}")
 
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
         """One turn of the setpoint loop; publishes what was decided.
@@ -263,7 +244,6 @@ class VehicleController:
         the drone hover; the error is raised only once a second of turns has ended so.
         """
         try:
-            self._planner.turn(now)
             record = self.loop.turn(now, neighbours)
             self._failures = 0
         except Exception as error:
@@ -271,8 +251,6 @@ class VehicleController:
             if self._failures >= _TURNS_FAILED or self.loop.state is None:
                 raise
             record = self._recover(error, now)
-        record = replace(record, heard=tuple(self._heard), planned=self._planner.answered)
-        self._heard.clear()
         self._turned = now
         self._publish(setpoint_stream(self.id), record, now)
         self._publish(status_stream(self.id), self.mission.status, now)

@@ -55,13 +55,9 @@ class Publisher:
         origin: Message[Any],
         received: int,
         stamp: int,
-        state: int | None = None,
     ) -> Message[Any]:
-        """Publish what was made from `origin`, which arrived at host time `received`.
-
-        `state` is the mission time of the vehicle's state that it was made by.
-        """
-        spans = (*origin.spans, TraceSpan(self.stream, received, host_time_ns(), state))
+        """Publish what was made from `origin`, which arrived at host time `received`."""
+        spans = (*origin.spans, TraceSpan(self.stream, received, host_time_ns()))
         return self._send(stamp, origin.header, origin.captured, spans, item)
 
     def _send(

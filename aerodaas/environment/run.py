@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from aerodaas.actors.run.flight import Flight, FlightState
     from aerodaas.actors.run.plan import FlightPlan
     from aerodaas.environment.environment import Environment
-    from aerodaas.recording.replay.timeline import ReplayTimeline
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
 __all__ = ["Run"]
@@ -233,7 +232,7 @@ class Run:
         self._change_models()
         application = self._application()
         session = Session(
-            self.config, speed, replay_timeline=self._replay_timeline(), application=application
+            self.config, speed, timetables=self._timetables(), application=application
         )
         compute = self._environment.compute()
         joins = self.options.address or os.environ.get("RAY_ADDRESS")
@@ -263,16 +262,15 @@ class Run:
         if any(robot.driver == "simulated" for robot in self.config.robots):
             load_scenario(self.config.simulation.world)
 
-    def _replay_timeline(self) -> ReplayTimeline:
-        from aerodaas.recording.replay.timeline import ReplayTimeline  # noqa: PLC0415 - only where it flies
-
+    def _timetables(self) -> dict[str, tuple[int, ...]]:
+        """When sources measure in a replay; none in any other flight."""
         if self.options.replay is None:
-            return ReplayTimeline()
-        from aerodaas.recording.replay.timeline_reader import (  # noqa: PLC0415 - loads decoders
-            read_replay_timeline,
+            return {}
+        from aerodaas.recording.replay.timetables import (  # noqa: PLC0415 - loads decoders
+            read_timetables,
         )
 
-        return read_replay_timeline(self.options.replay)
+        return read_timetables(self.options.replay)
 
     def _change_models(self) -> None:
         """Give every detector the model that the command line asks for."""

@@ -262,9 +262,9 @@ class Mission:
         }
         return turns.get(self.state, self._fly)(state)
 
-    def replan(self) -> None:
-        """Plan the whole queue again, because the trajectory scheduler has been replaced."""
-        self._navigator.replan()
+    def use_planner(self, planner: Planner) -> None:
+        """Plan with `planner` from now on, beginning with the whole queue."""
+        self._navigator.use_planner(planner)
 
     def vehicle_refused(self, text: str) -> None:
         """Record that the vehicle refused an action; `text` is the vehicle's message."""

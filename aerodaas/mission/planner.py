@@ -6,7 +6,6 @@ lockstep are deterministic; `BackgroundPlanner` plans on an executor while the d
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -21,7 +20,6 @@ __all__ = [
     "Plan",
     "PlanRequest",
     "Planner",
-    "SerialPlanner",
     "solve",
 ]
 
@@ -102,32 +100,6 @@ class _SchedulerPlanner:
         return self._scheduler.replans_on_arrival
 
 
-class SerialPlanner(_SchedulerPlanner, ABC):
-    """Makes one plan at a time; of the waiting requests, only the newest is kept."""
-
-    _waiting: PlanRequest | None = None
-
-    def submit(self, request: PlanRequest) -> None:
-        """Start planning as soon as the current plan is done."""
-        self._waiting = request
-        if not self._busy:
-            self._next()
-
-    def _next(self) -> None:
-        request, self._waiting = self._waiting, None
-        if request is not None:
-            self._begin(request)
-
-    @property
-    @abstractmethod
-    def _busy(self) -> bool:
-        """Whether a plan is being made or has not been returned yet."""
-
-    @abstractmethod
-    def _begin(self, request: PlanRequest) -> None:
-        """Start making this plan."""
-
-
 class InlinePlanner(_SchedulerPlanner):
     """Plans synchronously in `submit`."""
 
@@ -143,8 +115,8 @@ class InlinePlanner(_SchedulerPlanner):
         return plan
 
 
-class BackgroundPlanner(SerialPlanner):
-    """Plans on an executor.
+class BackgroundPlanner(_SchedulerPlanner):
+    """Makes one plan at a time on an executor; of the waiting requests, only the newest is kept.
 
     A process keeps the setpoint loop free of the interpreter lock that long plans hold; the
     scheduler is sent there with each request and so must pickle. Without an executor, a thread is
@@ -157,6 +129,13 @@ class BackgroundPlanner(SerialPlanner):
         self._executor = executor or ThreadPoolExecutor(1, "planner")
         self._running: Future[Plan] | None = None
         self._request: PlanRequest | None = None
+        self._waiting: PlanRequest | None = None
+
+    def submit(self, request: PlanRequest) -> None:
+        """Start planning as soon as the current plan is done."""
+        self._waiting = request
+        if self._running is None:
+            self._begin()
 
     def poll(self) -> Plan | None:
         """Return the plan that is ready, and start on the waiting request."""
@@ -171,18 +150,17 @@ class BackgroundPlanner(SerialPlanner):
             if error is None
             else Plan(request, request.pending, f"planning failed: {error}")
         )
-        self._next()
+        self._begin()
         return plan
 
     def close(self) -> None:
         """Release the executor; a plan being made is not waited for."""
         self._executor.shutdown(wait=False, cancel_futures=True)
 
-    @property
-    def _busy(self) -> bool:
-        return self._running is not None
-
-    def _begin(self, request: PlanRequest) -> None:
+    def _begin(self) -> None:
+        request, self._waiting = self._waiting, None
+        if request is None:
+            return
         self._request = request
         try:
             self._running = self._executor.submit(solve, self._scheduler, request)

@@ -273,14 +273,10 @@ def _latency(message: Message[Any]) -> Entry:
     spans = []
     before = message.captured
     for span in message.spans:
-        entry: dict[str, Any] = {
-            "node": span.node,
-            "wait_ms": (span.received - before) / _MILLISECOND,
-            "work_ms": (span.published - span.received) / _MILLISECOND,
-        }
-        if span.state is not None:
-            entry["state"] = span.state
-        spans.append(entry)
+        wait, work = span.received - before, span.published - span.received
+        spans.append(
+            {"node": span.node, "wait_ms": wait / _MILLISECOND, "work_ms": work / _MILLISECOND}
+        )
         before = span.published
     value = {
         "stream": message.stream,

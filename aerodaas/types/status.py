@@ -16,7 +16,6 @@ __all__ = [
     "Message",
     "MissionState",
     "MissionStatus",
-    "ReceivedMessage",
     "SetpointRecord",
     "TraceSpan",
 ]
@@ -88,18 +87,6 @@ class MissionStatus:
         return visited / known if known else 0.0
 
 
-class ReceivedMessage(NamedTuple):
-    """Something that reached a mission by stream."""
-
-    stream: str
-    source: str
-    """Of the measurement that it was made from."""
-    stamp: int
-    """Of that measurement."""
-    at: int
-    """Mission clock when it was heard."""
-
-
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class SetpointRecord:
@@ -112,10 +99,6 @@ class SetpointRecord:
     """Names of the limits that changed it, such as `max_speed` or `geofence`."""
     cause: Header | None = None
     """Measurement that the command behind this setpoint was made from, for latency."""
-    heard: tuple[ReceivedMessage, ...] = ()
-    """Navigation and commands that came since the last turn, in the order in which they counted."""
-    planned: bool = False
-    """Whether a plan had come from the trajectory scheduler."""
 
 
 @fast_pickle
@@ -140,8 +123,6 @@ class TraceSpan(NamedTuple):
     node: str
     received: int
     published: int
-    state: int | None = None
-    """Mission clock of the vehicle's state that it went by; None if it asked for none."""
 
 
 @dataclass(frozen=True, slots=True)

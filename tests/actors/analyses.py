@@ -55,7 +55,7 @@ class Weave(NavigableAnalytics):
 class FrameNumbers(Analytics[Readings]):
     """Says which frame it was given; under an analytics scheduler, where there is one."""
 
-    scheduled: ClassVar[bool] = True
+    scheduled = True
     produces: ClassVar[type] = Readings
 
     def process(self, item: Frame, context: Context) -> Readings:

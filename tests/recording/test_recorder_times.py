@@ -113,7 +113,7 @@ def test_without_drops_nothing_is_said_of_them(tmp_path: Path) -> None:
 
 
 HOP = TraceSpan("cam", 2_000_000, 5_000_000)
-SECOND_HOP = TraceSpan("find", 6_000_000, 8_500_000, 5)
+SECOND_HOP = TraceSpan("find", 6_000_000, 8_500_000)
 
 
 @pytest.mark.parametrize(
@@ -137,7 +137,7 @@ def test_the_way_is_told_where_nothing_else_tells_it(
 
 
 def test_the_way_of_a_message_in_full(tmp_path: Path) -> None:
-    """Captured at 1 ms, each span's wait and work after that; a state only where there is one."""
+    """Captured at 1 ms, each span's wait and work after that."""
     path = tmp_path / "a.mcap"
     written(path, message(3, "note", seq=6, spans=(HOP, SECOND_HOP)))
     (found,) = read(path, "/latency")
@@ -149,7 +149,7 @@ def test_the_way_of_a_message_in_full(tmp_path: Path) -> None:
         "total_ms": 7.5,
         "hops": [
             {"node": "cam", "wait_ms": 1.0, "work_ms": 3.0},
-            {"node": "find", "wait_ms": 1.0, "work_ms": 2.5, "state": 5},
+            {"node": "find", "wait_ms": 1.0, "work_ms": 2.5},
         ],
     }
     assert (found.schema, found.stamp, found.captured) == (

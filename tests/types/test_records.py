@@ -34,7 +34,6 @@ from aerodaas.types.status import (
     Decision,
     MissionState,
     MissionStatus,
-    ReceivedMessage,
     SetpointRecord,
 )
 from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
@@ -59,7 +58,7 @@ RECORDS: list[Any] = [
     PositionSetpoint(np.zeros(3)),
     SETPOINT,
     VehicleState(1, ODOMETRY, Battery(1.0), VehicleMode.GROUNDED, armed=False),
-    SetpointRecord(1, SETPOINT, SETPOINT, ("fence",), None, (ReceivedMessage("s", "c", 1, 2),)),
+    SetpointRecord(1, SETPOINT, SETPOINT, ("fence",)),
     Decision(1, "t", "edge", "", {"slack": 0.1}),
     MissionStatus(1, MissionState.ENROUTE),
     Waypoint("a", 1.0, 2.0, 3.0),

@@ -54,8 +54,6 @@ SETPOINT = json_schema(
     sent={},
     clipped_by="array",
     cause={},
-    heard={"type": "array", "items": {"type": "object"}},
-    planned="boolean",
 )
 
 
@@ -138,8 +136,6 @@ def setpoint(item: SetpointRecord, message: Message[Any], session: Session) -> I
         "sent": _setpoint_json(item.sent),
         "clipped_by": item.clipped_by,
         "cause": item.cause._asdict() if item.cause else None,
-        "heard": [one._asdict() for one in item.heard],
-        "planned": item.planned,
     }
     yield Entry(topic(message.stream, "setpoint"), SETPOINT, json_bytes(value), item.stamp)
 

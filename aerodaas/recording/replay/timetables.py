@@ -1,0 +1,66 @@
+"""When each source of a recorded flight measured: the timetables of its replay."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from aerodaas.recording.encoding import stream_of
+from aerodaas.recording.reader import Record, Recording
+
+__all__ = ["read_timetables"]
+
+
+class _Reading:
+    """Gathers stamps by stream, message by message."""
+
+    def __init__(self) -> None:
+        self.stamps: dict[str, set[int]] = defaultdict(set)
+
+    def frame(self, record: Record) -> None:
+        self.stamps[record.value["source"]].add(record.value["stamp"])
+
+    def reading(self, record: Record) -> None:
+        """Of a sensor, whose stream is the topic without the kind of data."""
+        name = record.topic.strip("/")
+        # A stream that is named after the kind of its data does not repeat it.
+        for stream in (name, name.rpartition("/")[0]):
+            self.stamps[stream_of(stream)].add(record.stamp)
+
+    def result(self, record: Record) -> None:
+        """Of an analysis; one without inputs measures something itself."""
+        source = record.value["source"]
+        if source == stream_of(record.topic.strip("/").rpartition("/")[0]):
+            self.stamps[source].add(record.value["stamp"])
+
+    def latency(self, record: Record) -> None:
+        """Of a message; one that has passed through one actor only is a measurement."""
+        if len(record.value["hops"]) == 1:
+            self.stamps[record.value["stream"]].add(record.captured)
+
+
+def read_timetables(path: str | Path) -> dict[str, tuple[int, ...]]:
+    """Stamps (mission clock, nanoseconds) of each source's measurements, in order, by stream.
+
+    Raises RecordingError if the recording cannot be read.
+    """
+    with Recording.open(path) as recording:
+        found = _Reading()
+        readers: dict[str, Callable[[Record], None]] = {
+            "aerodaas.Frame": found.frame,
+            "foxglove.Odometry": found.reading,
+            "foxglove.LocationFix": found.reading,
+            "aerodaas.Battery": found.reading,
+            "aerodaas.MissionStatus": found.reading,
+            "aerodaas.Detections": found.result,
+            "aerodaas.Navigation": found.result,
+            "aerodaas.Value": found.result,
+            "aerodaas.Latency": found.latency,
+        }
+        for record in recording.records(schemas=readers):
+            # Another version's message: the rest is still worth keeping to.
+            with suppress(KeyError, TypeError, IndexError, AttributeError):
+                readers[record.schema](record)
+    return {stream: tuple(sorted(stamps)) for stream, stamps in found.stamps.items()}
