@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: fly test lint training clean
+.PHONY: fly test lint docs training clean
 
 fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
@@ -23,6 +23,10 @@ lint: $(VENV)/.installed-dev
 	$(BIN)/mypy
 	$(BIN)/pyright
 
+# The documentation with its API reference, in site/index.html.
+docs: $(VENV)/.installed-dev
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "AeroDaaS needs Python 3.10 or newer; run: make PYTHON=python3.x")'
 	$(PYTHON) -m venv $(VENV)
@@ -40,4 +44,4 @@ training: $(VENV)/.installed-dev
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'torch==2.13.0' -e '.[dev,training]'
 
 clean:
-	rm -rf $(VENV) runs
+	rm -rf $(VENV) runs site

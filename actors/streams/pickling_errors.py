@@ -20,6 +20,7 @@ _MOST = 1000
 def culprit(item: object, error: Exception) -> str:
     """Say which part of `item` cannot be sent, and why; `error` is what came of the whole.
 
+    >>> import threading
     >>> culprit({"lock": threading.Lock()}, TypeError("cannot pickle '_thread.lock' object"))
     "a dict cannot be sent: its item 'lock', a lock: cannot pickle '_thread.lock' object"
     """
