@@ -9,12 +9,14 @@ from .dataflow.interfaces import IAnalyse as IAnalyse
 from .dataflow.interfaces import ICompute as ICompute
 from .dataflow.interfaces import IDeployable as IDeployable
 from .dataflow.interfaces import IEnvironment as IEnvironment
+from .dataflow.interfaces import IMonitoringAnalytics as IMonitoringAnalytics
 from .dataflow.interfaces import INavigableAnalyse as INavigableAnalyse
 from .dataflow.interfaces import INavigate as INavigate
 from .dataflow.interfaces import IPullSensor as IPullSensor
 from .dataflow.interfaces import IPushSensor as IPushSensor
 from .dataflow.interfaces import IRobot as IRobot
 from .dataflow.interfaces import ISensor as ISensor
+from .dataflow.navigation import AeroNav as AeroNav
 from .dataflow.navigation import AeroNavigation as AeroNavigation
 from .dataflow.navigation import PriorityQueue as PriorityQueue
 from .environment.environment import Environment as Environment
@@ -35,6 +37,7 @@ from .types.data import Header as Header
 from .types.data import Image as Image
 from .types.data import Odom as Odom
 from .types.data import Odometry as Odometry
+from .types.data import Readings as Readings
 from .types.errors import AeroDaaSError as AeroDaaSError
 from .types.waypoints import NavigationType as NavigationType
 from .types.waypoints import SchedulingType as SchedulingType

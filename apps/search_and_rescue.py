@@ -2,9 +2,8 @@
 
 from math import dist
 
-from aerodaas import AeroNavigation, Environment, MonitoringAnalytics, Waypoint
+from aerodaas import AeroNavigation, Environment, MonitoringAnalytics, Readings, Waypoint
 from aerodaas.analytics import VipDetectionAnalytics, VipFollowAnalytics
-from aerodaas.types.data import Readings
 
 SAFE, NEAR = (57, 6), 3
 

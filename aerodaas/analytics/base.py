@@ -25,14 +25,17 @@ from typing import (
     TypeVar,
     get_args,
     get_origin,
+    overload,
     runtime_checkable,
 )
 
 from typing_extensions import Self
 
+from aerodaas.analytics.single_item import process_item
 from aerodaas.config.model import RuntimeEnvConfig, TaskConfig, as_runtime_env
+from aerodaas.dataflow.containers import AeroData
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node, Trigger, refusal
-from aerodaas.dataflow.interfaces import IAeroData, IAnalyse, ICompute, INavigableAnalyse
+from aerodaas.dataflow.interfaces import IAnalyse, ICompute, INavigableAnalyse
 from aerodaas.dataflow.names import PaperNames, snake_case
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.mission.commands import TRIGGERED
@@ -153,19 +156,44 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         self._runtime_env = other._runtime_env
         return self
 
-    def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co]:
-        """Analyse a stream; called again, the same analysis reads a further stream.
+    @overload
+    def analyse(self, data: AeroStreamData[Any]) -> AeroStreamData[O_co]: ...
+    @overload
+    def analyse(self, data: AeroData[Any]) -> AeroData[O_co | None]: ...
+    def analyse(self, data: object) -> AeroStreamData[O_co] | AeroData[O_co | None]:
+        """Analyse a stream, or a single item at once.
 
-        While a mission flies, the analysis starts at once; it can then not be changed any more.
-        Raises GraphError if `data` is no stream or carries the wrong type, and in flight whatever
-        the analysis' `open` raises.
+        Called again with a stream, the same analysis reads that one, too. While a mission flies,
+        the analysis starts at once; it can then not be changed any more. A single item, such as
+        `AeroData(frame)`, is processed in the application's process, without a mission.
+
+        Args:
+            data: A stream of items that the analysis accepts, or one such item.
+
+        Returns:
+            The stream of results; of a single item its result, which may be None.
+
+        Raises:
+            GraphError: If `data` is neither, or carries another type.
+            Exception: What the analysis' `open` raises, for a single item and in flight.
         """
-        if not isinstance(data, AeroStreamData):
+        if isinstance(data, AeroStreamData):
+            return self._analyse_stream(data)
+        if not isinstance(data, AeroData):
             message = (
-                f"{type(self).__name__} takes a stream, not {type(data).__name__}; "
+                f"{type(self).__name__} takes a stream or AeroData, not {type(data).__name__}; "
                 "get one with sensor.get_data_stream() or another analysis"
             )
             raise GraphError(message)
+        item = data.get_data()
+        self._prepare_for(type(item))
+        return AeroData(process_item(self, item))
+
+    def _prepare_for(self, item: type) -> None:
+        """Prepare for items of this type; raises GraphError for one that needs something else."""
+
+    def _analyse_stream(self, data: AeroStreamData[Any]) -> AeroStreamData[O_co]:
+        self._prepare_for(data.item)
         graph = data.graph
         if self.node is not None:
             self._require_idle("read a further stream")
@@ -270,6 +298,6 @@ class NavigableAnalytics(Analytics[AeroNavigation], INavigableAnalyse):
 
     produces: ClassVar[type] = AeroNavigation
 
-    def generate_navigation(self, data: IAeroData[Any]) -> AeroStreamData[AeroNavigation]:
+    def generate_navigation(self, data: AeroStreamData[Any]) -> AeroStreamData[AeroNavigation]:
         """Turn analytics' results into navigation; the same as `analyse`."""
         return self.analyse(data)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, TypeAlias, TypeVar
+from typing import ClassVar, TypeAlias, TypeVar
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.models import DETECTOR_CLASSES
-from aerodaas.dataflow.graph import AeroStreamData
-from aerodaas.dataflow.interfaces import IAeroData
 from aerodaas.types.data import Alert, Detections, Frame
 from aerodaas.types.errors import GraphError
 
@@ -52,12 +50,10 @@ class BoxAnalytics(Analytics[O_co]):
         self.detector = detector
         self._explained = False
 
-    def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co]:
-        """Analyse a stream of boxes or of frames; raises GraphError for any other."""
-        if isinstance(data, AeroStreamData) and issubclass(data.item, Frame):
+    def _prepare_for(self, item: type) -> None:
+        if issubclass(item, Frame):
             self.detector = self.detector or shipped_detector(type(self).__name__, self.labels)
             self.isolated = True
-        return super().analyse(data)
 
     def examine(self, boxes: Detections, context: Context) -> O_co | None:
         """Turn the boxes of one frame into a result."""

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, overload
 
 from typing_extensions import Self
 
 if TYPE_CHECKING:
+    from aerodaas.dataflow.containers import AeroData
     from aerodaas.dataflow.graph import AeroStreamData
     from aerodaas.dataflow.navigation import AeroNavigation
 
@@ -22,6 +23,7 @@ __all__ = [
     "ICompute",
     "IDeployable",
     "IEnvironment",
+    "IMonitoringAnalytics",
     "INavigableAnalyse",
     "INavigate",
     "IPullSensor",
@@ -95,11 +97,15 @@ class IDeployable(ABC):
 
 
 class IAnalyse(IDeployable, Generic[O_co]):
-    """An analysis of streams."""
+    """An analysis of streams, or of single items."""
 
+    @overload
+    def analyse(self, data: AeroStreamData[Any]) -> AeroStreamData[O_co]: ...
+    @overload
+    def analyse(self, data: AeroData[Any]) -> AeroData[O_co | None]: ...
     @abstractmethod
-    def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co]:
-        """Analyse a stream; the results are a stream of their own."""
+    def analyse(self, data: Any) -> Any:
+        """Analyse a stream, whose results are a stream of their own; or one item, at once."""
 
     @abstractmethod
     def instantiate(self) -> AeroStreamData[O_co]:
@@ -112,6 +118,10 @@ class IAnalyse(IDeployable, Generic[O_co]):
         when: Callable[[Any], bool] | None = None,
     ) -> Self:
         """Wake another analysis, or do something to a robot, `when` a result says so."""
+
+
+class IMonitoringAnalytics(IAnalyse[O_co]):
+    """An analysis whose results are readings of a robot and its mission, to be watched."""
 
 
 class INavigate(ABC):
@@ -144,7 +154,7 @@ class INavigableAnalyse(IAnalyse["AeroNavigation"]):
     """An analysis whose results are navigation."""
 
     @abstractmethod
-    def generate_navigation(self, data: IAeroData[Any]) -> AeroStreamData[AeroNavigation]:
+    def generate_navigation(self, data: AeroStreamData[Any]) -> AeroStreamData[AeroNavigation]:
         """Turn analytics' results into navigation; the same as `analyse`, as the table names it."""
 
 

@@ -18,7 +18,7 @@ from aerodaas.types.waypoints import (
     Waypoint,
 )
 
-__all__ = ["AeroNavigation", "PriorityQueue"]
+__all__ = ["AeroNav", "AeroNavigation", "PriorityQueue"]
 
 
 class AeroNavigation(AeroListData[NavigationItem]):
@@ -78,6 +78,8 @@ def _checked(data: Iterable[object], priority: int | None) -> list[NavigationIte
     return items if priority is None else [replace(item, priority=priority) for item in items]
 
 
+AeroNav = AeroNavigation
+"""The paper's name in its table."""
 N = TypeVar("N")
 
 

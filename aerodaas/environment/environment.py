@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from aerodaas.actors.run.checks import check_environment
 from aerodaas.config.model import ComputeConfig, EnvironmentConfig, RobotConfig
@@ -25,6 +25,7 @@ from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.trajectory.base import NavigationEntry, TrajectoryScheduler
 from aerodaas.types.errors import ConfigError, GraphError, MissionError, UnknownIdError
 from aerodaas.types.identifiers import find_scoped
+from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["Environment", "Robot"]
 
@@ -116,6 +117,69 @@ class Environment(PaperNames, IEnvironment):
             if resource.id == compute_id:
                 return Compute(self.graph, resource)
         raise UnknownIdError("compute resource", compute_id, [one.id for one in self.compute()])
+
+    def share_out(
+        self,
+        waypoints: Sequence[Waypoint],
+        *,
+        objective: Literal["energy", "time"] = "energy",
+        budget: float = 2.0,
+    ) -> dict[str, list[Waypoint]]:
+        """Share waypoints out over all robots; each flies its tour and comes home.
+
+        A robot's charge less its reserve bounds its tour. Waypoints that no robot can serve, or
+        not by their deadline, are left out.
+
+        Args:
+            waypoints: Local or global waypoints.
+            objective: `energy` for the least energy of all robots together, `time` for the
+                earliest return of the last robot.
+            budget: Seconds to search for.
+
+        Returns:
+            The waypoints of each robot in order, local ENU, by the robot's id.
+
+        Raises:
+            InvalidWaypointError: For a relative waypoint, or a global one without a `home` in the
+                environment file.
+            SchedulerError: Without PyVRP (on Python 3.10).
+        """
+        from aerodaas.environment.fleet import shared_waypoints  # noqa: PLC0415 - loads PyVRP
+
+        return shared_waypoints(self.config, waypoints, objective, budget)
+
+    def start_mission(self, hook: Callable[[], None] | None = None, *, wait: bool = True) -> None:
+        """Start the mission of every robot that navigates, as `Robot.start_mission` does.
+
+        Args:
+            hook: Called before the flight, after the hooks of all robots' `on_start`.
+            wait: Return when the mission has ended; if False, as soon as it flies.
+
+        Raises:
+            AeroDaaSError: What the mission ended with; the drones are landed and the recording is
+                closed first.
+        """
+        robots = self._robots.values()
+        for each in [one for robot in robots for one in robot.start_hooks]:
+            each()
+        if hook is not None:
+            hook()
+        if sharing.offer(self):
+            return
+        run = self.launch_again()
+        run.on_end += [one for robot in robots for one in robot.end_hooks if one not in run.on_end]
+        if wait:
+            run.wait()
+
+    def end_mission(self) -> None:
+        """End the mission: every flying robot lands where it is."""
+        for robot in dict.fromkeys(edge.robot for edge in self.graph.navigation):
+            self.command(robot, End())
+
+    def wait(self) -> None:
+        """Return when the mission has ended; raises what it ended with."""
+        if self.run is not None:
+            self.run.wait()
 
     def set_trajectory_scheduler(self, scheduler: INavigate) -> None:
         """Plug in the trajectory scheduler; raises ConfigError if it is none.
@@ -289,8 +353,8 @@ class Robot(PaperNames, IRobot):
         self._environment = environment
         self.config = config
         self.robot_id = config.id
-        self._start_hooks: list[Callable[[], None]] = []
-        self._end_hooks: list[Callable[[], None]] = []
+        self.start_hooks: list[Callable[[], None]] = []
+        self.end_hooks: list[Callable[[], None]] = []
 
     def has_sensors(self) -> bool:
         """Return True if the robot has any onboard sensors."""
@@ -348,14 +412,7 @@ class Robot(PaperNames, IRobot):
         anew: what was given to `navigate` since, or where that is nothing, the same again. Raises
         the project's errors; whatever happens, the drone is landed and the recording closed first.
         """
-        for each in [*self._start_hooks, *([hook] if hook else [])]:
-            each()
-        if sharing.offer(self._environment):
-            return
-        run = self._environment.launch_again()
-        run.on_end += [each for each in self._end_hooks if each not in run.on_end]
-        if wait:
-            run.wait()
+        self._environment.start_mission(hook, wait=wait)
 
     def end_mission(self) -> None:
         """End the mission: land here; the hooks of `on_end` run once it is over."""
@@ -375,12 +432,12 @@ class Robot(PaperNames, IRobot):
 
     def on_start(self, hook: Callable[[], None]) -> Callable[[], None]:
         """Register a hook to run before take-off; usable as a decorator."""
-        self._start_hooks.append(hook)
+        self.start_hooks.append(hook)
         return hook
 
     def on_end(self, hook: Callable[[], None]) -> Callable[[], None]:
         """Register a hook to run after the mission has ended; usable as a decorator."""
-        self._end_hooks.append(hook)
+        self.end_hooks.append(hook)
         return hook
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from typing import Any
 
 import pytest
 from scripted import ScriptedDetector
@@ -57,8 +58,8 @@ def test_examples_build(example: str, started: list[Robot]) -> None:
     """Each example gives a graph that can be flown."""
     names: dict[str, object] = {}
     exec(blocks("python preamble")[0], names)  # noqa: S102 - our own page
-    frames = names["frames"]
-    names["detections"] = ScriptedDetector("person", 0.0, 1.0, (0, 0, 1, 1)).analyse(frames)  # type: ignore[arg-type]
+    frames: Any = names["frames"]
+    names["detections"] = ScriptedDetector("person", 0.0, 1.0, (0, 0, 1, 1)).analyse(frames)
     exec(example, names)  # noqa: S102 - our own page
     env = names["env"]
     assert isinstance(env, Environment)

@@ -15,7 +15,7 @@ from aerodaas.analytics.base import Context, NavigableAnalytics
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.follow.observation import observation
 from aerodaas.dataflow.graph import AeroStreamData, Trigger
-from aerodaas.dataflow.interfaces import IAeroData, IEnvironment
+from aerodaas.dataflow.interfaces import IEnvironment
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.following.ground import GroundView
 from aerodaas.following.inspection import InspectionController, InspectionPhase, InspectionPlan
@@ -97,19 +97,17 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         self._told = False
         self._frame: Frame | None = None
 
-    def analyse(self, data: IAeroData[Any]) -> AeroStreamData[AeroNavigation]:
-        """Inspect by a stream of frames or boxes; raises GraphError for any other.
-
-        Only frames can be written to a folder.
-        """
-        frames = isinstance(data, AeroStreamData) and issubclass(data.item, Frame)
-        if self.folder is not None and not frames:
+    def _prepare_for(self, item: type) -> None:
+        super()._prepare_for(item)
+        if self.folder is not None and not issubclass(item, Frame):
             message = (
                 f"{type(self).__name__} has no pictures to write to {self.folder}: analyse the "
                 "camera's stream, with detector= where you have your own"
             )
             raise GraphError(message)
-        stream = super().analyse(data)
+
+    def _analyse_stream(self, data: AeroStreamData[Any]) -> AeroStreamData[AeroNavigation]:
+        stream = super()._analyse_stream(data)
         if self.node is not None and self.node.robot is not None and self.lands:
             landing = Trigger(self.node.robot, "end_mission", inspection_over)
             if landing not in self.node.triggers:

@@ -9,6 +9,7 @@ from typing import ClassVar
 import numpy as np
 
 from aerodaas.analytics.base import Analytics, Context
+from aerodaas.dataflow.interfaces import IMonitoringAnalytics
 from aerodaas.mission.safety.reconcile import Reconciler
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Alert, Battery, Frame, GpsFix, Header, Odometry, Readings
@@ -21,7 +22,7 @@ __all__ = ["MonitoringAnalytics"]
 _READINGS = ("battery", "camera", "gps", "height", "position", "speed", "state", "yaw")
 
 
-class MonitoringAnalytics(Analytics[Readings]):
+class MonitoringAnalytics(Analytics[Readings], IMonitoringAnalytics[Readings]):
     """Readings of a drone, by name, and alerts about them.
 
     Analyse any of the streams of odometry, vehicle state, GPS, battery, mission status

@@ -21,7 +21,7 @@ from aerodaas.analytics.people.joints import POINTS
 from aerodaas.analytics.people.lying import lies
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.dataflow.graph import AeroStreamData, Trigger
-from aerodaas.dataflow.interfaces import IAeroData, ICompute, IEnvironment
+from aerodaas.dataflow.interfaces import ICompute, IEnvironment
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Alert, Detection, Detections, Frame
 from aerodaas.types.errors import ConfigError, GraphError
@@ -128,16 +128,21 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         """Stream of the pose model that runs for this analysis alone."""
         self._told = False
 
-    def analyse(self, data: IAeroData[Any]) -> AeroStreamData[Detections]:
+    def _prepare_for(self, item: type) -> None:
+        if issubclass(item, Frame):
+            name = type(self).__name__
+            raise GraphError(f"{name} watches a stream of frames, or the poses found in a frame")
+
+    def _analyse_stream(self, data: AeroStreamData[Any]) -> AeroStreamData[Detections]:
         """Watch a stream of frames or of bodies; called again, one of vests, too.
 
-        Raises GraphError for any other stream, and for boxes of a model without keypoints alone.
+        Raises GraphError for boxes of a model without keypoints alone.
         """
-        if isinstance(data, AeroStreamData) and issubclass(data.item, Frame):
+        if issubclass(data.item, Frame):
             data = self._poses_in(data)
-        if isinstance(data, AeroStreamData) and not self._streams:
+        if not self._streams:
             _require_keypoints(data.graph.nodes[data.name].work, type(self).__name__)
-        stream = super().analyse(data)
+        stream = super()._analyse_stream(data)
         self._streams += 1
         if self.lands and self.node is not None and self.node.robot is not None:
             landing = Trigger(self.node.robot, "end_mission", hand_raised)

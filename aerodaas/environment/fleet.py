@@ -1,0 +1,49 @@
+"""Waypoints shared out over the robots of an environment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+import numpy as np
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.schedulers.trajectory.base import PlanningContext
+from aerodaas.schedulers.trajectory.fleet import share_out
+from aerodaas.types.energy import EnergyModel
+from aerodaas.types.errors import InvalidWaypointError
+from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.waypoints import Waypoint, WaypointType
+
+__all__ = ["shared_waypoints"]
+
+
+def shared_waypoints(
+    config: EnvironmentConfig,
+    waypoints: Sequence[Waypoint],
+    objective: Literal["energy", "time"],
+    budget: float,
+) -> dict[str, list[Waypoint]]:
+    """Tours for the robots of `config`, by id, as `Environment.share_out` describes them."""
+    for waypoint in waypoints:
+        if waypoint.waypoint_type is WaypointType.RELATIVE:
+            raise InvalidWaypointError(
+                f"waypoint {waypoint.id!r} is relative to a robot, and no robot has it yet: "
+                'share out waypoints with waypoint_type "local" or "global"'
+            )
+    home, wind = config.home, np.array(config.simulation.wind, dtype=np.float64)
+    origin = GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
+    nowhere = np.zeros(3)
+    local = [waypoint.resolve(nowhere, origin) for waypoint in waypoints]
+    fleet = {
+        robot.id: PlanningContext(
+            now=0.0,
+            position=np.array(robot.start, dtype=np.float64),
+            home=np.array(robot.start, dtype=np.float64),
+            speed=robot.limits.cruise_speed,
+            energy=EnergyModel(robot.limits.endurance, wind),
+            reserve=robot.limits.battery_land,
+        )
+        for robot in config.robots
+    }
+    return share_out(local, fleet, objective=objective, budget=budget)
