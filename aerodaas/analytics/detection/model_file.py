@@ -88,7 +88,7 @@ class ModelFile:
         known = tuple(axis for axis in declared if axis is not None)
         return known if len(known) == len(declared) else self.trial[0].shape
 
-    def literal(self, key: str) -> Any:  # noqa: ANN401 - whatever the exporter wrote
+    def literal(self, key: str) -> Any:  # noqa: ANN401 - of any type
         """One metadata value as a Python literal; None if it is missing or malformed."""
         return _literal(self.metadata.get(key))
 
@@ -204,7 +204,7 @@ def _is_size(value: object) -> bool:
     )
 
 
-def _literal(text: str | None) -> Any:  # noqa: ANN401 - whatever the exporter wrote
+def _literal(text: str | None) -> Any:  # noqa: ANN401 - of any type
     if text is None:
         return None
     try:

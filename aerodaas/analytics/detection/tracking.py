@@ -24,8 +24,7 @@ __all__ = ["Track", "Tracker", "TrackingAnalytics"]
 _NEWEST = 0.2
 """Weight of the newest detection in the score of a track, a mean over about five detections."""
 _GATE = 25.0
-"""Squared Mahalanobis distance, with four degrees of freedom, that 1 in 20,000 true boxes exceeds.
-"""
+"""Squared Mahalanobis distance, four degrees of freedom, exceeded by 1 in 20,000 true boxes."""
 
 
 @dataclass(eq=False)

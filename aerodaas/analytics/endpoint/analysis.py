@@ -66,7 +66,7 @@ def endpoint_analysis(
     Raises GraphError if the endpoint's protocol does not support the analysis.
     """
     endpoint = resource.endpoint
-    assert endpoint is not None  # noqa: S101 - the kind says so
+    assert endpoint is not None  # noqa: S101 - implied by the resource's kind
     if endpoint.protocol == "function":
         if not issubclass(work.produces, Detections):
             raise GraphError(
