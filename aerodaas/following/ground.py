@@ -78,7 +78,7 @@ class GroundView:
         return bool(((pixel >= 0) & (pixel <= self._corners[2])).all())
 
     def area(self, farthest: float) -> float:
-        """Area (m²) of ground in the image, within `farthest` metres of the point below the camera."""
+        """Area (m²) of ground in the image, within `farthest` metres from below the camera."""
         angles = np.linspace(0.0, math.tau, _CORNERS, endpoint=False)
         # The polygon has the same area as the circle.
         radius = farthest * math.sqrt(math.tau / _CORNERS / math.sin(math.tau / _CORNERS))

@@ -23,7 +23,7 @@ _LEAST_NOISE = 0.03
 _ACCELERATION = 0.7
 """Standard deviation of a walking person's acceleration, m/s^2."""
 _LEAP, _PATIENCE = 2.5, 0.5
-"""Gate of a sighting in standard deviations of range, and seconds for which it rejects outliers."""
+"""Gate of a sighting in standard deviations of range, and seconds for which it is applied."""
 _NEAREST = 0.1
 _FIRST_SPEED = 0.7
 """Standard deviation of a velocity not yet observed, m/s."""
