@@ -80,8 +80,8 @@ class TimedContext(Protocol):
 class Analytics(PaperNames, IAnalyse[O_co]):
     """An analysis; subclasses declare the types they accept and produce, and implement `process`.
 
-    Life cycle in the actor: `open` once, `process` for each item (one at a time, newest first),
-    `close` once.
+    Life cycle in the actor: `open` once, `process` for one item at a time (the newest one; in
+    lockstep, every one in order), `close` once.
     """
 
     accepts: ClassVar[tuple[type, ...]] = (object,)

@@ -77,7 +77,11 @@ class RemoteAnalytics(CommandingAnalytics):
         self._thread: threading.Thread | None = None
 
     def open(self) -> None:
-        """Bind the port; raises SourceError if that fails."""
+        """Bind the port.
+
+        Raises:
+            SourceError: If the port cannot be bound.
+        """
         host, port = self._settings.host, self._settings.port
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:

@@ -39,7 +39,7 @@ class EndToEndDecoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Keep the rows from `min_score` on whose class exists."""
+        """Keep the rows with a score of at least `min_score` and a valid class."""
         del size
         rows = outputs[0]
         invalid = int(np.count_nonzero(np.isnan(rows[:, _SCORE])))
