@@ -32,7 +32,7 @@ _ASTRAY = 0.1
 class KeypointModel:
     """A keypoint network on square crops around people, as `tools.training pose` exports it.
 
-    Its input are crops (n, 3, s, s), RGB from 0 to 1, its output keypoints (n, 17, 3): u and v in
+    It maps crops (n, 3, s, s), RGB from 0 to 1, to keypoints (n, 17, 3): u and v in
     pixels of the crop, and the confidence, 0 to 1, that the joint is visible and correctly placed.
 
     The network runs on each crop twice, the second time mirrored. A real arm is found in both; a
