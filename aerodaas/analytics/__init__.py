@@ -1,7 +1,7 @@
-"""Analyses that ship with the project, and the base for one's own.
+"""Analyses that ship with the project, and the base classes for user-defined ones.
 
-`__init__.pyi` beside this file lists the names; each is loaded when it is first used, for
-onnxruntime and OpenCV take their time.
+`__init__.pyi` beside this file lists the names; each is loaded on first use, because
+onnxruntime and OpenCV are slow to import.
 """
 
 import lazy_loader

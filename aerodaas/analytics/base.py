@@ -1,4 +1,4 @@
-"""The base of every analysis: build the graph in the application, run in an actor.
+"""Base classes of analyses: graph node in the application, worker in an actor.
 
 A user's analysis is one class::
 
@@ -9,8 +9,8 @@ A user's analysis is one class::
         def process(self, item: Frame, context: Context) -> float:
             return float(item.image.mean())
 
-The instance is sent to its actor by value before `open` is called there, so a constructor keeps
-only what is cheap to send and checks only what the user could have got wrong.
+The instance is sent to its actor by value before `open` is called there, so a constructor stores
+only state that is cheap to send and validates only the user's settings.
 """
 
 from __future__ import annotations
@@ -51,68 +51,69 @@ O_co = TypeVar("O_co", covariant=True)
 
 
 class Context(Protocol):
-    """What an analysis may ask of the actor that runs it."""
+    """Services that the actor provides to the analysis it runs."""
 
     def now(self) -> int:
-        """Mission clock of the item being processed, in nanoseconds."""
+        """Mission time of the item being processed, in nanoseconds."""
         ...
 
     def vehicle(self) -> VehicleState | None:
-        """The newest state of the robot whose data is processed; None before the first."""
+        """Newest state of the robot whose data is processed; None before the first."""
         ...
 
     def alert(self, alert: Alert) -> None:
-        """Tell the people who watch: shown, logged and recorded."""
+        """Publish an alert to the operator: displayed, logged and recorded."""
         ...
 
     @property
     def kind(self) -> ComputeKind:
-        """Where this runs: on the edge node beside the vehicle, or in the cloud."""
+        """Compute resource of this actor: the edge node beside the vehicle, or the cloud."""
         ...
 
 
 @runtime_checkable
 class TimedContext(Protocol):
-    """A context that knows how long the result is of use."""
+    """A context with a deadline for the result."""
 
     def time_left(self) -> float | None:
-        """Wall seconds until then; None where nothing says."""
+        """Wall-clock seconds until the deadline; None without a deadline."""
         ...
 
 
 class Analytics(PaperNames, IAnalyse[O_co]):
-    """An analysis; subclasses say what they accept and produce, and implement `process`.
+    """An analysis; subclasses declare the types they accept and produce, and implement `process`.
 
-    Life cycle in the actor: `open` once, `process` for each item (one at a time, newest first
-    come), `close` once.
+    Life cycle in the actor: `open` once, `process` for one item at a time (the newest one; in
+    lockstep, every one in order), `close` once.
     """
 
     accepts: ClassVar[tuple[type, ...]] = (object,)
     """Item types that `analyse` takes."""
     produces: ClassVar[type] = object
-    """Type of the results; by default what the brackets say: `Analytics[float]`."""
+    """Type of the results; by default the type argument of the base, as in `Analytics[float]`."""
     isolated: bool = False
-    """True for an analysis that needs a process of its own, such as a neural network."""
+    """True for an analysis that needs its own process, such as a neural network."""
     scheduled: bool = False
-    """True for an analysis of frames whose every run the analytics scheduler decides on."""
+    """True for an analysis of frames whose every run is decided by the analytics scheduler."""
     concurrent: bool = False
     """True if several threads may call `process` at once, as executors in the cloud do."""
     task: TaskConfig | None = None
-    """What the scheduler is told of it, unless the environment file's `schedulers.tasks` do."""
+    """Benefit and costs for the scheduler, unless `schedulers.tasks` in the environment file gives
+    them."""
     rate: float = 1.0
-    """How often an external source (`instantiate`) is asked, in Hz."""
+    """Polling rate of an external source (`instantiate`), in Hz."""
     name: str = ""
-    """Name of the stream; by default the class's own in snake_case."""
+    """Name of the stream; by default the class name in snake_case."""
 
     node: Node | None = None
-    """Place in the graph, once `analyse` or `instantiate` was called."""
+    """Node in the graph, once `analyse` or `instantiate` was called."""
     _graph: Graph | None = None
     _compute: str | None = None
     _runtime_env: RuntimeEnvConfig | None = None
     _triggers: tuple[Trigger, ...] = ()
 
     def __init_subclass__(cls, **more: Any) -> None:  # noqa: ANN401 - of other bases
-        """Produce what the brackets say, unless the class says it."""
+        """Set `produces` from the type argument of the base, unless the class sets it."""
         super().__init_subclass__(**more)
         if "produces" in vars(cls):
             return
@@ -125,20 +126,37 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         """Load models and connect; called once in the actor, before the mission starts."""
 
     def process(self, item: Any, context: Context) -> O_co | None:  # noqa: ANN401
-        """Turn one item into a result, or None where there is nothing to say."""
+        """Compute the result of one item.
+
+        Args:
+            item: Newest item of an analysed stream; None for an external source.
+            context: Services of the actor.
+
+        Returns:
+            The result to publish, or None for no result.
+        """
         raise NotImplementedError
 
     def close(self) -> None:
-        """Release what `open` took."""
+        """Release the resources that `open` acquired."""
 
     def deploy(
         self, compute: ICompute, runtime_env: RuntimeEnvConfig | Mapping[str, Any] | None = None
     ) -> Self:
-        """Run on `compute`; returns itself.
+        """Run on `compute`.
 
-        `runtime_env` is what the analysis has for itself: `{"packages": ["torch==2.4.1"]}`,
-        `{"env_vars": {…}}` or `{"image_uri": "…"}`. The environment file may replace it. Such an
-        analysis has a process of its own. Raises ConfigError for one that makes no sense.
+        Args:
+            compute: Edge or cloud node, or endpoint.
+            runtime_env: The analysis' own runtime environment: `{"packages": ["torch==2.4.1"]}`,
+                `{"env_vars": {…}}` or `{"image_uri": "…"}`; the environment file may replace it.
+                Such an analysis runs in its own process.
+
+        Returns:
+            The analysis itself.
+
+        Raises:
+            ConfigError: If `runtime_env` is invalid.
+            GraphError: If the analysis is already running.
         """
         self._compute = str(compute.get_compute_properties()["id"])
         self._graph = getattr(compute, "graph", None)
@@ -151,7 +169,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         return self
 
     def beside(self, other: Analytics[Any]) -> Self:
-        """Run where `other` runs; returns itself."""
+        """Run on the compute resource and in the runtime environment of `other`; returns itself."""
         self._compute, self._graph = other._compute, other._graph
         self._runtime_env = other._runtime_env
         return self
@@ -207,9 +225,13 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         return AeroStreamData(graph, node.id, self.produces)
 
     def instantiate(self) -> AeroStreamData[O_co]:
-        """Start without an input stream: `process(None, …)` is called at the analysis' own pace.
+        """Start as an external source: `process(None, …)` is called at `rate`, without input.
 
-        Raises GraphError if it was not deployed, for then it belongs to no environment.
+        Returns:
+            The stream of results.
+
+        Raises:
+            GraphError: If it was not deployed, and so belongs to no environment.
         """
         if self._graph is None:
             message = f"{type(self).__name__}: call deploy(compute) before instantiate()"
@@ -230,10 +252,20 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         target: IAnalyse[Any] | Callable[[], None],
         when: Callable[[Any], bool] | None = None,
     ) -> Self:
-        """Wake `target` (another analysis, or a robot's method) when a result says so.
+        """Wake an analysis or call a robot's method when a result meets a condition.
 
-        `when` gets each result; without it, every result that is not None triggers. An analysis
-        that is a target sleeps until it is woken. Raises GraphError for any other target.
+        An analysis that is a target stays dormant until it is woken.
+
+        Args:
+            target: Another analysis, or a method such as `drone.end_mission`.
+            when: Condition on each result; by default every result that is not None triggers.
+
+        Returns:
+            The analysis itself.
+
+        Raises:
+            GraphError: For any other target, for a `when` that is not callable, or if one of the
+                two analyses is already running.
         """
         if when is not None and not callable(when):
             raise refusal(f"a trigger's `when` is a function of a result, not {when!r}")
@@ -263,7 +295,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
             self._graph.require_idle(self.node, what)
 
     def _leave_flying(self, graph: Graph) -> None:
-        """Be in no graph, as before: it could not start in flight."""
+        """Remove the node from the graph after a failed start in flight."""
         if graph.flying and self.node is not None:
             graph.nodes.pop(self.node.id, None)
             self.node = None
@@ -288,7 +320,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         return self.node
 
     def __getstate__(self) -> dict[str, Any]:
-        """Leave the graph behind when sent to an actor."""
+        """State without the graph, to be sent to an actor."""
         hidden = {"node", "_graph"}
         return {key: value for key, value in self.__dict__.items() if key not in hidden}
 

@@ -1,4 +1,4 @@
-"""What analyses of boxes share: they take a detector's stream, or a camera's and find the boxes."""
+"""Base class of analyses of bounding boxes, from a detector's stream or a camera's."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ O_co = TypeVar("O_co", covariant=True)
 
 
 def shipped_detector(owner: str, labels: Sequence[str]) -> Analytics[Detections]:
-    """Open the detector that ships for those of `labels` that it knows.
+    """Create the shipped detector for those of `labels` that it has classes for.
 
-    Raises GraphError, in the name of `owner`, where it knows none of them, and ModelError where
-    its file is missing.
+    Raises GraphError, in the name of `owner`, if it has none of them, and ModelError if its file
+    is missing.
     """
     known = [label for label in labels if label in DETECTOR_CLASSES]
     if not known:
@@ -29,7 +29,7 @@ def shipped_detector(owner: str, labels: Sequence[str]) -> Analytics[Detections]
             "or pass one as detector="
         )
         raise GraphError(message)
-    # onnxruntime takes its time to load.
+    # onnxruntime is slow to import.
     from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415
 
     return OnnxDetector(classes=known)
@@ -38,14 +38,14 @@ def shipped_detector(owner: str, labels: Sequence[str]) -> Analytics[Detections]
 class BoxAnalytics(Analytics[O_co]):
     """An analysis of boxes; subclasses implement `examine`.
 
-    Of a camera's stream it finds the boxes itself, with `detector` or the one that ships.
+    On a camera's stream it runs `detector`, or the shipped one, itself.
     """
 
     Detector: TypeAlias = Analytics[Detections]
     accepts: ClassVar[tuple[type, ...]] = (Detections, Frame)
 
     def __init__(self, labels: Sequence[str], detector: Detector | None) -> None:
-        """Look at boxes with one of `labels`."""
+        """Select the boxes with one of `labels`; `detector` is for camera streams."""
         self.labels = (labels,) if isinstance(labels, str) else tuple(labels)
         self.detector = detector
         self._explained = False
@@ -60,12 +60,12 @@ class BoxAnalytics(Analytics[O_co]):
         raise NotImplementedError
 
     def open(self) -> None:
-        """Start the detector, where there is one."""
+        """Open the detector, if any."""
         if self.detector is not None:
             self.detector.open()
 
     def close(self) -> None:
-        """Release the detector, where there is one."""
+        """Close the detector, if any."""
         if self.detector is not None:
             self.detector.close()
 
@@ -77,7 +77,7 @@ class BoxAnalytics(Analytics[O_co]):
         return None if found is None else self.examine(found, context)
 
     def explain_once(self, boxes: Detections, context: Context) -> None:
-        """Tell people, once, what geometry lacks."""
+        """Publish one alert that names the missing calibration or height."""
         if self._explained:
             return
         self._explained = True

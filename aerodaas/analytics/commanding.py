@@ -1,4 +1,4 @@
-"""Analyses that talk with the mission whenever they want to, and are answered."""
+"""Analyses that send commands to the mission at any time and receive its answers."""
 
 from __future__ import annotations
 
@@ -16,41 +16,48 @@ __all__ = ["CommandingAnalytics", "MissionLink"]
 
 
 class MissionLink(Protocol):
-    """The mission of one robot, as seen from an analysis; any thread may use it."""
+    """Thread-safe interface of an analysis to the mission of one robot."""
 
     def status(self) -> MissionStatus | None:
-        """The newest word of the mission; None before the first."""
+        """Newest status of the mission; None before the first."""
         ...
 
     def vehicle(self) -> VehicleState | None:
-        """The newest state of the vehicle; None before the first."""
+        """Newest state of the vehicle; None before the first."""
         ...
 
     def command(self, command: Command) -> Future[Answer]:
-        """Tell the mission something; the future holds what it says."""
+        """Send a command to the mission; the future holds its answer."""
         ...
 
     def fly(self, navigation: AeroNavigation, index: int | None = None) -> Future[Answer]:
-        """Add navigation, as an item of this analysis' own stream.
+        """Add navigation to the mission, as an item of this analysis' own stream.
 
-        It counts as the application added that stream (its priority, deadline, order); with
-        `index`, that many waypoints of the same priority are visited before. A waypoint of an id
-        that is already queued is refused.
+        The priority, deadline and order with which the application added that stream apply. A
+        waypoint whose id is already queued is refused.
+
+        Args:
+            navigation: Waypoints or velocity commands to add.
+            index: Number of waypoints of the same priority to visit first; None for the default
+                position.
+
+        Returns:
+            Future of the mission's answer.
         """
         ...
 
     def alert(self, alert: Alert) -> None:
-        """Tell the people who watch: shown, logged and recorded."""
+        """Publish an alert to the operator: displayed, logged and recorded."""
         ...
 
 
 class CommandingAnalytics(NavigableAnalytics):
-    """An analysis with threads of its own that commands the mission, such as a remote control.
+    """An analysis with its own threads that commands the mission, such as a remote control.
 
-    In the actor, `begin` is called between `open` and the first `process`. In lockstep, what it
-    commands takes effect when the drone's loop next turns.
+    In the actor, `begin` is called between `open` and the first `process`. In lockstep, its
+    commands take effect in the next cycle of the drone's loop.
     """
 
     def begin(self, mission: MissionLink) -> None:
-        """Start talking with `mission`; return at once."""
+        """Start to exchange messages with `mission`, and return without blocking."""
         raise NotImplementedError

@@ -1,4 +1,4 @@
-"""An analysis that takes time instead of computing, to study schedulers on any machine."""
+"""A synthetic analysis that sleeps instead of computing, to study schedulers on any machine."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ __all__ = ["SyntheticAnalytics"]
 
 
 class SyntheticAnalytics(Analytics[Readings]):
-    """Stands in for a model: sleeps as long as the model would take, then answers.
+    """A stand-in for a model that sleeps for the model's execution time.
 
-    It occupies no core, so that the timing of a whole set of models can be had on two.
+    It occupies no core, so that the timing of many models can be studied on a two-core machine.
     """
 
     accepts: ClassVar[tuple[type, ...]] = (Frame,)
@@ -24,10 +24,15 @@ class SyntheticAnalytics(Analytics[Readings]):
     concurrent = True
 
     def __init__(self, name: str, edge_ms: float, cloud_ms: float) -> None:
-        """Take `edge_ms` milliseconds on the edge and `cloud_ms` in the cloud.
+        """Set the execution times.
 
-        `name` is that of the stream, under which the environment file gives benefit and costs.
-        Raises ConfigError for times that are negative or not finite.
+        Args:
+            name: Name of the stream, under which the environment file gives benefit and costs.
+            edge_ms: Execution time on the edge, milliseconds.
+            cloud_ms: Execution time in the cloud, milliseconds.
+
+        Raises:
+            ConfigError: If a time is negative or not finite.
         """
         for what, value in (("edge_ms", edge_ms), ("cloud_ms", cloud_ms)):
             if not 0 <= value < float("inf"):
@@ -36,6 +41,6 @@ class SyntheticAnalytics(Analytics[Readings]):
         self._seconds = {"edge": edge_ms / 1000, "cloud": cloud_ms / 1000}
 
     def process(self, item: Frame, context: Context) -> Readings:
-        """Take the time, then say how long it was."""
+        """Sleep for the execution time, and return it in seconds."""
         time.sleep(self._seconds[context.kind])
         return Readings(item.header.stamp, {"seconds": self._seconds[context.kind]})

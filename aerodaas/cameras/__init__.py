@@ -1,1 +1,1 @@
-"""Cameras: one protocol for simulated, recorded and live pictures."""
+"""Cameras: one protocol for simulated, recorded and live images."""

@@ -1,4 +1,4 @@
-"""The Camera protocol: simulated, folder of pictures, video and streams look the same."""
+"""The Camera protocol, common to simulated cameras, image folders, videos and live streams."""
 
 from __future__ import annotations
 
@@ -18,49 +18,58 @@ __all__ = ["Camera", "Picture"]
 @valued
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """What a camera gives: pixels, and when they were taken."""
+    """An image of a camera with its timestamp."""
 
     image: NDArray[np.uint8]
-    """Height x width x 3, BGR."""
+    """Pixels, height x width x 3, BGR."""
     stamp: int
-    """Mission clock at capture, in nanoseconds."""
+    """Mission time at capture, nanoseconds."""
     label: str = ""
-    """Where it came from, such as a file's name."""
+    """Source of the image, such as a file name."""
     odometry: Odometry | None = None
-    """The vehicle's at capture where the source knows it; None: the vehicle's newest is it."""
+    """Odometry of the vehicle at capture; None if the source has none, so that the vehicle's newest
+    applies."""
     depth: NDArray[np.uint16] | None = None
-    """Of each pixel, as in a `Frame`; None from cameras that measure none."""
+    """Depth of each pixel, as in a `Frame`; None for cameras without depth."""
 
 
 @runtime_checkable
 class Camera(Protocol):
-    """A source of pictures that is asked for its newest one at the sensor's rate."""
+    """A source of images, whose newest one is polled at the sensor's rate."""
 
     @property
     def model(self) -> CameraModel | None:
-        """Calibration and mount, where known."""
+        """Calibration and mount; None if unknown."""
         ...
 
     @property
     def finished(self) -> bool:
-        """True once the source has ended and will give no more pictures."""
+        """Whether the source has ended and will return no more images."""
         ...
 
     def open(self) -> None:
-        """Start the source; raise SourceError that names the place and the remedy."""
+        """Start the source.
+
+        Raises:
+            SourceError: If it cannot be started, naming the source and the remedy.
+        """
         ...
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the newest picture at mission time `stamp`, or None if there is no new one.
+        """Return the newest image; a broken one is skipped and counted in `skipped`.
 
-        `pose` is the true pose of the vehicle that carries the camera; only simulated cameras
-        use it. A picture that is broken is skipped and counted in `skipped`.
+        Args:
+            stamp: Present mission time, nanoseconds.
+            pose: True pose of the vehicle that carries the camera, used only by simulated cameras.
+
+        Returns:
+            The newest image with its timestamp, or None if there is no new one.
         """
         ...
 
     @property
     def skipped(self) -> int:
-        """Pictures that could not be read."""
+        """Number of images that could not be decoded."""
         ...
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""FolderCamera: a folder of pictures, played as if a camera took them."""
+"""FolderCamera: playback of a folder of images as a camera."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ _KINDS = {".jpg", ".jpeg", ".png", ".bmp", ".webp"}
 
 
 class FolderCamera:
-    """Plays the pictures of a folder at the sensor's rate, in the order a person would count.
+    """Plays the images of a folder at the sensor's rate, in natural order of their names.
 
-    Settings: `path` of the folder, `loop`, and the lens and mount of `CameraConfig`. Which
-    picture is shown depends on the mission's stamps only. Grey, 16-bit and transparent pictures
-    become 8-bit BGR; their sizes may differ.
+    Settings: `path` of the folder, `loop`, and the lens and mount of `CameraConfig`. The image
+    returned depends on mission time only. Grey, 16-bit and transparent images are converted to
+    8-bit BGR; their sizes may differ.
     """
 
     settings_model = CameraConfig
 
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
-        """Check the settings of `sensor`; raises ConfigError."""
+        """Validate the settings of `sensor`; raises ConfigError."""
         del environment
         self._settings = camera_settings(sensor)
         self._folder = Path(required_path(sensor, self._settings, "folder of pictures"))
@@ -48,21 +48,21 @@ class FolderCamera:
 
     @property
     def model(self) -> CameraModel | None:
-        """Calibration for the size of the newest picture; None before `open`."""
+        """Calibration for the size of the newest image; None before `open`."""
         return self._model
 
     @property
     def finished(self) -> bool:
-        """True once the last picture was given; never for a folder that loops."""
+        """Whether the last image was returned; always False for a folder that loops."""
         return not self._settings.loop and self._played >= len(self._files) - 1
 
     @property
     def skipped(self) -> int:
-        """Files that hold no readable picture."""
+        """Number of files without a readable image."""
         return len(self._broken)
 
     def open(self) -> None:
-        """List the pictures; raises SourceError if there is none that can be read."""
+        """List the images; raises SourceError if none is readable."""
         try:
             files = [path for path in self._folder.iterdir() if path.suffix.lower() in _KINDS]
         except OSError as error:
@@ -87,11 +87,11 @@ class FolderCamera:
         self._model = camera_model(self._settings, first.shape[1], first.shape[0])
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the picture whose turn it is at `stamp`; None if it was given or is broken."""
+        """Return the image due at `stamp`; None if it was returned already or is broken."""
         del pose
         if self._start is None:
             self._start = stamp
-        # The nearest, so that a sensor whose clock jitters neither repeats nor leaves one out.
+        # The nearest, so that a jittering timestamp neither repeats nor skips an image.
         turn = round(seconds(stamp - self._start) * self._rate)
         if turn <= self._played or self.finished:
             return None
@@ -105,7 +105,7 @@ class FolderCamera:
         return Picture(image, stamp, path.name)
 
     def close(self) -> None:
-        """Nothing is held open."""
+        """Do nothing, as no file is kept open."""
 
     def _read(self, path: Path) -> NDArray[np.uint8] | None:
         image = _decode(path)
@@ -116,7 +116,7 @@ class FolderCamera:
 
 
 def _natural(path: Path) -> list[tuple[int, str]]:
-    """Sort key under which frame_2 comes before frame_10."""
+    """Sort key that orders frame_2 before frame_10."""
     parts = re.split(r"(\d+)", path.name.lower())
     return [(int(part), "") if part.isdigit() else (0, part) for part in parts]
 
@@ -136,9 +136,9 @@ def _decode(path: Path) -> NDArray[np.uint8] | None:
 
 
 def _is_cut_short(content: bytes) -> bool:
-    """Whether a JPEG lacks its end marker: OpenCV fills what is missing with grey, silently.
+    """Whether a JPEG lacks its end marker: OpenCV silently fills a missing part with grey.
 
-    Only the second half counts, because a thumbnail ahead of the picture has a marker too.
+    Only the second half counts, because a thumbnail before the image has a marker, too.
     """
     is_jpeg = content.startswith(b"\xff\xd8")
     return is_jpeg and content.rfind(b"\xff\xd9") < len(content) // 2

@@ -1,4 +1,4 @@
-"""H.264 in pieces of UDP: frames put together, then decoded without a frame's delay."""
+"""H.264 over UDP: assembly of frames from packets, and decoding without a frame of delay."""
 
 from __future__ import annotations
 
@@ -14,41 +14,41 @@ from av.video.frame import VideoFrame
 __all__ = ["FrameAssembler", "FrameDecoder", "WholeFrame"]
 
 _LONGEST = 1460
-"""Bytes of a Tello's video packet: a shorter one ends a frame. Waiting for the next frame's start
-code instead, as FFmpeg's own parser must, would cost a frame's time."""
+"""Size in bytes of a Tello's video packet: a shorter one ends a frame. Waiting for the next frame's
+start code instead, as FFmpeg's own parser must, would add a frame interval of latency."""
 _START_CODE = b"\x00\x00\x00\x01"
 _UNIT = re.compile(rb"\x00\x00\x01(.)", re.DOTALL)
 _SLICES = frozenset({1, 2, 5})
 _LARGEST_FRAME = 1 << 20
-"""Bytes from which on something that claims to be a frame is none."""
+"""Size in bytes above which the content is discarded as invalid."""
 
 
 @dataclass(frozen=True, slots=True)
 class WholeFrame:
-    """The bytes of one encoded frame, with the headers before it."""
+    """One encoded frame with the headers before it."""
 
     content: bytes
     arrived: int
-    """When its first packet came, host nanoseconds."""
+    """Host time of its first packet's arrival, nanoseconds."""
 
 
 class FrameAssembler:
-    """Puts packets together to frames; what is lost in between is the decoder's to notice."""
+    """Assembles packets to frames; the decoder detects frames with lost packets."""
 
     def __init__(self) -> None:
-        """Wait for the start of a frame."""
+        """Start without packets, waiting for a start code."""
         self._content = bytearray()
         self._arrived = 0
         self._has_slice = False
         self.dropped = 0
-        """Packets that belong to no frame: the stream was joined in its middle, or is none."""
+        """Number of packets outside a frame: from before the first start code, or invalid."""
 
     def take(self, packet: bytes, now: int) -> list[WholeFrame]:
-        """Take a packet that came at `now` (host nanoseconds); returns the frames it completes."""
+        """Add a packet received at `now` (host nanoseconds); returns the frames it completes."""
         done: list[WholeFrame] = []
         starts = packet.startswith(_START_CODE)
         if starts and self._has_slice:
-            # The frame before had no short packet: it was lost, or the sizes came out even.
+            # The previous frame had no short packet: it was lost, or the last one was full.
             done.append(self._finish())
         if not starts and not self._content:
             self.dropped += 1
@@ -74,29 +74,29 @@ class FrameAssembler:
 
 
 class FrameDecoder:
-    """One frame in, one picture out, from the first key frame on."""
+    """Decodes one image per frame, from the first key frame on."""
 
     def __init__(self, *, only_whole: bool = False) -> None:
-        """With `only_whole`, leave out what rests on a damaged frame."""
+        """With `only_whole`, omit images that depend on a damaged frame."""
         self._only_whole = only_whole
         self._codec = self._fresh()
         self._started = False
         self._tainted = True
         self.broken = 0
-        """Frames that could not be decoded, or only with damage."""
+        """Number of frames that could not be decoded, or only with damage."""
         self.waiting = 0
-        """Frames left out before the first key frame, or with `only_whole` before the next one."""
+        """Number of frames omitted before a key frame: the first, or with `only_whole` the next."""
 
     @staticmethod
     def _fresh() -> VideoCodecContext:
         codec = av.CodecContext.create("h264", "r")
-        # Threads by frame would hold frames back, as does reordering for B frames.
+        # Frame threading would delay frames, as does reordering for B frames.
         codec.thread_count = 1
         codec.flags |= Flags.low_delay
         return codec
 
     def decode(self, frame: WholeFrame) -> VideoFrame | None:
-        """Decode `frame`; None if no picture that is fit to be shown comes of it."""
+        """Decode `frame`; None without an intact image."""
         try:
             pictures = self._codec.decode(av.Packet(frame.content))
         except FFmpegError:

@@ -1,7 +1,7 @@
-"""Frames of a live source: decoded in a thread of their own, only the newest is kept.
+"""Live video source: frames are decoded in a separate thread, and only the newest is kept.
 
-A reader that asks less often than frames arrive would otherwise see frames that grow staler in
-the decoder's queue: seconds of it, as users of Wi-Fi drones report.
+For a reader slower than the frame rate, frames would otherwise queue in the decoder and age by
+seconds, as users of Wi-Fi drones report.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ _OPENING = threading.Lock()
 
 
 class LiveSource:
-    """The newest frame of a URL (rtsp, udp, http, …) or device (/dev/video0)."""
+    """Source of the newest frame of a URL (rtsp, udp, http, …) or device (/dev/video0)."""
 
     def __init__(self, address: str, *, timeout: float = _FIRST_FRAME_TIMEOUT) -> None:
-        """Watch `address`; `open` waits up to `timeout` seconds for the first frame."""
+        """Read from `address`; `open` waits up to `timeout` seconds for the first frame."""
         self._address = address
         self._timeout = timeout
         self._lock = threading.Lock()
@@ -43,12 +43,12 @@ class LiveSource:
         self._frame: tuple[NDArray[np.uint8], int] | None = None
         self._thread: threading.Thread | None = None
         self.finished = False
-        """Never true: a source that is silent is connected to again."""
+        """Always False: a source that times out is reconnected."""
         self.skipped = 0
         self.reconnections = 0
 
     def open(self) -> NDArray[np.uint8]:
-        """Start decoding and return the first frame; raises SourceError if none comes."""
+        """Start decoding and return the first frame; raises SourceError without one."""
         self._thread = threading.Thread(target=self._decode, name="live-source", daemon=True)
         self._thread.start()
         if not self._arrived.wait(self._timeout):
@@ -65,7 +65,7 @@ class LiveSource:
             return self._frame[0]
 
     def newest(self, stamp: int) -> tuple[NDArray[np.uint8], int] | None:
-        """Return the newest frame not yet given and its stamp: `stamp` less the frame's age."""
+        """Return the newest unread frame with its capture time: `stamp` minus the frame's age."""
         with self._lock:
             frame, self._frame = self._frame, None
         if frame is None:
@@ -93,7 +93,7 @@ class LiveSource:
             wait = min(2 * wait, _LONGEST_WAIT)
 
     def _drain(self, capture: cv2.VideoCapture) -> bool:
-        """Read frames until the source falls silent; tell whether there was any."""
+        """Read frames until the source ends or times out; returns whether there was any."""
         any_frame = False
         while not self._closing.is_set() and capture.grab():
             grabbed = host_time_ns()
@@ -124,10 +124,10 @@ def _connect(address: str) -> cv2.VideoCapture:
 
 @contextmanager
 def _low_latency() -> Iterator[None]:
-    """Have a capture that is opened meanwhile gather no frames before it gives out the first.
+    """Disable FFmpeg's buffering for captures opened within this context.
 
-    OpenCV takes FFmpeg's options from the environment only, where they would spoil the reading of
-    files that are opened later.
+    OpenCV takes FFmpeg's options from the environment only, where they would also affect files
+    that are opened later.
     """
     with _OPENING:
         before = os.environ.get(_OPTIONS)

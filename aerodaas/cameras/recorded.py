@@ -1,4 +1,4 @@
-"""A camera that plays whatever was recorded: a folder of pictures, or a video file or URL."""
+"""Camera for recorded material: a folder of images, or a video file or URL."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["recorded_camera"]
 
 
 def recorded_camera(sensor: SensorConfig, environment: EnvironmentConfig) -> Camera:
-    """Make the camera that fits the setting `path`; raises ConfigError for bad settings."""
+    """Create the camera for the setting `path`; raises ConfigError for invalid settings."""
     path = camera_settings(sensor).path
     kind = FolderCamera if path is None or Path(path).is_dir() else VideoCamera
     return kind(sensor, environment)

@@ -1,4 +1,4 @@
-"""The settings that a camera's driver reads from its sensor's entry."""
+"""Settings of a camera's driver, from its sensor's entry."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ __all__ = ["camera_model", "camera_settings", "required_path"]
 
 
 def camera_settings(sensor: SensorConfig) -> CameraConfig:
-    """Check the settings of `sensor`; raises ConfigError that names the sensor and the setting."""
+    """Validate the settings of `sensor`; raises ConfigError naming the sensor and the setting."""
     return checked(CameraConfig, sensor.settings, f"sensor {sensor.full_id}: settings")
 
 
 def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> str:
-    """Return the path among the settings; raises ConfigError where it is missing."""
+    """Return the path among the settings; raises ConfigError if it is missing."""
     if not settings.path:
         message = f'sensor {sensor.full_id}: settings: give the {what} as "path"'
         raise ConfigError(message)
@@ -26,7 +26,7 @@ def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> st
 
 
 def camera_model(settings: CameraConfig, width: int, height: int) -> CameraModel:
-    """Make the pinhole model of pictures of `width` x `height` pixels, with the mount's pose."""
+    """Make the pinhole model of images of `width` x `height` pixels, with the mount's pose."""
     return CameraModel.from_fov(
         width,
         height,

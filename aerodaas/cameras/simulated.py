@@ -1,4 +1,4 @@
-"""The simulated camera: looks at the simulated world from the vehicle's true pose."""
+"""Simulated camera: renders the simulated world from the vehicle's true pose."""
 
 from __future__ import annotations
 
@@ -24,13 +24,13 @@ class SimulatedCamera:
     """A pinhole camera in the simulated world; implements `aerodaas.cameras.base.Camera`.
 
     Raises ConfigError if the sensor's settings are not those of a `CameraConfig`, or if the
-    environment's world is broken.
+    environment's world is invalid.
     """
 
     settings_model = CameraConfig
 
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
-        """Check the settings and load the world; the renderer starts in `open`."""
+        """Validate the settings and load the world; the renderer starts in `open`."""
         config = camera_settings(sensor)
         self._name = sensor.id
         self._world = World.load(environment.simulation)
@@ -52,24 +52,24 @@ class SimulatedCamera:
 
     @property
     def finished(self) -> bool:
-        """Never: a simulated camera goes on as long as it is asked."""
+        """Always False, as a simulated camera does not end."""
         return False
 
     @property
     def skipped(self) -> int:
-        """None: every picture is good."""
+        """Always 0, as every rendered image is valid."""
         return 0
 
     def open(self) -> None:
-        """Start the renderer; raise SourceError if it cannot be had."""
+        """Start the renderer; raises SourceError if that fails."""
         if self._renderer is None:
-            # panda3d takes 0.2 s to import, which only a camera that is used should pay.
+            # Imported late, because panda3d takes 0.2 s to import.
             from aerodaas.simulation.depth import renderer_for  # noqa: PLC0415
 
             self._renderer = renderer_for(self._world, self._model, self._depth_range)
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Picture at mission time `stamp` (ns) from the true `pose`; None while that is unknown.
+        """Render at mission time `stamp` (ns) from the true `pose`; None while that is unknown.
 
         Raises SourceError if the camera is not open.
         """

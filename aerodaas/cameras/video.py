@@ -1,4 +1,4 @@
-"""VideoCamera: a video file, a network stream or a camera plugged into this machine."""
+"""VideoCamera: a video file, a network stream or a local camera device."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _LIVE = re.compile(r"^([a-z][a-z0-9+.\-]*://|/dev/video\d+$)", re.IGNORECASE)
 
 
 class VideoCamera:
-    """Plays a video file by the mission's stamps, or shows the newest frame of a live source.
+    """Plays a video file by mission time, or returns the newest frame of a live source.
 
     Settings: `path` (a file, a URL such as `rtsp://…` or `udp://…`, or `/dev/video0`), `loop`
     for files, and the lens and mount of `CameraConfig`.
@@ -27,7 +27,7 @@ class VideoCamera:
     settings_model = CameraConfig
 
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
-        """Check the settings of `sensor`; raises ConfigError."""
+        """Validate the settings of `sensor`; raises ConfigError."""
         del environment
         self._settings = camera_settings(sensor)
         self._address = required_path(sensor, self._settings, "video file, URL or device")
@@ -45,21 +45,21 @@ class VideoCamera:
 
     @property
     def finished(self) -> bool:
-        """True at the end of a file that does not loop; never for a live source."""
+        """Whether a file that does not loop has ended; always False for a live source."""
         return self._source.finished
 
     @property
     def skipped(self) -> int:
-        """Frames that could not be decoded."""
+        """Number of frames that could not be decoded."""
         return self._source.skipped
 
     def open(self) -> None:
-        """Open the source; raises SourceError if no frame can be had from it."""
+        """Open the source; raises SourceError if it returns no frame."""
         first = self._source.open()
         self._model = camera_model(self._settings, first.shape[1], first.shape[0])
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the frame of mission time `stamp`; None if there is no new one."""
+        """Return the newest frame at mission time `stamp`; None if there is no new one."""
         del pose
         found = self._source.newest(stamp)
         if found is None:

@@ -1,4 +1,4 @@
-"""Frames of a video file by their time, the same at each run."""
+"""Deterministic playback of a video file by mission time."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from aerodaas.types.errors import SourceError
 __all__ = ["VideoFile"]
 
 _log = logging.getLogger(__name__)
-# The nanosecond stamp of frame k lies up to one nanosecond below k / rate.
+# The timestamp of frame k in nanoseconds lies up to one nanosecond below k / rate.
 _ROUNDING = 1e-4
 
 
 class VideoFile:
-    """Plays a video at its own rate, along the mission's stamps."""
+    """Plays a video at its own frame rate, by mission time."""
 
     def __init__(self, path: str, fallback_rate: float, *, loop: bool) -> None:
-        """Play `path`; `fallback_rate` in Hz is for files that state none."""
+        """Play `path`; `fallback_rate` in Hz is for files without a frame rate."""
         self._path = path
         self._rate = fallback_rate
         self._loop = loop
@@ -53,7 +53,7 @@ class VideoFile:
         return self._first
 
     def newest(self, stamp: int) -> tuple[NDArray[np.uint8], int] | None:
-        """Return the frame due at `stamp`, with that stamp; None if it was given already."""
+        """Return the frame due at `stamp`, with that timestamp; None if returned already."""
         if self._start is None:
             self._start = stamp
         due = math.floor(seconds(stamp - self._start) * self._rate + _ROUNDING)
@@ -62,7 +62,7 @@ class VideoFile:
         if self._position < 0 and due == 0 and self._first is not None:
             self._position = 0
             return self._first, stamp
-        # `open` has read frame 0, so that the decoder stands behind it.
+        # `open` has read frame 0, so the decoder is positioned after it.
         self._position = max(self._position, 0)
         while self._position < due:
             if not self._advance():
@@ -81,7 +81,7 @@ class VideoFile:
             self._capture = None
 
     def _advance(self) -> bool:
-        """Decode one frame further; begin again at the end of a video that loops."""
+        """Grab the next frame; a video that loops restarts at its end."""
         if self._capture is None:
             return False
         if not self._capture.grab():

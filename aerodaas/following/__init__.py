@@ -1,4 +1,4 @@
-"""Following a target: its geometry, the controllers, and the room that an approach needs.
+"""Target following: geometry, controllers, and clearance for the approach.
 
 It may import `types` and `config`.
 """

@@ -1,4 +1,4 @@
-"""How fast a drone may come near whom it follows: so that it stops in time, come what may."""
+"""Speed limit for the approach to people, so that the drone stops in time."""
 
 from __future__ import annotations
 
@@ -17,15 +17,16 @@ from aerodaas.types.geometry import Vector
 __all__ = ["ApproachLimit", "closing_speed"]
 
 _AHEAD = 0.7
-"""Radians off the drone's way within which somebody stands in it."""
+"""Angle off the direction of flight within which a person is in the path, radians."""
 _LONGEST_BLIND = 1.0
-"""Seconds between two pictures that count; who is not seen for longer is lost."""
+"""Longest interval between two frames that is considered, seconds; a target unseen for longer is
+lost."""
 
 
 def closing_speed(gap: float, deceleration: float, reaction_time: float) -> float:
-    """The highest speed (m/s) towards somebody `gap` metres beyond the least safe distance.
+    """Highest safe speed (m/s) towards a person `gap` metres beyond the least safe distance.
 
-    As `braking_speed` where there is room. Where there is none it is negative, so that the drone
+    For a positive gap as `braking_speed`. For a negative gap it is negative, so that the drone
     backs away; the slope is 1 / `reaction_time` on both sides of zero. Keeping below it makes
     gap >= 0 a forward invariant (control barrier function: Ames et al., "Control barrier
     functions: theory and applications", ECC 2019).
@@ -34,14 +35,14 @@ def closing_speed(gap: float, deceleration: float, reaction_time: float) -> floa
 
 
 class ApproachLimit:
-    """Remembers where people of the newest pictures stood, and takes them to stand there still.
+    """Speed limit by the positions of people in the newest frames, who are assumed to stand still.
 
-    Whoever walks away may stop at any moment, so that nothing is gained by their walking. All who
-    were seen count, not only the target: who it is matters to following, not to a collision.
+    A person walking away may stop at any moment, so their walking allows no higher speed. All
+    detected people count, not only the target: identity does not matter to a collision.
     """
 
     def __init__(self, nearest: float, limits: FollowLimits) -> None:
-        """Let the drone come no nearer than `nearest` metres."""
+        """Keep the drone at least `nearest` metres away from people."""
         self.nearest = nearest
         self.limits = limits
         self._places: list[Vector] = []
@@ -49,12 +50,12 @@ class ApproachLimit:
         self._target = False
         """Whether the first of them is the target."""
         self._blind = 0.0
-        """Seconds from one picture to the next: added to the reaction time, so that a drone whose
-        pictures come seldom keeps farther away. That they come late needs no more, as whoever is
-        seen is taken to have stopped when the picture was taken."""
+        """Interval between frames in seconds, added to the reaction time, so that a drone with a
+        low frame rate keeps farther away. The latency of frames needs no allowance, because people
+        are assumed to have stopped at capture."""
 
     def reset(self) -> None:
-        """Forget them all."""
+        """Discard all sightings."""
         self._places, self._sightings = [], []
 
     def see(
@@ -64,9 +65,9 @@ class ApproachLimit:
         at_capture: Odometry | None,
         interval: float,
     ) -> None:
-        """Take in everybody whom a picture shows that was taken `interval` seconds after the last.
+        """Store the people in a frame captured `interval` seconds after the last.
 
-        One that shows nobody leaves them where they stood.
+        A frame without people keeps their previous positions.
         """
         self._blind = min(interval, _LONGEST_BLIND)
         seen = [*([] if target is None else [target]), *others]
@@ -78,12 +79,11 @@ class ApproachLimit:
             self._places = [place_of(one, at_capture) for one in seen]
 
     def speed(self, towards: RelativeTarget, away: float, now: Odometry | None) -> float:
-        """Fastest speed in m/s towards `towards`, which moves away at `away` m/s.
+        """Highest safe speed in m/s towards `towards`, which moves away at `away` m/s.
 
-        Negative where the drone must back off from the target. Its walking away allows no more
-        speed than its standing still, but a drone that gains on it has less room than it seems: the
-        airframe goes on gaining until it has answered. Others in the way stop the drone, but do not
-        drive it back.
+        Negative if the drone must back off from the target. A target walking away allows no more
+        speed than a standing one, and a drone that gains on it has less room than measured, by the
+        airframe's response time. Others in the path stop the drone, but do not drive it back.
         """
         seen = list(self._distances(towards.bearing, now))
         target = min([towards.distance, *(far for far, is_target in seen if is_target)])
@@ -97,7 +97,7 @@ class ApproachLimit:
         return closing_speed(distance - self.nearest, self.limits.braking, reaction_time)
 
     def _distances(self, bearing: float, now: Odometry | None) -> Iterator[tuple[float, bool]]:
-        """How far each stands that is in the way, and whether it is the target."""
+        """Distance of each person in the path, and whether it is the target."""
         seen = self._sightings
         if now is not None:
             seen = [seen_from(now, (float(x), float(y))) for x, y in self._places]
@@ -108,7 +108,7 @@ class ApproachLimit:
 
 
 def _speed(now: Odometry | None, bearing: float) -> float:
-    """How fast the drone flies towards `bearing`, in m/s; zero if that is not known."""
+    """Speed of the drone towards `bearing` in m/s; zero if unknown."""
     if now is None or not np.isfinite(now.velocity).all():
         return 0.0
     heading = now.yaw + bearing

@@ -1,7 +1,7 @@
-"""Room to fly towards a target: what a depth camera shows at the drone's own height counts.
+"""Clearance for the approach to a target, from depth images at the drone's own height.
 
-A follower flies along its line of sight, and who is seen past the corner of a wall is seen along
-the wall. Nothing here finds a way around: the drone stops before what stands in its way.
+A follower flies along its line of sight, which may graze the corner of a wall. No path around an
+obstacle is planned: the drone stops in front of it.
 """
 
 from __future__ import annotations
@@ -21,21 +21,22 @@ from aerodaas.types.geometry import rotation_from_rpy
 __all__ = ["Clearance", "surfaces"]
 
 _BELOW, _ABOVE = 0.5, 0.4
-"""Metres from the body's centre within which a surface is at the drone's own height."""
+"""Vertical distances in metres from the body's centre within which a surface is an obstacle."""
 _GROUND = 0.3
-"""Metres above home below which it is the ground, or what lies on it."""
+"""Height above home in metres below which a surface is the ground, or an object lying on it."""
 _HALF_WIDTH = 0.5
-"""Metres to the side of the way that are to be free: half a drone, and what the wind moves it."""
+"""Half the width of the corridor in metres: half a drone, and its displacement by wind."""
 _BEFORE = 0.8
-"""Metres from the body's centre at which it stops before a surface."""
+"""Distance of the body's centre from a surface at which the drone stops, metres."""
 _BODY = 0.7
-"""Metres around the target within which surfaces are its own; the approach to it is limited."""
+"""Radius around the target within which surfaces belong to it, metres; `ApproachLimit` keeps the
+distance to the target itself."""
 
 
 def surfaces(seen: Detections) -> NDArray[np.float64] | None:
-    """Forward and left of the body, (n, 2) in metres, of what is at the drone's own height.
+    """Positions (n, 2) of the surfaces at the drone's own height, metres forward and left.
 
-    In the level body frame. None where the frame has no depth or the camera is not calibrated.
+    In the level body frame. None if the frame has no depth or the camera is not calibrated.
     """
     cells, camera, odometry = seen.nearest, seen.camera, seen.odometry
     if cells is None or camera is None:
@@ -56,10 +57,10 @@ def surfaces(seen: Detections) -> NDArray[np.float64] | None:
 
 
 class Clearance:
-    """Remembers the surfaces of the newest depth picture, and takes them to stand still."""
+    """Speed limit by the surfaces of the newest depth image, which are assumed to be static."""
 
     def __init__(self, limits: FollowLimits, nearest: float) -> None:
-        """Stop 0.8 m before what is in the way, or `nearest` where the target is let so near."""
+        """Stop 0.8 m before an obstacle, or `nearest` metres if that is less."""
         self._limits = limits
         self._before = min(_BEFORE, nearest)
         self._points: NDArray[np.float64] = np.zeros((0, 2))
@@ -69,15 +70,15 @@ class Clearance:
     def see(
         self, points: NDArray[np.float64] | None, at_capture: Odometry | None, interval: float
     ) -> None:
-        """Take in the surfaces of a picture taken `interval` seconds after the last.
+        """Store the surfaces of a frame captured `interval` seconds after the last.
 
-        None, of a picture without depth, leaves those before.
+        None, for a frame without depth, keeps the previous ones.
         """
         if points is not None:
             self._points, self._at, self._interval = points, at_capture, interval
 
     def speed(self, towards: RelativeTarget, now: Odometry | None) -> float:
-        """Fastest speed in m/s along the line of sight `towards`: infinite where it is free."""
+        """Highest safe speed along the line of sight `towards`, m/s; infinite if it is free."""
         points = self._points
         if self._at is not None and now is not None:
             east_north = self._at.position[:2] + points @ _turn(self._at.yaw).T

@@ -1,4 +1,4 @@
-"""Velocity commands within limits of speed, then of acceleration, from one frame to the next."""
+"""Speed and acceleration limits of velocity commands."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ __all__ = ["CommandShaper"]
 
 
 class CommandShaper:
-    """Remembers the last command, so that the next one differs from it by no more than it may."""
+    """Rate limiter: limits a command's speed, then its difference to the previous command."""
 
     def __init__(self, limits: FollowLimits) -> None:
-        """Start at rest."""
+        """Start with a zero command."""
         self.limits = limits
         self._velocity: NDArray[np.float64] = np.zeros(3)
         self._yaw_rate = 0.0
 
     def reset(self) -> None:
-        """Be at rest again."""
+        """Return to a zero command."""
         self._velocity, self._yaw_rate = np.zeros(3), 0.0
 
     def towards(self, bearing: float) -> float:
-        """The last command's speed in m/s in a direction of the body, positive to the left."""
+        """Speed of the last command in m/s towards a body-frame bearing, positive to the left."""
         return float(self._velocity[:2] @ (np.cos(bearing), np.sin(bearing)))
 
     def shape(
@@ -37,10 +37,10 @@ class CommandShaper:
         *,
         braking: bool = False,
     ) -> VelocityCommand:
-        """Command for `wanted` (forward, left, up in m/s) and `yaw_rate` (rad/s).
+        """Limit `wanted` (forward, left, up in m/s) and `yaw_rate` (rad/s).
 
-        `dt` is the time since the last command in seconds; `braking` lets the velocity change
-        as fast as the limits say for that. Numbers that are not finite command a stop, at once.
+        `dt` is the time since the last command in seconds; `braking` applies the limit `stopping`
+        instead of `acceleration`. Numbers that are not finite command an immediate stop.
         """
         limits = self.limits
         if not np.isfinite([*wanted, yaw_rate]).all():

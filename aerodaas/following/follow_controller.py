@@ -1,11 +1,11 @@
-"""From sightings of a target to velocity commands: pure, on the mission's stamps alone.
+"""Follow controller: velocity commands from sightings of a target.
 
-The drone turns to face the target and moves along the line of sight to keep its distance, by
-PID. Where odometry is known, the target's own velocity is fed forward, so that a walking person
-is followed without lag: along the line of sight to the speed, across it to the turn. The drone
-so flies where its camera looks and comes to stand behind the target, as in pure pursuit. A
-target out of sight is followed where it should be for a moment; then the drone slows down,
-holds, turns in search, and gives up.
+It is pure and depends on message timestamps alone. The drone turns to face the target and moves
+along the line of sight to keep its distance, by PID. If odometry is available, the target's own
+velocity is fed forward, so that a walking person is followed without lag: along the line of sight
+to the speed, across it to the yaw rate. So the drone flies in the direction of its camera and
+ends up behind the target, as in pure pursuit. A target out of sight is followed at its predicted
+position for a moment; then the drone slows down, holds, turns in search, and gives up.
 """
 
 from __future__ import annotations
@@ -33,26 +33,27 @@ from aerodaas.types.waypoints import DEFAULT_PRIORITY, VelocityCommand
 __all__ = ["LYING", "FollowController", "FollowPhase", "Observation"]
 
 _LONGEST_STEP = 0.5
-"""Seconds; after a longer silence the integrals would grow by what nobody saw."""
+"""Longest time step in seconds, so that the integrals do not grow over a gap between frames."""
 _FIRST_STEP = 0.1
 _FARTHEST = 1000.0
-"""Metres; no camera tells a person from farther away."""
+"""Greatest plausible distance in metres; no camera detects a person farther away."""
 _FARTHEST_FROM_HOME = 1e5
 LYING = 1.3
-"""Metres from the feet to the chest of one who lies there, at most; in any direction."""
+"""Greatest distance from the feet to the chest of a lying person in metres, in any direction."""
 _TOPPLING = 0.4
-"""Seconds from a fall's begin until it is known for one."""
+"""Seconds from the beginning of a fall until it is detected."""
 _CRAWL = 0.1
-"""m/s; what may go on no faster stands."""
+"""Speed in m/s below which the drone counts as blocked."""
 _INTEGRAL_REACH = 1.2
-"""Metres; a person who walks at 1 m/s is followed so far behind by the proportional part alone."""
+"""Distance error in metres within which the integral is active; the proportional part alone follows
+a person walking at 1 m/s with this error."""
 
 
 class FollowPhase(str, enum.Enum):
-    """What the controller is doing about its target."""
+    """Phase of following."""
 
     WAITING = "waiting"
-    """No target was ever seen, or it was given up: there is nothing to command."""
+    """No target was detected yet, or it was given up; no commands."""
     FOLLOWING = "following"
     SLOWING = "slowing"
     HOLDING = "holding"
@@ -61,22 +62,23 @@ class FollowPhase(str, enum.Enum):
 
 @dataclass(frozen=True, slots=True)
 class Observation:
-    """What one frame tells: the target or None, and the drone then and now."""
+    """Input of the controller for one frame: target, and odometry at capture and at present."""
 
     stamp: int
-    """Nanoseconds of mission time at capture."""
+    """Mission time at capture, nanoseconds."""
     sighting: RelativeTarget | None
+    """The target, if detected."""
     at_capture: Odometry | None = None
     now: Odometry | None = None
     now_stamp: int | None = None
     others: tuple[RelativeTarget, ...] = ()
-    """What else the frame shows that may be the target, or somebody like it."""
+    """Other objects with the target's labels."""
     surfaces: NDArray[np.float64] | None = None
-    """What the frame's depth shows at the drone's own height, as `clearance.surfaces` gives it."""
+    """Surfaces at the drone's own height, as returned by `clearance.surfaces`."""
 
 
 class FollowController:
-    """Keeps `distance` metres from the target and, where odometry is known, `height` metres up."""
+    """Keeps `distance` metres from the target and, given odometry, `height` metres above home."""
 
     def __init__(
         self,
@@ -89,9 +91,9 @@ class FollowController:
         motion: TargetMotion | None = None,
         priority: int = DEFAULT_PRIORITY,
     ) -> None:
-        """Wait for a first sighting of what moves as `motion` says, by default as people do.
+        """Start in phase WAITING, for a target that moves by `motion`, by default a person.
 
-        Distances in metres, both above zero.
+        `distance` and `height` are in metres, above zero.
         """
         self.distance = distance
         self.height = height
@@ -108,19 +110,19 @@ class FollowController:
         self._approach = ApproachLimit(limits.nearest * distance, limits)
         self._clearance = Clearance(limits, limits.nearest * distance)
         self.blocked = False
-        """Whether something stands in the way to the target, so that the drone does not move."""
+        """Whether an obstacle on the path to the target stops the drone."""
         self._upright = Upright()
         self._stamp: int | None = None
         self._seen: int | None = None
         self._last: RelativeTarget | None = None
         self._stood: tuple[float, float] | None = None
-        """East and north of home where the target stood before it fell."""
+        """Position of the target before it fell, metres east and north of home."""
         self._places: deque[tuple[int, tuple[float, float]]] = deque()
-        """Stamps, and where the target was then, of the last moments."""
+        """Timestamps and positions of the target, of the last `_TOPPLING` seconds."""
         self._braking = False
 
     def step(self, seen: Observation) -> VelocityCommand | None:
-        """Command for one frame; None while there is no target and for stamps that run back."""
+        """Compute the command for one frame; None without a target and for an old timestamp."""
         if self._stamp is not None and seen.stamp <= self._stamp:
             return None
         dt = _FIRST_STEP if self._stamp is None else seconds(seen.stamp - self._stamp)
@@ -138,21 +140,21 @@ class FollowController:
         return self._command(velocity, yaw_rate, seen, min(dt, _LONGEST_STEP))
 
     def give_up(self) -> None:
-        """Forget the target at once and wait for another."""
+        """Drop the target at once and wait for another."""
         self.phase = FollowPhase.WAITING
         self._forget()
 
     def change_target(self) -> None:
-        """Forget the target but not the drone's motion: another one is followed from now on."""
+        """Drop the target but not the drone's motion, to follow another one from now on."""
         self._seen = self._last = self._stood = None
         self._places.clear()
         self._upright.reset()
         self._reset()
 
     def expected(self, odometry: Odometry, stamp: int) -> RelativeTarget | None:
-        """Where the target should be in a picture taken at `odometry`; None if that is unknown.
+        """Predicted sighting of the target in a frame captured at `odometry`; None if unknown.
 
-        A bound is where the feet of one who fell are: they lie, or get up, within `LYING` of it.
+        A bound locates the feet of a fallen person, who lies, or gets up, within `LYING` of them.
         """
         if self._stood is not None:
             return replace(seen_from(odometry, self._stood), bound=True)
@@ -179,7 +181,7 @@ class FollowController:
             self._remember_place(place_of(sighting, seen.at_capture), seen.stamp)
 
     def _remember_place(self, place: NDArray[np.float64], stamp: int) -> None:
-        """Keep where the target was of late: the first picture of a fall looks like a long step."""
+        """Store a recent position, because the first frame of a fall resembles a long step."""
         self._places.append((stamp, (float(place[0]), float(place[1]))))
         while seconds(stamp - self._places[0][0]) > _TOPPLING:
             self._places.popleft()
@@ -207,9 +209,9 @@ class FollowController:
         self._yaw_pid.reset()
 
     def _wanted(self, seen: Observation, dt: float) -> tuple[NDArray[np.float64], float]:
-        """Velocity (forward, left) in m/s and yaw rate in rad/s that the phase asks for."""
+        """Velocity (forward, left) in m/s and yaw rate in rad/s that the phase requires."""
         self._braking = self.blocked = False
-        # Whoever fell gets up where they fell: they are watched over, not turned away from.
+        # A fallen person gets up at the same place, so the camera stays on it.
         if self.phase is not FollowPhase.SEARCHING or self._stood is not None:
             return self._follow(seen, dt)
         self._reset()
@@ -218,7 +220,7 @@ class FollowController:
         return np.zeros(2), 0.0
 
     def _share(self, stamp: int) -> float:
-        """Part of what following asks for that is done, by how long nobody was seen."""
+        """Fraction of the command to apply, by the time since the last sighting."""
         if self.phase is FollowPhase.SLOWING:
             unseen = seconds(stamp - (self._seen or 0))
             return (self.lost.slow - unseen) / (self.lost.slow - self.lost.coast)
@@ -229,13 +231,13 @@ class FollowController:
         distance = max(target.distance, self.limits.nearest * self.distance)
         yaw_rate = float(self._yaw_pid(-target.bearing, dt=dt) or 0.0) + left / distance
         error = target.distance - self.distance
-        # Far away the integral would only wind up and carry the drone past its place.
+        # Far away the integral would only wind up and cause an overshoot.
         self._distance_pid.Ki = self.gains.distance[1] if abs(error) < _INTEGRAL_REACH else 0.0
         speed = float(self._distance_pid(-error, dt=dt) or 0.0) + away
         now = seen.now or seen.at_capture
         safe = self._approach.speed(target, away, now)
         if target.bound and self._stood is None:
-            # Nobody knows how near it is. Of one who fell it is known where the feet are.
+            # The distance is only an upper bound; for a fallen person, the feet are located.
             safe = min(safe, 0.0)
         free = self._clearance.speed(target, now)
         self.blocked = free < min(speed, _CRAWL)
@@ -244,26 +246,26 @@ class FollowController:
         share = self._share(seen.stamp)
         if share == 0.0 or (speed > safe and safe <= 0.0):
             self._distance_pid.reset()
-        # Whoever comes may be out of the picture for being near: backing off goes on.
+        # An approaching person may be outside the image by being near, so backing off continues.
         speed = share * min(speed, safe) if now is None else min(share * speed, safe)
         direction = np.array([math.cos(target.bearing), math.sin(target.bearing)])
         return speed * direction, share * yaw_rate
 
     def _target(self, seen: Observation) -> tuple[RelativeTarget, float, float]:
-        """The target as it should be now, and how fast it moves away and to the left."""
+        """Predicted target at present, and its velocity away and to the left, m/s."""
         last = self._last or RelativeTarget(0.0, self.distance)
         now = seen.now or seen.at_capture
         stamp = max(seen.stamp, seen.now_stamp or 0) if seen.now else seen.stamp
         predicted = None if now is None else self.motion.relative_to(now, stamp)
         if last.bound and predicted is not None:
-            # Whoever came nearer until the picture cut them is taken to come on.
+            # A person who came nearer until cut by the image's edge is assumed to keep coming.
             found, away, _ = predicted
             if away >= 0.0:
                 return last, 0.0, 0.0
             nearest = last.distance if self._seen == seen.stamp else math.inf
             return replace(last, distance=min(nearest, found.distance)), away, 0.0
         if now is not None and last.bound and self._stood is not None:
-            # Whoever lies there has their feet about where they stood, and may get up on them.
+            # A lying person's feet are about where they stood, and the person may get up there.
             feet = seen_from(now, self._stood)
             if self._seen != seen.stamp:
                 last = replace(feet, bound=True)
@@ -274,7 +276,7 @@ class FollowController:
     def _command(
         self, velocity: NDArray[np.float64], yaw_rate: float, seen: Observation, dt: float
     ) -> VelocityCommand:
-        """Keep the height, within the limits of speed and acceleration."""
+        """Add the height control and apply the limits of speed and acceleration."""
         odometry = seen.now or seen.at_capture
         climb = 0.0
         if odometry is not None:
@@ -291,7 +293,7 @@ def _pid(gains: tuple[float, float, float], low: float, high: float) -> PID:
 
 
 def _without_nonsense(seen: Observation) -> Observation:
-    """Leave out what holds a number that cannot be: it counts as not observed."""
+    """Remove sightings and odometry with implausible numbers, which count as not observed."""
     sighting = seen.sighting if _can_be(seen.sighting) else None
     others = tuple(filter(_can_be, seen.others))
     at_capture = seen.at_capture if _is_sane(seen.at_capture) else None

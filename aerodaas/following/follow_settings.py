@@ -1,4 +1,4 @@
-"""What can be tuned about following, with the reason for each default."""
+"""Tuning parameters of following, with the reason for each default."""
 
 from __future__ import annotations
 
@@ -9,85 +9,88 @@ __all__ = ["FollowGains", "FollowLimits", "LostPolicy", "TargetChoice"]
 
 @dataclass(frozen=True, slots=True)
 class FollowGains:
-    """Proportional, integral and derivative gains.
+    """Proportional, integral and derivative gains of the follower.
 
-    With a frame every 0.2 s and 0.2 s from capture to command, gains above about 2 per second
-    start to swing.
+    With a frame every 0.2 s and a latency of 0.2 s from capture to command, gains above about 2
+    per second start to oscillate.
     """
 
     distance: tuple[float, float, float] = (0.9, 0.15, 0.0)
-    """m/s for each metre, metre second and m/s."""
+    """m/s per metre, metre second and m/s."""
     yaw: tuple[float, float, float] = (1.5, 0.1, 0.0)
-    """rad/s for each radian, radian second and rad/s."""
+    """rad/s per radian, radian second and rad/s."""
     height: float = 1.0
-    """m/s for each metre."""
+    """m/s per metre."""
 
 
 @dataclass(frozen=True, slots=True)
 class FollowLimits:
-    """What a command never exceeds, near people."""
+    """Limits of a follower's commands, near people."""
 
     forward: float = 1.5
-    """m/s towards the target."""
+    """Speed towards the target, m/s."""
     backward: float = 2.0
-    """m/s away from it. Nothing looks where the drone goes then, but whoever walks up to it, at the
-    1.4 m/s that people walk, must not reach it."""
+    """Speed away from the target, m/s. No camera covers that direction, but a person approaching at
+    a walking speed of 1.4 m/s must not reach the drone."""
     climb: float = 0.5
-    """m/s up or down."""
+    """Vertical speed, m/s."""
     yaw_rate: float = 1.2
-    """rad/s."""
+    """Yaw rate, rad/s."""
     acceleration: float = 1.5
-    """m/s^2 of the commanded velocity."""
+    """Acceleration of the commanded velocity, m/s²."""
     braking: float = 2.5
-    """m/s^2 with which the drone is sure to stop: how fast it may come near is reckoned with it."""
+    """Deceleration that the drone reliably achieves, m/s²; it determines the speed of approach."""
     stopping: float = 4.0
-    """m/s^2 of the commanded velocity where the drone would else come too near: the airframe does
-    what it can."""
+    """Acceleration of the commanded velocity to avoid coming too near, m/s², which the airframe
+    follows as well as it can."""
     reaction_time: float = 0.4
-    """Seconds from the command to brake until the drone does: the tilting of the airframe. The time
-    between two frames, in which no such command can come, is measured and added."""
+    """Seconds from the command to brake until the drone brakes, after tilting. The time between two
+    frames, during which no such command is computed, is measured and added."""
     response: float = 0.4
-    """Seconds by which the airframe's velocity lags behind the commanded one."""
+    """Lag of the airframe's velocity behind the commanded one, seconds."""
     yaw_acceleration: float = 4.0
-    """rad/s^2 of the commanded yaw rate."""
+    """Acceleration of the commanded yaw rate, rad/s²."""
     nearest: float = 0.6
-    """Part of the wanted distance within which the drone never moves towards the target; it comes
-    up no faster than it could stop there."""
+    """Fraction of the wanted distance within which the drone never moves towards the target; its
+    approach is slow enough to stop there."""
 
 
 @dataclass(frozen=True, slots=True)
 class LostPolicy:
-    """What happens after the target went out of sight; each time in seconds from then."""
+    """Reaction to a lost target; each time in seconds since its last sighting."""
 
     coast: float = 0.4
-    """Until here it is followed where it should be: a detector misses now and then."""
+    """End of following the predicted target, as a detector misses occasionally."""
     slow: float = 1.4
-    """Until here the drone slows down to a stop."""
+    """End of slowing down to a stop."""
     hold: float = 3.0
-    """Until here it waits for the same target; from here on, another may take its place."""
+    """End of waiting for the same target; afterwards, another one may replace it."""
     search: float = 18.0
-    """Until here it turns in search, at 0.5 rad/s more than once around; then it gives up."""
+    """End of turning in search, at 0.5 rad/s more than one revolution; then the target is given
+    up."""
     search_rate: float = 0.5
-    """rad/s."""
+    """Yaw rate of the search, rad/s."""
 
 
 @dataclass(frozen=True, slots=True)
 class TargetChoice:
-    """What it takes to be chosen as a target; one that is held is held on less."""
+    """Conditions for choosing a target; a target is held under weaker ones."""
 
     score: float = 0.0
-    """Least mean confidence of the track that is chosen, and below which it gives way to a much
-    surer one; the detector's own threshold holds as well."""
+    """Least mean confidence of the chosen track, below which it gives way to a much surer one; the
+    detector's own threshold applies as well."""
     sure: float = 0.0
-    """Confidence from which a box begins a track; below, it only continues one."""
+    """Least confidence of a box that starts a track; others only continue one."""
     looks: int = 2
-    """Frames in which it must have been seen, the first target by a drone that is up."""
+    """Number of frames with a detection before the choice; for the first target, with the drone
+    high enough."""
     grounded: bool = False
-    """It stands on the ground: a box of its size that hangs in the air is something else, and one
-    that fills the picture from side to side down to its lower edge may be the ground itself. Not
-    for a part of a thing, such as a vest, nor where the ground is far from level."""
+    """Whether the target stands on the ground: a box of its size in the air is another object, and
+    one that fills the image from side to side down to its lower edge may be the ground. Not for a
+    part of an object, such as a vest, nor on ground that is far from level."""
     whole: bool = False
-    """The first look at it shows all of it: of what fills the picture, the size is not known."""
+    """Whether the first detection must show all of the target, as the size of an object that fills
+    the image is unknown."""
     shared: float = 1.0
-    """Of two boxes that share more than this part of the smaller one, the better one counts; 1
-    counts both."""
+    """Shared fraction of the smaller of two boxes above which only the better one counts; 1 keeps
+    both."""

@@ -1,4 +1,4 @@
-"""Where the pixels of a picture meet flat ground, seen from a drone of known height."""
+"""Projection of an image's pixels onto flat ground, from a drone of known height."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ Array = NDArray[np.float64]
 _CORNERS = 64
 _STEEPEST = 1e-6
 _LOWEST = 0.05
-"""Metres; a camera that lies on the ground sees none of it."""
+"""Least height of the camera in metres; a camera lying on the ground does not see it."""
 
 
 class GroundView:
-    """One frame's view of the ground, which is flat and at the height of home.
+    """Projection between one frame and the ground, which is flat and at the height of home.
 
-    Ground coordinates are metres in the level body frame (forward, left), from below the drone.
+    Ground coordinates are metres in the level body frame (forward, left), with the origin below
+    the drone.
     """
 
     def __init__(self, detections: Detections) -> None:
-        """Look as the camera of `detections` did; raises ValueError for an unknown pose."""
+        """Use the camera and pose of `detections`; raises ValueError if they are unknown."""
         camera, odometry = detections.camera, detections.odometry
         if camera is None or odometry is None:
             raise ValueError("the ground is found only from a calibrated camera of known height")
@@ -34,7 +35,7 @@ class GroundView:
         self._rotation: Array = level @ camera.body_from_optical
         self._eye: Array = level @ np.array(camera.mount)
         self.height = odometry.height + float(self._eye[2])
-        """Metres of the camera above the ground."""
+        """Height of the camera above the ground, metres."""
         if not (np.isfinite(self._rotation).all() and _LOWEST < self.height < math.inf):
             raise ValueError("the camera's attitude or height says nothing")
         self._scale = np.array([camera.width / detections.width, camera.height / detections.height])
@@ -51,7 +52,7 @@ class GroundView:
         )
 
     def points(self, pixels: Array, up: float = 0.0) -> Array:
-        """Ground points (N, 2) below what is `up` metres high at the pixels (N, 2).
+        """Ground points (N, 2) below objects `up` metres high at the pixels (N, 2).
 
         NaN at and above the horizon; `up` must be less than the camera's height.
         """
@@ -62,13 +63,13 @@ class GroundView:
         return np.asarray(self._eye[:2] + reach[:, None] * rays[:, :2])
 
     def height_above(self, point: Array, pixel: Array) -> float:
-        """Metres above the ground of what is seen at `pixel` (2,), if it is above `point` (2,)."""
+        """Height in metres of the object at `pixel` (2,), if it is above ground `point` (2,)."""
         (ray,) = self._rays(pixel[None])
         away = float(np.hypot(*(point - self._eye[:2])))
         return self.height + away * float(ray[2] / max(np.hypot(*ray[:2]), _STEEPEST))
 
     def sees(self, point: Array) -> bool:
-        """Whether `point` (3,), forward, left and up from the ground below, is in the picture."""
+        """Whether `point` (3,), forward, left and up from the ground below, is in the image."""
         eye = np.array([*self._eye[:2], self.height])
         across, down, depth = self._rotation.T @ (point - eye)
         if depth <= 0:
@@ -77,9 +78,9 @@ class GroundView:
         return bool(((pixel >= 0) & (pixel <= self._corners[2])).all())
 
     def area(self, farthest: float) -> float:
-        """Square metres of ground in the picture within `farthest` metres of the camera's foot."""
+        """Area (m²) of ground in the image, within `farthest` metres from below the camera."""
         angles = np.linspace(0.0, math.tau, _CORNERS, endpoint=False)
-        # The polygon has the circle's area.
+        # The polygon has the same area as the circle.
         radius = farthest * math.sqrt(math.tau / _CORNERS / math.sin(math.tau / _CORNERS))
         region = radius * np.column_stack([np.cos(angles), np.sin(angles)])
         rays = self._rays(self._corners)

@@ -1,8 +1,9 @@
-"""Inspecting a tower: approach to a stand-off, climb along it, come down; pure, on stamps alone.
+"""Controller of a tower inspection: approach to a stand-off, climb along the tower, descent.
 
-The tower stands; where, is estimated from all sightings. Motion along the line of sight is braked
-so that the drone stops at the stand-off, and away from it the drone moves at once. Whatever goes
-wrong, an unseen tower or the time, ends in the descent, and the descent in the end.
+It is a pure state machine on message timestamps. The tower's position is estimated from all
+sightings. The approach is braked so that the drone stops at the stand-off, and too near a drone
+backs away at once. Loss of the tower and the time limit lead to the descent, and the descent to
+the end.
 """
 
 from __future__ import annotations
@@ -29,44 +30,47 @@ __all__ = ["InspectionController", "InspectionPhase", "InspectionPlan"]
 
 _LONGEST_STEP = 0.5
 _CONFIRMED = 3
-"""Sightings before the drone sets out."""
+"""Number of sightings that start the approach."""
 _MEMORY = 2.0
-"""Seconds within which they must fall."""
+"""Seconds within which these sightings must occur."""
 _FRESH = 1.0
 """Seconds after a sighting in which the drone still moves towards the tower."""
 _CLOSE = 0.5
 _LEVEL = 0.3
-"""Metres from the stand-off and from a height that count as there."""
+"""Tolerances of the stand-off and of a height, metres."""
 _REACTION = 0.6
-"""Seconds from a picture to the drone's answer."""
+"""Seconds from capture to the drone's response."""
 _SEARCH_RATE = 0.3
 _FARTHER = 1.25
-"""Times its known distance; a tower that seems farther is seen in part."""
+"""Ratio to the estimated distance above which a sighting shows only a part of the tower."""
 
 
 @dataclass(frozen=True, slots=True)
 class InspectionPlan:
-    """What to fly; metres, m/s, seconds. Raises ConfigError for numbers that cannot be."""
+    """Parameters of an inspection, in metres, m/s and seconds.
+
+    Raises ConfigError for numbers out of range.
+    """
 
     stand_off: float = 8.0
-    """Along the ground from the tower's near side; never less."""
+    """Least distance along the ground from the tower's near side."""
     base: float = 2.0
     """Height at which the climb begins and the descent ends."""
     top: float = 35.0
     interval: float = 2.0
-    """Height between two pictures."""
+    """Height between two images."""
     speed: float = 1.5
-    """Of the approach."""
+    """Speed of the approach."""
     climb: float = 1.0
     patience: float = 20.0
-    """Without a sight of the tower until the inspection ends."""
+    """Time without a sighting of the tower after which the inspection ends."""
     longest: float = 600.0
-    """From the beginning to the descent, at most."""
+    """Longest time from the beginning to the descent."""
     farthest: float = 100.0
-    """A tower farther away is left alone."""
+    """Greatest distance of a tower to inspect."""
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Validate the numbers."""
         for name in self.__slots__:
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
@@ -76,10 +80,10 @@ class InspectionPlan:
 
 
 class InspectionPhase(str, enum.Enum):
-    """How far the inspection has come."""
+    """Phase of the inspection."""
 
     WAITING = "waiting"
-    """No tower has been seen, or only in a frame or two: there is nothing to command."""
+    """No tower has been detected, or in fewer than three frames; no commands."""
     APPROACHING = "approaching"
     CLIMBING = "climbing"
     DESCENDING = "descending"
@@ -87,17 +91,17 @@ class InspectionPhase(str, enum.Enum):
 
 
 class InspectionController:
-    """Flies one inspection by `plan`."""
+    """Controller of one inspection by `plan`."""
 
     def __init__(self, plan: InspectionPlan, priority: int = DEFAULT_PRIORITY) -> None:
-        """Wait for a tower."""
+        """Start in phase WAITING; `priority` is that of the commands."""
         self.plan = plan
         self.priority = priority
         self.phase = InspectionPhase.WAITING
         self.reason = ""
-        """Why the climb ended before the top; empty if it did not."""
+        """Reason why the climb ended before the top; empty if it did not."""
         self.picture_due: float | None = None
-        """Height in metres of the picture to be taken of the frame last stepped; None for none."""
+        """Height in metres if the frame last stepped is an image to keep, else None."""
         self.motion = TargetMotion(acceleration=0.0, speed=0.0)
         limits = FollowLimits(plan.speed, plan.speed, max(plan.climb, 0.5), 0.8, 1.0, 2.0)
         self._shaper = CommandShaper(limits)
@@ -108,7 +112,7 @@ class InspectionController:
         self._next_picture = plan.base
 
     def step(self, seen: Observation) -> VelocityCommand | None:
-        """Command for one frame; None while there is nothing to inspect, and without odometry."""
+        """Compute the command for one frame; None without a tower or odometry."""
         self.picture_due = None
         if self._stamp is not None and seen.stamp <= self._stamp:
             return None
@@ -160,7 +164,7 @@ class InspectionController:
                 self.phase, self._began = InspectionPhase.APPROACHING, seen.stamp
 
     def _seems_farther(self, sighting: RelativeTarget, seen: Observation) -> bool:
-        """Tell whether a sighting must be of a part of the tower: it stands, and seemed nearer."""
+        """Whether a sighting shows only a part of the tower, which is static and was nearer."""
         if self.phase is InspectionPhase.WAITING or sighting.bound or seen.at_capture is None:
             return False
         known = self.motion.relative_to(seen.at_capture, seen.stamp)
@@ -190,7 +194,7 @@ class InspectionController:
         self.phase, self.reason = InspectionPhase.DESCENDING, reason
 
     def _along(self, distance: float, unseen: float) -> float:
-        """Speed towards the tower, m/s; negative where it is too near."""
+        """Speed towards the tower, m/s; negative if it is too near."""
         room = distance - self.plan.stand_off
         if room < 0:
             return max(2.0 * room, -self.plan.speed)
@@ -201,7 +205,7 @@ class InspectionController:
     def _climb(self, height: float) -> float:
         plan = self.plan
         if self.phase is InspectionPhase.APPROACHING:
-            # From up there the foot of a near tower is out of the picture.
+            # From a greater height the foot of a near tower is outside the image.
             return max(min(plan.base - height, 0.8 * plan.climb), -plan.climb)
         target = plan.top if self.phase is InspectionPhase.CLIMBING else plan.base
         way = target - height

@@ -1,10 +1,10 @@
-"""Where a detected object of known size stands, seen from a level drone.
+"""Position of a detected object of known size relative to a level drone.
 
-The size of a box tells the distance of an object whose size is known, never beyond where the ray
-through its lower edge meets the ground. A box that the picture's edge cuts is too small, so that
-the distance read from it is an upper bound: the object may stand nearer, never farther. Taking such
-a bound for the distance would fly the drone into a person who stands so near that the feet are out
-of the picture, which with a level camera of the Tello's kind is so within 3 m.
+The size of a box gives the distance of an object whose size is known, limited to the point where
+the ray through its lower edge meets the ground. A box cut by the image's edge is too small, so
+the distance derived from it is an upper bound: the object may be nearer, never farther. Taking
+such a bound for the distance would fly the drone into a person so near that the feet are outside
+the image, which is the case within 3 m for a level camera like the Tello's.
 """
 
 from __future__ import annotations
@@ -20,34 +20,35 @@ from aerodaas.types.geometry import Vector, rotation_from_rpy
 __all__ = ["RelativeTarget", "TargetSize", "ends_in_picture", "sight"]
 
 _MARGIN = 0.03
-"""Part of the picture's side within which a box counts as cut: boxes of people whose feet are out
-of the picture end up to 18 of 720 pixels short of its edge (three YOLO models, 36 real frames)."""
+"""Distance of a box from the image's edge, as a fraction of the side, within which it counts as
+cut: boxes of people whose feet are outside the image end up to 18 of 720 pixels short of its edge
+(three YOLO models, 36 real frames)."""
 _HIDDEN = 1.3
-"""Where height and width disagree by more than this, part of the height must be hidden."""
+"""Ratio of the distances by height and by width above which part of the height is hidden."""
 _LIES = 0.8
-"""A box that meets the ground this much nearer than its size says is of somebody who lies there:
-whoever gets up again may do so nearer than what is seen of them, as feet stand before a chest."""
+"""Ratio of the distance to the ground at the lower edge to the distance by size, below which a
+person lies there: they may get up nearer than their visible part, as feet precede a chest."""
 _AFLOAT, _TILTED = 1.5, 0.05
-"""What is afloat meets the ground so many times farther than its size says, and by more than an
-attitude that is 3 degrees wrong would make it."""
+"""Ratio of the distance to the ground at the lower edge to the distance by size, above which an
+object is afloat, and the least difference in slope, to allow for an attitude error of 3 degrees."""
 _TWICE = 2.0
-"""What is so many times farther than its size says is no large target, but what lies behind it,
-and what is so many times nearer, all of it in the picture, something that passes in between."""
+"""Ratio of measured depth to the distance by size, above which the depth is that of the background,
+and below whose inverse, for a box entirely in the image, it is that of an object in between."""
 _SMALLEST_SLOPE = 1e-3
 _NARROWEST, _WIDEST = 0.6, 1.6
 
 
 @dataclass(frozen=True, slots=True)
 class TargetSize:
-    """Height and width of an object in metres; of the two, the height varies less."""
+    """Height and width of an object in metres; the height varies less than the width."""
 
     height: float
     width: float
     widest: float | None = None
-    """Where the width is another from another side, as a car's is: the greatest, in metres."""
+    """Greatest width in metres, if the width depends on the viewing side, as a car's does."""
 
     def with_width(self, width: float) -> TargetSize:
-        """The same with a width that was measured, kept within reason of the one assumed here."""
+        """Replace the width by a measured one, clamped to a plausible range."""
         most = max(_WIDEST * self.width, self.widest or 0.0)
         bounded = min(max(width, _NARROWEST * self.width), most)
         return TargetSize(self.height, bounded, self.widest)
@@ -55,21 +56,22 @@ class TargetSize:
 
 @dataclass(frozen=True, slots=True)
 class RelativeTarget:
-    """One look at the target, in the level body frame (FLU without roll and pitch)."""
+    """One sighting of the target in the level body frame (FLU without roll and pitch)."""
 
     bearing: float
-    """Radians, positive to the left."""
+    """Direction in radians, positive to the left."""
     distance: float
-    """Metres along the ground from the body's centre."""
+    """Distance along the ground from the body's centre, metres."""
     bound: bool = False
-    """It stands at `distance` or nearer: the picture's edges cut it on all measures, or it lies."""
+    """Whether `distance` is an upper bound, because the image's edges cut the box in both
+    directions, or the target lies."""
     width: float | None = None
-    """The target's width in metres, where the whole of it was seen."""
+    """Width of the target in metres, if it is entirely in the image."""
     afloat: bool = False
-    """Its size says that it is far nearer than where the ground lies below it: it stands on none,
-    or is larger than assumed."""
+    """Whether the distance by size is much less than that of the ground at its lower edge: the
+    object does not stand on the ground, or is larger than assumed."""
     top: float | None = None
-    """Metres from home up to its upper edge, where that is in the picture."""
+    """Height of its upper edge above home in metres, if that is in the image."""
 
     @property
     def offset(self) -> Vector:
@@ -80,10 +82,10 @@ class RelativeTarget:
 def sight(detection: Detection, detections: Detections, size: TargetSize) -> RelativeTarget | None:
     """Locate `detection`, one of `detections`, an upright object of `size`.
 
-    Where its depth was measured, that is the distance to it. Else the height counts where all of
-    it is in the picture; where its top or bottom is cut off or hidden, by a wall or a car, the
-    width stands in, for such a box is too short and the object nearer than it seems. None if the
-    camera is not calibrated or the box says nothing.
+    A measured depth gives the distance. Otherwise the height of the box does, if all of it is in
+    the image; if its top or bottom is cut off or hidden, by a wall or a car, the width is used as
+    well, because such a box is too short and the object nearer than it appears. None if the
+    camera is not calibrated or the box is degenerate.
     """
     camera, odometry = detections.camera, detections.odometry
     left, top, right, bottom = detection.box
@@ -126,7 +128,7 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Rel
     if math.isfinite(lens) and top >= margin_v:
         crown = lens + measured * _slope(ray(u, top))
     direction = np.array([math.cos(bearing), math.sin(bearing)])
-    # From the lens to the body's centre.
+    # Moves the origin from the lens to the body's centre.
     place = measured * direction + mount[:2]
     return RelativeTarget(
         bearing=math.atan2(place[1], place[0]),
@@ -139,10 +141,10 @@ def sight(detection: Detection, detections: Detections, size: TargetSize) -> Rel
 
 
 def ends_in_picture(detection: Detection, detections: Detections) -> bool:
-    """Whether a box has a side or its lower edge in the picture.
+    """Whether a side or the lower edge of a box is in the image.
 
-    What leaves it on the left, on the right and below may be the ground before the camera, of which
-    a detector sees no more than of a thing as near as that.
+    A box that extends beyond the left, right and lower edges may be the ground before the camera,
+    which a detector cannot distinguish from an object at that distance.
     """
     left, _, right, bottom = detection.box
     margin_u, margin_v = _MARGIN * detections.width, _MARGIN * detections.height
@@ -154,9 +156,9 @@ def ends_in_picture(detection: Detection, detections: Detections) -> bool:
 
 
 def _along_ground(depth: float | None, ray: Vector, axis: Vector) -> float | None:
-    """Metres along the ground, from the lens, to where `ray` is `depth` metres along `axis`.
+    """Ground distance in metres from the lens to the point of `ray` with `depth` along `axis`.
 
-    None where nothing was measured. Ray and axis are unit vectors of the level frame.
+    None without a measured depth. Ray and axis are unit vectors of the level frame.
     """
     towards = float(ray @ axis)
     if depth is None or not (math.isfinite(depth) and depth > 0.0 and towards > 0.0):
@@ -165,11 +167,11 @@ def _along_ground(depth: float | None, ray: Vector, axis: Vector) -> float | Non
 
 
 def _reach(lowest: Vector, lens: float) -> float:
-    """Metres from the lens, `lens` metres up, to where the ray through a box's lower edge ends.
+    """Distance in metres from the lens, `lens` metres up, to the ground at a box's lower edge.
 
-    Nothing stands below the ground, so no target is farther: one that lies there looks small, which
-    its size alone would take for far away. Where the ground falls off the target is only thought
-    nearer than it is; infinite where the height is not known or the ray does not go down.
+    It limits the distance of a lying target, which appears small and therefore far away by its
+    size. Where the ground falls off, the target is only estimated nearer than it is. Infinite if
+    the height is unknown or the ray does not point down.
     """
     slope = _slope(lowest)
     if not (math.isfinite(lens) and lens > 0.0 and slope < -_SMALLEST_SLOPE):
@@ -178,7 +180,7 @@ def _reach(lowest: Vector, lens: float) -> float:
 
 
 def _is_afloat(lowest: Vector, distance: float, lens: float) -> bool:
-    """Tell whether what is `distance` away has its lower edge, along `lowest`, above the ground."""
+    """Whether an object at `distance` has its lower edge, along `lowest`, above the ground."""
     if not (math.isfinite(lens) and lens > 0.0 and distance > 0.0):
         return False
     ground, edge = -lens / distance, _slope(lowest)
@@ -190,5 +192,5 @@ def _azimuth(ray: Vector) -> float:
 
 
 def _slope(ray: Vector) -> float:
-    """Metres up for each metre along the ground."""
+    """Slope of a ray, metres up per metre along the ground."""
     return float(ray[2] / max(math.hypot(ray[0], ray[1]), _SMALLEST_SLOPE))

@@ -1,7 +1,7 @@
-"""Where the target is on the ground and how it moves: a Kalman filter at constant velocity.
+"""Constant-velocity Kalman filter of the target's position and velocity on the ground.
 
-It works in the local ENU frame, so that the drone's own motion does not pass for the target's,
-and bridges the time between a frame's capture and the command that it leads to.
+It works in the local ENU frame, so that the drone's own motion is not mistaken for the target's,
+and compensates the latency from a frame's capture to the resulting command.
 """
 
 from __future__ import annotations
@@ -18,38 +18,38 @@ from aerodaas.types.data import Odometry
 __all__ = ["TargetMotion", "place_of", "seen_from"]
 
 _RANGE_NOISE, _SIDE_NOISE = 0.06, 0.02
-"""Standard deviations along and across the line of sight, in parts of the distance."""
+"""Standard deviations along and across the line of sight, as fractions of the distance."""
 _LEAST_NOISE = 0.03
 _ACCELERATION = 0.7
 """Standard deviation of a walking person's acceleration, m/s^2."""
 _LEAP, _PATIENCE = 2.5, 0.5
-"""Standard deviations of range beyond which a sighting leaps, and seconds of disbelief."""
+"""Gate of a sighting in standard deviations of range, and seconds for which it is applied."""
 _NEAREST = 0.1
 _FIRST_SPEED = 0.7
 """Standard deviation of a velocity not yet observed, m/s."""
 
 
 def seen_from(odometry: Odometry, place: tuple[float, float]) -> RelativeTarget:
-    """How a place (metres east and north of home) lies from a drone at `odometry`."""
+    """Bearing and distance of a place (metres east, north of home) from a drone at `odometry`."""
     way = np.array(place) - odometry.position[:2]
     bearing = math.remainder(math.atan2(way[1], way[0]) - odometry.yaw, math.tau)
     return RelativeTarget(bearing, float(np.hypot(*way)))
 
 
 def place_of(sighting: RelativeTarget, odometry: Odometry) -> NDArray[np.float64]:
-    """East and north of home in metres, shape (2,), of what a drone at `odometry` sees so."""
+    """Position (2,) of a sighting from a drone at `odometry`, metres east and north of home."""
     heading = odometry.yaw + sighting.bearing
     towards = np.array([math.cos(heading), math.sin(heading)])
     return np.asarray(odometry.position[:2] + sighting.distance * towards)
 
 
 class TargetMotion:
-    """Position and velocity of the target, east and north."""
+    """Estimator of the target's position and velocity, east and north."""
 
     def __init__(self, acceleration: float = _ACCELERATION, speed: float = _FIRST_SPEED) -> None:
-        """Know nothing of a target that accelerates (m/s²) and moves (m/s) so, at one sigma.
+        """Set the standard deviations of the target's acceleration (m/s²) and initial speed (m/s).
 
-        With both zero, the target is known to stand.
+        With both zero, the target is assumed to be static.
         """
         self._acceleration, self._speed = acceleration, speed
         self._state: NDArray[np.float64] | None = None
@@ -58,22 +58,23 @@ class TargetMotion:
 
     @property
     def known(self) -> bool:
-        """Whether the target was ever observed since the last reset."""
+        """Whether the target was observed since the last reset."""
         return self._state is not None
 
     @property
     def place(self) -> tuple[float, float] | None:
-        """East and north of home in metres where it was last believed; None before the first."""
+        """Last estimated position, metres east and north of home; None before the first."""
         return None if self._state is None else (float(self._state[0]), float(self._state[1]))
 
     def reset(self) -> None:
-        """Forget the target."""
+        """Discard the estimate."""
         self._state = None
 
     def leaps(self, sighting: RelativeTarget, odometry: Odometry, stamp: int) -> bool:
-        """Tell whether a sighting is farther off than a target that was there can have got to.
+        """Whether a sighting is farther away than the target can have moved.
 
-        Such a box shows a part of it, or one who tilts before a fall. It is believed if it lasts.
+        Such a box shows a part of the target, or a person about to fall. It is accepted if it
+        persists.
         """
         predicted = self.relative_to(odometry, stamp)
         if predicted is None or seconds(stamp - self._stamp) > _PATIENCE:
@@ -81,7 +82,7 @@ class TargetMotion:
         return sighting.distance - predicted[0].distance > _LEAP * _RANGE_NOISE * sighting.distance
 
     def observe(self, sighting: RelativeTarget, odometry: Odometry, stamp: int) -> None:
-        """Take in a sighting made at `stamp` from a drone at `odometry`."""
+        """Update the estimate by a sighting at `stamp` from a drone at `odometry`."""
         heading = odometry.yaw + sighting.bearing
         along = np.array([math.cos(heading), math.sin(heading)])
         across = np.array([-along[1], along[0]])
@@ -104,10 +105,10 @@ class TargetMotion:
     def relative_to(
         self, odometry: Odometry, stamp: int
     ) -> tuple[RelativeTarget, float, float] | None:
-        """Predict for `stamp` how the target is seen from `odometry`.
+        """Predict the target at `stamp` relative to a drone at `odometry`.
 
-        Returns the sighting and the target's velocity in m/s, away from the drone along the line
-        of sight and to the left across it. None before the first observation.
+        Returns the bearing and distance, and the target's velocity in m/s away from the drone
+        along the line of sight and to the left across it. None before the first observation.
         """
         if self._state is None:
             return None
@@ -120,7 +121,7 @@ class TargetMotion:
         return found, away, left
 
     def spread(self, stamp: int) -> float:
-        """Standard deviation in metres of where it is predicted to be at `stamp`; 0 if unknown."""
+        """Standard deviation of the position predicted for `stamp`, metres; 0 without a target."""
         if self._state is None:
             return 0.0
         _, covariance = self._predicted(self._state, seconds(stamp - self._stamp))

@@ -1,4 +1,4 @@
-"""Whether a target stands: whoever falls, lies or gets up does not walk."""
+"""Detection of whether a target stands, as a person who falls, lies or gets up does not walk."""
 
 from __future__ import annotations
 
@@ -9,38 +9,38 @@ from aerodaas.types.clock import seconds
 __all__ = ["Upright"]
 
 _SPAN = 0.15
-"""Seconds between two looks that are compared; less would measure the noise of boxes."""
+"""Seconds between two compared sightings; shorter spans would measure the noise of boxes."""
 _FASTEST, _FASTEST_SHARE = 0.8, 0.3
-"""m/s up or down from which a target falls or gets up, and that for each metre of distance, for
-an attitude that is a little wrong moves what is far away more."""
+"""Vertical speed in m/s above which a target falls or gets up, and its increase per metre of
+distance, because an attitude error moves distant objects more."""
 _KEPT = 8
 _LOW = 0.6
-"""Parts of its height when it stood, below which a target that sank so fast is still down."""
+"""Fraction of its standing height below which a fallen target is still down."""
 
 
 class Upright:
-    """Follows the height of the target's upper edge, which tells a fall even without the feet.
+    """Tracks the height of the target's upper edge, which shows a fall even without the feet.
 
-    A falling person's chest goes a metre aside within half a second. A follower that took this
-    for walking would fly after it, over the person's feet.
+    A falling person's chest moves a metre sideways within half a second. A follower that took
+    this for walking would fly after it, over the person's feet.
     """
 
     def __init__(self) -> None:
-        """Know nothing yet."""
+        """Start without sightings."""
         self._looks: deque[tuple[int, float]] = deque(maxlen=_KEPT)
         self._stood: float | None = None
-        """The height from which it fell."""
+        """Height before the fall, metres."""
 
     def reset(self) -> None:
-        """Forget the target."""
+        """Discard the target."""
         self._looks.clear()
         self._stood = None
 
     def stands(self, top: float, distance: float, stamp: int) -> bool:
-        """Take in a look at the target's upper edge, `top` metres above home.
+        """Add a sighting of the target's upper edge, `top` metres above home.
 
-        False while it goes up or down faster than anybody who walks, and after a fall until it is
-        up again.
+        Returns False while it moves up or down faster than a walking person's, and after a fall
+        until it is up again.
         """
         before = self._before(stamp)
         self._looks.append((stamp, top))
@@ -57,6 +57,6 @@ class Upright:
         return True
 
     def _before(self, stamp: int) -> tuple[int, float] | None:
-        """The newest look that is old enough to be compared with."""
+        """Newest sighting that is old enough for a comparison."""
         earlier = (look for look in reversed(self._looks) if seconds(stamp - look[0]) >= _SPAN)
         return next(earlier, None)

@@ -1,1 +1,1 @@
-"""The embedded simulator: world, flight dynamics, renderer."""
+"""Embedded simulator: world, flight dynamics and renderer."""

@@ -1,4 +1,4 @@
-"""Write a picture of a world from several sides: `python -m aerodaas.simulation field`."""
+"""Preview of a world as one image: `python -m aerodaas.simulation field`."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def preview(
     height: Annotated[float, typer.Option(help="Metres above the ground.")] = 1.5,
     out: Annotated[Path, typer.Option(help="Where to write it.")] = Path("world.png"),
 ) -> None:
-    """Render six views around a place, and one from above, into one picture.
+    """Render six views around a place, and one from above, into one image.
 
     Example: `python -m aerodaas.simulation campus --seed 3 --east 5 --out campus.png`
     """

@@ -1,7 +1,7 @@
-"""What a simulated drone is made of: the settings of the simulated driver.
+"""Airframe of a simulated drone: the settings of the simulated driver.
 
-The defaults describe a 2 kg quadrotor with 10-inch rotors and a 4-cell 5 Ah battery, about
-20 minutes of hover: the class of the Holybro X500 that PX4 ships as its own simulated default.
+The defaults describe a 2 kg quadrotor with 10-inch rotors and a 4-cell 5 Ah battery, with about
+20 minutes of hover: the class of the Holybro X500, PX4's own default simulation model.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ GRAVITY = 9.80665
 """Standard gravity, m/s^2."""
 
 AIR_DENSITY = 1.225
-"""Sea level, International Standard Atmosphere, kg/m^3."""
+"""Air density at sea level, International Standard Atmosphere, kg/m^3."""
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -26,7 +26,7 @@ Fraction = Annotated[float, Field(ge=0, le=1)]
 
 
 class Airframe(BaseModel):
-    """Mass, rotors, drag, battery and own limits of a simulated multirotor."""
+    """Mass, rotors, drag, battery and limits of a simulated multirotor."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -38,7 +38,7 @@ class Airframe(BaseModel):
     efficiency: Annotated[float, Field(gt=0, le=1)] = 0.6
     """Ideal power over electrical power: rotors, motors and controllers together."""
     avionics_power: NotNegative = 10.0
-    """Watts drawn whether flying or not."""
+    """Constant power in watts, in flight and on the ground."""
     rotor_drag: NotNegative = 0.15
     """Linear drag of the rotors, (m/s^2) per m/s of airspeed."""
     body_drag: NotNegative = 0.02
@@ -47,11 +47,11 @@ class Airframe(BaseModel):
     max_tilt: Annotated[float, Field(ge=5, le=60)] = 30.0
     """Degrees."""
     max_speed: Positive = 12.0
-    """m/s that it can do horizontally, whatever the mission's limits allow."""
+    """Greatest horizontal speed in m/s, regardless of the mission's limits."""
     max_climb: Positive = 3.0
-    """m/s that it can do vertically."""
+    """Greatest vertical speed in m/s."""
     landing_speed: Annotated[float, Field(gt=0, le=2)] = 0.4
-    """m/s downwards close to the ground."""
+    """Downward speed close to the ground, m/s."""
     cells: Annotated[int, Field(ge=1, le=24)] = 4
     capacity: Positive = 5.0
     """Ampere-hours."""
@@ -60,9 +60,9 @@ class Airframe(BaseModel):
     battery: Fraction = 1.0
     """Charge at the start, 0 to 1."""
     battery_minimum: Fraction = 0.15
-    """Charge below which it refuses to take off."""
+    """Charge below which a takeoff is refused."""
     battery_failsafe: Fraction = 0.05
-    """Charge below which it lands by itself, whatever it is told."""
+    """Charge below which it lands by itself, overriding all commands."""
 
     @model_validator(mode="after")
     def _agree(self) -> Self:

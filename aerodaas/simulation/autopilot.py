@@ -1,4 +1,4 @@
-"""The autopilot of the simulated drone: its modes, from the ground and back to it."""
+"""Autopilot of the simulated drone: mode logic from takeoff to landing."""
 
 from __future__ import annotations
 
@@ -21,38 +21,38 @@ _DISARM_AFTER = 0.5
 """Seconds on the ground after a landing until the motors stop."""
 
 _DISARM_GUIDED_AFTER = 2.0
-"""The same when setpoints led to the ground, as PX4's COM_DISARM_LAND."""
+"""The same after setpoints led to the ground, as PX4's COM_DISARM_LAND."""
 
 _POWER_PERIOD = 10
-"""Steps between two looks at the power drawn; it changes slowly."""
+"""Steps between two computations of the power drawn, which changes slowly."""
 
 _ARRIVED = 0.1
-"""Metres and m/s within which a take-off height or home counts as reached."""
+"""Tolerance in metres and m/s within which a takeoff height or home counts as reached."""
 
 _STANDING = 0.15
-"""m/s below which a hold latches its place."""
+"""Speed in m/s below which a hold latches its position."""
 
 _FLARE_SPEED_PER_METRE = 0.5
-"""1/s: how a descent slows down towards the ground."""
+"""Descent speed per metre of height above the ground, 1/s."""
 
 _CRASH_SPEED = 2.0
-"""m/s downwards at touchdown from which it is reported as a crash."""
+"""Downward speed in m/s at touchdown above which a crash is reported."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlightLimits:
-    """What the vehicle keeps to: m/s, m/s^2."""
+    """Limits of the vehicle's motion, m/s and m/s^2."""
 
     speed: float
     climb: float
     acceleration: float
     cruise: float
-    """Horizontal m/s where nobody states another."""
+    """Default horizontal speed, m/s."""
 
 
 @dataclass(frozen=True, slots=True)
 class Goto:
-    """Fly to a believed position (ENU metres) at most at `speed` m/s, facing `yaw` radians."""
+    """Setpoint: an estimated position (ENU metres), speed limit (m/s) and yaw (radians)."""
 
     position: Triple
     yaw: float
@@ -61,16 +61,16 @@ class Goto:
 
 @dataclass(frozen=True, slots=True)
 class Steer:
-    """Fly at a velocity (ENU m/s) and turn at `yaw_rate` rad/s."""
+    """Setpoint: a velocity (ENU m/s) and a yaw rate (rad/s)."""
 
     velocity: Triple
     yaw_rate: float
 
 
 class Autopilot:
-    """Flies a `Multirotor` by what it believes of its position, one step at a time.
+    """Flies a `Multirotor` by its estimated position, one step at a time.
 
-    The public methods set a mode and a target; they trust their caller to have checked both.
+    The public methods set a mode and a target, which the caller must have validated.
     """
 
     def __init__(
@@ -80,12 +80,12 @@ class Autopilot:
         noise: SensorNoise,
         limits: FlightLimits,
     ) -> None:
-        """Stand on the ground, disarmed."""
+        """Start on the ground, disarmed."""
         self.mode = VehicleMode.GROUNDED
         self.armed = False
         self.crashed = False
         self.ended: FlightEnd | None = None
-        """How the latest flight ended; None before and during one."""
+        """End of the latest flight; None before and during one."""
         self.battery = FlightBattery(airframe)
         self._airframe = airframe
         self._rotor = rotor
@@ -100,7 +100,7 @@ class Autopilot:
 
     @property
     def flying(self) -> bool:
-        """True in every mode in which the rotors carry it."""
+        """Whether the mode is any other than GROUNDED."""
         return self.mode is not VehicleMode.GROUNDED
 
     def take_off(self, height: float) -> None:
@@ -119,20 +119,20 @@ class Autopilot:
         self._target = target
 
     def hold(self) -> None:
-        """Brake and stay; does nothing while already holding."""
+        """Brake and hold the position; does nothing while already holding."""
         if self.mode is not VehicleMode.HOLDING:
             self.mode = VehicleMode.HOLDING
             self._target = None
 
     def return_home(self) -> None:
-        """Fly level to the place of take-off and land there."""
+        """Fly level to the takeoff position and land there."""
         self.mode = VehicleMode.RETURNING
         x, y, _ = self._home
         height = self._believed()[2]
         self._target = Goto((x, y, height), self._believed_yaw(), self._limits.cruise)
 
     def land(self, mode: VehicleMode = VehicleMode.LANDING) -> None:
-        """Descend here; `mode` may be FAILSAFE, which nobody can override."""
+        """Descend in place; `mode` may be FAILSAFE, which cannot be overridden."""
         self.mode = mode
         x, y, z = self._believed()
         self._target = Goto((x, y, z), self._believed_yaw(), self._limits.cruise)
@@ -183,7 +183,7 @@ class Autopilot:
         return velocity, yaw_rate_towards(self._believed_yaw(), target.yaw)
 
     def _descent(self) -> float:
-        """Speed of a landing in m/s: fast above, gentle close to the ground."""
+        """Descent speed of a landing in m/s, reduced close to the ground."""
         height = self._rotor.position[2] - self._rotor.ground
         slow = self._airframe.landing_speed
         return min(self._limits.climb, max(slow, _FLARE_SPEED_PER_METRE * height))

@@ -1,4 +1,4 @@
-"""The battery: what flying draws from it, and how its voltage answers."""
+"""Battery model: power drawn in flight, charge and voltage."""
 
 from __future__ import annotations
 
@@ -14,19 +14,19 @@ _FULL, _KNEE, _EMPTY = 4.2, 3.6, 3.2
 """Open-circuit volts of a lithium-polymer cell at full charge, at `_KNEE_AT`, and empty."""
 
 _KNEE_AT = 0.1
-"""Charge at which the discharge curve bends down."""
+"""Charge at the knee of the discharge curve."""
 
 _INDUCED_ITERATIONS = 4
 _SECONDS_PER_HOUR = 3600.0
 
 
 def flight_power(airframe: Airframe, thrust: Triple, airspeed: Triple) -> float:
-    """Electrical watts drawn while the rotors give `thrust` (over mass, ENU m/s^2).
+    """Electrical power in watts for a `thrust` over mass (ENU m/s^2).
 
     Momentum theory with Glauert's induced velocity in forward flight (Leishman, "Principles of
     Helicopter Aerodynamics", 2nd ed., sections 2.2 and 2.14): induced power, which falls with
-    speed, and the useful power of thrust times airspeed, which pays for climb and drag. Rotors do
-    not charge the battery on the way down.
+    speed, plus the useful power of thrust times airspeed, for climb and drag. Rotors do not
+    charge the battery in descent.
     """
     size = math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2)
     if size <= 0.0:
@@ -34,7 +34,7 @@ def flight_power(airframe: Airframe, thrust: Triple, airspeed: Triple) -> float:
     useful = sum(f * v for f, v in zip(thrust, airspeed, strict=True))
     across = math.sqrt(max(0.0, sum(v * v for v in airspeed) - (useful / size) ** 2))
     hover = math.sqrt(airframe.mass * size / (2.0 * AIR_DENSITY * airframe.disc_area))
-    # Climb is paid for in `useful`; leaving it out here keeps the fixed point stable in descent.
+    # Climb is included in `useful`; omitting it here keeps the fixed point stable in descent.
     induced = hover
     for _ in range(_INDUCED_ITERATIONS):
         induced = 0.5 * (induced + hover * hover / math.hypot(across, induced))
@@ -43,10 +43,10 @@ def flight_power(airframe: Airframe, thrust: Triple, airspeed: Triple) -> float:
 
 
 class FlightBattery:
-    """Charge counted in ampere-hours behind an internal resistance."""
+    """Battery with coulomb counting and an internal resistance."""
 
     def __init__(self, airframe: Airframe) -> None:
-        """Start at the charge that the settings give."""
+        """Start at the charge of the settings."""
         self._cells = airframe.cells
         self._resistance = airframe.cells * airframe.cell_resistance
         self._capacity = airframe.capacity * _SECONDS_PER_HOUR
@@ -64,8 +64,8 @@ class FlightBattery:
     def drain(self, power: float, duration: float) -> None:
         """Draw `power` watts for `duration` seconds."""
         rest = self._open_circuit()
-        # The voltage at the terminals solves U (rest - U) = power * resistance; beyond its
-        # largest answer the pack gives what it can at half its rest voltage.
+        # The terminal voltage solves U (rest - U) = power * resistance; beyond the greatest
+        # possible power the pack delivers that power, at half its rest voltage.
         room = max(0.0, rest * rest - 4.0 * power * self._resistance)
         self._voltage = 0.5 * (rest + math.sqrt(room))
         self._current = power / self._voltage
@@ -73,5 +73,5 @@ class FlightBattery:
 
     @property
     def state(self) -> Battery:
-        """Charge, volts and amperes at present."""
+        """Present charge, voltage and current."""
         return Battery(self.fraction, self._voltage, self._current)

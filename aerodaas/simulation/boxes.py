@@ -1,4 +1,4 @@
-"""Boxes in space around the things of a world: the exact labels."""
+"""3D boxes around the objects of a world, the ground truth of detections."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ class Box:
     """An upright box: centre in ENU metres, extents along its own axes, yaw in radians."""
 
     id: str
-    """Of the entity it surrounds."""
+    """Id of the enclosed entity."""
     label: str
     """`person`, `vest`, `car`, `tower`, `tree`, `building`, `crop_rows`, `rubble` or
     `fence`."""
     centre: tuple[float, float, float]
     size: tuple[float, float, float]
-    """Metres along its yaw, across it and up."""
+    """Extents along its yaw, across it and up, metres."""
     yaw: float = 0.0
 
     @property
@@ -36,7 +36,7 @@ class Box:
         return np.asarray(local @ turn + np.array(self.centre))
 
     def contains(self, point: tuple[float, float, float], margin: float = 0.0) -> bool:
-        """Tell whether an ENU point lies within the box, widened by `margin` metres."""
+        """Whether an ENU point lies within the box, widened by `margin` metres."""
         x, y, z = (here - there for here, there in zip(point, self.centre, strict=True))
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         own = (c * x + s * y, c * y - s * x, z)

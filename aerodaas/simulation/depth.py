@@ -1,7 +1,7 @@
-"""Depth pictures of a simulated world, aligned with the camera's.
+"""Depth images of a simulated world, aligned with the camera's images.
 
-The software renderer hands out no depth buffer. So the scene is painted once more with a texture
-of two rulers laid along the optical axis: the colour of a pixel tells how far away it is.
+The software renderer provides no depth buffer. So the scene is rendered once more with a texture
+of two rulers along the optical axis, so that the colour of a pixel encodes its depth.
 """
 
 from __future__ import annotations
@@ -35,33 +35,34 @@ from aerodaas.types.geometry import CameraModel
 __all__ = ["DepthRenderer", "renderer_for"]
 
 _MARKS = 1024
-"""On each ruler: of 10 m, every centimetre."""
+"""Number of marks on each ruler: for 10 m, one per centimetre."""
 _SPARE = 1.05
-"""The fine ruler is longer than the range by this factor."""
+"""Ratio of the fine ruler's length to the range."""
 _WORLD = 1310.72
-"""Metres of the coarse ruler, which tells how often the fine one has begun anew."""
+"""Length of the coarse ruler in metres, which counts the repetitions of the fine one."""
 _PAINTED = 8
-"""Bit of every colour on the rulers; where it lacks, there is nothing."""
+"""Bit set in every colour on the rulers; a pixel without it shows no object."""
 _OVERRIDE = 100
-"""Precedence over the states of nodes."""
+"""Priority over the states of nodes."""
 
 
 def renderer_for(world: World, camera: CameraModel, depth_range: float | None) -> Renderer:
-    """Render what `camera` sees; with a range in metres, its depth, too."""
+    """Create the renderer for `camera`, with depth if a range in metres is given."""
     if depth_range is None:
         return Renderer(world, camera)
     return DepthRenderer(world, camera, depth_range)
 
 
 class DepthRenderer(Renderer):
-    """Renders the picture and how far away each of its pixels is.
+    """Renders the image and the depth of each of its pixels.
 
-    Exact to about 2 %, by the renderer's rounding; holes in leaves count as leaves. A real stereo
-    camera errs with the square of the distance, and by holes.
+    The depth is accurate to about 2 %, limited by the renderer's rounding; holes in leaves count
+    as leaves. The error of a real stereo camera grows with the square of the distance, and its
+    depth has holes.
     """
 
     def __init__(self, world: World, camera: CameraModel, depth_range: float) -> None:
-        """Measure up to `depth_range` metres along the optical axis."""
+        """Measure depth up to `depth_range` metres along the optical axis."""
         super().__init__(world, camera)
         self._range = depth_range
         self._length = _SPARE * depth_range
@@ -70,7 +71,7 @@ class DepthRenderer(Renderer):
         self._marks = self._open(self._eye.attach_new_node(eye), np.zeros(3))
 
     def depth(self) -> NDArray[np.uint16]:
-        """Of the last picture: (height, width) in millimetres, 0 beyond the range."""
+        """Depth of the last image, (height, width) in millimetres, 0 beyond the range."""
         shape = (self._camera.height, self._camera.width, 4)
         marks = cv2.flip(np.frombuffer(self._marks.get_ram_image(), np.uint8).reshape(shape), 0)
         rest, fine, coarse = (marks[..., channel].astype(np.int32) for channel in range(3))
@@ -82,7 +83,7 @@ class DepthRenderer(Renderer):
 
 
 def _rulers(length: float) -> RenderState:
-    """Paint everything by its place along the camera's axis, and by nothing else."""
+    """Render state that colours every surface by its depth alone."""
     fine, coarse = np.mgrid[:_MARKS, :_MARKS]
     rest = (coarse % 4 << 6) + (fine % 4 << 4) + _PAINTED
     rulers = Texture("rulers")

@@ -1,14 +1,14 @@
 """Flight dynamics of a multirotor under its own velocity controller.
 
 The model is a point mass under the thrust of its rotors, gravity and drag, with a first-order lag
-from commanded to actual thrust vector that stands for the attitude loop (Mellinger and Kumar,
+from commanded to actual thrust vector in place of the attitude loop (Mellinger and Kumar,
 "Minimum snap trajectory generation and control for quadrotors", ICRA 2011, separate the two in
-the same way). The controller turns a velocity demand into an acceleration and cancels what drag
-and wind do by feeding back the measured difference between acceleration and thrust (Smeur, de
+the same way). The controller converts a velocity demand to an acceleration and compensates drag
+and wind by feeding back the measured difference between acceleration and thrust (Smeur, de
 Croon, Chu, "Cascaded incremental nonlinear dynamic inversion for MAV disturbance rejection",
 Control Engineering Practice 73, 2018).
 
-All of it is scalar arithmetic: for vectors of three, Python's floats are several times faster
+It uses scalar arithmetic, because for vectors of three Python's floats are several times faster
 than numpy.
 """
 
@@ -26,25 +26,25 @@ __all__ = ["STEP", "STEP_NS", "KinematicState", "Multirotor", "Triple"]
 Triple: TypeAlias = tuple[float, float, float]
 
 STEP_NS = 10_000_000
-"""The fixed step in nanoseconds; steps lie on the grid of its multiples."""
+"""Fixed time step in nanoseconds; steps lie on the grid of its multiples."""
 
 STEP = STEP_NS / 1e9
-"""The same in seconds."""
+"""Fixed time step in seconds."""
 
 _VELOCITY_GAIN = 2.5
-"""1/s. With the lag below, the velocity loop is overdamped: it does not overshoot."""
+"""Velocity gain, 1/s. With the lag below, the velocity loop is overdamped, without overshoot."""
 
 _THRUST_LAG = 0.08
-"""Seconds from a commanded to an actual thrust vector; attitude loops reach 0.05 to 0.15."""
+"""Lag from commanded to actual thrust vector in seconds; attitude loops reach 0.05 to 0.15."""
 
 _DISTURBANCE_LAG = 0.25
-"""Seconds in which the controller learns what drag and wind do."""
+"""Time constant of the estimate of drag and wind, seconds."""
 
 _YAW_RATE_LAG = 0.12
-"""Seconds."""
+"""Lag from commanded to actual yaw rate, seconds."""
 
 _MIN_THRUST_SHARE = 0.3
-"""Share of the weight that the controller always keeps as upward thrust, to stay steerable."""
+"""Least upward thrust as a fraction of the weight, to stay controllable."""
 
 
 def _share(lag: float) -> float:
@@ -58,7 +58,7 @@ _YAW_RATE_SHARE = _share(_YAW_RATE_LAG)
 
 @dataclass(frozen=True, slots=True)
 class KinematicState:
-    """Exact state of motion at one moment; ENU metres, m/s, radians, rad/s."""
+    """Exact state of motion at one time; ENU metres, m/s, radians, rad/s."""
 
     position: Triple
     velocity: Triple
@@ -69,10 +69,10 @@ class KinematicState:
 
 
 class Multirotor:
-    """The vehicle and its velocity controller, advanced by steps of `STEP` seconds.
+    """Vehicle with velocity controller, advanced by steps of `STEP` seconds.
 
-    `max_acceleration` in m/s^2 bounds what the controller asks for, `max_yaw_rate` is rad/s,
-    `start` ENU metres, `yaw` radians. The ground is flat, at the height of `start`.
+    `max_acceleration` in m/s^2 limits the controller's demand; `max_yaw_rate` is in rad/s, `start`
+    in ENU metres, `yaw` in radians. The ground is flat, at the height of `start`.
     """
 
     __slots__ = (
@@ -105,7 +105,7 @@ class Multirotor:
         start: Triple,
         yaw: float,
     ) -> None:
-        """Stand at `start` with the motors off."""
+        """Start on the ground at `start` with the motors off."""
         self._rotor_drag = airframe.rotor_drag
         self._body_drag = airframe.body_drag
         self._tilt_slope = math.tan(math.radians(airframe.max_tilt))
@@ -124,7 +124,7 @@ class Multirotor:
         self.ground = start[2]
         self.on_ground = True
         self.impact = 0.0
-        """m/s downwards at the latest touchdown."""
+        """Downward speed at the latest touchdown, m/s."""
 
     @property
     def airspeed(self) -> Triple:
@@ -166,7 +166,7 @@ class Multirotor:
         self.yaw_rate = 0.0
 
     def _command(self, demand: Triple) -> Triple:
-        """Thrust over mass that the controller asks for, within tilt and acceleration limits."""
+        """Commanded thrust over mass, within tilt and acceleration limits."""
         vx, vy, vz = self.velocity
         ax = _VELOCITY_GAIN * (demand[0] - vx)
         ay = _VELOCITY_GAIN * (demand[1] - vy)
@@ -211,9 +211,9 @@ class Multirotor:
             self.on_ground = True
 
     def motion(self, ahead: float = 0.0) -> KinematicState:
-        """State of motion, carried on by `ahead` seconds (less than a step) for reading.
+        """State of motion, extrapolated by `ahead` seconds (less than a step).
 
-        Reading between two steps of the grid does not change the simulation.
+        The extrapolation does not change the simulation.
         """
         x, y, z = self.position
         vx, vy, vz = self.velocity
@@ -234,7 +234,7 @@ class Multirotor:
         )
 
     def _tilt(self) -> tuple[float, float]:
-        """Roll and pitch that point the body's up axis along the thrust."""
+        """Roll and pitch that align the body's up axis with the thrust."""
         fx, fy, fz = self.thrust
         size = math.sqrt(fx * fx + fy * fy + fz * fz)
         if self.on_ground or size < _MIN_THRUST_SHARE:

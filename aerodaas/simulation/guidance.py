@@ -1,4 +1,4 @@
-"""From where to go to how fast: the position loop of the simulated autopilot."""
+"""Position loop of the simulated autopilot: position error to velocity."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from aerodaas.simulation.dynamics import Triple
 __all__ = ["approach_speed", "velocity_towards", "yaw_rate_towards"]
 
 _POSITION_GAIN = 1.2
-"""1/s, close to the target."""
+"""Proportional gain close to the target, 1/s."""
 
 _BRAKING_SHARE = 0.5
-"""Share of the acceleration limit that braking plans with; the rest meets lag and wind."""
+"""Fraction of the acceleration limit used to plan braking; the rest is reserve for lag and wind."""
 
 _YAW_GAIN = 1.8
-"""1/s."""
+"""Proportional gain of the yaw, 1/s."""
 
 
 def approach_speed(distance: float, max_acceleration: float) -> float:
-    """Speed in m/s from which the vehicle can still stop within `distance` metres.
+    """Highest speed in m/s from which the vehicle can stop within `distance` metres.
 
-    Proportional close by, a square root further out, joined smoothly: ArduPilot's
+    Proportional close to the target, a square root farther away, joined smoothly: ArduPilot's
     `sqrt_controller`.
     """
     braking = _BRAKING_SHARE * max_acceleration
@@ -52,5 +52,5 @@ def velocity_towards(
 
 
 def yaw_rate_towards(yaw: float, target: float) -> float:
-    """Yaw rate in rad/s that turns from `yaw` to `target` the short way round."""
+    """Yaw rate in rad/s that turns from `yaw` to `target` by the smaller angle."""
     return _YAW_GAIN * math.remainder(target - yaw, math.tau)

@@ -1,4 +1,4 @@
-"""Sensor noise: what the drone believes differs from the truth, by seed."""
+"""Seeded sensor noise of the simulated odometry and GPS."""
 
 from __future__ import annotations
 
@@ -17,34 +17,34 @@ __all__ = ["NoiseLevels", "SensorNoise"]
 
 @dataclass(frozen=True, slots=True)
 class NoiseLevels:
-    """Standard deviations at a scale of 1, of a good filter fed by GNSS and vision outdoors."""
+    """Standard deviations at a scale of 1, of a good outdoor filter with GNSS and vision."""
 
     position: float = 0.01
-    """White, metres."""
+    """White noise, metres."""
     drift: float = 0.08
-    """Slow, metres per horizontal axis."""
+    """Slow drift, metres per horizontal axis."""
     drift_vertical: float = 0.03
-    """Slow, metres; a rangefinder looks down."""
+    """Slow drift, metres, with a downward rangefinder."""
     drift_time: float = 60.0
     """Correlation time of the drifts, seconds."""
     velocity: float = 0.03
-    """White, m/s."""
+    """White noise, m/s."""
     angle: float = 0.003
-    """White, radians, of roll, pitch and yaw."""
+    """White noise of roll, pitch and yaw, radians."""
     yaw_drift: float = 0.01
-    """Slow, radians."""
+    """Slow drift, radians."""
     gps: float = 0.6
-    """Slow, metres per horizontal axis."""
+    """Slow error, metres per horizontal axis."""
     gps_vertical: float = 1.0
-    """Slow, metres."""
+    """Slow error, metres."""
     satellites: int = 14
 
 
 class SensorNoise:
     """Errors of odometry and GPS, updated every `PERIOD` steps of the flight dynamics.
 
-    A scale of 0 reads the truth. Drifts are Ornstein-Uhlenbeck processes; the odometry's start
-    at zero, because a filter is aligned where the drone stands.
+    A scale of 0 returns the true values. Drifts are Ornstein-Uhlenbeck processes; the odometry's
+    start at zero, because a filter is aligned at the start.
     """
 
     PERIOD = 5
@@ -58,9 +58,9 @@ class SensorNoise:
         self._keep = math.exp(-STEP * self.PERIOD / self._levels.drift_time)
         self._stir = math.sqrt(1.0 - self._keep**2)
         self.drift: Triple = (0.0, 0.0, 0.0)
-        """Slow error of the believed position, metres; what a vehicle cannot steer out."""
+        """Slow error of the estimated position in metres, which the controller cannot correct."""
         self.yaw_drift = 0.0
-        """Slow error of the believed yaw, radians."""
+        """Slow error of the estimated yaw, radians."""
         self._gps = self._white(self._levels.gps, self._levels.gps, self._levels.gps_vertical)
         self._position = self._velocity = self._angles = (0.0, 0.0, 0.0)
 
@@ -91,7 +91,7 @@ class SensorNoise:
         self._angles = self._white(levels.angle, levels.angle, levels.angle)
 
     def odometry(self, motion: KinematicState) -> Odometry:
-        """What the drone believes of its `motion`."""
+        """Odometry with noise for a true `motion`."""
         levels, angles = self._levels, self._angles
         return Odometry(
             np.array(motion.position) + self.drift + self._position,
@@ -104,7 +104,7 @@ class SensorNoise:
         )
 
     def gps(self, motion: KinematicState, origin: GeodeticOrigin) -> GpsFix:
-        """Return the fix that a receiver gives at this `motion`."""
+        """GPS fix with noise for a true `motion`."""
         levels = self._levels
         latitude, longitude, altitude = origin.to_geodetic(np.array(motion.position) + self._gps)
         return GpsFix(

@@ -1,4 +1,4 @@
-"""The GPS log of somebody's phone in a simulated world: `python -m aerodaas.simulation.phone`."""
+"""GPS log of a simulated person's phone: `python -m aerodaas.simulation.phone`."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from aerodaas.types.geometry import GeodeticOrigin
 __all__ = ["write_log"]
 
 _SIGMA, _MEMORY = 1.2, 0.97
-"""Metres of error of a phone in the open, and how much of it is left a second later."""
+"""Position error of a phone in the open in metres, and its correlation after one second."""
 _BEGAN = datetime(2025, 1, 1, 9, tzinfo=timezone.utc)
 
 
 def write_log(path: Path, world: World, person: str, origin: GeodeticOrigin, end: float) -> None:
-    """Write one row a second until `end` seconds of mission time, as loggers' CSV files have it.
+    """Write one CSV row per second until `end` seconds of mission time, in a logger's format.
 
-    Errors wander as a first-order Gauss-Markov process, drawn from the world's seed. Raises
-    KeyError if the world has nobody called `person`.
+    Errors are a first-order Gauss-Markov process, drawn from the world's seed. Raises KeyError if
+    the world has no `person` of that name.
     """
     draw, thing = random.Random(f"{world.seed}/phone"), world.thing(person)
     east, north = (draw.gauss(0, _SIGMA) for _ in range(2))
@@ -63,7 +63,7 @@ def main(
     ] = (13.0166, 77.5695, 920.0),
     out: Annotated[Path, typer.Option(help="Where to write it.")] = Path("phone.csv"),
 ) -> None:
-    """Write what a logger in a person's pocket would have written down.
+    """Write the log of a GPS logger carried by a person.
 
     Example: `python -m aerodaas.simulation.phone campus vip --seed 3 --out vip_log.csv`
     """

@@ -1,7 +1,7 @@
-"""Pictures of a simulated world, by panda3d's software renderer.
+"""Images of a simulated world, by panda3d's software renderer.
 
-It needs no GPU, no display and no system library. panda3d's axes agree with ENU (x right/east,
-y ahead/north, z up), and its cameras look along their own y.
+It needs no GPU, display or system library. panda3d's axes agree with ENU (x right/east, y
+ahead/north, z up), and its cameras look along their own y axis.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from aerodaas.types.geometry import CameraModel, rotation_from_rpy
 
 __all__ = ["Renderer"]
 
-# A moving camera fills panda3d's cache of transforms by some 36 a frame, for good.
+# A moving camera permanently adds some 36 entries per frame to panda3d's transform cache.
 _SETTINGS = """
 transform-cache false
 load-display p3tinydisplay
@@ -46,13 +46,13 @@ _NEAR, _FAR = 0.1, 1200.0
 """Metres."""
 
 _LOWEST = 0.12
-"""Metres above the ground at which the landing gear holds the camera, at least."""
+"""Least height of the camera above the ground in metres, by the landing gear."""
 
 
 class Renderer:
-    """Renders one camera's view of a world; it belongs to the thread that made it.
+    """Renders one camera's view of a world; usable only in the thread that created it.
 
-    Raises SourceError if the software renderer cannot be had.
+    Raises SourceError if the software renderer is not available.
     """
 
     def __init__(self, world: World, camera: CameraModel, looks: Looks | None = None) -> None:
@@ -68,7 +68,7 @@ class Renderer:
                 "panda3d came without its software renderer (p3tinydisplay); "
                 "reinstall it with `pip install --force-reinstall panda3d`"
             )
-        # An engine of its own: rendering one camera must not render all others of the process.
+        # A separate engine, so that rendering one camera does not render all others of the process.
         self._pipe = pipe
         self._engine = GraphicsEngine(pipe)
         self._scene = Scene(world, looks)
@@ -76,7 +76,7 @@ class Renderer:
         self._pixels = self._open(self._eye, HAZE)
 
     def _open(self, eye: NodePath, clear: ArrayLike) -> Texture:
-        """Open a buffer for what `eye` sees and return the texture that it fills."""
+        """Open an offscreen buffer for the camera `eye`, and return its texture."""
         camera = self._camera
         properties = FrameBufferProperties()
         properties.set_rgb_color(True)
@@ -100,7 +100,7 @@ class Renderer:
         return pixels
 
     def render(self, time: float, pose: Odometry) -> NDArray[np.uint8]:
-        """Picture (height, width, 3) in BGR at `time` seconds from a vehicle at `pose`."""
+        """Render (height, width, 3) in BGR at `time` seconds from a vehicle at `pose`."""
         body = rotation_from_rpy(pose.roll, pose.pitch, pose.yaw)
         right, down, ahead = (body @ self._optical).T
         x, y, z = np.asarray(pose.position) + body @ np.array(self._camera.mount)
@@ -114,7 +114,7 @@ class Renderer:
         return picture.astype(np.uint8, copy=False)
 
     def depth(self) -> NDArray[np.uint16] | None:
-        """Of the last picture; None, for this camera measures none."""
+        """Depth of the last image; None, as this camera measures none."""
         return None
 
     def close(self) -> None:
@@ -124,7 +124,7 @@ class Renderer:
 
 
 def _lens(camera: CameraModel) -> PerspectiveLens:
-    """Pinhole lens of these intrinsics: the film is measured in horizontal pixels."""
+    """Pinhole lens of these intrinsics, with the film size in horizontal pixels."""
     lens = PerspectiveLens()
     stretch = camera.fx / camera.fy
     lens.set_film_size(camera.width, camera.height * stretch)

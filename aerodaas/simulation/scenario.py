@@ -1,8 +1,8 @@
-"""Scenario files: what stands, walks and drives in a simulated world.
+"""Scenario files: static and moving objects of a simulated world.
 
-Lengths are metres in the local ENU frame, speeds m/s, times seconds of the mission clock, angles
-degrees (people write these files). What a scenario leaves open, such as colours, the sun and the
-places of scattered trees, is drawn from the seed.
+Lengths are metres in the local ENU frame, speeds m/s, times seconds of mission time, angles
+degrees (these files are written by hand). Values that a scenario leaves open, such as colours,
+the sun and the positions of scattered trees, are drawn from the seed.
 """
 
 from __future__ import annotations
@@ -58,29 +58,29 @@ class _Strict(BaseModel):
 
 
 class Pause(_Strict):
-    """A rest on the way."""
+    """A pause along a path."""
 
     at: Annotated[float, Field(ge=0)]
-    """Metres from the first point."""
+    """Distance from the first point, metres."""
     seconds: Length
 
 
 class Motion(_Strict):
-    """A walk or drive along a path, its corners rounded."""
+    """Motion along a path with rounded corners, of a person or car."""
 
     points: list[Place] = Field(min_length=2)
     speed: Length = 1.0
     variation: Annotated[float, Field(ge=0, lt=1)] = 0.1
-    """Share by which the speed swings, with a phase drawn from the seed."""
+    """Relative amplitude of the speed's oscillation, with a phase drawn from the seed."""
     start: Annotated[float, Field(ge=0)] = 0.0
-    """Seconds of waiting at the first point."""
+    """Waiting time at the first point, seconds."""
     end: Literal["stop", "loop", "vanish"] = "stop"
-    """At the last point: stay there, go on to the first one, or be gone."""
+    """Action at the last point: stay there, continue to the first one, or disappear."""
     corner: Annotated[float, Field(ge=0)] = 1.0
-    """How far before and after a point its corner is rounded."""
+    """Distance before and after a point over which its corner is rounded, metres."""
     pauses: list[Pause] = Field(default_factory=list)
     jitter: Annotated[float, Field(ge=0, le=100)] = 0.0
-    """Metres east and north by which the seed may displace each point but the first, at most."""
+    """Greatest random displacement of each point except the first, metres east and north."""
 
     @model_validator(mode="after")
     def _moves(self) -> Self:
@@ -90,24 +90,24 @@ class Motion(_Strict):
 
 
 class Gesture(_Strict):
-    """What a person does with the body from `start` seconds on, for `duration` seconds."""
+    """A person's gesture from `start` seconds on, for `duration` seconds."""
 
     kind: Literal["hand_raised", "fallen"]
     start: Annotated[float, Field(ge=0)]
     duration: Length = 1_000.0
     forward: bool = False
-    """Who falls falls on the face, not on the back."""
+    """Whether a person falls forward, on the face, instead of on the back."""
     jitter: Annotated[float, Field(ge=0, le=1_000)] = 0.0
-    """Seconds by which the seed may shift the start, at most."""
+    """Greatest random shift of the start, seconds."""
 
 
 class _Placed(_Strict):
     id: Name
     at: Place = (0.0, 0.0)
     yaw: Finite | None = None
-    """Degrees counter-clockwise from east; None: drawn from the seed."""
+    """Degrees counter-clockwise from east; by default drawn from the seed."""
     jitter: Annotated[float, Field(ge=0, le=100)] = 0.0
-    """Metres east and north by which the seed may displace it, at most."""
+    """Greatest random displacement, metres east and north."""
 
 
 class Tree(_Placed):
@@ -118,7 +118,7 @@ class Tree(_Placed):
 
 
 class Trees(_Strict):
-    """Trees scattered over an area, clear of everything else in the scenario."""
+    """Trees scattered over an area, clear of all other objects of the scenario."""
 
     kind: Literal["trees"]
     id: Name
@@ -126,9 +126,9 @@ class Trees(_Strict):
     area: tuple[Finite, Finite, Finite, Finite]
     """West, south, east and north edge."""
     clear: tuple[Finite, Finite, Finite, Finite] | None = None
-    """An area within it that is kept free, edges likewise."""
+    """An area within it that is kept free: west, south, east and north edge."""
     height: tuple[Length, Length] = (4.0, 9.0)
-    """Smallest and greatest."""
+    """Least and greatest height."""
 
 
 class Building(_Placed):
@@ -185,7 +185,7 @@ class Person(_Placed):
     kind: Literal["person"]
     height: Annotated[float, Field(ge=1.0, le=2.2)] | None = None
     vest: Literal["none", "any", "yellow", "lime", "orange", "pink"] = "none"
-    """A hazard vest; `any` lets the seed choose its colour."""
+    """Colour of a hazard vest; with `any`, it is drawn from the seed."""
     motion: Motion | None = None
     gestures: list[Gesture] = Field(default_factory=list)
 
@@ -204,7 +204,7 @@ class Tower(_Placed):
     kind: Literal["tower"]
     height: Length = 35.0
     width: Length = 3.0
-    """At the foot."""
+    """Width at the foot."""
 
 
 EntitySpec: TypeAlias = Annotated[
@@ -214,23 +214,23 @@ EntitySpec: TypeAlias = Annotated[
 
 
 class Ground(_Strict):
-    """What the flat ground is covered with."""
+    """Surface of the flat ground."""
 
     surface: Literal["grass", "soil", "asphalt"] = "grass"
 
 
 class Sky(_Strict):
-    """Sun and haze; what is None is drawn from the seed."""
+    """Sun and clouds; values of None are drawn from the seed."""
 
     sun_azimuth: Finite | None = None
     """Degrees counter-clockwise from east."""
     sun_elevation: Annotated[float, Field(ge=10, le=90)] | None = None
     clouds: Annotated[float, Field(ge=0, le=1)] | None = None
-    """Cover, 0 to 1."""
+    """Cloud cover, 0 to 1."""
 
 
 class Scenario(_Strict):
-    """A whole scenario file."""
+    """Content of a scenario file."""
 
     name: str
     description: str = ""
@@ -248,14 +248,14 @@ class Scenario(_Strict):
 
 
 def scenario_names() -> list[str]:
-    """Names of the scenarios that ship with the project."""
+    """Names of the shipped scenarios."""
     return sorted(file.stem for file in _WORLDS.glob("*.json"))
 
 
 def load_scenario(world: str) -> Scenario:
-    """Load the scenario that ships under this name or lies at this path.
+    """Load a shipped scenario by name, or a scenario file by path.
 
-    Raises ConfigError that names the file and the place in it.
+    Raises ConfigError that names the file and the location in it.
     """
     source = _WORLDS / f"{world}.json" if world in scenario_names() else Path(world)
     if not source.is_file():

@@ -1,8 +1,8 @@
-"""The human body: where its joints are while it stands, walks, raises a hand or lies fallen.
+"""Kinematic model of the human body: joint positions when standing, walking, gesturing or lying.
 
-The renderer draws limbs between these joints and the labels are taken from them, so that both
-agree exactly. Coordinates are metres in the person's own frame: x forward, y left, z up, with
-the feet on the ground.
+The renderer draws limbs between these joints and the labels are derived from them, so that both
+agree exactly. Coordinates are metres in the person's own reference frame: x forward, y left,
+z up, with the feet on the ground.
 """
 
 from __future__ import annotations
@@ -81,39 +81,39 @@ LIMBS = tuple(
         ("ankle", "toe"),
     )
 )
-"""Pairs of joints that a limb joins."""
+"""Pairs of joints connected by a limb."""
 
 _REFERENCE_HEIGHT = 1.75
-"""Metres; the proportions below are those of an average adult (Drillis and Contini, 1966)."""
+"""Height in metres of an average adult with the proportions below (Drillis and Contini, 1966)."""
 
 _THIGH, _SHIN, _FOOT, _ANKLE = 0.43, 0.43, 0.19, 0.08
 _UPPER_ARM, _FOREARM = 0.30, 0.30
 _HIP_HALF, _SHOULDER_HALF = 0.10, 0.20
 _TORSO, _SHOULDER_DROP, _HEAD = 0.56, 0.05, 0.17
 _STRIDE = 1.35
-"""Metres of two steps."""
+"""Length of two steps, metres."""
 
 _FOOT_ANGLE = 1.32
-"""Radians between shin and foot, toes a little down."""
+"""Angle between shin and foot in radians, with the toes slightly down."""
 
 _LYING = 0.14
-"""Height of the pelvis above the ground when lying."""
+"""Height of the pelvis above the ground when lying, metres."""
 
 
 @dataclass(frozen=True, slots=True)
 class Posture:
-    """What the body does at a moment."""
+    """Posture of the body at one time."""
 
     travelled: float = 0.0
-    """Metres walked, which sets the phase of the gait."""
+    """Distance walked in metres, which determines the phase of the gait."""
     stepping: float = 0.0
-    """How much the legs swing, 0 (standing) to 1 (walking briskly)."""
+    """Swing of the legs, 0 (standing) to 1 (walking briskly)."""
     raised: float = 0.0
-    """How far the right hand is raised, 0 to 1."""
+    """Elevation of the right hand, 0 to 1."""
     fallen: float = 0.0
-    """How far the body has fallen over, 0 to 1."""
+    """Progress of a fall, 0 to 1."""
     forward: bool = False
-    """It falls on its face, not on its back."""
+    """Whether the fall is on the face instead of on the back."""
 
 
 def joints(height: float, posture: Posture) -> NDArray[np.float64]:
@@ -162,7 +162,7 @@ def _arm(place: dict[str, _Point], side: str, sign: float, swing: float, raised:
 
 
 def _from(start: _Point, angle: float, length: float, out: float = 0.0) -> _Point:
-    """End of a limb that hangs from `start`, turned forward by `angle` and sideways by `out`."""
+    """End of a limb hanging from `start`, rotated forward by `angle` and sideways by `out`."""
     reach = length / math.sqrt(1.0 + out * out)
     return (
         start[0] + reach * math.sin(angle),

@@ -1,4 +1,4 @@
-"""Where something that moves along a path is at a time: a pure function of both."""
+"""Position of an object moving along a path, as a pure function of time."""
 
 from __future__ import annotations
 
@@ -14,36 +14,36 @@ __all__ = ["Track", "TrackPoint"]
 
 _CORNER_PIECES = 6
 _SPEED_PERIOD = 17.0
-"""Seconds of one swing of the speed."""
+"""Period of the speed's oscillation, seconds."""
 
 _MOMENT = 1e-3
-"""Seconds to which the beginning of a rest is known."""
+"""Accuracy of the beginning of a pause, seconds."""
 
 _LOOK = 0.15
-"""Metres before and after a place between which its direction is taken."""
+"""Distance in metres before and after a position over which its direction is computed."""
 
 
 @dataclass(frozen=True, slots=True)
 class TrackPoint:
-    """A place on a track."""
+    """State of motion on a track."""
 
     x: float
     y: float
     yaw: float
     """Radians counter-clockwise from east."""
     travelled: float
-    """Metres since the start."""
+    """Distance from the start, metres."""
     speed: float
-    """m/s."""
+    """Speed, m/s."""
     present: bool
-    """False once a thing that vanishes at the end is gone."""
+    """False once an object that vanishes at the end has disappeared."""
 
 
 class Track:
-    """A `Motion` with its corners rounded and its swing of speed drawn from `seed`."""
+    """A `Motion` with rounded corners and with a speed oscillation drawn from `seed`."""
 
     def __init__(self, motion: Motion, seed: str) -> None:
-        """Prepare the path."""
+        """Compute the path."""
         self._motion = motion
         draw = random.Random(seed)
         self._phase = draw.uniform(0.0, math.tau)
@@ -59,11 +59,11 @@ class Track:
 
     @property
     def length(self) -> float:
-        """Metres from the first to the last point."""
+        """Length from the first to the last point, metres."""
         return self._lengths[-1]
 
     def at(self, time: float) -> TrackPoint:
-        """Place at `time` seconds of the mission clock."""
+        """State at `time` seconds of mission time."""
         motion = self._motion
         moving, rests = self._moving(time)
         travelled, speed = self._travelled(moving), 0.0
@@ -79,7 +79,7 @@ class Track:
         return TrackPoint(x, y, yaw, travelled, speed, not (ended and motion.end == "vanish"))
 
     def _moving(self, time: float) -> tuple[float, bool]:
-        """Seconds spent in motion until `time`, and whether it rests then."""
+        """Seconds spent in motion until `time`, and whether it pauses then."""
         moving = time - self._motion.start
         if moving <= 0.0:
             return 0.0, True
@@ -92,13 +92,13 @@ class Track:
         return moving, False
 
     def _travelled(self, moving: float) -> float:
-        """Metres after so many seconds in motion."""
+        """Distance in metres after `moving` seconds in motion."""
         motion, turn = self._motion, math.tau / _SPEED_PERIOD
         swing = math.sin(turn * moving + self._phase) - math.sin(self._phase)
         return motion.speed * (moving + motion.variation * swing / turn)
 
     def _time_to(self, metres: float) -> float:
-        """Seconds in motion after which so many metres are done, by bisection."""
+        """Seconds in motion until `metres` are travelled, by bisection."""
         low, high = 0.0, metres / self._motion.speed + _SPEED_PERIOD
         while high - low > _MOMENT:
             middle = (low + high) / 2
@@ -112,13 +112,13 @@ class Track:
         index = min(max(index, 0), len(self._points) - 2)
         (x0, y0), (x1, y1) = self._points[index], self._points[index + 1]
         piece = self._lengths[index + 1] - self._lengths[index]
-        # Points may lie so close that their distance is lost in the length of the whole.
+        # Points may be so close that their distance is lost by rounding in the total length.
         share = min(max((travelled - self._lengths[index]) / piece, 0.0), 1.0) if piece else 0.0
         return x0 + share * (x1 - x0), y0 + share * (y1 - y0)
 
 
 def _displaced(motion: Motion, draw: random.Random) -> list[tuple[float, float]]:
-    """The points, each but the first moved by what the seed says."""
+    """Displace each point except the first at random, within the jitter."""
     reach = motion.jitter
     moved = [
         (x + draw.uniform(-reach, reach), y + draw.uniform(-reach, reach))
@@ -159,6 +159,6 @@ def _rounded(
 def _towards(
     here: tuple[float, float], there: tuple[float, float], metres: float
 ) -> tuple[float, float]:
-    """Place at most `metres` from `here` towards `there`, never past the middle."""
+    """Point at most `metres` from `here` towards `there`, never past the middle."""
     share = min(metres / math.dist(here, there), 0.5)
     return here[0] + share * (there[0] - here[0]), here[1] + share * (there[1] - here[1])

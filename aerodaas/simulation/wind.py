@@ -1,4 +1,4 @@
-"""Wind: a steady mean and gusts that remember a few seconds, by seed."""
+"""Wind model: constant mean and seeded gusts with a correlation time of a few seconds."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import random
 __all__ = ["Wind"]
 
 _GUST_TIME = 2.5
-"""Correlation time in seconds: a turbulence length of some 10 m carried past at 4 m/s, as the
-low-altitude Dryden model (MIL-F-8785C) gives for a few metres above the ground."""
+"""Correlation time in seconds: a turbulence length of some 10 m at a wind of 4 m/s, as in the
+low-altitude Dryden model (MIL-F-8785C) for a few metres above the ground."""
 
 _VERTICAL_SHARE = 0.5
-"""Close to the ground vertical gusts are about half as strong as horizontal ones (same source)."""
+"""Ratio of vertical to horizontal gusts close to the ground, about one half (same source)."""
 
 
 class Wind:
@@ -35,7 +35,7 @@ class Wind:
         draw = self._draw
         self._gust = (draw(0, gust), draw(0, gust), draw(0, gust * _VERTICAL_SHARE))
         self.velocity = self._sum()
-        """Wind at present, ENU m/s."""
+        """Present wind, ENU m/s."""
 
     def _sum(self) -> tuple[float, float, float]:
         mean, gust = self._mean, self._gust

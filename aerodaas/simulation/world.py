@@ -1,7 +1,7 @@
-"""A simulated world: the things of a scenario, placed by a seed, at any time.
+"""Simulated world: the objects of a scenario, placed by a seed, at any time.
 
-There is no world server: where a thing is, is a pure function of scenario, seed and time, so
-that every process computes the same world for itself.
+There is no world server: the state of an object is a pure function of scenario, seed and time, so
+that every process computes the same world.
 """
 
 from __future__ import annotations
@@ -38,33 +38,33 @@ from aerodaas.simulation.track import Track
 __all__ = ["CAR_SIZE", "ROOF_RISE", "State", "Thing", "World"]
 
 CAR_SIZE = (4.2, 1.8, 1.45)
-"""Metres: length, width, height."""
+"""Length, width and height of a car, metres."""
 
 ROOF_RISE = 0.35
-"""Rise of a gable roof over half the width of its building."""
+"""Ratio of a gable roof's rise to half the width of its building."""
 
 CROWN_SHARE = 0.36
-"""Radius of a tree's crown over the tree's height."""
+"""Ratio of a tree's crown radius to its height."""
 
 _BRISK = 1.3
-"""m/s at which a person's legs swing fully."""
+"""Walking speed in m/s at which the legs swing fully."""
 
 _GESTURE_TIME = 0.7
-"""Seconds in which a person takes a posture."""
+"""Duration of a person's change of posture, seconds."""
 
 _TREE_GAP = 2.5
-"""Metres between a scattered tree's trunk and anything else, at least."""
+"""Least distance of a scattered tree's trunk from any other object, metres."""
 
 _BODY_MARGIN = (0.10, 0.06, 0.13)
-"""Metres of flesh, hair and clothes around a person's joints: ahead, sideways, up."""
+"""Extent of the body beyond a person's joints in metres: ahead, sideways, up."""
 
 _VEST_MARGIN = (0.135, 0.02, 0.02)
-"""The same for the chest around pelvis, neck and shoulders."""
+"""The same for the chest beyond pelvis, neck and shoulders."""
 
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Where a thing is at a moment, and how it holds itself."""
+    """Position and posture of an object at one time."""
 
     x: float
     y: float
@@ -77,32 +77,32 @@ class State:
 
 @dataclass(frozen=True)
 class Thing:
-    """One thing of a world: its specification, its place and what the seed made of it."""
+    """One object of a world: its specification, its position and its random values."""
 
     spec: Tree | Building | CropRows | Road | Rubble | Fence | Person | Car | Tower
     seed: str
-    """Seeds the thing's looks; the same in every process."""
+    """Seed of the object's appearance, the same in every process."""
     x: float = 0.0
     y: float = 0.0
     yaw: float = 0.0
     height: float = 0.0
-    """Metres, where the kind has one."""
+    """Height in metres, for kinds with a height."""
     track: Track | None = None
     gestures: tuple[Gesture, ...] = ()
-    """A person's, at the times that the seed has chosen."""
+    """Gestures of a person, with their randomly shifted times."""
 
     @property
     def id(self) -> str:
-        """Name in the scenario."""
+        """Id in the scenario."""
         return self.spec.id
 
     @property
     def moves(self) -> bool:
-        """True if its state depends on time."""
+        """Whether its state depends on time."""
         return self.track is not None or bool(self.gestures)
 
     def state(self, time: float) -> State:
-        """State at `time` seconds of the mission clock."""
+        """State at `time` seconds of mission time."""
         if self.track is None:
             return State(self.x, self.y, self.yaw, posture=self._posture(time, 0.0, 0.0))
         lying, lies = self._lying(time)
@@ -112,7 +112,7 @@ class Thing:
         return State(point.x, point.y, point.yaw, point.present, posture, speed)
 
     def _lying(self, time: float) -> tuple[float, bool]:
-        """Seconds until `time` for which a fall held up the walk, and whether it does so then."""
+        """Seconds until `time` for which falls stopped the walk, and whether one does so then."""
         lying, lies = 0.0, False
         for gesture in self.gestures:
             if gesture.kind == "fallen" and time > gesture.start:
@@ -142,11 +142,11 @@ class Thing:
         return np.asarray(body @ turn + np.array([state.x, state.y, 0.0]))
 
     def keypoints(self, time: float) -> NDArray[np.float64]:
-        """Return a person's 17 COCO keypoints at `time`, (17, 3) ENU metres."""
+        """A person's 17 COCO keypoints at `time`, (17, 3) ENU metres."""
         return self.joints(time)[list(KEYPOINTS)]
 
     def boxes(self, time: float) -> list[Box]:
-        """Boxes around the thing at `time`; empty when it is gone or flat."""
+        """Boxes around the object at `time`; empty if it has disappeared or is flat."""
         state, spec = self.state(time), self.spec
         if not state.present or isinstance(spec, Road):
             return []
@@ -203,10 +203,10 @@ class Thing:
 
 
 class World:
-    """All things of a scenario under one seed."""
+    """All objects of a scenario under one seed."""
 
     def __init__(self, scenario: Scenario, seed: int = 0) -> None:
-        """Place everything."""
+        """Place all objects."""
         self.scenario = scenario
         self.seed = seed
         things = [
@@ -228,18 +228,18 @@ class World:
 
     @classmethod
     def load(cls, config: SimulationConfig) -> World:
-        """Make the world of an environment; raises ConfigError for a broken scenario."""
+        """Create the world of an environment; raises ConfigError for an invalid scenario."""
         return cls(load_scenario(config.world), config.seed)
 
     def thing(self, name: str) -> Thing:
-        """Return the thing called `name`; raises KeyError if there is none."""
+        """Return the object with the id `name`; raises KeyError if there is none."""
         for thing in self.things:
             if thing.id == name:
                 return thing
         raise KeyError(name)
 
     def boxes(self, time: float) -> list[Box]:
-        """Boxes around everything that stands, walks or drives at `time` seconds."""
+        """Boxes around all objects at `time` seconds."""
         return [box for thing in self.things for box in thing.boxes(time)]
 
 
@@ -266,7 +266,7 @@ def _place(
 
 
 def _timed(spec: Person, draw: random.Random) -> tuple[Gesture, ...]:
-    """The person's gestures, each shifted by what the seed says."""
+    """The person's gestures, each shifted at random within its jitter."""
     shifts = [draw.uniform(-gesture.jitter, gesture.jitter) for gesture in spec.gestures]
     return tuple(
         gesture.model_copy(update={"start": max(0.0, gesture.start + shift)})
@@ -277,7 +277,7 @@ def _timed(spec: Person, draw: random.Random) -> tuple[Gesture, ...]:
 def _scatter(
     spec: Trees, seed: str, obstacles: list[Box], roads: list[Road], walks: list[Motion]
 ) -> list[Thing]:
-    """Place trees by rejection; an area too crowded gets fewer than it asked for."""
+    """Place trees by rejection sampling; an area too crowded gets fewer than requested."""
     draw = random.Random(f"{seed}/scatter")
     lines = [(road.points, road.width / 2 + _TREE_GAP) for road in roads]
     lines += [(walk.points, 2 * _TREE_GAP) for walk in walks]
@@ -308,7 +308,7 @@ def _within(place: tuple[float, float], area: tuple[float, float, float, float] 
 
 
 def _distance(place: tuple[float, float], points: list[tuple[float, float]]) -> float:
-    """Distance from a place to a line through `points`."""
+    """Distance from a place to the polyline through `points`."""
     return min(_distance_to_piece(place, here, there) for here, there in itertools.pairwise(points))
 
 
@@ -334,6 +334,6 @@ def _fence_boxes(spec: Fence) -> list[Box]:
 
 
 def _smooth(share: float) -> float:
-    """Go from 0 to 1 with a gentle start and end."""
+    """Smooth step from 0 to 1."""
     share = min(max(share, 0.0), 1.0)
     return share * share * (3.0 - 2.0 * share)

@@ -1,5 +1,5 @@
-"""Neural detectors in ONNX files: any export that people in this field use.
+"""Neural detectors in ONNX files, for the common export formats.
 
-`aerodaas.analytics.detection.detector.OnnxDetector` is the analysis; `families` holds what is
-particular to each kind of model.
+`aerodaas.analytics.detection.detector.OnnxDetector` is the analysis; `families` holds the
+decoder of each kind of model.
 """

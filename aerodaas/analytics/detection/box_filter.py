@@ -1,9 +1,9 @@
-"""A Kalman filter of one box: centre, width and height at constant velocity.
+"""Constant-velocity Kalman filter of one box: centre, width and height.
 
-The four numbers of a box don't influence each other, so that four filters of two states (value
-and its velocity) run side by side as arrays, in closed form. As in SORT and DeepSORT (Bewley et
-al. 2016, Wojke et al. 2017) all noise is in proportion to the box's height, because near objects
-move faster in the picture; unlike there, time is in seconds, not in frames.
+The four numbers of a box are independent, so four filters of two states (value and velocity) run
+in parallel as arrays, in closed form. As in SORT and DeepSORT (Bewley et al. 2016, Wojke et al.
+2017) all noise is proportional to the box's height, because near objects move faster in the
+image; unlike there, time is in seconds, not in frames.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ _SMALLEST = 1.0
 
 
 class BoxFilter:
-    """What is known of one box, and how well."""
+    """Estimate of one box, with its covariance."""
 
     def __init__(self, box: tuple[float, float, float, float]) -> None:
-        """Start at a detected `box` (left, top, right, bottom in pixels), at rest."""
+        """Initialise at a detected `box` (left, top, right, bottom in pixels), at rest."""
         self.value: Array = _measurement(box)
         self.velocity: Array = np.zeros(4)
         scale = self._scale
@@ -56,13 +56,16 @@ class BoxFilter:
         self._velocity_variance = self._velocity_variance + noise * dt**2
 
     def distance(self, box: tuple[float, float, float, float]) -> tuple[float, float]:
-        """Squared Mahalanobis distance of a detected `box`, and log determinant of its spread."""
+        """Squared Mahalanobis distance of a detected `box`, and log determinant of the covariance.
+
+        The covariance is that of the innovation.
+        """
         spread = self._variance + (_MEASUREMENT * self._scale) ** 2
         innovation = _measurement(box) - self.value
         return float(np.sum(innovation**2 / spread)), float(np.sum(np.log(spread)))
 
     def update(self, box: tuple[float, float, float, float]) -> None:
-        """Correct by a detected `box`."""
+        """Correct the estimate by a detected `box`."""
         spread = self._variance + (_MEASUREMENT * self._scale) ** 2
         innovation = _measurement(box) - self.value
         gain, velocity_gain = self._variance / spread, self._covariance / spread

@@ -1,4 +1,4 @@
-"""The 80 classes of COCO, for models that carry no names of their own."""
+"""The 80 class names of COCO, for models without class names in their metadata."""
 
 from __future__ import annotations
 
@@ -16,4 +16,4 @@ clock, vase, scissors, teddy bear, hair drier, toothbrush
 """
 
 COCO_NAMES: tuple[str, ...] = tuple(" ".join(_LIST.split()).split(", "))
-"""In the order of the 2017 detection challenge, numbered from 0."""
+"""Class names in the order of the 2017 detection challenge, numbered from 0."""

@@ -1,4 +1,4 @@
-"""OnnxDetector: frames in, labelled boxes (and keypoints) out, by any model of a known family."""
+"""OnnxDetector: labelled boxes (and keypoints) in frames, by any model of a supported family."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _WARM_UP_RUNS = 2
 
 
 class _Desk(threading.local):
-    """What one thread works with; a copy of it, sent elsewhere, is a clean one."""
+    """Working buffers of one thread, which are not pickled."""
 
     letterbox: Letterbox | None = None
     buffer: NDArray[np.floating] | None = None
@@ -46,11 +46,11 @@ class _Desk(threading.local):
 
 
 class OnnxDetector(Analytics[Detections]):
-    """Detects objects, and keypoints where the model is a pose model.
+    """Detects objects, with their keypoints if the model is a pose model.
 
-    ``OnnxDetector("yolo11n.onnx", classes=["person"])``. The model's kind, names and input size
-    are told from the file, which travels to the actor by value: an edge or cloud node needs no
-    copy of its own.
+    ``OnnxDetector("yolo11n.onnx", classes=["person"])``. The model's family, class names and
+    input size are read from the file, which is sent to the actor by value: an edge or cloud node
+    needs no copy.
     """
 
     accepts: ClassVar[tuple[type, ...]] = (Frame,)
@@ -72,13 +72,23 @@ class OnnxDetector(Analytics[Detections]):
         threads: int | None = None,
         families: Sequence[ModelFamily] = FAMILIES,
     ) -> None:
-        """Read the model at `path`, by default the one that ships, and make sure that it detects.
+        """Read the model and check that it is a detector.
 
-        `classes` keeps these class names only. `min_score` (0 to 1) is the least confidence of a
-        detection; of two boxes of one class that overlap by more than `iou`, the better one
-        stays. `names` overrides the file's class names. `size`, in pixels, is for models whose
-        input may vary. `providers` and `threads` go to onnxruntime; by default the best provider
-        there is, and half of the cores. Raises ModelError for a file or setting that cannot work.
+        Args:
+            path: ONNX file; by default the shipped one.
+            classes: Class names to keep; by default all.
+            min_score: Least confidence of a detection, above 0 to 1.
+            iou: Overlap of two boxes of one class above which only the better one is kept,
+                above 0 to 1.
+            names: Class names that replace the file's.
+            size: Side of the input in pixels, a multiple of 32, for models of variable size.
+            providers: Execution providers in onnxruntime's spelling, best first; by default the
+                best available one.
+            threads: Threads of onnxruntime, 1 or more; by default half of the cores.
+            families: Model families to recognise, in order.
+
+        Raises:
+            ModelError: If the file or a setting is unsuitable.
         """
         for name, value in (("min_score", min_score), ("iou", iou)):
             if not 0.0 < value <= 1.0:
@@ -98,9 +108,9 @@ class OnnxDetector(Analytics[Detections]):
         self.names = _names_for(model, self.decoder, names)
         self.size = model.size
         self.invalid = 0
-        """Outputs dropped so far because they were not finite numbers."""
+        """Number of outputs dropped so far because they were not finite."""
         self.excess = 0
-        """Boxes dropped so far because a frame had more than any scene holds."""
+        """Number of boxes dropped so far because a frame had implausibly many."""
         self._wanted = _wanted_classes(self.path, self.names, classes)
         self._content = model.content
         self._input = model.input.name
@@ -114,7 +124,11 @@ class OnnxDetector(Analytics[Detections]):
         self._desk = _Desk()
 
     def with_model(self, path: str | Path) -> Self:
-        """Return the same detector with the model at `path`; raises ModelError."""
+        """Return a detector with the model at `path` and the same classes, thresholds and threads.
+
+        Raises:
+            ModelError: If the file or a setting is unsuitable.
+        """
         twin = copy.copy(self)
         OnnxDetector.__init__(
             twin,
@@ -128,14 +142,14 @@ class OnnxDetector(Analytics[Detections]):
         return twin
 
     def open(self) -> None:
-        """Create the session and run it, so that the first frame of the mission is not slow."""
+        """Create the session and warm it up, so that the mission's first frame is not slow."""
         self._session = open_session(self._content, self.path, self.providers, self.threads)
         blank = np.zeros((1, 3, *self.size), self._dtype)
         for _ in range(_WARM_UP_RUNS):
             self.infer(blank)
 
     def close(self) -> None:
-        """Release the session, and say what was dropped."""
+        """Release the session, and log the numbers of dropped outputs and boxes."""
         if self.invalid or self.excess:
             _log.warning(
                 "%s: dropped %d outputs that were not finite and %d boxes too many",
@@ -146,12 +160,12 @@ class OnnxDetector(Analytics[Detections]):
         self._session = None
 
     def process(self, item: Frame, context: Context) -> Detections:
-        """Find the objects in one frame."""
+        """Detect the objects in one frame."""
         del context
         return self.detect([item])[0]
 
     def detect(self, frames: Sequence[Frame]) -> list[Detections]:
-        """Find the objects in each frame: at once if all have one size and the model allows it."""
+        """Detect the objects in each frame, as one batch if sizes and model allow it."""
         same_size = len({frame.image.shape for frame in frames}) == 1
         if len(frames) > 1 and not (self._batches and same_size):
             return [self.detect([frame])[0] for frame in frames]
@@ -161,7 +175,7 @@ class OnnxDetector(Analytics[Detections]):
 
     @property
     def model_name(self) -> str:
-        """What the model is called at an endpoint that serves it: its file's name, bare."""
+        """Default name of the model at an endpoint: its file name without suffix."""
         return Path(self.path).stem
 
     @property
@@ -174,7 +188,7 @@ class OnnxDetector(Analytics[Detections]):
     def preprocess(self, frames: Sequence[Frame]) -> NDArray[np.floating]:
         """Letterbox frames of one size into the network's input, count x 3 x height x width.
 
-        The array is the detector's own and is overwritten by this thread's next call.
+        The returned array is overwritten by this thread's next call.
         """
         desk = self._desk
         shape = (frames[0].height, frames[0].width)
@@ -189,7 +203,11 @@ class OnnxDetector(Analytics[Detections]):
         return desk.buffer
 
     def infer(self, pixels: NDArray[np.floating]) -> list[NDArray[np.floating]]:
-        """Run the network; raises ModelError before `open`."""
+        """Run the network.
+
+        Raises:
+            ModelError: If called before `open`.
+        """
         if self._session is None:
             message = f"{self.path}: call open() before the first frame"
             raise ModelError(message)
@@ -198,7 +216,11 @@ class OnnxDetector(Analytics[Detections]):
     def postprocess(
         self, frames: Sequence[Frame], outputs: Sequence[NDArray[np.floating]]
     ) -> list[Detections]:
-        """Turn the network's outputs for the frames last preprocessed into detections."""
+        """Convert the network's outputs for the frames last preprocessed to detections.
+
+        Raises:
+            ModelError: If no frames were preprocessed.
+        """
         letterbox = self._desk.letterbox
         if letterbox is None:
             message = f"{self.path}: preprocess the frames first"
@@ -229,7 +251,7 @@ class OnnxDetector(Analytics[Detections]):
         points = found.keypoints
         if points is not None:
             points = np.concatenate([letterbox.restore(points[..., :2]), points[..., 2:]], axis=2)
-        # Beyond the picture's edge nothing of a box may be left after clipping.
+        # Clipping leaves nothing of a box outside the image.
         inside = np.flatnonzero((boxes[:, 2:] > boxes[:, :2]).all(axis=1))
         rows = zip(inside, boxes[inside].tolist(), strict=True)
         return [

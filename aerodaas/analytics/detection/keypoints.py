@@ -1,4 +1,4 @@
-"""KeypointModel: the joints of people whose boxes are known."""
+"""KeypointModel: joints of people whose boxes are given."""
 
 from __future__ import annotations
 
@@ -23,20 +23,20 @@ Box = tuple[float, float, float, float]
 
 _TASK = "keypoints"
 _NUMBERS = 3
-"""For each joint: u, v, confidence."""
+"""Numbers per joint: u, v, confidence."""
 
 _ASTRAY = 0.1
-"""Sides of the cut by which the places of a joint differ where one of them is doubtful."""
+"""Distance of the two estimates of a joint, in sides of the crop, from which one is doubtful."""
 
 
 class KeypointModel:
-    """A network on square cuts around people, as `tools.training pose` exports it.
+    """A keypoint network on square crops around people, as `tools.training pose` exports it.
 
-    Cuts (n, 3, s, s), RGB from 0 to 1, to keypoints (n, 17, 3): u and v in pixels of the cut, and
-    the confidence, 0 to 1, that the joint is seen and its place is right.
+    It maps crops (n, 3, s, s), RGB from 0 to 1, to keypoints (n, 17, 3): u and v in
+    pixels of the crop, and the confidence, 0 to 1, that the joint is visible and correctly placed.
 
-    Each cut is looked at twice, the second time mirrored. An arm that is there is found in both;
-    one that the network makes up, of a window behind a shoulder, seldom is.
+    The network runs on each crop twice, the second time mirrored. A real arm is found in both; a
+    spurious one, such as a window behind a shoulder, rarely is.
     """
 
     def __init__(
@@ -46,7 +46,7 @@ class KeypointModel:
         providers: Sequence[str] | None = None,
         threads: int | None = None,
     ) -> None:
-        """Read the file, which travels to the actor by value; raises ModelError."""
+        """Read the file, which is sent to the actor by value; raises ModelError."""
         model = read_model(path)
         shape = model.output_shape
         if model.metadata.get("task") != _TASK or tuple(shape[1:]) != (POINTS, _NUMBERS):
@@ -57,13 +57,13 @@ class KeypointModel:
             )
         self.path = str(path)
         self.size = model.size[0]
-        """Side of the cuts in pixels."""
+        """Side of the crops in pixels."""
         self._content, self._input, self._dtype = model.content, model.input.name, model.dtype
         self._providers, self._threads = providers, threads
         self._session: ort.InferenceSession | None = None
 
     def open(self) -> None:
-        """Create the session and run it, so that the first frame of the mission is not slow."""
+        """Create the session and warm it up, so that the mission's first frame is not slow."""
         self._session = open_session(self._content, self.path, self._providers, self._threads)
         self._run(np.zeros((1, 3, self.size, self.size), self._dtype))
 
@@ -72,9 +72,9 @@ class KeypointModel:
         self._session = None
 
     def find(self, image: NDArray[np.uint8], boxes: Sequence[Box]) -> NDArray[np.float32]:
-        """Keypoints (n, 17, 3) in pixels of `image` (BGR) of the person in each of `boxes`.
+        """Find the keypoints (n, 17, 3) of the person in each of `boxes`, in pixels of `image`.
 
-        All in one run of the network; raises ModelError before `open`.
+        `image` is BGR. All boxes take one run of the network; raises ModelError before `open`.
         """
         squares = [square_around(box) for box in boxes]
         cuts = np.stack([cut_out(image, square, self.size) for square in squares])
@@ -89,7 +89,7 @@ class KeypointModel:
     def _agreed(
         self, straight: NDArray[np.float32], mirrored: NDArray[np.float32]
     ) -> NDArray[np.float32]:
-        """Where the joints are by both looks; the less these agree, the less it is believed."""
+        """Merge the keypoints of both runs; confidence falls with the distance between them."""
         other = mirrored[:, MIRRORED]
         other[..., 0] = self.size - other[..., 0]
         apart = np.linalg.norm(straight[..., :2] - other[..., :2], axis=-1) / self.size

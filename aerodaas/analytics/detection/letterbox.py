@@ -1,4 +1,4 @@
-"""Letterboxing: a frame of any size into the network's input, and boxes back again."""
+"""Letterboxing of frames into a network's input, and of boxes back to the frame."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ _STRIDE = 32
 
 
 class Letterbox:
-    """The mapping between frames of one size and a network input of one size.
+    """Mapping between frames of one size and a network input of one size.
 
-    The padding is written once, when the buffer is made; each frame then overwrites the middle
+    The padding is written once, when the buffer is made; each frame overwrites the inner part
     only. Resizing is bilinear, as in training.
     """
 
@@ -30,7 +30,7 @@ class Letterbox:
     ) -> None:
         """Map frames of `frame` (height, width) pixels to at most `network` (height, width).
 
-        Where the input's size is `flexible`, padding beyond the next multiple of 32 is left out.
+        If the input's size is `flexible`, padding beyond the next multiple of 32 is omitted.
         """
         height, width = frame
         self.ratio = min(network[0] / height, network[1] / width)
@@ -41,7 +41,7 @@ class Letterbox:
         self.network = network
         self.style = style
         slack = (network[0] - self.inner[0], network[1] - self.inner[1])
-        # Halves are rounded down, as by Ultralytics' LetterBox.
+        # Halves are rounded down, as in Ultralytics' LetterBox.
         self.top, self.left = (slack[0] // 2, slack[1] // 2) if style.centred else (0, 0)
 
     def buffer(self, count: int, dtype: type[np.float32 | np.float16]) -> NDArray[np.floating]:
@@ -60,9 +60,9 @@ class Letterbox:
             np.multiply(plane, scale, out=window[channel], casting="unsafe")
 
     def restore(self, points: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Points (..., 2) of the network's input, as u and v of the frame, clipped to it."""
+        """Convert points (..., 2) of the network's input to u and v of the frame, clipped to it."""
         height, width = self.frame
-        # Per axis, because rounding to whole pixels stretches the two a little differently.
+        # Per axis, because rounding to whole pixels scales the two slightly differently.
         scale = np.array([width / self.inner[1], height / self.inner[0]], np.float32)
         moved = (points - np.array([self.left, self.top], np.float32)) * scale
         clipped: NDArray[np.float32] = np.clip(moved, 0, np.array([width, height], np.float32))

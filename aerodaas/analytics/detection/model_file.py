@@ -1,7 +1,7 @@
-"""What an ONNX file says about itself: inputs, outputs, metadata, and one trial run.
+"""Reader of ONNX files: inputs, outputs, metadata, and one trial run.
 
-Nothing here trusts the file's name. Everything that is wrong with a file is told here, while the
-application is built, as one ModelError that names the path and the remedy.
+The file's name is not trusted. Every defect of a file is raised here, while the application is
+built, as one ModelError that names the path and the remedy.
 """
 
 from __future__ import annotations
@@ -35,17 +35,17 @@ _REMEDY = "export the model again, for example `yolo export model=yolo11n.pt for
 
 @dataclass(frozen=True)
 class Tensor:
-    """An input or output as the file declares it; None stands for an axis that may vary."""
+    """An input or output as the file declares it; None in the shape denotes a variable axis."""
 
     name: str
     shape: tuple[int | None, ...]
     kind: str
-    """The element type as onnxruntime spells it, such as `tensor(float)`."""
+    """Element type in onnxruntime's spelling, such as `tensor(float)`."""
 
 
 @dataclass(frozen=True)
 class ModelFile:
-    """A model that onnxruntime can load and that takes one colour picture."""
+    """A model that onnxruntime can load and whose input is one colour image."""
 
     path: Path
     content: bytes
@@ -53,7 +53,7 @@ class ModelFile:
     outputs: tuple[Tensor, ...]
     metadata: dict[str, str]
     size: tuple[int, int]
-    """Height and width of the input, in pixels: declared, or chosen where it may vary."""
+    """Height and width of the input in pixels: declared, or chosen if variable."""
     session: ort.InferenceSession
 
     @property
@@ -63,17 +63,17 @@ class ModelFile:
 
     @property
     def batches(self) -> bool:
-        """Whether several pictures may be given at once."""
+        """Whether the batch size is variable."""
         return self.input.shape[0] is None
 
     @property
     def resizes(self) -> bool:
-        """Whether the input's height and width may vary."""
+        """Whether the input's height and width are variable."""
         return None in self.input.shape[2:]
 
     @cached_property
     def trial(self) -> tuple[NDArray[np.float32], ...]:
-        """Outputs for one mid-grey picture: they show the shapes and scales of what follows."""
+        """Outputs for one mid-grey image, which show the shapes and scales of the outputs."""
         picture = np.full((1, _COLOURS, *self.size), 0.5, self.dtype)
         try:
             outputs = self.session.run(None, {self.input.name: picture})
@@ -83,18 +83,18 @@ class ModelFile:
 
     @property
     def output_shape(self) -> tuple[int, ...]:
-        """Shape of the first output for one picture: as declared, or by trial where it varies."""
+        """Shape of the first output for one image: as declared, or by trial if variable."""
         declared = self.outputs[0].shape
         known = tuple(axis for axis in declared if axis is not None)
         return known if len(known) == len(declared) else self.trial[0].shape
 
-    def literal(self, key: str) -> Any:  # noqa: ANN401 - whatever the exporter wrote
-        """One metadata value as a Python literal; None where it is missing or malformed."""
+    def literal(self, key: str) -> Any:  # noqa: ANN401 - of any type
+        """One metadata value as a Python literal; None if it is missing or malformed."""
         return _literal(self.metadata.get(key))
 
     @property
     def names(self) -> tuple[str, ...] | None:
-        """Class names from the metadata, by class number; None where there are none."""
+        """Class names from the metadata, by class number; None without any."""
         names = self.literal("names")
         if isinstance(names, dict) and set(names) == set(range(len(names))):
             names = [names[index] for index in range(len(names))]
@@ -103,16 +103,15 @@ class ModelFile:
         return tuple(str(name) for name in names)
 
     def refusal(self, problem: str, remedy: str = _REMEDY) -> ModelError:
-        """Make the error that says what is wrong with this file and what to do."""
+        """Make the error that names a problem of this file and its remedy."""
         return _refusal(self.path, problem, remedy)
 
 
 def read_model(path: str | Path, size: int | None = None) -> ModelFile:
     """Read and check an ONNX file.
 
-    `size` is the side in pixels of the square that a model of variable input size is given.
-    Raises ModelError if the file is missing, empty, no ONNX model, or takes anything but one
-    colour picture.
+    `size` is the side in pixels of the square input of a model of variable input size. Raises
+    ModelError if the file is missing, empty, not an ONNX model, or does not take one colour image.
     """
     path = Path(path)
     content = _read(path)
@@ -205,7 +204,7 @@ def _is_size(value: object) -> bool:
     )
 
 
-def _literal(text: str | None) -> Any:  # noqa: ANN401 - whatever the exporter wrote
+def _literal(text: str | None) -> Any:  # noqa: ANN401 - of any type
     if text is None:
         return None
     try:

@@ -1,4 +1,4 @@
-"""One box for each object, where a detector gives several: of a part, or with what is beside it."""
+"""Suppression of further boxes of one object, around a part of it or including its surroundings."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ __all__ = ["one_for_each"]
 
 
 def one_for_each(items: Sequence[Detection], shared: float) -> list[Detection]:
-    """Keep, best first, what shares no more than `shared` of the smaller box with a better one.
+    """Keep, best first, boxes that share at most `shared` of the smaller box with a better one.
 
-    A box of half an object lies in that of the whole, and overlaps it too little for the usual
-    suppression, which divides by the union. Labels are told apart.
+    A box of half an object lies within the box of the whole, and overlaps it too little for the
+    usual suppression, which divides by the union. Labels are treated separately.
     """
     kept: list[Detection] = []
     boxes = np.zeros((0, 4))

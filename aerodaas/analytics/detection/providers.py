@@ -1,4 +1,4 @@
-"""Where inference runs: execution providers, threads, and the session's options."""
+"""Creation of onnxruntime sessions: execution providers, threads and options."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _log = logging.getLogger(__name__)
 _PREFERRED = ("TensorrtExecutionProvider", "CUDAExecutionProvider", "CPUExecutionProvider")
 _ERRORS_ONLY = 3
 _ENGINES = Path.home() / ".cache" / "aerodaas" / "tensorrt"
-# A TensorRT engine takes minutes to build: it is kept for the next flight.
+# A TensorRT engine takes minutes to build and is cached for the next flight.
 _OPTIONS: dict[str, dict[str, Any]] = {
     "TensorrtExecutionProvider": {
         "trt_fp16_enable": True,
@@ -29,16 +29,16 @@ _OPTIONS: dict[str, dict[str, Any]] = {
 
 
 def default_threads() -> int:
-    """Half of the cores this process may use, so that two models on one edge don't fight."""
+    """Half of the cores available to this process, so that two models can share an edge node."""
     return max(1, len(os.sched_getaffinity(0)) // 2)
 
 
 def open_session(
     content: bytes, label: str, providers: Sequence[str] | None, threads: int | None
 ) -> ort.InferenceSession:
-    """Create the session for a model's `content`, and log where it runs.
+    """Create the session for a model's `content`, and log its execution provider.
 
-    `providers` are names in onnxruntime's spelling, best first; None takes what is there of
+    `providers` are names in onnxruntime's spelling, best first; None selects those available of
     TensorRT, CUDA and CPU. Raises ModelError if a provider is not installed or the session
     cannot be created.
     """
@@ -55,7 +55,7 @@ def open_session(
     options.log_severity_level = _ERRORS_ONLY
     options.intra_op_num_threads = threads or default_threads()
     options.inter_op_num_threads = 1
-    # Waiting threads would otherwise burn the cores that other actors need.
+    # Spinning threads would occupy cores that other actors need.
     options.add_session_config_entry("session.intra_op.allow_spinning", "0")
     if "TensorrtExecutionProvider" in chosen:
         _ENGINES.mkdir(parents=True, exist_ok=True)

@@ -11,12 +11,12 @@ __all__ = ["strongest", "suppress"]
 
 
 def suppress(candidates: Candidates, iou: float) -> Candidates:
-    """Keep, best first, the boxes that overlap no better one of their class by more than `iou`."""
+    """Keep, best first, boxes that overlap no better one of their class by more than `iou`."""
     if len(candidates) == 0:
         return candidates
     boxes = candidates.boxes.astype(np.float64)
     boxes[:, 2:] -= boxes[:, :2]
-    # OpenCV's stubs ask for sequences where its bindings take arrays, much faster.
+    # OpenCV's stubs require sequences, but its bindings accept arrays, which are much faster.
     kept = cv2.dnn.NMSBoxesBatched(
         boxes,  # type: ignore[arg-type]
         candidates.scores,  # type: ignore[arg-type]

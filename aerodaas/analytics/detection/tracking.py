@@ -1,10 +1,10 @@
-"""Tracking: detections get an identity that lasts through misses, crossings and occlusions.
+"""Multi-object tracking: persistent identities through misses, crossings and occlusions.
 
-Each target has a Kalman filter of its box. The nearest pairs of targets and detections are
-joined first (greedy global nearest neighbour), by likelihood, so that a young, vague track does
-not take the detection of a well-known one. Detections that are unsure may only continue a track,
-after the sure ones (ByteTrack, Zhang et al. 2022). The optimal assignment differs from this only in
-crowds, and would need scipy.
+Each target has a Kalman filter of its box. Targets and detections are associated in order of
+likelihood (greedy global nearest neighbour), so that a new, uncertain track does not take the
+detection of an established one. Detections of low score may only continue a track, after those of
+high score (ByteTrack, Zhang et al. 2022). The optimal assignment differs from this only in crowds,
+and would need scipy.
 """
 
 from __future__ import annotations
@@ -22,47 +22,47 @@ from aerodaas.types.data import Detection, Detections
 __all__ = ["Track", "Tracker", "TrackingAnalytics"]
 
 _NEWEST = 0.2
-"""Weight of the newest look in the score of a track: it stands for about five looks."""
+"""Weight of the newest detection in the score of a track, a mean over about five detections."""
 _GATE = 25.0
-"""Squared Mahalanobis distance, of four degrees of freedom, that one true box in 20,000 exceeds."""
+"""Squared Mahalanobis distance, four degrees of freedom, exceeded by 1 in 20,000 true boxes."""
 
 
 @dataclass(eq=False)
 class Track:
-    """One target and what is known of it."""
+    """Tracking state of one target."""
 
     id: int
     detection: Detection
-    """As last seen."""
+    """Its last detection."""
     filter: BoxFilter
     score: float
-    """Mean confidence of its looks, the newest weighing most."""
+    """Mean confidence of its detections, weighted towards the newest."""
     hits: int = 1
-    """How often it was seen."""
+    """Number of its detections."""
     age: float = 0.0
-    """Seconds since it was last seen."""
+    """Seconds since its last detection."""
 
 
 class Tracker:
-    """Keeps the identity of every target."""
+    """Assigns a persistent identity to every target."""
 
     def __init__(self, *, max_age: float = 1.0, min_hits: int = 2, sure: float = 0.0) -> None:
-        """Forget a target unseen for `max_age` seconds; trust it once seen `min_hits` times.
+        """Drop a track undetected for `max_age` seconds; confirm it after `min_hits` detections.
 
-        Detections that score below `sure` continue tracks, but begin none.
+        Detections that score below `sure` continue tracks, but start none.
         """
         self.max_age = max_age
         self.min_hits = min_hits
         self.sure = sure
         self.tracks: list[Track] = []
-        """All that are not lost, those that are out of sight among them."""
+        """All tracks that are not lost, including those out of sight."""
         self._stamp: int | None = None
         self._next_id = 1
 
     def update(self, detections: Detections) -> Detections:
-        """Return `detections` with the `track_id` of each that belongs to a trusted target.
+        """Return `detections` with the `track_id` of each that belongs to a confirmed track.
 
-        Stamps must not run back; a frame older than the last one gives no identities.
+        A frame older than the last one is returned unchanged.
         """
         stamp = detections.header.stamp
         dt = 0.0 if self._stamp is None else seconds(stamp - self._stamp)
@@ -82,11 +82,11 @@ class Tracker:
         return replace(detections, items=tuple(named))
 
     def find(self, track_id: int | None) -> Track | None:
-        """Return the track of this id; None if there is none or it was lost."""
+        """Return the track of this id; None if it is unknown or lost."""
         return next((track for track in self.tracks if track.id == track_id), None)
 
     def _associate(self, items: Sequence[Detection]) -> list[Track | None]:
-        """Give each detection its track: one that is known, or a new one if it is sure."""
+        """Assign each detection an existing track, or a new one if its score suffices."""
         pairs = sorted(
             (item.score < self.sure, cost, row, column)
             for row, track in enumerate(self.tracks)
@@ -119,23 +119,28 @@ class Tracker:
 
 
 class TrackingAnalytics(Analytics[Detections]):
-    """Gives the boxes of a detector identities that last."""
+    """Adds persistent track ids to the boxes of a detector."""
 
     accepts: ClassVar[tuple[type, ...]] = (Detections,)
     produces: ClassVar[type] = Detections
 
     def __init__(self, *, max_age: float = 1.0, min_hits: int = 2) -> None:
-        """Forget a target unseen for `max_age` seconds; trust it once seen `min_hits` times."""
+        """Configure the tracker.
+
+        Args:
+            max_age: Seconds without a detection after which a track is dropped.
+            min_hits: Number of detections that confirm a track.
+        """
         self.tracker = Tracker(max_age=max_age, min_hits=min_hits)
 
     def process(self, item: Detections, context: Context) -> Detections:
-        """Return the same boxes with their identities."""
+        """Return the same boxes with the track ids of confirmed tracks."""
         del context
         return self.tracker.update(item)
 
 
 def _cost(track: Track, item: Detection) -> float | None:
-    """Twice the negative log-likelihood of the pair; None if it cannot be the same object."""
+    """Twice the negative log-likelihood of the pair, up to a constant; None beyond the gate."""
     if track.detection.label != item.label:
         return None
     distance, spread = track.filter.distance(item.box)

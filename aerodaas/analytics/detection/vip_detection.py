@@ -1,4 +1,4 @@
-"""VipDetectionAnalytics: finds the hazard vest of the person to be assisted."""
+"""VipDetectionAnalytics: detection of the hazard vest of the person to be assisted."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["VipDetectionAnalytics"]
 
 
 class VipDetectionAnalytics(OnnxDetector):
-    """An `OnnxDetector` that looks for hazard vests, by default with the model that ships."""
+    """An `OnnxDetector` for hazard vests, by default with the shipped model."""
 
     def __init__(
         self,
@@ -24,11 +24,20 @@ class VipDetectionAnalytics(OnnxDetector):
         providers: Sequence[str] | None = None,
         threads: int | None = None,
     ) -> None:
-        """Load `model`, or the one that ships; raises ModelError.
+        """Read the model.
 
-        `classes` are the names to keep: by default `vest` of the shipped model, and every class
-        of a model of your own. Of two boxes that overlap by more than `iou` the better one stays:
-        less than other detectors allow, for people seldom stand chest before chest.
+        Args:
+            model: ONNX file; by default the shipped one.
+            classes: Class names to keep; by default `vest` of the shipped model, and every class
+                of any other model.
+            min_score: Least confidence of a detection, above 0 to 1.
+            iou: Overlap of two boxes above which only the better one is kept, above 0 to 1; lower
+                than in other detectors, because people rarely stand chest before chest.
+            providers: As in `OnnxDetector`.
+            threads: As in `OnnxDetector`.
+
+        Raises:
+            ModelError: If the file or a setting is unsuitable.
         """
         wanted = ["vest"] if model is None and classes is None else classes
         super().__init__(

@@ -1,5 +1,5 @@
-"""Inference endpoints over HTTP, as a place where analyses run.
+"""Inference endpoints over HTTP, as compute resources for analyses.
 
-`analysis.endpoint_analysis` puts an analysis before an endpoint: what it does in `process` then
-happens there, by the Open Inference Protocol (KServe v2) or at a plain function's URL.
+`analysis.endpoint_analysis` wraps an analysis so that its inference runs at an endpoint, by the
+Open Inference Protocol (KServe v2) or at a plain function's URL.
 """

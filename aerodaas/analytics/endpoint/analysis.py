@@ -1,4 +1,4 @@
-"""An analysis whose work is done at an endpoint; everything else about it stays as it was."""
+"""Wrapper that runs an analysis' inference at an endpoint."""
 
 from __future__ import annotations
 
@@ -28,11 +28,11 @@ _PICTURE = (360, 640, 3)
 
 @runtime_checkable
 class TensorAnalysis(Protocol):
-    """An analysis whose model may run elsewhere: it makes tensors of frames, results of tensors."""
+    """An analysis whose model may run remotely: frames to tensors, and tensors to results."""
 
     @property
     def model_name(self) -> str:
-        """What its model is called where nobody says otherwise."""
+        """Default name of its model at an endpoint."""
         ...
 
     @property
@@ -41,13 +41,13 @@ class TensorAnalysis(Protocol):
         ...
 
     def preprocess(self, frames: Sequence[Frame]) -> NDArray[np.floating]:
-        """Make the model's input of frames of one size."""
+        """Convert frames of one size to the model's input."""
         ...
 
     def postprocess(
         self, frames: Sequence[Frame], outputs: Sequence[NDArray[np.floating]]
     ) -> list[Any]:
-        """Make results of the model's outputs for the frames last preprocessed."""
+        """Convert the model's outputs for the frames last preprocessed to results."""
         ...
 
 
@@ -60,13 +60,13 @@ class _Choosy(Protocol):
 def endpoint_analysis(
     work: Analytics[Any], name: str, resource: ComputeConfig, *, strict: bool
 ) -> Analytics[Any]:
-    """The analysis `work`, called `name`, with its inference at the endpoint `resource`.
+    """Wrap the analysis `work`, called `name`, so that its inference runs at `resource`.
 
-    A frame without an answer is counted and told; `strict`: raised as EndpointError, too.
-    Raises GraphError where the endpoint's protocol cannot do what the analysis does.
+    A frame without a reply is counted and logged; with `strict` EndpointError is raised, too.
+    Raises GraphError if the endpoint's protocol does not support the analysis.
     """
     endpoint = resource.endpoint
-    assert endpoint is not None  # noqa: S101 - the kind says so
+    assert endpoint is not None  # noqa: S101 - implied by the resource's kind
     if endpoint.protocol == "function":
         if not issubclass(work.produces, Detections):
             raise GraphError(
@@ -83,7 +83,7 @@ def endpoint_analysis(
 
 
 class _EndpointAnalysis(Analytics[Any]):
-    """Asks the endpoint; subclasses know the protocol."""
+    """Base of the wrappers; subclasses implement the protocol of the endpoint."""
 
     isolated = True
     scheduled = True
@@ -109,7 +109,7 @@ class _EndpointAnalysis(Analytics[Any]):
         self._lock: Any = None
 
     def open(self) -> None:
-        """Look at the endpoint; one that cannot work is refused, one that is silent is not.
+        """Check the endpoint; an unsuitable one is refused, an unreachable one is only logged.
 
         Raises ConfigError or ModelError.
         """
@@ -122,7 +122,7 @@ class _EndpointAnalysis(Analytics[Any]):
             _log.warning("%s: %s; the mission goes on without it", self.name, error)
 
     def process(self, item: Frame, context: Context) -> Any:  # noqa: ANN401
-        """Have the endpoint analyse a frame; None where it did not."""
+        """Analyse a frame at the endpoint; None without a reply."""
         budget = context.time_left() if isinstance(context, TimedContext) else None
         with self._lock:
             self.asked += 1
@@ -137,7 +137,7 @@ class _EndpointAnalysis(Analytics[Any]):
         return result
 
     def close(self) -> None:
-        """Say how often the endpoint failed, and hang up."""
+        """Log the endpoint's failures, and close the connection."""
         if self._connection is None:
             return
         failures = self._connection.failures
@@ -147,7 +147,7 @@ class _EndpointAnalysis(Analytics[Any]):
         self._connection.close()
 
     def _fail(self, error: EndpointError) -> None:
-        """Tell a failure once, until it is another one or things went well again."""
+        """Log a failure once, until a different failure or a success."""
         with self._lock:
             known, self._last = self._last, str(error)
         if known != self._last:
@@ -155,15 +155,15 @@ class _EndpointAnalysis(Analytics[Any]):
 
     @abstractmethod
     def _check(self, connection: Connection) -> None:
-        """Raise ConfigError or ModelError where it cannot work, EndpointError if it is silent."""
+        """Raise ConfigError or ModelError if unsuitable, EndpointError if unreachable."""
 
     @abstractmethod
     def _ask(self, frame: Frame, budget: float | None) -> Any:  # noqa: ANN401
-        """Have a frame analysed; raises EndpointError."""
+        """Analyse a frame; raises EndpointError."""
 
 
 class _TensorAnalysis(_EndpointAnalysis):
-    """By the Open Inference Protocol."""
+    """Wrapper that uses the Open Inference Protocol."""
 
     def _check(self, connection: Connection) -> None:
         called = self._endpoint.models.get(self.name) or self.work.model_name
@@ -182,7 +182,7 @@ class _TensorAnalysis(_EndpointAnalysis):
 
 
 class _FunctionAnalysis(_EndpointAnalysis):
-    """By JPEG and JSON."""
+    """Wrapper that sends JPEG to a function's URL and receives JSON."""
 
     def _check(self, connection: Connection) -> None:
         called = self._endpoint.models.get(self.name, self.name)

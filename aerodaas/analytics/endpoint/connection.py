@@ -1,4 +1,4 @@
-"""HTTP to one endpoint: kept connections, a budget of time, bounded replies, few retries."""
+"""HTTP client of one endpoint: persistent connections, deadlines, bounded replies, few retries."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from aerodaas.types.errors import ConfigError, EndpointError
 __all__ = ["Connection", "Reply"]
 
 _MOST_BYTES = 64 * 2**20
-"""Of a reply; the raw output of a large detector has 3 MB."""
+"""Largest size of a reply; the raw output of a large detector has 3 MB."""
 _CHUNK = 1 << 18
 _FIRST_PAUSE = 0.02
-"""Seconds before the second attempt; doubled before each further one."""
+"""Delay before the second attempt in seconds; doubled before each further one."""
 _LEAST_ATTEMPT = 0.005
-"""Seconds below which another attempt is not worth its while."""
+"""Remaining time in seconds below which no further attempt is made."""
 _BUSY = {
     HTTPStatus.TOO_MANY_REQUESTS,
     HTTPStatus.BAD_GATEWAY,
@@ -36,7 +36,7 @@ _TEXT_SHOWN = 200
 
 @dataclass(frozen=True)
 class Reply:
-    """What the endpoint answered."""
+    """Reply of the endpoint."""
 
     status: int
     headers: Mapping[str, str]
@@ -44,13 +44,13 @@ class Reply:
 
     @property
     def text(self) -> str:
-        """The beginning of the body, for a message."""
+        """Beginning of the body, for error messages."""
         shown = " ".join(self.body[:_TEXT_SHOWN].decode("utf-8", "replace").split())
         return shown or "an empty reply"
 
 
 class _AttemptError(Exception):
-    """One attempt has failed; `again` if another may succeed."""
+    """Failure of one attempt; `again` if another may succeed."""
 
     def __init__(self, kind: str, text: str, *, again: bool) -> None:
         super().__init__(text)
@@ -59,16 +59,16 @@ class _AttemptError(Exception):
 
 
 class Connection:
-    """Asks one endpoint. Any number of threads may; `executors` connections are kept open."""
+    """Thread-safe HTTP client of one endpoint, with up to `executors` persistent connections."""
 
     def __init__(self, config: EndpointConfig, executors: int) -> None:
-        """Connect with the first request.
+        """Configure the client, which connects with the first request.
 
-        Raises ConfigError where the environment lacks the secret that `token_env` names.
+        Raises ConfigError if the environment variable named by `token_env` is not set.
         """
         self.url = config.url.rstrip("/")
         self.failures: Counter[str] = Counter()
-        """Attempts that failed, by kind."""
+        """Failed attempts by kind."""
         self._config = config
         self._secret = _secret(config)
         self._pool = urllib3.PoolManager(maxsize=executors, block=True, retries=False)
@@ -82,10 +82,10 @@ class Connection:
         headers: Mapping[str, str] | None = None,
         budget: float | None = None,
     ) -> Reply:
-        """Send a request and return the reply, whatever its status but those of a busy server.
+        """Send a request and return the reply, of any status except those of a busy server.
 
-        `budget` are the wall seconds that the answer is of use; never more than the endpoint's
-        `timeout`. Raises EndpointError when there is no reply within it.
+        `budget` is the time for the reply in wall-clock seconds, capped by the endpoint's
+        `timeout`. Raises EndpointError without a reply within it.
         """
         timeout = self._config.timeout
         until = time.monotonic() + (timeout if budget is None else min(timeout, budget))
@@ -128,7 +128,7 @@ class Connection:
             try:
                 content = _read(response, until)
             except BaseException:
-                # What is left unread must not be taken for the next request's reply.
+                # Unread bytes must not be taken for the next request's reply.
                 response.close()
                 raise
             response.release_conn()

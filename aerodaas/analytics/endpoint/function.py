@@ -1,10 +1,10 @@
-"""A plain function's URL: a picture goes there as JPEG, what it shows comes back as JSON.
+"""Client of a plain function's URL: JPEG image in the request, detections as JSON in the reply.
 
 Request: `POST url`, `Content-Type: image/jpeg`, `X-Analysis: <name>`. Reply, status 200::
 
     {"detections": [{"box": [left, top, right, bottom], "label": "person", "score": 0.9}]}
 
-Boxes are in pixels of the picture sent; `track_id` (integer) and `keypoints` (a list of
+Boxes are in pixels of the sent image; `track_id` (integer) and `keypoints` (a list of
 `[u, v, confidence]`) may be added.
 """
 
@@ -33,7 +33,7 @@ Number = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class _Found(BaseModel):
-    """One object as the function tells it."""
+    """One object in the function's reply."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -44,7 +44,7 @@ class _Found(BaseModel):
     keypoints: Annotated[list[tuple[Number, Number, Number]], Field(max_length=1000)] | None = None
 
     def within(self, width: int, height: int) -> Detection | None:
-        """As a detection, clipped to the picture; None if nothing is left of it."""
+        """Convert to a detection clipped to the image; None if the clipped box is empty."""
         left, right = (min(max(edge, 0.0), float(width)) for edge in self.box[::2])
         top, bottom = (min(max(edge, 0.0), float(height)) for edge in self.box[1::2])
         if left >= right or top >= bottom:
@@ -59,17 +59,17 @@ class _Answer(BaseModel):
 
 
 class FunctionUrl:
-    """A function that detects, for the analysis `name`."""
+    """Client of a detection function, for the analysis `name`."""
 
     def __init__(self, connection: Connection, name: str) -> None:
         self._connection = connection
         self._headers = {"Content-Type": "image/jpeg", "X-Analysis": name}
 
     def check(self) -> None:
-        """Send one grey picture.
+        """Test the function with a grey image.
 
-        Raises ConfigError if there is no such function for us, EndpointError if it does not
-        answer as agreed.
+        Raises ConfigError if the URL or the secret is wrong, EndpointError if the reply is not
+        as specified.
         """
         reply = self._post(_GREY, None)
         refuse_denied(reply, self._connection.url)
@@ -87,9 +87,9 @@ class FunctionUrl:
         classes: Sequence[str] | None = None,
         min_score: float = 0.0,
     ) -> Detections:
-        """Find the objects in a frame, of these classes and of at least this score.
+        """Detect the objects in a frame, of these classes and of at least this score.
 
-        `budget` as of `Connection.ask`. Raises EndpointError.
+        `budget` is as in `Connection.ask`. Raises EndpointError.
         """
         found = self._read(self._post(frame.image, budget), frame.width, frame.height)
         wanted = [

@@ -1,4 +1,4 @@
-"""One model behind the Open Inference Protocol: is it there, does it fit, what does it say."""
+"""Client of one model behind the Open Inference Protocol: metadata check and inference."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _DENIED = {HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN}
 
 
 def refuse_denied(reply: Reply, url: str) -> None:
-    """Raise ConfigError if the endpoint wants another secret."""
+    """Raise ConfigError if the endpoint rejects the secret."""
     if reply.status in _DENIED:
         raise ConfigError(
             f"{url} refuses our secret (status {reply.status}): "
@@ -34,7 +34,7 @@ def refuse_denied(reply: Reply, url: str) -> None:
 
 
 class EndpointModel:
-    """The model `name` at an endpoint."""
+    """Client of the model `name` at an endpoint."""
 
     def __init__(self, connection: Connection, name: str) -> None:
         self.name = name
@@ -43,9 +43,9 @@ class EndpointModel:
         self._binary = True
 
     def check(self, inputs: Sequence[TensorSpec], outputs: Sequence[TensorSpec]) -> None:
-        """Compare what the endpoint says of the model with what will be sent and expected.
+        """Compare the model's metadata at the endpoint with the expected inputs and outputs.
 
-        Raises ModelError or ConfigError where it cannot work, EndpointError where nobody says.
+        Raises ModelError or ConfigError if they do not fit, EndpointError without a reply.
         """
         reply = self._connection.ask("GET", self._path)
         refuse_denied(reply, self._connection.url)
@@ -59,16 +59,16 @@ class EndpointModel:
             known = {spec.name: spec for spec in told[kind]}
             for spec in wanted:
                 there = known.get(spec.name)
-                # Outputs are converted, whatever their element type.
+                # Outputs of any element type are converted.
                 kinds = kind == "outputs" or (there and there.datatype == spec.datatype)
                 if there is None or not kinds or not there.fits(spec.shape):
                     raise self._misfit(f"no {kind[:-1]} {spec}", told[kind])
 
     def rehearse(self, inputs: Mapping[str, NDArray[Any]], outputs: Sequence[TensorSpec]) -> None:
-        """Infer once before the mission: learns whether the server takes binary tensors.
+        """Run one trial inference, which determines whether the server accepts binary tensors.
 
-        Raises ModelError if it takes neither these nor JSON or answers with something else,
-        EndpointError if it does not answer.
+        Raises ModelError if it accepts neither binary nor JSON tensors or the outputs do not fit,
+        EndpointError without a reply.
         """
         for self._binary in (True, False):
             reply = self._infer(inputs, outputs, None)
@@ -89,7 +89,7 @@ class EndpointModel:
         outputs: Sequence[TensorSpec],
         budget: float | None,
     ) -> list[NDArray[Any]]:
-        """Run the model; raises EndpointError. `budget` as of `Connection.ask`."""
+        """Run the model; raises EndpointError. `budget` is as in `Connection.ask`."""
         reply = self._infer(inputs, outputs, budget)
         if reply.status != HTTPStatus.OK:
             self._connection.failures["status"] += 1

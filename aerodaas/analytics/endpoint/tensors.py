@@ -1,4 +1,4 @@
-"""The Open Inference Protocol (KServe v2): tensors as JSON, or binary behind the JSON.
+"""Codec of the Open Inference Protocol (KServe v2): tensors as JSON, or binary after the JSON.
 
 Source: the protocol's REST specification and its binary tensor data extension, as documented by
 the KServe and Triton projects.
@@ -19,7 +19,7 @@ from aerodaas.types.errors import EndpointError
 __all__ = ["DATATYPES", "HEADER_LENGTH", "TensorSpec", "decode_reply", "encode_request"]
 
 HEADER_LENGTH = "Inference-Header-Content-Length"
-"""HTTP header: bytes of JSON before the binary data."""
+"""HTTP header with the number of bytes of JSON before the binary data."""
 DATATYPES: dict[str, type[np.generic]] = {
     "BOOL": np.bool_,
     "UINT8": np.uint8,
@@ -34,13 +34,13 @@ DATATYPES: dict[str, type[np.generic]] = {
     "FP32": np.float32,
     "FP64": np.float64,
 }
-"""Element types by the protocol's names; BYTES is no tensor of numbers."""
+"""Element types by the protocol's names, except BYTES, which is not numeric."""
 _NAMES = {np.dtype(kind): name for name, kind in DATATYPES.items()}
 
 
 @dataclass(frozen=True)
 class TensorSpec:
-    """An input or output of a model; None stands for an axis that may vary."""
+    """An input or output of a model; None in the shape denotes a variable axis."""
 
     name: str
     datatype: str
@@ -48,11 +48,11 @@ class TensorSpec:
 
     @classmethod
     def of(cls, name: str, kind: type[np.generic], shape: Sequence[int | None]) -> TensorSpec:
-        """Describe a tensor by its numpy type."""
+        """Create a spec from a numpy type."""
         return cls(name, _NAMES[np.dtype(kind)], tuple(shape))
 
     def fits(self, shape: Sequence[int | None]) -> bool:
-        """Tell whether a tensor of this shape, some axes of which may vary, may be one of these."""
+        """Whether a tensor of `shape`, possibly with variable axes, is compatible."""
         pairs = zip(self.shape, shape, strict=False)
         same = len(self.shape) == len(shape)
         return same and all(None in pair or pair[0] == pair[1] for pair in pairs)
@@ -65,7 +65,7 @@ class TensorSpec:
 def encode_request(
     inputs: Mapping[str, NDArray[Any]], outputs: Sequence[str], *, binary: bool
 ) -> tuple[bytes, dict[str, str]]:
-    """Return body and headers of a request for `outputs` of a model."""
+    """Encode `inputs` as body and headers of a request for the named `outputs`."""
     described, blocks = [], []
     for name, array in inputs.items():
         entry: dict[str, Any] = {
@@ -90,10 +90,10 @@ def encode_request(
 
 
 def decode_reply(body: bytes, header_length: str | None) -> dict[str, NDArray[Any]]:
-    """Return the outputs of a reply by name; raises EndpointError for what is no such reply."""
+    """Decode the outputs of a reply by name; raises EndpointError for a malformed reply."""
     try:
         end = int(header_length) if header_length is not None else len(body)
-        # A length that lies leaves no JSON, or no data, and so is found out.
+        # A wrong length leaves invalid JSON or too little data, and so is detected.
         content = json.loads(body[: max(0, end)])
         found: dict[str, NDArray[Any]] = {}
         for output in content["outputs"]:

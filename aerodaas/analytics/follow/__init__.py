@@ -1,1 +1,1 @@
-"""Analyses that follow a target; the geometry and the controllers are in `aerodaas.following`."""
+"""Analyses that follow a target; geometry and controllers are in `aerodaas.following`."""

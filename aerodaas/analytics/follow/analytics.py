@@ -1,4 +1,4 @@
-"""Following: the boxes of a detector become velocity commands that keep a drone at its target."""
+"""FollowAnalytics: velocity commands that keep a drone at its target, from a detector's boxes."""
 
 from __future__ import annotations
 
@@ -30,29 +30,30 @@ __all__ = ["FollowAnalytics"]
 
 _log = logging.getLogger(__name__)
 _REACH, _REACH_SHARE = 0.3, 0.2
-"""Metres, and parts of the distance, from where the target should stand to where it is seen; and
-as far as it may have gone since, while it was not."""
+"""Allowed offset of a box from the target's expected position: metres, plus a fraction of the
+distance. The possible motion of the target since its last detection is added."""
 _SURER = 0.2
-"""By how much the score of another must be better than that of a doubtful target."""
+"""Margin by which another track's score must exceed that of a doubtful target."""
 _ALOFT = (1.0, 0.6)
-"""Metres of height, or parts of the height to follow at, from which all who stand near are seen:
-from the ground, the chest of who stands 3 m away is above the picture, and a passer's is not."""
+"""Height in metres, or fraction of the following height, above which all near people are seen:
+from the ground, the chest of a person 3 m away is above the image, but that of a more distant
+passer-by is not."""
 _BLOCKED = (3, 10)
-"""Of the last 10 frames so many in which something stands in the way are told."""
+"""Frames with an obstacle, of the last 10, that raise an alert."""
 _WIDTH_MEMORY = 0.1
-"""Weight of the newest look in the mean of the target's width: arms swing."""
+"""Weight of the newest measurement in the mean of the target's width, as arms swing."""
 
 
 class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
-    """Follows one object of known size at a distance, and stays with that one.
+    """Follows one object of known size at a distance, and stays with that object.
 
-    It locks on the nearest trusted target of its labels and holds it by its track. Until a
-    first target is seen, and after one was given up, it commands nothing, so that other
-    navigation goes on. The camera must be calibrated (`horizontal_fov` of the sensor).
+    It locks on to the nearest trusted target of its labels and holds it by its track. Before the
+    first target, and after one was given up, it sends no commands, so that other navigation goes
+    on. The camera must be calibrated (`horizontal_fov` of the sensor).
     """
 
     falls: ClassVar[bool] = True
-    """Whether a target may fall: a change of its height is then no motion along the ground."""
+    """Whether a target may fall, so that a change of its height is no motion along the ground."""
 
     def __init__(
         self,
@@ -71,13 +72,26 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         choice: TargetChoice | None = None,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
-        """Follow what carries one of `labels` from `distance`, flying at `height`, in metres.
+        """Follow an object with one of `labels`.
 
-        `target_height` and `target_width` are the size of the object itself, in metres. With an
-        `area`, the corners of a polygon in metres east and north of home, a target that leaves it
-        is given up at once. `motion` says how it moves, `choice` what it takes to be followed.
-        Raises ConfigError for lengths that are not positive, and for an
-        area that is none.
+        Args:
+            labels: Labels of the boxes to follow.
+            distance: Distance to keep along the ground, metres.
+            height: Flight height, metres.
+            target_height: Height of the object, metres.
+            target_width: Width of the object, metres.
+            priority: Priority of the velocity commands.
+            gains: Controller gains; by default `FollowGains()`.
+            limits: Limits of the commands; by default `FollowLimits()`.
+            lost: Reaction to a lost target; by default `LostPolicy()`.
+            motion: Motion model of the target; by default that of a person.
+            area: Corners (metres east, north of home) of the polygon outside which a target is
+                given up at once; by default unbounded.
+            choice: Conditions for choosing a target; by default `TargetChoice()`.
+            detector: Detector for camera streams; by default the shipped one.
+
+        Raises:
+            ConfigError: If a length is not positive and finite, or `area` is not a polygon.
         """
         lengths = {
             "distance": distance,
@@ -106,14 +120,14 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             max_age=self.controller.lost.slow, min_hits=self.choice.looks, sure=self.choice.sure
         )
         self.target: int | None = None
-        """Track that is followed."""
+        """Id of the followed track."""
         self._blocked = Debounce(*_BLOCKED)
         self._aloft = 0
-        """Frames taken since it was high enough to choose."""
+        """Number of frames since the drone was high enough to choose a target."""
         self._width = target_width
 
     def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
-        """Return one velocity command, or None where there is nobody to follow."""
+        """Return one velocity command, or None without a target."""
         item = boxes
         if item.camera is None:
             self.explain_once(item, context)
@@ -134,7 +148,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
 
     def _possible(self, item: Detections) -> Detections:
-        """Leave out the boxes of what cannot be the target, so that no track takes them."""
+        """Remove boxes that cannot be the target, so that no track is matched to them."""
         boxes = [box for box in item if all(map(math.isfinite, box.box))]
         if self.choice.grounded:
             boxes = [box for box in boxes if ends_in_picture(box, item)]
@@ -145,7 +159,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         return replace(item, items=tuple(boxes))
 
     def _target_in(self, tracked: Detections) -> Detection | None:
-        """Find the target among the boxes of this frame; choose one where there is none."""
+        """Find the target among the boxes of this frame, or choose a new one."""
         found = tracked.labelled(*self.labels)
         trusted = [item for item in found if item.track_id is not None]
         mine = next((item for item in trusted if item.track_id == self.target), None)
@@ -172,16 +186,16 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         return best
 
     def _is_aloft(self, item: Detections) -> bool:
-        """Whether the drone is so high that a first choice misses nobody."""
+        """Whether the drone is high enough to see all near people for a first choice."""
         least, part = _ALOFT
         height = math.inf if item.odometry is None else item.odometry.height
         return not height < min(least, part * self.controller.height)
 
     def _score_to_displace(self, mine: Detection | None) -> float:
-        """Least score of what takes the place of the target, seen as `mine`; infinite for nothing.
+        """Least score that displaces the target, detected as `mine`; infinite if none may.
 
-        One that has come to look doubtful, such as a passer in a bright shirt, gives way to a much
-        surer one.
+        A target whose score has become doubtful, such as a passer-by in a bright shirt, gives way
+        to a much surer one.
         """
         held = self.tracker.find(self.target)
         if mine is None or held is None or held.score >= self.choice.score:
@@ -203,14 +217,14 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         context.alert(Alert(item.header, "target_left_area", text))
 
     def _shows_enough(self, detection: Detection, item: Detections) -> bool:
-        """Tell whether its size can be told, if that is asked of a first look."""
+        """Whether the object's width is measurable, if that is required of a first detection."""
         if not self.choice.whole:
             return True
         sighting = sight(detection, item, self.size)
         return sighting is not None and sighting.width is not None
 
     def _is_inside(self, detection: Detection, item: Detections) -> bool:
-        """Tell whether it may be followed: it is in the area, if there is one."""
+        """Whether the object is inside the area, if there is one."""
         if self.area is None:
             return True
         sighting, odometry = sight(detection, item, self.size), item.odometry
@@ -222,9 +236,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
     def _found_where_expected(
         self, found: Sequence[Detection], item: Detections
     ) -> Detection | None:
-        """The box that stands on the ground where the target should: it has lost its track only.
+        """Find a box at the target's expected ground position, after the loss of its track.
 
-        A drone that pitches shakes the picture more than a tracker of boxes can know.
+        A pitching drone moves the image by more than a tracker of boxes can predict.
         """
         odometry, controller = item.odometry, self.controller
         expected = None if odometry is None else controller.expected(odometry, item.header.stamp)
@@ -247,7 +261,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         return best
 
     def _is_lost(self) -> bool:
-        """Whether the target has been gone for a while; another one is then taken as it is."""
+        """Whether the target is lost, so that another may replace it without a complete view."""
         free = (FollowPhase.WAITING, FollowPhase.SEARCHING)
         return self.target is not None and self.controller.phase in free
 

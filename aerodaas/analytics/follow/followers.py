@@ -1,4 +1,4 @@
-"""Followers of what the applications follow, with the sizes and distances that suit it."""
+"""Followers of persons, hazard vests and cars, with sizes and distances suited to each."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class PersonFollowAnalytics(FollowAnalytics):
 class VipFollowAnalytics(FollowAnalytics):
     """Follows a person by the hazard vest, from 2 m at a height of 1.5 m as in the paper.
 
-    A vest's outline is about 0.6 m tall and 0.43 m wide, and is all in the picture at that
+    A vest's outline is about 0.6 m tall and 0.43 m wide, and is entirely in the image at that
     distance.
     """
 
@@ -43,9 +43,25 @@ class VipFollowAnalytics(FollowAnalytics):
         priority: int = DEFAULT_PRIORITY,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
-        """Follow from `distance`, flying at `height`, in metres.
+        """Follow a hazard vest.
 
-        The paper's listings pass the environment; the analysed stream knows its own.
+        Args:
+            environment: Ignored; accepted because the paper's listings pass it.
+            distance: Distance to keep along the ground, metres.
+            height: Flight height, metres.
+            labels: Labels of the boxes to follow.
+            target_height: Height of the vest, metres.
+            target_width: Width of the vest, metres.
+            gains: Controller gains; by default `FollowGains()`.
+            limits: Limits of the commands; by default `FollowLimits()`.
+            lost: Reaction to a lost target; by default `LostPolicy()`.
+            choice: Conditions for choosing a target; by default strict ones, because a sunlit
+                wall may resemble a vest.
+            priority: Priority of the velocity commands.
+            detector: Detector for camera streams; by default the shipped one.
+
+        Raises:
+            ConfigError: If a length is not positive and finite.
         """
         del environment
         super().__init__(
@@ -64,10 +80,10 @@ class VipFollowAnalytics(FollowAnalytics):
 
 
 class CarFollowAnalytics(FollowAnalytics):
-    """Follows a car, 1.5 m tall, from 6 m at a height of 2.5 m, which has it all in the picture.
+    """Follows a car, 1.5 m tall, from 6 m at a height of 2.5 m, so that all of it is in the image.
 
-    It ends, so that an interrupted survey resumes, when the car leaves the `area`, or when it is
-    out of sight for some seconds, having turned away or driven off.
+    Following ends, so that an interrupted survey resumes, when the car leaves the `area` or is
+    out of sight for some seconds.
     """
 
     falls: ClassVar[bool] = False
@@ -90,10 +106,28 @@ class CarFollowAnalytics(FollowAnalytics):
         priority: int = DEFAULT_PRIORITY,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
-        """Follow from `distance`, flying at `height`, in metres.
+        """Follow a car.
 
-        `area` is a polygon of corners (metres east, north of home) beyond which no car is
-        followed. The paper's listings pass the environment; the analysed stream knows its own.
+        Args:
+            environment: Ignored; accepted because the paper's listings pass it.
+            distance: Distance to keep along the ground, metres.
+            height: Flight height, metres.
+            labels: Labels of the boxes to follow.
+            target_height: Height of the car, metres.
+            target_width: Width of the car, metres.
+            target_length: Length of the car, metres.
+            area: Corners (metres east, north of home) of the polygon outside which no car is
+                followed; by default unbounded.
+            gains: Controller gains; by default gentler ones than `FollowGains()`.
+            limits: Limits of the commands; by default gentler ones than `FollowLimits()`.
+            lost: Reaction to a lost target; by default with a search of a few seconds.
+            choice: Conditions for choosing a target; by default strict ones, because windows
+                resemble cars.
+            priority: Priority of the velocity commands.
+            detector: Detector for camera streams; by default the shipped one.
+
+        Raises:
+            ConfigError: If a length is not positive and finite, or `area` is not a polygon.
         """
         del environment
         super().__init__(
@@ -115,17 +149,17 @@ class CarFollowAnalytics(FollowAnalytics):
 
 
 _VEST_CHOICE = TargetChoice(score=0.5, sure=0.4, looks=5, whole=True)
-"""A wall in the sun may look a little like a vest, right before the camera and for a moment; nobody
-should end a search for that."""
+"""Strict, because a sunlit wall close to the camera may briefly resemble a vest, which must not end
+a search."""
 _CAR_LOST = LostPolicy(coast=1.0, slow=2.0, hold=3.0, search=7.0)
-"""A car that has turned away is gone sooner than it is found."""
+"""A short search: a car that has turned away is rarely found again."""
 _CAR_CHOICE = TargetChoice(score=0.5, sure=0.3, looks=5, grounded=True, shared=0.6)
-"""Windows look like cars, but hang on walls, and are seldom taken for one as surely; half a car
-looks like one, too."""
+"""Windows resemble cars, but are above the ground and score lower; half a car resembles a whole
+one."""
 _CAR_GAINS = FollowGains(distance=(0.5, 0.05, 0.0))
 _CAR_LIMITS = FollowLimits(
     backward=0.6, acceleration=0.8, braking=1.5, stopping=2.0, reaction_time=0.5
 )
-"""Gentle: a drone that pitches hard tilts a near car out of the picture."""
+"""Gentle, because a hard pitch tilts a near car out of the image."""
 _CAR_ACCELERATION = 0.3
 """Standard deviation of a car's acceleration among people, m/s^2."""

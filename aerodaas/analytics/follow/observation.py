@@ -1,4 +1,4 @@
-"""What a follower's controller is told about one frame."""
+"""Input of a follower's controller for one frame."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def observation(
     context: Context,
     others: tuple[RelativeTarget, ...] = (),
 ) -> Observation:
-    """The `sighting` in `boxes`, with the drone as it was at capture and as it is now."""
+    """Combine the `sighting` in `boxes` with the drone's odometry at capture and at present."""
     state = context.vehicle()
     return Observation(
         stamp=boxes.header.stamp,

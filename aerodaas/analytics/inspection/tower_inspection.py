@@ -1,4 +1,4 @@
-"""TowerInspectionAnalytics: approach a tower, climb along it taking pictures, and land."""
+"""TowerInspectionAnalytics: approach a tower, climb along it taking images, and land."""
 
 from __future__ import annotations
 
@@ -28,26 +28,27 @@ __all__ = ["InspectionOver", "TowerInspectionAnalytics", "inspection_over"]
 
 _log = logging.getLogger(__name__)
 _MARGIN = 0.02
-"""Part of the picture's side within which a box counts as cut by its edge."""
+"""Fraction of the image height within which a box counts as cut by the image's edge."""
 
 
 class InspectionOver(AeroNavigation):
-    """The last navigation of an inspection: stop. What waits for it may land."""
+    """The last navigation of an inspection, a stop; a trigger on it may land the drone."""
 
 
 def inspection_over(result: object) -> bool:
-    """Tell whether an inspection has ended, as a condition for `trigger`."""
+    """Whether an inspection has ended; a condition for `trigger`."""
     return isinstance(result, InspectionOver)
 
 
 class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
-    """Inspects the first tower that is seen, then lands; until then it commands nothing.
+    """Inspects the first tower that is detected, then lands; until then it sends no commands.
 
-    The drone comes down to `base` on its way to the stand-off, climbs to `top` facing the tower,
-    comes down again and lands where it is. The tower's distance is that of its foot on the ground
-    (flat, at the height of home), so that the foot must be in the picture from the start: a
-    camera that looks ahead sees it. The drone never moves towards the tower within the stand-off,
-    nor while the tower is out of sight; an unseen tower and a limit of time end the inspection.
+    The drone descends to `base` on its way to the stand-off, climbs to `top` facing the tower,
+    descends again and lands in place. The tower's distance is measured at its foot on the ground
+    (flat, at the height of home), so the foot must be in the image from the start, as it is for a
+    forward-looking camera. The drone never moves towards the tower within the stand-off distance,
+    nor while the tower is out of sight. Losing the tower or exceeding the time limit ends the
+    inspection.
     """
 
     def __init__(
@@ -70,15 +71,29 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         priority: int = DEFAULT_PRIORITY,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
-        """Keep `stand_off` metres, climb from `base` to `top` (metres above home) at `climb` m/s.
+        """Plan the inspection.
 
-        A picture is taken each `interval` metres; with a folder `pictures`, on the machine where
-        the analysis runs, they are written there as JPEG. `width` is the tower's at its foot.
-        An inspection begins with boxes of a score of `sure` (0 to 1) and more.
-        `patience` and `longest`, in seconds, bound the time without a sight of the tower and the
-        time in all. With `lands=False` the drone is left to other navigation at the end. The
-        paper's listings pass the environment; the analysed stream knows its own. Raises
-        ConfigError for numbers that cannot be.
+        Args:
+            environment: Ignored; accepted because the paper's listings pass it.
+            stand_off: Distance to keep from the tower, metres.
+            base: Height at which the climb begins and the descent ends, metres above home.
+            top: Height at which the climb ends, metres above home.
+            interval: Height between two images, metres.
+            speed: Speed of the approach, m/s.
+            climb: Vertical speed, m/s.
+            patience: Longest time without a detection of the tower, seconds.
+            longest: Longest time from the beginning to the descent, seconds.
+            width: Width of the tower at its foot, metres.
+            sure: Least score of a box that begins an inspection, 0 to 1.
+            labels: Labels of the boxes to inspect.
+            lands: Whether to land at the end; otherwise other navigation takes over.
+            pictures: Folder for the images as JPEG, on the machine where the analysis runs; by
+                default none are written.
+            priority: Priority of the velocity commands.
+            detector: Detector for camera streams; by default the shipped one.
+
+        Raises:
+            ConfigError: If a number is out of range.
         """
         del environment
         if not 0.0 < width < math.inf:
@@ -93,7 +108,7 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         self.sure = sure
         self.folder = None if pictures is None else Path(pictures)
         self.taken: list[float] = []
-        """Heights in metres of the pictures taken so far."""
+        """Heights of the images taken so far, metres."""
         self._told = False
         self._frame: Frame | None = None
 
@@ -115,12 +130,12 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         return stream
 
     def process(self, item: Detections | Frame, context: Context) -> AeroNavigation | None:
-        """Return one velocity command, or None where there is nothing to inspect."""
+        """Return one velocity command, or None without a tower to inspect."""
         self._frame = item if isinstance(item, Frame) else None
         return super().process(item, context)
 
     def examine(self, boxes: Detections, context: Context) -> AeroNavigation | None:
-        """Return one velocity command, or None where there is nothing to inspect."""
+        """Return one velocity command, or None without a tower to inspect."""
         if boxes.camera is None or boxes.odometry is None:
             self.explain_once(boxes, context)
             return None
@@ -142,7 +157,7 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
         return kind(NavigationType.ANALYTICS_DRIVEN, [command])
 
     def _sight(self, detection: Detection, boxes: Detections) -> RelativeTarget | None:
-        """Where the tower's foot is; where that is out of the picture, at most how far."""
+        """Bearing and distance of the tower's foot; an upper bound if it is outside the image."""
         left, _, right, bottom = detection.box
         if not all(map(math.isfinite, detection.box)):
             return None
@@ -153,12 +168,12 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
             return None
         if at_most is None or bottom >= (1 - _MARGIN) * boxes.height or not np.isfinite(foot).all():
             return at_most
-        # What hides the foot makes the tower seem farther.
+        # An occluded foot makes the tower appear farther away.
         distance = min(float(np.hypot(*foot)), at_most.distance)
         return RelativeTarget(math.atan2(foot[1], foot[0]), distance)
 
     def _at_most(self, detection: Detection, boxes: Detections) -> RelativeTarget | None:
-        """A tower is nowhere wider than its foot is from corner to corner."""
+        """Upper bound of the distance: no part of a tower is wider than its foot's diagonal."""
         camera = boxes.camera
         left, top, right, bottom = detection.box
         if camera is None:

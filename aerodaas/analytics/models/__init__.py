@@ -1,9 +1,9 @@
-"""The networks that ship with the project, each beside its model card.
+"""The neural networks shipped with the project, each beside its model card.
 
-They are trained by `tools.training` on rendered pictures alone; `detector.md` and `pose.md`
-tell how, and how well they do. The detector takes 320 x 320 pixels and is laid out as Ultralytics
-exports are, so that `OnnxDetector` and other tools read it; the pose model takes cuts around
-people, which `PoseAnalytics` makes.
+They are trained by `tools.training` on rendered images alone; `detector.md` and `pose.md`
+describe the training and the accuracy. The detector takes 320 x 320 pixels and has the layout of
+Ultralytics exports, so that `OnnxDetector` and other tools load it; the pose model takes crops
+around people, which `PoseAnalytics` makes.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ __all__ = ["DETECTOR", "DETECTOR_CLASSES", "POSE"]
 _HERE = Path(__file__).parent
 
 DETECTOR = _HERE / "detector.onnx"
-"""Finds `DETECTOR_CLASSES`."""
+"""Object detector of `DETECTOR_CLASSES`."""
 
 DETECTOR_CLASSES = ("vest", "person", "car", "tower")
 """Class names of the detector, in the order of its outputs."""
 
 POSE = _HERE / "pose.onnx"
-"""Finds the 17 keypoints of COCO, in COCO's order, of the person in a cut of 128 x 128 pixels."""
+"""Pose model: the 17 keypoints of COCO, in COCO's order, of a person in a 128 x 128 pixel crop."""

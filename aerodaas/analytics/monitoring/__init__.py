@@ -1,1 +1,1 @@
-"""Watching readings, distances and GPS loggers."""
+"""Monitoring of readings, distances and GPS loggers."""

@@ -1,4 +1,4 @@
-"""Watching a flight: chosen readings as a stream, and alerts where they go wrong or disagree."""
+"""MonitoringAnalytics: selected readings as a stream, with alerts on limits and contradictions."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ _READINGS = ("battery", "camera", "gps", "height", "position", "speed", "state",
 
 
 class MonitoringAnalytics(Analytics[Readings], IMonitoringAnalytics[Readings]):
-    """Readings of a drone, by name, and alerts about them.
+    """Publishes selected readings of a drone by name, and alerts about them.
 
     Analyse any of the streams of odometry, vehicle state, GPS, battery, mission status
-    (stat-stream) and camera; each item gives the readings that were asked for, as far as they
-    are known by then. With mission status and odometry, it says where the two disagree.
+    (stat-stream) and camera; each item produces the newest values of the selected readings
+    received so far. With mission status and odometry, it alerts when the two contradict.
     """
 
     accepts: ClassVar[tuple[type, ...]] = (
@@ -48,11 +48,16 @@ class MonitoringAnalytics(Analytics[Readings], IMonitoringAnalytics[Readings]):
         max_height: float = math.inf,
         patience: float = 2.0,
     ) -> None:
-        """Watch `readings`: battery, camera, gps, height, position, speed, state, yaw.
+        """Select readings and the limits of the alerts.
 
-        Alerts when the charge falls to `battery_low` (0 to 1), the height exceeds `max_height`
-        metres, or state and odometry have disagreed for `patience` seconds. Raises UnknownIdError
-        for another name.
+        Args:
+            readings: Any of battery, camera, gps, height, position, speed, state, yaw.
+            battery_low: Charge at or below which to alert, 0 to 1.
+            max_height: Height above which to alert, metres; by default none.
+            patience: Seconds for which state and odometry must contradict before an alert.
+
+        Raises:
+            UnknownIdError: If a name is not a reading.
         """
         for name in readings:
             if name not in _READINGS:
@@ -73,7 +78,7 @@ class MonitoringAnalytics(Analytics[Readings], IMonitoringAnalytics[Readings]):
         item: Odometry | VehicleState | GpsFix | Battery | MissionStatus | Frame,
         context: Context,
     ) -> Readings:
-        """Take note of one item; returns everything watched, as known now."""
+        """Update the readings from one item; returns the newest values of the selected ones."""
         now = context.now()
         vehicle = context.vehicle()
         if vehicle is not None:
@@ -145,7 +150,7 @@ class MonitoringAnalytics(Analytics[Readings], IMonitoringAnalytics[Readings]):
         return found
 
     def _alert(self, found: dict[str, str], now: int, context: Context) -> None:
-        """Tell people once, when something begins."""
+        """Publish one alert for each condition of `found` that has just begun."""
         for kind, text in found.items():
             if kind not in self._raised:
                 header = Header(self._count, now, self.name or "monitoring")

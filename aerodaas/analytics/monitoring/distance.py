@@ -1,4 +1,4 @@
-"""DistanceAnalytics: how far the nearest person or thing is, and an alert when that is too near."""
+"""DistanceAnalytics: distance to the nearest object, with an alert when it is too near."""
 
 from __future__ import annotations
 
@@ -20,15 +20,16 @@ SIZES: Mapping[str, TargetSize] = {
     "vest": TargetSize(0.6, 0.43),
     "car": TargetSize(1.5, 1.8, widest=4.2),
 }
-"""Heights and widths in metres of what the shipped detector finds."""
+"""Heights and widths of the shipped detector's classes, in metres."""
 
 
 class DistanceAnalytics(BoxAnalytics[Readings]):
-    """Metres along the ground from the drone to the nearest object of known size.
+    """Measures the distance along the ground from the drone to the nearest object of known size.
 
-    Each result has `distance` and `bearing` (radians, positive to the left) of the nearest, and
-    `distance.LABEL` of the nearest of each label; nothing of what is not seen. An object that the
-    picture's edges cut on all sides is at the distance told or nearer.
+    Each result has `distance` (metres) and `bearing` (radians, positive to the left) of the
+    nearest object, and `distance.LABEL` of the nearest of each label; without a detection the
+    value is absent. For an object that the image's edges cut on all sides, the distance is an
+    upper bound.
     """
 
     produces: ClassVar[type] = Readings
@@ -42,10 +43,19 @@ class DistanceAnalytics(BoxAnalytics[Readings]):
         of: int = 3,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
-        """Alert when `needed` of the last `of` frames show something within `limit` metres.
+        """Alert when `needed` of the last `of` frames show an object within `limit`.
 
-        `sizes` are heights and widths in metres by label, by default those of persons, vests and
-        cars; other labels are not looked at. Raises ConfigError for numbers that cannot be.
+        Args:
+            limit: Distance along the ground, metres.
+            sizes: Heights and widths by label, metres; by default those of persons, vests and
+                cars. Other labels are ignored.
+            needed: Frames that must show the object, 1 to `of`.
+            of: Frames that are considered.
+            detector: Detector for camera streams; by default the shipped one.
+
+        Raises:
+            ConfigError: If a length is not positive and finite, `sizes` is empty, or `needed` is
+                not within 1 to `of`.
         """
         given = SIZES if sizes is None else sizes
         self.sizes = {

@@ -1,4 +1,4 @@
-"""GpsLoggerAnalytics: the places that a GPS logger wrote down, or tells by HTTP, as a stream."""
+"""GpsLoggerAnalytics: the fixes of a GPS log file or HTTP feed as a stream."""
 
 from __future__ import annotations
 
@@ -22,19 +22,19 @@ _log = logging.getLogger(__name__)
 _LARGEST = 64 * 2**20
 _LARGEST_ANSWER = 2**20
 _LOST_AFTER = 3
-"""Failures in a row after which people are told."""
+"""Consecutive failures after which an alert is published."""
 
 
 class GpsLoggerAnalytics(Analytics[GpsFix]):
-    """An external source: the fixes of a GPS logger, such as the one in a person's pocket.
+    """An external source of the fixes of a GPS logger, such as one that a person carries.
 
     ``GpsLoggerAnalytics("vip.gpx").deploy(edge).instantiate()``. The source is a GPX or CSV file,
     or the `http://` address of a feed that answers with its newest row (JSON, CSV or GPX).
 
-    A file's first time is mission time zero, plus `offset` seconds: a row that was written 10 s
+    The first timestamp of a file is mission time zero, plus `offset` seconds: a row written 10 s
     after the first one is current 10 s into the mission, at any speed and in lockstep. Rows
-    without times follow each other at `rate`. Each new fix is told once. A feed is asked at
-    `rate` by the wall clock, and what it says is stamped when it says it.
+    without timestamps follow each other at `rate`. Each fix is published once. A feed is polled
+    at `rate` by the wall clock, and its rows are stamped on arrival.
     """
 
     produces: ClassVar[type] = GpsFix
@@ -48,11 +48,18 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
         max_age: float = 10.0,
         timeout: float = 2.0,
     ) -> None:
-        """Read the file at `source`, which then travels by value; a feed is first asked in flight.
+        """Read a file, which is sent to the actor by value; a feed is first polled in flight.
 
-        `rate` in Hz; a fix older than `max_age` seconds is not told, but counted. A feed has
-        `timeout` seconds to answer. Raises SourceError for a file without a single usable row,
-        and ConfigError for settings that cannot be.
+        Args:
+            source: Path of a GPX, CSV or JSON file, or `http://` or `https://` address of a feed.
+            rate: Polling rate of a feed and rate of rows without timestamps, Hz.
+            offset: Mission time of the file's first row, seconds.
+            max_age: Seconds after which a fix is counted as stale instead of published.
+            timeout: Seconds that a feed has to answer.
+
+        Raises:
+            SourceError: If the file cannot be read, is larger than 64 MiB or has no usable row.
+            ConfigError: If a setting is out of range.
         """
         for name, value in (("rate", rate), ("max_age", max_age), ("timeout", timeout)):
             if not 0.0 < value < math.inf:
@@ -64,11 +71,11 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
         self.max_age = max_age
         self.timeout = timeout
         self.malformed = 0
-        """Rows so far that could not be read."""
+        """Number of rows so far that could not be parsed."""
         self.stale = 0
-        """Rows so far that came too late or told an old time."""
+        """Number of rows so far that arrived too late or had an old timestamp."""
         self.failures = 0
-        """Requests so far that a feed did not answer."""
+        """Number of requests so far that a feed did not answer."""
         self._is_feed = self.source.startswith(("http://", "https://"))
         self._times: list[float] = []
         self._fixes: list[GpsFix] = []
@@ -78,7 +85,7 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
             self._load(Path(source), offset)
 
     def close(self) -> None:
-        """Say what was not used."""
+        """Log the numbers of unused rows and failed requests."""
         if self.malformed or self.stale or self.failures:
             _log.warning(
                 "%s: %d malformed rows, %d stale ones, %d requests without an answer",
@@ -89,7 +96,7 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
             )
 
     def process(self, item: None, context: Context) -> GpsFix | None:
-        """Return the newest fix that was not told yet, or None."""
+        """Return the newest fix if it has not been published yet, else None."""
         del item
         if self._is_feed:
             return self._ask(context)

@@ -1,7 +1,8 @@
-"""Tracks of GPS loggers: GPX, CSV and JSON text becomes timed fixes; what is malformed is counted.
+"""Parser of GPS logger tracks: GPX, CSV and JSON text to timed fixes.
 
-Loggers agree on little: columns are told by their names, in the spellings that are common, and
-times may be ISO 8601 (of UTC where no zone is told) or seconds or milliseconds since 1970.
+Malformed rows are counted. Formats vary between loggers: columns are recognised by the common
+spellings of their names, and times may be ISO 8601 (UTC without a zone) or seconds or
+milliseconds since 1970.
 """
 
 from __future__ import annotations
@@ -33,13 +34,13 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
 }
 _UNITS = re.compile(r"\((m|metres|meters|deg|degrees|utc)\)|\[.*?\]", re.IGNORECASE)
 _MILLISECONDS = 1e11
-"""Seconds since 1970 are fewer than this until the year 5138."""
+"""Larger numbers are milliseconds: seconds since 1970 stay below this until the year 5138."""
 _POLE, _DATE_LINE = 90.0, 180.0
 
 
 @dataclass(frozen=True, slots=True)
 class TimedFix:
-    """One row: a fix, and its time in seconds since 1970, or None where the row tells none."""
+    """One row: a fix, and its time in seconds since 1970, or None for a row without a time."""
 
     fix: GpsFix
     time: float | None
@@ -47,19 +48,19 @@ class TimedFix:
 
 @dataclass
 class GpsTrack:
-    """All usable rows, and how many were not."""
+    """Usable rows of a track, with the counts of unusable ones."""
 
     rows: list[TimedFix] = field(default_factory=list)
     malformed: int = 0
-    """Rows that are no place, or whose numbers and times cannot be read."""
+    """Rows without a valid position, or whose numbers and times cannot be parsed."""
     stale: int = 0
-    """Rows no later than the one before."""
+    """Rows whose timestamp is not later than the previous one."""
 
 
 def parse_track(text: str, name: str) -> GpsTrack:
-    """Read the text of a GPX, CSV or JSON document called `name`.
+    """Parse the text of a GPX, CSV or JSON document called `name`.
 
-    Raises SourceError if it is none of them.
+    Raises SourceError for any other format.
     """
     start = text.lstrip("\ufeff \t\r\n")[:1]
     if start == "<":
@@ -91,7 +92,7 @@ def _gpx(text: str, name: str) -> Iterator[Mapping[str, object] | None]:
         parser.feed(text.lstrip("\ufeff \t\r\n"))
         parser.close()
     except ET.ParseError:
-        # A logger that ran out of battery leaves a file without an end.
+        # A logger that ran out of battery leaves a truncated file.
         broken = True
     points = 0
     events = parser.read_events()
@@ -180,7 +181,7 @@ def _time(value: object) -> float | None:
     if number is not None:
         return number / 1000 if number > _MILLISECONDS else number
     text = str(value).strip().replace("/", "-").replace("Z", "+00:00")
-    # Python 3.10 reads fractions of three or six digits only.
+    # Python 3.10 parses fractions of three or six digits only.
     text = re.sub(r"\.(\d+)", lambda found: f".{found[1]:0<6.6}", text)
     try:
         moment = datetime.fromisoformat(text)

@@ -1,1 +1,1 @@
-"""People in pictures: joints, gestures, falls, and how close they stand."""
+"""Analyses of people in images: joints, gestures, falls and crowd density."""

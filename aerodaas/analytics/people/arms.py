@@ -1,6 +1,7 @@
-"""Whether the joints that were found make an arm that is held up.
+"""Detection of a raised arm from keypoints.
 
-A keypoint network that does not see an arm puts it somewhere all the same, such as on a car behind.
+The lengths of the arm are checked, because a keypoint network also places joints of an arm it
+cannot see, for example on a car behind.
 """
 
 from __future__ import annotations
@@ -15,23 +16,25 @@ from aerodaas.analytics.people.joints import ARMS, FACE, HIPS, SHOULDERS, visibl
 __all__ = ["raised_arm"]
 
 _LONGEST = 0.85
-"""Of the trunk, shoulders to hips: an upper arm measures 0.6 of it and a forearm 0.55 (Winter,
-Biomechanics and Motor Control of Human Movement, 2009, by body height)."""
+"""Greatest length of an upper arm or forearm as a fraction of the trunk, shoulders to hips: they
+measure 0.6 and 0.55 of it (Winter, Biomechanics and Motor Control of Human Movement, 2009, by body
+height)."""
 
 _SHORTEST = 0.7
-"""Of the trunk, both parts of an arm together: one that seems shorter points at the lens, or is
-none, such as a tree's crown beside the head."""
+"""Least length of a whole arm as a fraction of the trunk: an apparently shorter one points at the
+lens, or is a false detection, such as a tree's crown beside the head."""
 _FACE_UP, _ELBOW_UP = 0.4, 0.4
-"""Of the trunk above the shoulders: the face, and the elbow of an arm whose wrist is not seen."""
+"""Height above the shoulders, as a fraction of the trunk, of the face if it is not seen, and of the
+elbow of a raised arm whose wrist is not seen."""
 
 Array = NDArray[np.float64]
 
 
 def raised_arm(keypoints: NDArray[np.floating], min_confidence: float) -> bool:
-    """Tell whether a wrist of `keypoints` (17, 3) is above the face, on an arm of human length.
+    """Whether a wrist of `keypoints` (17, 3) is above the face, on an arm of human length.
 
-    Where the wrist is not seen, the elbow tells. Joints of less than `min_confidence` are not seen,
-    and show nothing. Without hips, a wrist above the face is taken at its word.
+    If the wrist is not seen, the elbow decides. Joints below `min_confidence` count as not seen.
+    Without hips, the length of the arm is not checked.
     """
     points = keypoints[:, :2].astype(np.float64)
     seen = visible(keypoints, min_confidence)

@@ -1,4 +1,4 @@
-"""BodyPoseEmergencyAnalytics: a raised hand lands the drone, a fall alerts people."""
+"""BodyPoseEmergencyAnalytics: a raised hand lands the drone, a fall raises an alert."""
 
 from __future__ import annotations
 
@@ -33,48 +33,47 @@ _TEXTS = {
     "hand_raised": "The person raises a hand.",
 }
 _SURER = 2
-"""More frames, in twice the time, that a raised hand takes: a missed fall is worse than a false
-alert, but a landing nobody asked for is worse than one that comes half a second later."""
+"""Additional frames, in twice the time, that confirm a raised hand: a missed fall is worse than a
+false alert, but an unintended landing is worse than one that comes half a second later."""
 _VEST_AGE = 1.0
-"""Seconds for which the boxes of vests tell who wears one."""
+"""Seconds for which the boxes of vests identify the wearer."""
 _SAME_BODY = 0.6
-"""Two boxes of which the smaller lies in the other by more than this share are of one body."""
+"""Share of the smaller of two boxes inside the other, above which both are of one body."""
 _MOST_PEOPLE = 100
-"""A pose model's own limit is far above what can be told apart in a picture."""
+"""Greatest number of people; a pose model's own limit is far above the number distinguishable."""
 
 
 def hand_raised(result: object) -> bool:
-    """Tell whether a raised hand is confirmed, as a condition for `trigger`."""
+    """Whether a raised hand is confirmed; a condition for `trigger`."""
     return isinstance(result, Detections) and bool(result.labelled("hand_raised"))
 
 
 def fallen(result: object) -> bool:
-    """Tell whether a fall is confirmed, as a condition for `trigger`."""
+    """Whether a fall is confirmed; a condition for `trigger`."""
     return isinstance(result, Detections) and bool(result.labelled("fallen"))
 
 
 class BodyPoseEmergencyAnalytics(Analytics[Detections]):
-    """Watches one person's body: a raised hand lands the drone, a fall alerts people.
+    """Monitors one person's gestures: a raised hand lands the drone, a fall raises an alert.
 
-    Analyse a pose model's stream, or the camera's: then a `PoseAnalytics` runs as an analysis of
-    its own, called `body_pose`, which an analytics scheduler may schedule. A gesture counts once
-    `needed` of the last `of` frames show it for `hold` seconds. The landing is a `trigger` of the
-    robot whose camera it is; set others with the conditions `hand_raised` and
+    Analyse a pose model's stream, or the camera's: then a `PoseAnalytics` runs as a separate
+    analysis called `body_pose`, which an analytics scheduler may schedule. A gesture is confirmed
+    once `needed` of the last `of` frames show it for `hold` seconds. The landing is a `trigger`
+    on the robot that carries the camera; set others with the conditions `hand_raised` and
     `fallen` of this module::
 
         pose = BodyPoseEmergencyAnalytics(lands=False).deploy(edge)
         pose.analyse(camera)
         pose.trigger(drone.pause_mission, when=hand_raised)
 
-    One person's gestures count, and nobody else's. If a stream of boxes of vests is analysed,
-    too, it is the one whose box holds the middle of a vest. Otherwise it is the one nearest to
-    the middle of the picture, where a follower keeps its target; distance is counted in heights
-    of the person, so that a passer-by far behind does not win; and it stays that one until it is
-    out of sight for a second.
+    Only one person's gestures count. If a stream of boxes of vests is analysed, too, it is the
+    person whose box contains the centre of a vest. Otherwise it is the person nearest to the
+    middle of the image, where a follower keeps its target, until that person is out of sight for
+    a second; the distance is measured in heights of the person, so that a passer-by far behind is
+    not chosen.
 
-    Results are the people found. The one who counts has the track and the label of the confirmed
-    gesture, `hand_raised` or `fallen`, or else `upright`, `other` or `person`; all others stay
-    `person`.
+    Results are the detected people. The monitored person has the label of the confirmed gesture,
+    `hand_raised` or `fallen`, or else `upright`, `other` or `person`; all others have `person`.
     """
 
     Detector: TypeAlias = Analytics[Detections]
@@ -95,14 +94,24 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         gestures: str | Path = GESTURE_MODEL,
         detector: Detector | None = None,
     ) -> None:
-        """Confirm a fall that `needed` of the last `of` frames show for `hold` seconds.
+        """Configure the confirmation of gestures.
 
-        A raised hand takes two frames more, for twice as long: it lands the drone.
-        `lands=False` leaves the drone in the air. A gesture of less than `min_probability` is
-        none; keypoints of less than `min_confidence` count as missing (both 0 to 1). `gestures`
-        is a classifier of your own, `detector` a pose model for camera streams. The paper's
-        listings may pass the environment; the analysed stream knows its own. Raises ConfigError
-        and ModelError for settings that cannot work.
+        Args:
+            environment: Ignored; accepted because the paper's listings pass it.
+            needed: Frames of the last `of` that must show a fall; a raised hand, which lands the
+                drone, needs two more.
+            of: Frames that are considered.
+            hold: Seconds for which a fall must be shown; twice as long for a raised hand.
+            lands: Whether a raised hand lands the drone.
+            vest_labels: Labels of the boxes of vests.
+            min_probability: Least probability of a gesture, 0 to 1.
+            min_confidence: Confidence below which keypoints count as missing, 0 to 1.
+            gestures: ONNX file of the gesture classifier; by default the shipped one.
+            detector: Pose model for camera streams; by default `PoseAnalytics()`.
+
+        Raises:
+            ConfigError: If a setting is out of range.
+            ModelError: If the classifier cannot be read, or `min_confidence` is out of range.
         """
         del environment
         if not 0.0 <= min_probability <= 1.0:
@@ -114,9 +123,9 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self.classifier = GestureClassifier(gestures, min_confidence=min_confidence)
         self.tracker = Tracker(max_age=1.0, min_hits=1)
         self.person: int | None = None
-        """Track of the person who counts."""
+        """Track id of the monitored person."""
         self.unusable = 0
-        """Bodies so far whose keypoints could not be used."""
+        """Number of bodies so far with unusable keypoints."""
         self._downfall = Downfall(min_confidence)
         self._events = {
             "fallen": Debounce(needed, of, hold),
@@ -125,7 +134,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self._vests: Detections | None = None
         self._streams = 0
         self._poses: str | None = None
-        """Stream of the pose model that runs for this analysis alone."""
+        """Stream of the pose model that was started for this analysis."""
         self._told = False
 
     def _prepare_for(self, item: type) -> None:
@@ -153,15 +162,15 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
     def deploy(
         self, compute: ICompute, runtime_env: RuntimeEnvConfig | Mapping[str, Any] | None = None
     ) -> Self:
-        """Run on `compute`, the pose model that it runs itself included; returns itself."""
+        """Run on `compute`, together with its own pose model; otherwise as `Analytics.deploy`."""
         super().deploy(compute, runtime_env)
         if self._poses is not None and self.node is not None and self._graph is not None:
             self._graph.nodes[self._poses].compute = self.node.compute
         return self
 
     def _poses_in(self, camera: AeroStreamData[Frame]) -> AeroStreamData[Detections]:
-        """Run a pose model on `camera`: an analysis of its own, so that it can be scheduled."""
-        # onnxruntime takes its time to load.
+        """Run a pose model on `camera`, as a separate analysis that can be scheduled."""
+        # onnxruntime is slow to import.
         from aerodaas.analytics.people.pose import PoseAnalytics  # noqa: PLC0415
 
         detector = self.detector or PoseAnalytics()
@@ -179,7 +188,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self.classifier.close()
 
     def process(self, item: Detections, context: Context) -> Detections | None:
-        """Watch one frame; None for boxes of vests, which only say who counts."""
+        """Analyse one frame; None for boxes of vests, which only identify the wearer."""
         if item.labelled(*self.vest_labels):
             self._vests = item
         bodies = any(one.keypoints is not None for one in item)
@@ -214,14 +223,14 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         return replace(people, items=tuple(mine if one is chosen else one for one in people))
 
     def _with_missing(self, people: Detections) -> Detections:
-        """Add one who fell out of the picture, where last seen, once that is confirmed."""
+        """Add a person who fell out of the image, as last detected, once the fall is confirmed."""
         last = self._downfall.last
         if last is None or not self._events["fallen"].active:
             return people
         return replace(people, items=(*people.items, replace(last, label="fallen")))
 
     def _people(self, found: Detections) -> Detections:
-        """Return those whose body can be looked at, with their tracks."""
+        """Return the people with usable keypoints, with their tracks."""
         usable = [one for one in found if _is_usable(one)]
         self.unusable += len(found) - len(usable)
         middle = found.width / 2
@@ -238,7 +247,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         mine = next((one for one in people if one.track_id == self.person), None)
         known = self.tracker.find(self.person)
         if mine is None and known is not None:
-            # A body that is found in another extent, without its legs, is the same body.
+            # A box of a different extent, such as without the legs, is of the same body.
             last = known.detection
             mine = max(people, key=lambda one: _shared(one, last), default=None)
             mine = mine if mine is not None and _shared(mine, last) > _SAME_BODY else None
@@ -295,7 +304,7 @@ def _is_usable(one: Detection) -> bool:
 
 
 def _once(people: Sequence[Detection]) -> list[Detection]:
-    """Each body once, by the box with the most of its points: pose models box parts of it, too."""
+    """Keep for each body the box with the most keypoints; pose models also box parts of bodies."""
     best = sorted(people, key=lambda one: -_support(one))
     kept: list[Detection] = []
     for one in best:
@@ -317,12 +326,12 @@ def _shared(one: Detection, other: Detection) -> float:
 
 
 def _off_centre(one: Detection, middle: float) -> float:
-    """Distance from the middle of the picture in heights of the person."""
+    """Horizontal distance from the middle of the image in heights of the person."""
     return abs(one.centre[0] - middle) / max(one.box[3] - one.box[1], 1.0)
 
 
 def _wearer(people: Detections, vests: Detections, labels: Sequence[str]) -> Detection | None:
-    """The person around the best vest; of several, the one whose box fits it closest."""
+    """The person around the best vest; of several, the one with the smallest box."""
     scale_u, scale_v = people.width / vests.width, people.height / vests.height
     for vest in vests.labelled(*labels):
         u, v = vest.centre[0] * scale_u, vest.centre[1] * scale_v

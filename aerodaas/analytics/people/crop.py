@@ -1,4 +1,4 @@
-"""Cuts around bodies: the square of a picture that a keypoint network looks at."""
+"""Square crops around bodies, the input of a keypoint network."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 __all__ = ["CUT", "GREY", "MARGIN", "cut_out", "square_around"]
 
 CUT = 128
-"""Pixels of the square side."""
+"""Side of the crop in pixels."""
 
 MARGIN = 1.5
-"""Side of the square over the longer side of the body's box: a detector leaves out raised arms."""
+"""Ratio of the square's side to the longer side of the body's box, which may omit raised arms."""
 
 GREY = 114
-"""What lies outside the picture looks like."""
+"""Grey level of the crop outside the image, 0 to 255."""
 
 
 def square_around(
@@ -23,7 +23,7 @@ def square_around(
 ) -> tuple[float, float, float]:
     """Left, top and side, in pixels, of the square around `box` (left, top, right, bottom).
 
-    A square holds those who stand and those who lie at one scale.
+    A square shows standing and lying people at one scale.
     """
     left, top, right, bottom = box
     side = margin * max(right - left, bottom - top)
@@ -33,7 +33,7 @@ def square_around(
 def cut_out(
     image: NDArray[np.uint8], square: tuple[float, float, float], size: int = CUT
 ) -> NDArray[np.uint8]:
-    """The square (left, top, side) of `image` in size x size pixels; grey outside the picture."""
+    """Crop a square (left, top, side) of `image` to size x size pixels; grey outside the image."""
     left, top, side = square
     height, width = image.shape[:2]
     first = np.floor([left, top]).astype(int).clip(0, (width, height))

@@ -1,4 +1,4 @@
-"""CrowdDensityAnalytics: how many people stand how close together, by the camera's geometry."""
+"""CrowdDensityAnalytics: number and density of people on the ground, by the camera's geometry."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ from aerodaas.types.errors import ConfigError
 __all__ = ["CrowdDensityAnalytics"]
 
 _CELL = 1.0
-"""Metres; the peak is that of a square of two cells by two."""
+"""Side of a cell in metres; the peak is measured in squares of two cells by two."""
 _CUT = 0.03
-"""Part of the picture's height within which a box ends at its edge, the feet out of the picture."""
+"""Distance of a box from the lower edge, in image heights, within which the feet are cut off."""
 
 
 class CrowdDensityAnalytics(BoxAnalytics[Readings]):
-    """Counts people and says how dense they stand on the ground, in people for each m².
+    """Counts people and measures their density on the ground, in people per m².
 
-    Each result has `count` (all boxes), and where the camera is calibrated and the drone's height
-    known: `area` (m² of ground in the picture within `farthest` metres), `density` (people on
-    that ground for each m² of it) and `peak` (the densest 2 m x 2 m). The ground is taken for
-    flat, at the height of home; people stand where their boxes end. Whose feet the picture's
-    lower edge cuts off is counted, but stands nowhere.
+    Each result has `count` (all boxes), and if the camera is calibrated and the drone's height is
+    known: `area` (m² of ground in the image within `farthest` metres), `density` (people per m²
+    on that ground) and `peak` (the densest 2 m x 2 m). The ground is assumed to be flat, at the
+    height of home; people stand at the lower edges of their boxes. People whose feet are cut off
+    by the image's lower edge are counted, but not located.
     """
 
     produces: ClassVar[type] = Readings
@@ -46,10 +46,18 @@ class CrowdDensityAnalytics(BoxAnalytics[Readings]):
         of: int = 5,
         detector: BoxAnalytics.Detector | None = None,
     ) -> None:
-        """Alert when `needed` of the last `of` frames show a peak above `limit` people for each m².
+        """Alert when `needed` of the last `of` frames show a peak density above `limit`.
 
-        `farthest` (metres) bounds the ground that counts: farther feet are too uncertain.
-        Raises ConfigError for numbers that cannot be.
+        Args:
+            limit: Density of people per m².
+            farthest: Range of the ground considered, metres; farther feet are too uncertain.
+            labels: Labels of the boxes to count.
+            needed: Frames that must show the density, 1 to `of`.
+            of: Frames that are considered.
+            detector: Detector for camera streams; by default the shipped one.
+
+        Raises:
+            ConfigError: If a number is out of range.
         """
         for name, value in (("limit", limit), ("farthest", farthest)):
             if not 0.0 < value < math.inf:
@@ -60,7 +68,7 @@ class CrowdDensityAnalytics(BoxAnalytics[Readings]):
         self._crowded = Debounce(needed, of)
 
     def examine(self, boxes: Detections, context: Context) -> Readings:
-        """Count the people of one frame."""
+        """Count the people in one frame and measure their density."""
         people = [
             item for item in boxes.labelled(*self.labels) if all(map(math.isfinite, item.box))
         ]
@@ -86,7 +94,7 @@ class CrowdDensityAnalytics(BoxAnalytics[Readings]):
 
 
 def _peak(feet: NDArray[np.float64]) -> float:
-    """People for each m² in the fullest square of two cells by two."""
+    """People per m² in the densest square of two cells by two."""
     cells = np.floor(feet / _CELL).astype(np.int64)
     corners = np.concatenate([cells - [dx, dy] for dx in (0, 1) for dy in (0, 1)])
     if not len(corners):

@@ -1,4 +1,4 @@
-"""Debouncing: what single frames say becomes an event only once enough of them agree."""
+"""Debouncing of detections: an event begins only once enough frames agree."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from aerodaas.types.errors import ConfigError
 __all__ = ["Debounce"]
 
 _LONGEST_GAP = 5.0
-"""Seconds without a frame after which the frames before say nothing any more."""
+"""Seconds without a frame after which earlier frames are discarded."""
 
 
 class Debounce:
     """An event that begins when `needed` of the last `of` frames show it, for `hold` seconds.
 
-    It ends when none of the last `of` frames shows it, so that it is told once.
+    It ends when none of the last `of` frames shows it, so that it is reported once.
     """
 
     def __init__(self, needed: int = 3, of: int = 5, hold: float = 0.0) -> None:
-        """Start inactive; raises ConfigError for counts and times that cannot be."""
+        """Start inactive; raises ConfigError for counts and times out of range."""
         if not 1 <= needed <= of:
             raise ConfigError(f"needed must lie between 1 and of={of} frames, not {needed}")
         if not 0.0 <= hold < float("inf"):
@@ -29,12 +29,12 @@ class Debounce:
         self.hold = hold
         self.active = False
         self.began = False
-        """Whether the last frame began it."""
+        """Whether the event began with the last frame."""
         self._frames: deque[tuple[int, bool]] = deque(maxlen=of)
         self._since: int | None = None
 
-    def update(self, stamp: int, shown: bool) -> bool:  # noqa: FBT001 - the one thing it is told
-        """Take in whether the frame of `stamp` (nanoseconds) shows it; returns `active`."""
+    def update(self, stamp: int, shown: bool) -> bool:  # noqa: FBT001 - its only input
+        """Add whether the frame of `stamp` (nanoseconds) shows the event; returns `active`."""
         if self._frames and not 0 <= seconds(stamp - self._frames[-1][0]) <= _LONGEST_GAP:
             self._frames.clear()
         self._frames.append((stamp, shown))

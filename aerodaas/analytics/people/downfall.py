@@ -1,9 +1,9 @@
-"""Whether somebody who stood a moment ago is down, though their feet are below the picture.
+"""Fall detection for a person close to the camera, whose feet are below the image.
 
-Before a narrow lens, one who has fallen near is cut off by the lower edge, or gone. What is still
-known is where they stood, and that the top of their body sank faster than anybody bends. Heights
-are reckoned above that place, from the drone as it was at capture: a drone that climbs, brakes or
-turns makes nobody sink.
+With a narrow lens, a person who has fallen nearby is cut off by the lower edge, or out of the
+image. The person's last standing position is still known, and that the top of the body sank
+faster than by bending. Heights are computed above that position, from the drone's odometry at
+capture, so that a drone that climbs, brakes or turns does not cause an apparent fall.
 """
 
 from __future__ import annotations
@@ -23,39 +23,43 @@ from aerodaas.types.geometry import body_to_enu, enu_to_body
 __all__ = ["Downfall"]
 
 _STANDS = (1.3, 2.3)
-"""Metres of the top of a body that stands, at least and at most."""
+"""Least and greatest height of a standing body's top, metres."""
 
 _HIGHER = 0.2
-"""Metres of a camera above their head: higher, who walks below it sinks in the picture, too."""
+"""Greatest height of the camera above the head in metres: in the image of a higher one, a person
+walking below it sinks, too."""
 
 _SEEN, _GONE = (0.5, 1.3), (0.2, 1.0)
-"""Metres, and m/s, by which a body sinks that falls: whoever sits down or bends is slower than
-1.3 m/s (Bourke, O'Donovan and O'Laighin, Medical Engineering & Physics 30, 2008). Less is enough
-of one who is gone at the next look."""
+"""Least drop of a falling body's top in metres, and its speed in m/s: sitting down or bending is
+slower than 1.3 m/s (Bourke, O'Donovan and O'Laighin, Medical Engineering & Physics 30, 2008). Less
+suffices for a person who is out of the image in the next frame."""
 
 _SPAN = (0.15, 1.0)
-"""Seconds between two looks that are compared; less would measure the noise of boxes."""
+"""Seconds between two compared observations; shorter spans would measure the noise of boxes."""
 
 _LOW = 1.1
-"""Metres above where they stood, at which the top of one who lies farther away seems to be."""
+"""Greatest apparent height in metres, above the standing position, of the top of a body that lies
+farther away."""
 
 _CHEST = 1.2
-"""Metres up of what would be seen of one who still stood there."""
+"""Height in metres of the part of a standing body that must be within the image."""
 
 _CUT = 0.03
-"""Part of the picture's height within which a box counts as cut by its lower or upper edge."""
+"""Distance of a box from the lower or upper edge, in image heights, within which it is cut off."""
 
 _NEAR = 3.5
-"""Metres within which a fall is told; farther away all of the body is seen, and its posture."""
+"""Range of this detection in metres; farther away the whole body is in the image, and its posture
+decides."""
 
 _MOMENT, _FORGOTTEN = 1.5, 3.0
-"""Seconds after standing within which a fall begins, and for which one who is gone is missed."""
+"""Seconds after standing within which a fall must begin, and after the last observation until which
+a fall is remembered."""
 
 _REACH, _LONGEST = 1.5, 2.5
-"""Metres from there, within which who stands is the same person, and a body lies."""
+"""Metres from the standing position within which a standing person is the same, and a body lies."""
 
 _KEPT = 12
-"""Looks."""
+"""Number of observations kept."""
 
 Array = NDArray[np.float64]
 
@@ -64,28 +68,28 @@ Array = NDArray[np.float64]
 class _Look:
     stamp: int
     top: float
-    """Metres of the body's top above where it stood."""
+    """Height of the body's top above the standing position, metres."""
 
 
 class Downfall:
-    """Follows one person, who must be taller than 1.3 m to count, from standing to lying."""
+    """Fall detector for one person, taller than 1.3 m, from standing to lying."""
 
     def __init__(self, min_confidence: float) -> None:
-        """Keypoints of less than `min_confidence` (0 to 1) count as missing."""
+        """Treat keypoints below `min_confidence` (0 to 1) as missing."""
         self.last: Detection | None = None
-        """The person as last seen."""
+        """Last detection of the person."""
         self._least = min_confidence
         self._places: deque[Array] = deque(maxlen=_KEPT // 2)
-        """East, north and up of home where the person stood of late."""
+        """Recent standing positions, metres east, north and up of home."""
         self._looks: deque[_Look] = deque(maxlen=_KEPT)
         self._stood = 0
         self._fell = False
 
     def shows(self, person: Detection | None, seen: Detections, *, upright: bool) -> bool:
-        """Take in a frame of people; tell whether it shows the person down.
+        """Process a frame of people; returns whether the person has fallen.
 
-        `person` is None if not found; `upright` is what their gestures say. Always False from a
-        camera of unknown height or calibration.
+        `person` is None if not detected; `upright` is the result of the gesture classifier. Always
+        False for a camera of unknown height or calibration.
         """
         try:
             view = GroundView(seen)
@@ -104,7 +108,7 @@ class Downfall:
         if not there:
             self._fell = self._fell or self._sinks(*_GONE)
             return self._fell and view.sees(np.array([*feet, _CHEST]))
-        # A body that falls changes too much for a tracker: the nearest is the person, too.
+        # A falling body changes too much for a tracker, so the nearest body is accepted as well.
         body = max(there, key=lambda one: (one is person, one.area))
         top = view.height_above(feet, _crown(body))
         self._look(body, seen.header.stamp, top)
@@ -112,7 +116,7 @@ class Downfall:
         return self._fell and top <= _LOW
 
     def _stands(self, body: Detection, seen: Detections, view: GroundView) -> bool:
-        """Remember where they stand; False for who does not, or is somebody else."""
+        """Store the standing position; False if not standing, or if it is another person."""
         if body.keypoints is None or seen.odometry is None:
             return False
         feet = feet_below(body.keypoints, view, self._least)
@@ -132,7 +136,7 @@ class Downfall:
         return True
 
     def _feet(self, seen: Detections) -> Array:
-        """Where they stood, metres in the level body frame (forward, left)."""
+        """Median standing position, metres in the level body frame (forward, left)."""
         assert seen.odometry is not None  # noqa: S101 - a view has one
         way = np.median(self._places, axis=0) - seen.odometry.position
         return enu_to_body(way, seen.odometry.yaw)[:2]
@@ -142,7 +146,7 @@ class Downfall:
         self.last = body
 
     def _sinks(self, least: float, speed: float) -> bool:
-        """Whether they were sinking by `least` metres at `speed` m/s when last seen."""
+        """Whether the body sank by `least` metres at `speed` m/s up to the last observation."""
         *earlier, now = self._looks
         for look in earlier:
             span, drop = seconds(now.stamp - look.stamp), look.top - now.top
@@ -151,7 +155,7 @@ class Downfall:
         return False
 
     def _forget_by(self, stamp: int) -> None:
-        """Begin anew where what is known is too old at `stamp`, or the clock ran back."""
+        """Reset if the last observation is too old at `stamp`, or if time ran backwards."""
         known = self._looks[-1].stamp if self._fell else self._stood
         if not 0 <= seconds(stamp - known) <= (_FORGOTTEN if self._fell else _MOMENT):
             self._places.clear()
@@ -160,13 +164,13 @@ class Downfall:
 
 
 def _crown(body: Detection) -> Array:
-    """Pixel in the middle of the box's upper edge."""
+    """Pixel at the middle of the box's upper edge."""
     left, top, right, _ = body.box
     return np.array([(left + right) / 2, top])
 
 
 def _is_there(body: Detection, seen: Detections, feet: Array, view: GroundView) -> bool:
-    """Whether it is where they stood, and no other thing that is taken for somebody."""
+    """Whether a body is at the person's standing position, rather than a false detection."""
     left, _, right, bottom = body.box
     (lowest,) = view.points(np.array([[(left + right) / 2, bottom]]))
     cut = bottom >= (1 - _CUT) * seen.height
@@ -174,5 +178,5 @@ def _is_there(body: Detection, seen: Detections, feet: Array, view: GroundView) 
 
 
 def _is_headless(body: Detection, seen: Detections) -> bool:
-    """Whether the picture's upper edge cuts it, so that its top is not known."""
+    """Whether the image's upper edge cuts the body, so that its top is unknown."""
     return body.box[1] <= _CUT * seen.height

@@ -1,7 +1,7 @@
-"""What a body does, told from its keypoints.
+"""Gesture classification from keypoints.
 
-They are normalised, then a support vector machine says whether a hand is raised, the body has
-fallen, or it stands or walks.
+Keypoints are normalised, then a support vector machine classifies the body as fallen, with a
+raised hand, upright or other.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ GESTURES = ("fallen", "hand_raised", "other", "upright")
 """Classes of the model; `upright` is standing or walking, `other` sitting, bending and the like."""
 
 GESTURE_MODEL = Path(__file__).parents[1] / "models" / "gestures.onnx"
-"""The model that ships; `gestures.md` beside it tells how it was made, and how good it is."""
+"""The shipped model; `gestures.md` beside it describes its training and accuracy."""
 
 _LEAST = 5
-"""Keypoints without which nothing is told."""
+"""Least number of keypoints for a classification."""
 _FARTHEST = 4.0
 
 Array = NDArray[np.float32]
 
 
 def normalised(keypoints: Array, min_confidence: float) -> tuple[Array, NDArray[np.bool_]]:
-    """Features (N, 51) of bodies (N, 17, 3: u, v, confidence), and which of them tell anything.
+    """Features (N, 51) of bodies (N, 17, 3: u, v, confidence), and a mask of the usable bodies.
 
-    A body is moved so that its trunk is in the middle and scaled to one size, whatever its
-    distance. Points below `min_confidence`, and those that are not finite, count as missing:
-    they lie in the middle, and 17 further numbers say which are there. A body needs five points,
-    one of the trunk among them.
+    A body is centred on its trunk and scaled to one size, independent of its distance. Points
+    below `min_confidence`, and those that are not finite, count as missing: they are placed at
+    the centre, and 17 further features flag the points present. A usable body has at least five
+    points, one of them of the trunk.
     """
     points = np.asarray(keypoints[..., :2], np.float64)
     seen = visible(keypoints, min_confidence)
@@ -55,7 +55,7 @@ def normalised(keypoints: Array, min_confidence: float) -> tuple[Array, NDArray[
 
 
 def _mean(points: NDArray[np.float64], seen: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Mean of the points seen, shoulders and hips weighing the same."""
+    """Mean of the visible trunk points, with equal weights for shoulders and hips."""
     groups = []
     for part in (SHOULDERS, HIPS):
         count = seen[:, part].sum(axis=1)
@@ -68,12 +68,12 @@ def _mean(points: NDArray[np.float64], seen: NDArray[np.bool_]) -> NDArray[np.fl
 
 
 class GestureClassifier:
-    """A classifier in an ONNX file: features in, one of `GESTURES` and its probabilities out."""
+    """Gesture classifier in an ONNX file, with a probability for each of `GESTURES`."""
 
     def __init__(self, path: str | Path = GESTURE_MODEL, *, min_confidence: float = 0.35) -> None:
-        """Read the model, which travels to the actor by value; raises ModelError.
+        """Read the model, which is sent to the actor by value; raises ModelError.
 
-        Keypoints of less than `min_confidence` (0 to 1) count as missing.
+        Keypoints below `min_confidence` (0 to 1) count as missing.
         """
         if not 0.0 <= min_confidence <= 1.0:
             raise ModelError(f"min_confidence must lie between 0 and 1, not {min_confidence}")
@@ -88,7 +88,7 @@ class GestureClassifier:
         self.close()
 
     def open(self) -> None:
-        """Load the model; raises ModelError if it is none of gestures."""
+        """Load the model; raises ModelError if it is not a gesture model."""
         options = ort.SessionOptions()
         options.intra_op_num_threads = options.inter_op_num_threads = 1
         options.log_severity_level = 3
@@ -111,7 +111,7 @@ class GestureClassifier:
         self._session = None
 
     def classify(self, keypoints: Sequence[Array]) -> list[tuple[str, float] | None]:
-        """Gesture and probability of each body (17 x 3); None where its points tell nothing."""
+        """Gesture and probability of each body (17 x 3); None for an unusable body."""
         if self._session is None:
             raise ModelError(f"{self.path}: call open() before the first frame")
         if not keypoints:

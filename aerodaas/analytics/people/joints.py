@@ -1,4 +1,4 @@
-"""Joints of a body, in the order of COCO's 17 keypoints."""
+"""Indices of the joints of a body, in the order of COCO's 17 keypoints."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ BONES = (
     *((5, 7), (7, 9), (6, 8), (8, 10), (11, 13), (13, 15), (12, 14), (14, 16)),
     *((5, 6), (11, 12), (5, 11), (6, 12), (0, 5), (0, 6)),
 )
-"""Limbs, then trunk and neck: pairs of joints with body between them."""
+"""Pairs of joints connected by the body: limbs, then trunk and neck."""
 
 MIRRORED = np.array([0, 2, 1, 4, 3, 6, 5, 8, 7, 10, 9, 12, 11, 14, 13, 16, 15])
-"""Which joint each one is in a mirrored picture."""
+"""Index of each joint in a mirrored image."""
 
 
 def visible(keypoints: NDArray[np.floating[Any]], min_confidence: float) -> NDArray[np.bool_]:
-    """Which of `keypoints` (..., 17, 3: u, v, confidence) count as seen, shape (..., 17)."""
+    """Mask (..., 17) of the `keypoints` (..., 17, 3: u, v, confidence) that count as visible."""
     finite = np.isfinite(keypoints).all(axis=-1)
     return np.asarray(finite & (keypoints[..., 2] >= min_confidence))

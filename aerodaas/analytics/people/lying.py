@@ -1,8 +1,8 @@
-"""Whether a body lies on the ground, told from where its joints would touch it.
+"""Detection of a lying body by the projection of its joints onto the ground.
 
-Seen from behind, one who has fallen forward looks much like one who stands: the feet below, the
-head above. On the ground, though, a lying body is as long as a person, while the head of one who
-stands covers ground many metres behind.
+Seen from behind, a person who has fallen forward resembles a standing one: feet below, head
+above. Projected onto the ground, however, a lying body is as long as a person, while the head of
+a standing one is projected many metres behind the feet.
 """
 
 from __future__ import annotations
@@ -17,32 +17,33 @@ from aerodaas.types.data import Detections
 __all__ = ["feet_below", "lies"]
 
 _LONGEST = 2.3
-"""Metres of ground that a lying body covers, at most, its joints a little above it."""
+"""Greatest length in metres of a lying body projected onto the ground, from slightly above it."""
 
 _LOW = 0.75
-"""Metres: the head of one who sits or crouches is higher."""
+"""Greatest height of a lying person's head in metres; sitting or crouching, it is higher."""
 
 _HIPS_LOW = (0.7, 0.51)
-"""Metres above ankles and above knees; the hips of one who stands are higher."""
+"""Greatest height of a lying person's hips above ankles and above knees in metres; standing, they
+are higher."""
 
 _PAIR = 2
 
 _LEGS = ((ANKLES, 0.08), (KNEES, 0.5), (HIPS, 0.93))
-"""Joints, and their height in metres while an adult stands (Drillis and Contini, 1966)."""
+"""Joints, and their height in metres in a standing adult (Drillis and Contini, 1966)."""
 
 _ABOVE = 0.3
-"""Metres from joints up to a camera that tells by them where somebody stands."""
+"""Least height in metres of the camera above joints that locate a standing person."""
 
 _NEAREST = 0.3
-"""Metres from below the camera, nearer than which angles tell nothing."""
+"""Horizontal distance from the camera in metres, below which angles are not meaningful."""
 
 
 def lies(keypoints: NDArray[np.floating], seen: Detections, min_confidence: float) -> bool | None:
-    """Tell whether the body with `keypoints` (17, 3) in the frame of `seen` lies on flat ground.
+    """Whether the body with `keypoints` (17, 3) in the frame of `seen` lies on flat ground.
 
-    None where it cannot be told: from a camera of unknown height or calibration, without a pair of
-    ankles or knees, or without two joints of head and shoulders or both hips. Each joint is taken
-    to be above the nearest foot or knee, which gives its height if the body is upright.
+    None if undecidable: for a camera of unknown height or calibration, without a pair of ankles
+    or knees, or without two joints of head and shoulders or both hips. Each joint is assumed to
+    be above the nearest foot or knee, which gives its height if the body is upright.
     """
     try:
         view = GroundView(seen)
@@ -57,7 +58,7 @@ def lies(keypoints: NDArray[np.floating], seen: Detections, min_confidence: floa
     high, low = ground[upper][known[upper]], ground[lower][known[lower]]
     if np.isnan(high).any() or np.isnan(low).any():
         return False
-    # One joint out of place must not decide.
+    # Medians, so that one misplaced joint does not decide.
     top, foot = np.median(high, axis=0), np.median(low, axis=0)
     if np.hypot(*(top - foot)) > _LONGEST:
         return False
@@ -69,9 +70,9 @@ def lies(keypoints: NDArray[np.floating], seen: Detections, min_confidence: floa
 def feet_below(
     keypoints: NDArray[np.floating], view: GroundView, min_confidence: float
 ) -> NDArray[np.float64] | None:
-    """Where one stands who does, metres forward and left, by the lowest pair of joints seen.
+    """Position of a standing person, metres forward and left, by the lowest visible joint pair.
 
-    None if that is too high for this camera to tell, or there is none.
+    None if that pair is too high for this camera, or if no pair is visible.
     """
     known = visible(keypoints, min_confidence)
     for part, up in _LEGS:

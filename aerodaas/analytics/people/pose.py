@@ -1,4 +1,4 @@
-"""PoseAnalytics: people and their joints, first the boxes, then the keypoints in each."""
+"""PoseAnalytics: detection of people and their joints, first boxes, then the keypoints in each."""
 
 from __future__ import annotations
 
@@ -22,31 +22,31 @@ _PEOPLE = ("person",)
 _VESTS = ("vest", "hazard vest")
 
 _ABOVE, _BELOW = 0.55, 1.6
-"""Heights of an upright person's vest from its upper edge to the crown, its lower to the soles."""
+"""Distances from an upright person's vest to the crown and to the soles, in heights of the vest."""
 
 _LYING = 3.0
-"""A lying person's length in lengths of the vest, at most."""
+"""Greatest length of a lying person, in lengths of the vest."""
 
 _SAME, _SMALLER = 0.6, 0.35
-"""Boxes of one body share this much of the smaller one, which has this much of the other's area."""
+"""Least shared fraction of the smaller of two boxes of one body, and least ratio of their areas."""
 
 _TRUSTED = 0.35
-"""Confidence of keypoints that say how far a body reaches."""
+"""Least confidence of the keypoints that determine the extent of a body."""
 
 _LEAST = 5
-"""Keypoints of that confidence, without which they do not."""
+"""Least number of such keypoints."""
 
 _ROOM = 0.08
-"""Of a body's extent, from the outermost joint to the outline."""
+"""Distance from the outermost joint to the outline, as a fraction of the body's extent."""
 
 
 class PoseAnalytics(Analytics[Detections]):
-    """Finds people and the 17 keypoints of COCO, the shipped networks one after the other.
+    """Detects people and their 17 COCO keypoints, with two networks in sequence.
 
-    The detector gives boxes of people, and of vests: a vest in no person's box shows where
-    somebody must be. The keypoint network then looks at a square cut around each, all in one run,
-    at the `most` largest only. Boxes of one body, with an arm and without, count as one. Runs in
-    the detector's process; the analytics scheduler takes both networks for one task.
+    The detector finds boxes of people and of vests; a vest outside every person's box indicates
+    an undetected person. The keypoint network then processes a square crop around each of the
+    `most` largest people, all in one run. Boxes of one body, with an arm and without, count as
+    one. Both networks run in one process and are one task of the analytics scheduler.
     """
 
     accepts: ClassVar[tuple[type, ...]] = (Frame,)
@@ -65,11 +65,20 @@ class PoseAnalytics(Analytics[Detections]):
         providers: Sequence[str] | None = None,
         threads: int | None = None,
     ) -> None:
-        """Read the models; raises ModelError for a file, ConfigError for a `most` below 1.
+        """Read the models.
 
-        `model` finds keypoints in cuts (`python -m tools.training pose` makes one). `detector`
-        finds `person` or `vest`; by default it is the one that ships, which keeps boxes of
-        `min_score` and more. `providers` and `threads` are as for `OnnxDetector`.
+        Args:
+            model: ONNX file of the keypoint network, as made by `python -m tools.training pose`;
+                by default the shipped one.
+            detector: Detector of `person` or `vest`; by default the shipped one.
+            most: Greatest number of people per frame, 1 or more.
+            min_score: Least confidence of the default detector's boxes, above 0 to 1.
+            providers: As in `OnnxDetector`.
+            threads: As in `OnnxDetector`.
+
+        Raises:
+            ModelError: If a file or setting is unsuitable.
+            ConfigError: If `most` is below 1.
         """
         if most < 1:
             raise ConfigError(f"most must be 1 or more, not {most}")
@@ -88,17 +97,17 @@ class PoseAnalytics(Analytics[Detections]):
         self.keypoints.open()
 
     def close(self) -> None:
-        """Release both."""
+        """Release both networks."""
         self.detector.close()
         self.keypoints.close()
 
     def process(self, item: Frame, context: Context) -> Detections:
-        """Find the people in one frame."""
+        """Detect the people in one frame, with keypoints of (17, 3): u, v, confidence."""
         del context
         return self.detect(item)
 
     def detect(self, frame: Frame) -> Detections:
-        """Find the people in `frame`, with keypoints of (17, 3): u, v, confidence."""
+        """Detect the people in `frame`, with keypoints of (17, 3): u, v, confidence."""
         found = self.detector.detect([frame])[0]
         people = _merged(found.labelled(*_PEOPLE))
         for vest in found.labelled(*_VESTS):
@@ -117,7 +126,7 @@ class PoseAnalytics(Analytics[Detections]):
         )
 
     def _wearer(self, frame: Frame, vest: Detection) -> Detection:
-        """The person around a vest: a guess, set right by the joints that it shows."""
+        """Estimate the person around a vest, refined by the keypoints found there."""
         guess = body_around(vest.box)
         (joints,) = self.keypoints.find(frame.image, [guess])
         size = (frame.width, frame.height)
@@ -126,7 +135,7 @@ class PoseAnalytics(Analytics[Detections]):
 
 
 def _merged(people: Sequence[Detection]) -> list[Detection]:
-    """Each body once, in the box around all that were found of it; best first."""
+    """Merge the boxes of each body into their union, best first."""
     kept: list[Detection] = []
     for one in people:
         same = next((at for at, other in enumerate(kept) if _alike(one.box, other.box)), None)
@@ -140,7 +149,7 @@ def _merged(people: Sequence[Detection]) -> list[Detection]:
 
 
 def _alike(one: Box, other: Box) -> bool:
-    """Whether most of the smaller box lies in the other, and it is not much smaller."""
+    """Whether most of the smaller box lies in the other, which is not much larger."""
     width = min(one[2], other[2]) - max(one[0], other[0])
     height = min(one[3], other[3]) - max(one[1], other[1])
     inner = max(0.0, width) * max(0.0, height)
@@ -149,7 +158,7 @@ def _alike(one: Box, other: Box) -> bool:
 
 
 def body_around(vest: Box) -> Box:
-    """Guess the box of the person who wears a vest whose box this is, upright or lying."""
+    """Estimate the box of a vest's wearer, upright or lying."""
     left, top, right, bottom = vest
     wide, high = right - left, bottom - top
     if high >= wide:
@@ -159,7 +168,7 @@ def body_around(vest: Box) -> Box:
 
 
 def _extent(joints: NDArray[np.float32]) -> Box | None:
-    """Box around the joints that are trusted; None if they are too few."""
+    """Box around the joints of sufficient confidence; None if they are too few."""
     places = joints[joints[:, 2] >= _TRUSTED, :2].astype(float)
     if len(places) < _LEAST:
         return None

@@ -1,1 +1,1 @@
-"""Remote control: an analysis that serves HTTP and WebSocket, and the client that speaks them."""
+"""Remote control: an analysis that serves HTTP and WebSocket, and its client."""

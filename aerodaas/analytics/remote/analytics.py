@@ -1,4 +1,4 @@
-"""RemoteAnalytics: a person or a program takes part in the mission over the network."""
+"""RemoteAnalytics: monitoring and control of the mission over the network."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ _STOPPING = 5.0
 class RemoteAnalytics(CommandingAnalytics):
     """Serves HTTP and WebSocket while the mission runs: waypoints in, commands in, state out.
 
-    Analyse a camera's stream to show its newest picture, or `instantiate` for none. The stream
-    of this analysis is navigation: without `scheduler.add_navigation(…)`, waypoints are refused.
-    `aerodaas remote` and `aerodaas.analytics.remote.client.RemoteClient` speak with the service.
+    Analyse a camera's stream to serve its newest image, or `instantiate` without a camera. The
+    stream of this analysis is navigation: without `scheduler.add_navigation(…)`, waypoints are
+    refused. Clients are `aerodaas remote` and `aerodaas.analytics.remote.client.RemoteClient`.
     """
 
     isolated = True
@@ -45,10 +45,16 @@ class RemoteAnalytics(CommandingAnalytics):
         host: str | None = None,
         port: int | None = None,
     ) -> None:
-        """Listen as the section `remote` of `env_data` (`Environment.env_data`) says.
+        """Configure the service; the environment variable `AERODAAS_REMOTE_TOKEN` sets the token.
 
-        `host` and `port` lie over it. Raises ConfigError for an address beyond this machine
-        without a token, for everybody could fly the drone.
+        Args:
+            env_data: `Environment.env_data`, whose section `remote` holds the settings.
+            host: Address to listen on; overrides the section.
+            port: Port to listen on; overrides the section.
+
+        Raises:
+            ConfigError: If a setting is invalid, or the address is reachable from other machines
+                without a token, so that anyone on the network could command the drone.
         """
         asked = dict((env_data or {}).get("remote", {}))
         asked |= {"host": host} if host is not None else {}
@@ -71,7 +77,11 @@ class RemoteAnalytics(CommandingAnalytics):
         self._thread: threading.Thread | None = None
 
     def open(self) -> None:
-        """Take the port; raises SourceError if it cannot be had."""
+        """Bind the port.
+
+        Raises:
+            SourceError: If the port cannot be bound.
+        """
         host, port = self._settings.host, self._settings.port
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:
@@ -83,7 +93,7 @@ class RemoteAnalytics(CommandingAnalytics):
             ) from None
 
     def begin(self, mission: MissionLink) -> None:
-        """Serve from now on, in a thread."""
+        """Start the server in a thread."""
         import uvicorn  # noqa: PLC0415 - only in the actor
 
         from aerodaas.analytics.remote.app import build_app  # noqa: PLC0415 - only in the actor
@@ -104,7 +114,7 @@ class RemoteAnalytics(CommandingAnalytics):
         self._thread.start()
 
     def process(self, item: object, context: Context) -> None:  # noqa: ARG002 - the base's
-        """Keep the newest picture to be looked at."""
+        """Store the newest frame for `/frame.jpg`."""
         if isinstance(item, Frame):
             # A copy, so that the frame's shared memory is free for the next ones.
             self._frame = Frame(item.header, np.array(item.image))

@@ -1,4 +1,4 @@
-"""The service's routes: each turns a request into a command, and the mission's answer into JSON."""
+"""Routes of the remote control: request to command, and the mission's answer to JSON."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from aerodaas.types.errors import InvalidWaypointError
 __all__ = ["build_app"]
 
 _PATIENCE = 5.0
-"""Seconds within which the drone's actor answers; it turns 20 times a second."""
+"""Timeout of an answer from the drone's actor in seconds; its loop runs at 20 Hz."""
 
 _COMMANDS: dict[str, tuple[Command, str]] = {
     "pause": (Pause(), "Hover until told to resume."),
@@ -42,7 +42,7 @@ _COMMANDS: dict[str, tuple[Command, str]] = {
 
 
 def build_app(mission: MissionLink, newest_frame: Callable[[], Frame | None]) -> FastAPI:
-    """Build the service that commands `mission` and shows its camera's newest picture."""
+    """Build the service that commands `mission` and serves its camera's newest image."""
     app = FastAPI(title="AeroDaaS remote control", docs_url=None, redoc_url=None)
     app.add_exception_handler(RequestValidationError, _malformed)
     app.add_exception_handler(AnyHTTPException, _failed)
@@ -62,7 +62,7 @@ def build_app(mission: MissionLink, newest_frame: Callable[[], Frame | None]) ->
 
 
 class _Desk:
-    """Hands requests to the mission and waits for what it says."""
+    """Request handlers that forward commands to the mission and await its answers."""
 
     def __init__(self, mission: MissionLink, newest_frame: Callable[[], Frame | None]) -> None:
         self._mission = mission
@@ -70,14 +70,14 @@ class _Desk:
         self._count = 0
 
     def status(self) -> StatusOut:
-        """Say how the mission fares."""
+        """Return the status of mission and vehicle."""
         status = self._mission.status()
         if status is None:
             raise HTTPException(503, "the mission has not said anything yet")
         return StatusOut.of(status, self._mission.vehicle())
 
     def frame(self) -> Response:
-        """Show what the camera sees."""
+        """Return the camera's newest image as JPEG."""
         picture = self._newest_frame()
         if picture is None:
             raise HTTPException(404, "the camera has not shown anything yet")
@@ -93,7 +93,7 @@ class _Desk:
         return await self._tell(f"add {ids}", self._mission.fly(navigation, body.index))
 
     def route(self, name: str, command: Command) -> Callable[[], Any]:
-        """Make the route of one command."""
+        """Make the handler of one command."""
 
         async def tell() -> JSONResponse:
             return await self._tell(name, self._mission.command(command))
@@ -124,7 +124,7 @@ class _Desk:
         return status is not None and status.state in TERMINAL
 
     async def _tell(self, what: str, answer: Future[Answer]) -> JSONResponse:
-        """Wait for the mission's answer; everybody who watches learns of it."""
+        """Await the mission's answer and publish it as an alert."""
         try:
             said = await asyncio.wait_for(asyncio.wrap_future(answer), _PATIENCE)
         except asyncio.TimeoutError:
@@ -144,14 +144,14 @@ class _Desk:
 
 
 def _jpeg(frame: Frame) -> bytes:
-    import cv2  # noqa: PLC0415 - only where somebody looks
+    import cv2  # noqa: PLC0415 - only if an image is requested
 
     _, encoded = cv2.imencode(".jpg", frame.image, [cv2.IMWRITE_JPEG_QUALITY, 80])
     return encoded.tobytes()
 
 
 def _malformed(_: Request, error: Exception) -> JSONResponse:
-    """Name what is wrong and where; what was sent is not repeated, for it may hold NaN."""
+    """Report each invalid field and its location, without the input, which may contain NaN."""
     assert isinstance(error, RequestValidationError)  # noqa: S101 - registered for it alone
     problems = error.errors()
     status = 400 if any(problem["type"] == "json_invalid" for problem in problems) else 422

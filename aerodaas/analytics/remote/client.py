@@ -1,4 +1,4 @@
-"""The other end of the remote control: commands by HTTP, the mission's state by WebSocket."""
+"""Client of the remote control: commands by HTTP, the mission's state by WebSocket."""
 
 from __future__ import annotations
 
@@ -17,14 +17,17 @@ _MALFORMED = {400, 401, 403, 411, 413, 422}
 
 
 class RemoteClient:
-    """Speaks with a `RemoteAnalytics`.
+    """Client of a `RemoteAnalytics`.
 
     >>> client = RemoteClient("http://127.0.0.1:8350")  # doctest: +SKIP
     >>> client.add_waypoints([{"id": "look", "x": 5, "y": 5, "z": 2}])  # doctest: +SKIP
     """
 
     def __init__(self, url: str, token: str | None = None) -> None:
-        """Talk to the service at `url`, such as `http://127.0.0.1:8350`, with its `token`."""
+        """Configure the `url` of the service, such as `http://127.0.0.1:8350`, and its `token`.
+
+        Raises ConfigError for any other form of address.
+        """
         parts = urlsplit(url)
         if parts.scheme != "http" or parts.hostname is None:
             raise ConfigError(f"a remote control's address is http://host:port, not {url!r}")
@@ -32,7 +35,7 @@ class RemoteClient:
         self._headers = {} if token is None else {"Authorization": f"Bearer {token}"}
 
     def status(self) -> dict[str, Any]:
-        """How mission and vehicle fare, by name (`schemas.StatusOut`)."""
+        """Return the status of mission and vehicle, with the fields of `schemas.StatusOut`."""
         return self._ask("GET", "/status")
 
     def add_waypoints(
@@ -44,20 +47,20 @@ class RemoteClient:
     ) -> dict[str, Any]:
         """Add waypoints, each by the fields of `aerodaas.Waypoint`; returns the mission's answer.
 
-        Raises MissionError where the mission takes none of them, ConfigError for malformed ones.
+        Raises MissionError if the mission refuses all of them, ConfigError for malformed ones.
         """
         body = {"waypoints": list(waypoints), "ordered": ordered, "index": index}
         return self._ask("POST", "/waypoints", body)
 
     def command(self, name: str) -> dict[str, Any]:
-        """Say `pause`, `resume`, `clear`, `return-home` or `abort`; returns the mission's answer.
+        """Send `pause`, `resume`, `clear`, `return-home` or `abort`; returns the mission's answer.
 
-        Raises MissionError where the mission refuses.
+        Raises MissionError if the mission refuses.
         """
         return self._ask("POST", f"/{name}")
 
     def frame(self) -> bytes:
-        """The camera's newest picture as JPEG."""
+        """Return the camera's newest image as JPEG."""
         status, data = self._exchange("GET", "/frame.jpg", None)
         if status != http.client.OK:
             raise SourceError(_text(data, status))

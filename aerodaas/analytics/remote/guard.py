@@ -1,4 +1,4 @@
-"""Who may command the drone: decided before a request's body is even read."""
+"""Access control of the remote control, applied before a request's body is read."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _POLICY_VIOLATION = 1008
 
 
 def is_loopback(host: str) -> bool:
-    """Tell whether an address to listen on is reachable from this machine only."""
+    """Whether a listening address is reachable from this machine only."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -28,19 +28,19 @@ def is_loopback(host: str) -> bool:
 
 
 class Guard:
-    """ASGI middleware that lets in requests with the token, of a size that can be read.
+    """ASGI middleware that admits requests with the token and a bounded size.
 
-    Without a token, which is for loopback only, programs of this machine are let in but web pages
-    are not: a browser names the page's origin, or a host that is not this machine.
+    Without a token, which is for loopback only, local programs are admitted but web pages are
+    not: a browser sends the page's origin, or a host name other than this machine's.
     """
 
     def __init__(self, app: App, token: str | None) -> None:
-        """Protect `app` by `token`."""
+        """Protect `app` with `token`."""
         self._app = app
         self._token = None if token is None else token.encode()
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
-        """Pass a request on, or answer it with the reason why not."""
+        """Forward a request, or refuse it with the reason."""
         if scope["type"] not in {"http", "websocket"}:
             await self._app(scope, receive, send)
             return

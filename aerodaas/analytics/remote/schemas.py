@@ -1,4 +1,4 @@
-"""What the remote control says and hears, as JSON; units as everywhere (metres, seconds)."""
+"""JSON messages of the remote control; units are metres, seconds and radians."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST_WAYPOINTS = 1000
 
 
 class _Strict(BaseModel):
-    """Numbers are JSON numbers, not text; unknown keys are mistakes, not wishes."""
+    """Base of request models: numbers must be JSON numbers, and unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
@@ -47,9 +47,9 @@ class WaypointsIn(_Strict):
 
     waypoints: Annotated[list[WaypointIn], Field(min_length=1, max_length=_MOST_WAYPOINTS)]
     ordered: bool = True
-    """Keep their order whatever the scheduler would like."""
+    """Whether to keep their order; otherwise the scheduler chooses it."""
     index: Annotated[int, Field(ge=0)] | None = None
-    """Waypoints of the same priority to visit before these."""
+    """Number of waypoints of the same priority to visit before these."""
 
     @field_validator("waypoints")
     @classmethod
@@ -62,7 +62,7 @@ class WaypointsIn(_Strict):
         return waypoints
 
     def navigation(self) -> AeroNavigation:
-        """The waypoints as navigation; raises InvalidWaypointError for what no drone can fly."""
+        """Convert to navigation; raises InvalidWaypointError for waypoints that cannot be flown."""
         return AeroNavigation(
             NavigationType.ANALYTICS_DRIVEN,
             [Waypoint(**waypoint.model_dump()) for waypoint in self.waypoints],
@@ -71,21 +71,21 @@ class WaypointsIn(_Strict):
 
 
 class AnswerOut(BaseModel):
-    """What the mission, or the service in its place, says to a command."""
+    """Answer of the mission, or of the service on its behalf, to a command."""
 
     accepted: bool
     text: str = ""
     refused: Mapping[str, str] = Field(default_factory=dict)
-    """Reason by waypoint id, for the waypoints that were not taken."""
+    """Reason by waypoint id, for the refused waypoints."""
 
     @classmethod
     def of(cls, answer: Answer) -> AnswerOut:
-        """Put the mission's answer into words for JSON."""
+        """Convert the mission's answer."""
         return cls(accepted=answer.accepted, text=answer.text, refused=dict(answer.refused))
 
 
 class StatusOut(BaseModel):
-    """The mission and the vehicle at one moment; a figure that nobody knows is null."""
+    """Status of mission and vehicle at one time; unknown values are null."""
 
     time: float
     """Mission time, seconds."""
@@ -114,7 +114,7 @@ class StatusOut(BaseModel):
 
     @classmethod
     def of(cls, status: MissionStatus, vehicle: VehicleState | None) -> StatusOut:
-        """Put what is known into JSON's terms."""
+        """Convert the status, and the vehicle's state if there is one."""
         mission = cls(
             time=seconds(status.stamp),
             state=status.state.value,
@@ -143,5 +143,5 @@ class StatusOut(BaseModel):
 
 
 def _known(value: float) -> float | None:
-    """JSON has no NaN."""
+    """Replace a value that is not finite by None, because JSON has no NaN."""
     return value if math.isfinite(value) else None

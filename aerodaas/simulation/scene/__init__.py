@@ -1,1 +1,1 @@
-"""What a simulated world looks like: meshes, textures and the nodes made of them."""
+"""Appearance of a simulated world: meshes, textures and panda3d nodes."""

@@ -1,4 +1,4 @@
-"""Buildings, fences and lattice towers."""
+"""Scene nodes of buildings, fences and lattice towers."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ from aerodaas.simulation.world import ROOF_RISE, Thing
 __all__ = ["TowerLook", "add_building", "add_fence", "add_tower", "beam"]
 
 _EAVES = 0.45
-"""Metres by which a roof reaches over the walls."""
+"""Overhang of a roof over the walls, metres."""
 
 _BAY = 3.0
-"""Metres of a plastered wall per window."""
+"""Length of a plastered wall per window, metres."""
 
 _PROUD = 0.03
-"""Metres by which windows and doors stand out from their wall."""
+"""Protrusion of windows and doors from their wall, metres."""
 
 _BARN_LENGTH = 12.0
-"""Metres from which a wooden building is a barn, with a gate."""
+"""Length in metres above which a wooden building is a barn, with a gate."""
 
 _BESIDE_DOOR = 0.9
-"""Metres between a door and the middle of the next window, at least."""
+"""Least distance between a door and the middle of the next window, metres."""
 
 _FRAME = (0.90, 0.89, 0.86)
 _TILED_SHARE = 0.6
-"""Share of roofs in clay; the others are of slate."""
+"""Fraction of clay roofs; the others are of slate."""
 
 _WOODS = ((1.0, 0.95, 0.9), (0.75, 0.42, 0.36), (0.8, 0.85, 0.85))
 _PLASTERS = ((1.0, 0.97, 0.90), (0.98, 0.90, 0.74), (0.86, 0.90, 0.92), (0.95, 0.82, 0.76))
@@ -131,7 +131,7 @@ def _flat_roof(spec: Building) -> Mesh:
 
 
 def _openings(spec: Building, walls: str) -> Mesh:
-    """A door on the south side and, but for plaster that has them drawn, windows around."""
+    """A door on the south side and windows around, which the plaster texture already contains."""
     length, width, height = spec.size
     barn = walls == "wood" and length > _BARN_LENGTH
     door_width, tall = (3.2, 3.2) if barn else (1.1, 2.1)
@@ -154,7 +154,7 @@ def _openings(spec: Building, walls: str) -> Mesh:
 
 @dataclass(frozen=True)
 class _Opening:
-    """A door or window: where along its wall, how wide, from where to where up, its colour."""
+    """A door or window: position along its wall, width, lower and upper edge, colour."""
 
     along: float
     width: float
@@ -164,7 +164,7 @@ class _Opening:
 
 
 def _framed(opening: _Opening, wall: float, turn: float) -> list[Mesh]:
-    """A pane in its frame on the south `wall`, turned about the building's centre."""
+    """A framed pane on the south `wall`, rotated about the building's centre."""
     half, rim = opening.width / 2, 0.09
     result = []
     for out, margin, colour in ((_PROUD, rim, _FRAME), (2.5 * _PROUD, 0.0, opening.colour)):
@@ -207,19 +207,19 @@ def add_fence(parent: NodePath, thing: Thing, palette: Palette, light: Light) ->
 
 @dataclass(frozen=True)
 class TowerLook:
-    """How a lattice tower is built and painted."""
+    """Construction and paint of a lattice tower."""
 
     paint: tuple[tuple[float, float, float], tuple[float, float, float]] = (
         (0.86, 0.16, 0.12),
         (0.95, 0.95, 0.95),
     )
-    """Colours of its bands, in turn from the foot."""
+    """Alternating colours of its bands, from the foot."""
     taper: float = 0.22
-    """Width at the top over that at the foot."""
+    """Ratio of the width at the top to that at the foot."""
     section: float = 2.4
-    """Metres from one ring of bars to the next, about."""
+    """Approximate distance of two rings of bars, metres."""
     stout: float = 1.0
-    """Girth of the bars over the usual one."""
+    """Thickness of the bars relative to the default."""
 
 
 def add_tower(

@@ -1,4 +1,4 @@
-"""Cars."""
+"""Scene nodes of cars."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _COLOURS = (
 )
 _GLASS, _TYRE, _RIM = (0.13, 0.16, 0.20), (0.08, 0.08, 0.08), (0.62, 0.63, 0.65)
 
-# Outline of the side, from the rear bumper forward, metres: x, z, half width.
+# Side profile, from the rear bumper forward, metres: x, z, half width.
 _SILL, _BELT, _ROOF = 0.28, 0.88, 1.43
 _BODY = (
     (-2.08, 0.42, 0.80),
@@ -48,7 +48,7 @@ _ABOVE = np.array([0.3, 0.25, 0.92])
 
 @dataclass(frozen=True)
 class CarShape:
-    """A car's outline; the standard one is a saloon of `CAR_SIZE`."""
+    """Shape of a car; the default is a saloon of `CAR_SIZE`."""
 
     cabin: tuple[tuple[float, float], ...] = (
         (-1.75, 0.90),
@@ -56,16 +56,16 @@ class CarShape:
         (0.05, 1.43),
         (0.95, 0.90),
     )
-    """x and z of the windows' outline from the rear: sill, roof, roof, sill; metres."""
+    """x and z of the cabin's profile from the rear: sill, roof, roof, sill; metres."""
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    """Of the whole car: along, across, up."""
+    """Scale of the whole car: along, across, up."""
 
 
 class CarFigure:
-    """The node of one car."""
+    """Scene node of one car."""
 
     def __init__(self, parent: NodePath, thing: Thing, palette: Palette, shape: CarShape) -> None:
-        """Paint the car by its seed."""
+        """Build the car, with its colour by scenario or seed."""
         spec = thing.spec
         if not isinstance(spec, Car):
             raise TypeError(f"{thing.id} is no car")
@@ -78,7 +78,7 @@ class CarFigure:
         body.set_tag(LABEL, f"{spec.id}/car")
 
     def pose(self, state: State) -> None:
-        """Put the car where `state` says."""
+        """Move the car to `state`."""
         if not state.present:
             self.node.hide()
             return

@@ -1,4 +1,4 @@
-"""The ground, and what lies flat on it: fields of soil, roads, shadows."""
+"""Scene nodes of the ground and of flat objects on it: fields of soil, roads, shadows."""
 
 from __future__ import annotations
 
@@ -20,10 +20,10 @@ __all__ = ["add_ground", "add_road", "add_shadow"]
 
 _UP = np.array([0.0, 0.0, 1.0])
 _TEXEL = {"grass": 5.0, "soil": 3.0, "asphalt": 3.0, "gravel": 2.0}
-"""Metres across one repeat of a texture."""
+"""Size of one repetition of a texture, metres."""
 
 _RADII = np.array([0.0, 4, 8, 13, 20, 30, 45, 65, 95, 140, 200])
-"""Rings of the textured ground, metres; beyond, it fades into the haze."""
+"""Radii of the rings of textured ground, metres; beyond, it fades into the haze."""
 
 _FADE = np.array([200.0, 300, 500, 1000])
 _SECTORS = 32
@@ -45,7 +45,7 @@ def add_ground(parent: NodePath, surface: str, palette: Palette, light: Light) -
 
 
 def light_on_ground(light: Light) -> float:
-    """Brightness of level ground under this light."""
+    """Brightness of level ground under `light`."""
     flat = sheet([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]).lit(light.sun)
     return float(flat.colours[0, 0])
 
@@ -73,14 +73,14 @@ def _disc(radii: NDArray[np.float64], texel: float) -> Mesh:
 
 
 def _patches(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Slow change of brightness over the ground, which hides the repeats of its texture."""
+    """Slow variation of brightness over the ground, which hides the repetition of its texture."""
     x, y = points[:, 0], points[:, 1]
     waves = np.sin(0.21 * x + 0.13 * y) + np.sin(0.07 * x - 0.17 * y + 1.3)
     return np.asarray(1.0 + 0.04 * (waves + np.sin(0.031 * x + 0.043 * y + 0.5)))
 
 
 def add_field(parent: NodePath, spec: CropRows, palette: Palette, light: Light) -> None:
-    """Attach the soil of a field, its rows a little darker than the furrows between them."""
+    """Attach the soil of a field, with rows slightly darker than the furrows between them."""
     west, south, east, north = spec.area
     m = _FIELD_MARGIN
     bed = _level_sheet((west - m, south - m, east + m, north + m), _TEXEL["soil"])
@@ -98,7 +98,7 @@ def _level_sheet(area: tuple[float, float, float, float], texel: float) -> Mesh:
 
 
 def add_road(parent: NodePath, spec: Road, palette: Palette, light: Light) -> None:
-    """Attach a road, its corners mitred and its edges worn."""
+    """Attach a road with mitred corners and worn edges."""
     line = np.array(spec.points)
     steps = np.diff(line, axis=0)
     lengths = np.hypot(*steps.T)
@@ -125,9 +125,9 @@ def add_road(parent: NodePath, spec: Road, palette: Palette, light: Light) -> No
 
 
 def add_shadow(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
-    """Attach the shadow of a thing, below `parent` and in its frame: level, its yaw undone.
+    """Attach the shadow of an object to `parent`, in its reference frame, level and without yaw.
 
-    A still thing's parent is the world itself; a moving thing carries its soft shadow along.
+    The parent of a static object is the world itself; a moving object carries its soft shadow.
     """
     spec = thing.spec
     if isinstance(spec, Building):
@@ -156,7 +156,7 @@ def _soft(centre: tuple[float, float], across: float, deep: float) -> Mesh:
 
 
 def _cast(thing: Thing, spec: Building, light: Light) -> Mesh:
-    """Shadow of a box: the hull of its footprint and of where the light throws its top."""
+    """Shadow of a box: the convex hull of its footprint and of the projection of its top."""
     length, width, walls = spec.size
     c, s = math.cos(thing.yaw), math.sin(thing.yaw)
     foot = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (length / 2, width / 2)
@@ -167,7 +167,7 @@ def _cast(thing: Thing, spec: Building, light: Light) -> Mesh:
 
 
 def _fan(outline: ArrayLike, alpha: float) -> Mesh:
-    """A flat black polygon; either sense of turning will do."""
+    """A flat black polygon, of either winding order."""
     flat = np.asarray(outline, dtype=np.float64)
     (ax, ay), (bx, by) = flat[1] - flat[0], flat[2] - flat[0]
     if ax * by < ay * bx:

@@ -1,8 +1,8 @@
-"""Nodes with the state that the painter's order needs.
+"""Rendering layers, and nodes with the render state for the order of painting.
 
-Everything flat on the ground (the ground itself, fields, roads, shadows) is painted first and in
-this order without a depth test, because nothing lies below it; so flat things never flicker
-through each other, however far away.
+Flat objects (the ground itself, fields, roads, shadows) are painted first and in this order
+without a depth test, because nothing lies below them; so they never flicker through each other
+at any distance.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from aerodaas.simulation.scene.mesh import Mesh
 __all__ = ["LABEL", "Layer", "attach"]
 
 LABEL = "label"
-"""Tag of the nodes that detectors look for: the thing's id, a slash, the kind."""
+"""Tag of the nodes of detectable objects: the object's id, a slash, the kind."""
 
 
 class Layer(enum.IntEnum):
-    """What is painted over what."""
+    """Layers in the order of painting."""
 
     SKY = 0
     GROUND = 1
@@ -28,7 +28,7 @@ class Layer(enum.IntEnum):
     ROAD = 3
     SHADOW = 4
     SOLID = 5
-    """Everything that stands on the ground, sorted by depth."""
+    """Objects standing on the ground, sorted by depth."""
 
 
 def attach(
@@ -41,13 +41,13 @@ def attach(
     cutout: bool = False,
     both_sides: bool = False,
 ) -> NodePath:
-    """Attach `mesh` with `texture` below `parent`; `cutout` honours the texture's holes."""
+    """Attach `mesh` with `texture` to `parent`; `cutout` applies the texture's transparency."""
     node = parent.attach_new_node(mesh.node(name))
     node.set_texture(texture)
     node.set_two_sided(both_sides)
     if layer is Layer.SOLID:
-        # panda3d would sort by the addresses of states, and where surfaces touch the picture
-        # would then differ from run to run; unsorted, it draws in the order of the scene.
+        # panda3d would sort by the addresses of states, so that images would differ from run to
+        # run where surfaces touch; unsorted, it draws in the order of the scene.
         node.set_bin("unsorted", 0)
     else:
         node.set_bin("background", int(layer))

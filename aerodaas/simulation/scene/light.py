@@ -1,4 +1,4 @@
-"""Sun and sky of a world: where the light comes from and what the sky looks like."""
+"""Sun, clouds and sky dome of a world."""
 
 from __future__ import annotations
 
@@ -24,29 +24,29 @@ HAZE = np.array([0.78, 0.84, 0.88])
 _ZENITH = np.array([0.27, 0.47, 0.75])
 _OVERCAST = np.array([0.74, 0.77, 0.80])
 _CLOUD_HEIGHT = 0.14
-"""How strongly clouds shrink towards the horizon; smaller is stronger."""
+"""Perspective of the clouds; with smaller values they shrink more towards the horizon."""
 
 _DOME = 400.0
-"""Metres; nothing hides behind the sky, which is painted first."""
+"""Radius in metres; the sky is painted first, so it occludes no object."""
 
 _ROWS, _COLUMNS = 256, 1024
 
 
 @dataclass(frozen=True)
 class Light:
-    """Where the sun stands, and how cloudy it is."""
+    """Position of the sun, and cloud cover."""
 
     azimuth: float
     """Radians counter-clockwise from east."""
     elevation: float
     """Radians."""
     clouds: float
-    """Cover, 0 to 1."""
+    """Cloud cover, 0 to 1."""
     seed: int
 
     @classmethod
     def draw(cls, sky: Sky, seed: int) -> Light:
-        """Fill what the scenario leaves open from the seed."""
+        """Draw the values that the scenario leaves open from the seed."""
         random_ = random.Random(f"{seed}/sky")
         azimuth, elevation = random_.uniform(0, 360), random_.uniform(30, 65)
         clouds = random_.uniform(0.15, 0.6)
@@ -70,13 +70,13 @@ class Light:
         )
 
     def shadow_offset(self, height: float) -> tuple[float, float]:
-        """How far east and north of a thing the shadow of its point at `height` falls."""
+        """Offset (east, north) in metres of the shadow of a point at `height` metres."""
         reach = height / math.tan(self.elevation)
         return -reach * math.cos(self.azimuth), -reach * math.sin(self.azimuth)
 
 
 def sky_dome(parent: NodePath, light: Light) -> NodePath:
-    """Attach a dome that the renderer keeps centred on the camera."""
+    """Attach the sky dome, which the renderer keeps centred on the camera."""
     dome = blob(_DOME, rings=19, sides=24, repeat=1.0)
     up = np.clip(dome.points[:, 2] / _DOME, -1.0, 1.0)
     uv = np.stack([dome.uv[:, 0], np.clip(2.0 * np.arcsin(up) / np.pi, 0.004, 0.996)], axis=-1)
@@ -112,7 +112,7 @@ def _panorama(light: Light) -> Texture:
 def _clouds(
     light: Light, azimuth: NDArray[np.float64], elevation: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Opacity and brightness of a flat layer of clouds seen from below."""
+    """Opacity and brightness of a flat cloud layer seen from below."""
     size = 512
     field = noise(size, 1.45, light.seed % 2**31)
     away = 0.13 / (np.sin(elevation) + _CLOUD_HEIGHT)

@@ -1,7 +1,7 @@
-"""Triangle meshes as numpy arrays, their light baked in, and the panda3d nodes made of them.
+"""Triangle meshes as numpy arrays with baked lighting, and their panda3d nodes.
 
-Light is baked into the vertices' colours because the software renderer then only has to
-interpolate; it halves the time of a frame.
+Light is baked into the vertices' colours, so that the software renderer only interpolates, which
+halves the time per frame.
 """
 
 from __future__ import annotations
@@ -42,23 +42,23 @@ class Mesh:
     """Vertices with texture coordinates, normals and colours, and triangles between them."""
 
     points: Floats
-    """(n, 3), metres."""
+    """Vertices (n, 3), metres."""
     uv: Floats
-    """(n, 2)."""
+    """Texture coordinates (n, 2)."""
     normals: Floats
-    """(n, 3), unit length."""
+    """Normals (n, 3) of unit length."""
     colours: Floats
-    """(n, 3) red, green and blue, 0 to 1; they tint the texture."""
+    """Colours (n, 3), red, green and blue, 0 to 1; they tint the texture."""
     triangles: NDArray[np.int64]
-    """(m, 3), counter-clockwise seen from outside."""
+    """Indices (m, 3), counter-clockwise seen from outside."""
     alpha: float = 1.0
 
     def painted(self, colour: ArrayLike) -> Mesh:
-        """The same, tinted with one colour or one per vertex."""
+        """Copy tinted with one colour or one per vertex."""
         return replace(self, colours=self.colours * np.asarray(colour, dtype=np.float64))
 
     def moved(self, offset: ArrayLike, yaw: float = 0.0, scale: ArrayLike = 1.0) -> Mesh:
-        """The same, scaled, then turned by `yaw` radians about z, then moved."""
+        """Copy scaled, then rotated by `yaw` radians about z, then translated."""
         c, s = math.cos(yaw), math.sin(yaw)
         turn = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         factor = np.broadcast_to(np.asarray(scale, dtype=np.float64), (3,))
@@ -68,7 +68,7 @@ class Mesh:
         return replace(self, points=points, normals=normals @ turn)
 
     def lit(self, sun: ArrayLike) -> Mesh:
-        """The same under the light of a sun in this direction (unit vector), baked in."""
+        """Copy with baked light from a sun in this direction (unit vector)."""
         facing = np.clip(self.normals @ np.asarray(sun, dtype=np.float64), 0.0, 1.0)
         light = _AMBIENT + _DIFFUSE * facing + _SKYLIGHT * self.normals[:, 2]
         return self.painted(light[:, None])
@@ -96,7 +96,7 @@ class Mesh:
 
 
 def merged(meshes: Iterable[Mesh]) -> Mesh:
-    """One mesh of many; the first one's alpha counts."""
+    """Merge meshes into one, with the alpha of the first."""
     parts = list(meshes)
     starts = np.cumsum([0] + [len(part.points) for part in parts[:-1]])
     return Mesh(
@@ -124,7 +124,7 @@ def sheet(corners: ArrayLike, uv: ArrayLike = ((0, 0), (1, 0), (1, 1), (0, 1))) 
 
 
 def box(size: ArrayLike, *, texel: float = 1.0, bottom: bool = False) -> Mesh:
-    """A box that stands centred on the origin; its texture repeats every `texel` metres."""
+    """A box standing centred on the origin; its texture repeats every `texel` metres."""
     x, y, z = (float(extent) for extent in np.asarray(size, dtype=np.float64))
     hx, hy = x / 2, y / 2
     sides = [
@@ -148,7 +148,7 @@ def box(size: ArrayLike, *, texel: float = 1.0, bottom: bool = False) -> Mesh:
 
 
 def tube(radii: ArrayLike, heights: ArrayLike, *, sides: int = 8, flatten: float = 1.0) -> Mesh:
-    """A body of revolution about z with `radii` at `heights`; `flatten` squeezes it along x.
+    """A solid of revolution about z with `radii` at `heights`; `flatten` scales it along x.
 
     Texture coordinate u runs once around from the back, v from the bottom to the top.
     """
@@ -174,7 +174,7 @@ def tube(radii: ArrayLike, heights: ArrayLike, *, sides: int = 8, flatten: float
 
 
 def blob(radius: float, *, rings: int = 6, sides: int = 8, repeat: float = 2.0) -> Mesh:
-    """A sphere about the origin; its texture repeats `repeat` times around."""
+    """A sphere around the origin; its texture repeats `repeat` times around."""
     polar = np.linspace(-np.pi / 2, np.pi / 2, rings)
     angles = np.linspace(-np.pi, np.pi, sides + 1)
     latitude, longitude = np.meshgrid(polar, angles, indexing="ij")

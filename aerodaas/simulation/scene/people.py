@@ -1,4 +1,4 @@
-"""People: limbs between the joints of the skeleton, clothes, hazard vests."""
+"""Scene nodes of people: limbs between the joints of the skeleton, clothes, hazard vests."""
 
 from __future__ import annotations
 
@@ -49,20 +49,20 @@ _RADII = {
     "knee": (0.064, 0.048),
     "ankle": (0.050, 0.042),
 }
-"""Metres at the beginning and the end of the limb that starts at this joint."""
+"""Radii in metres at the beginning and end of the limb that starts at this joint."""
 
 _REFERENCE_HEIGHT = 1.75
 _CHEST_RADII = np.array([0.155, 0.165, 0.185, 0.215, 0.205, 0.09])
 _CHEST_LEVELS = np.array([-0.04, 0.15, 0.5, 0.78, 0.92, 1.02])
-"""Of the torso; levels run from the pelvis (0) to the neck (1)."""
+"""Levels of the torso's radii, from the pelvis (0) to the neck (1)."""
 
 _ABOVE = np.array([0.35, 0.2, 0.91])
-"""A figure turns while its light is baked in, so all are lit from above, a little ahead."""
+"""Direction of the light: as it is baked in and figures turn, from above and slightly ahead."""
 
 
 @dataclass(frozen=True)
 class Outfit:
-    """What a person looks like."""
+    """Appearance of a person."""
 
     skin: Colour
     hair: Colour
@@ -70,14 +70,14 @@ class Outfit:
     trousers: Colour
     shoes: Colour = _SHOES
     bare_arms: bool = False
-    """Forearms without sleeves."""
+    """Whether the forearms are without sleeves."""
     vest: VestCut | None = None
     build: float = 1.0
-    """Girth over that of an average adult."""
+    """Girth relative to an average adult's."""
 
     @classmethod
     def draw(cls, spec: Person, rng: np.random.Generator) -> Outfit:
-        """Dress a person of a scenario."""
+        """Draw the outfit of a person of a scenario."""
         skin, hair = _choose(rng, _SKINS), _choose(rng, _HAIRS)
         shirt, trousers = _choose(rng, _SHIRTS), _choose(rng, _TROUSERS)
         vest = spec.vest if spec.vest != "any" else str(rng.choice(sorted(_VESTS)))
@@ -86,10 +86,10 @@ class Outfit:
 
 
 class PersonFigure:
-    """The nodes of one person, posed anew for each picture."""
+    """Scene nodes of one person, posed for each image."""
 
     def __init__(self, parent: NodePath, thing: Thing, palette: Palette, wear: Outfit) -> None:
-        """Dress the person."""
+        """Build the person with the outfit `wear`."""
         spec = thing.spec
         if not isinstance(spec, Person):
             raise TypeError(f"{thing.id} is no person")
@@ -127,10 +127,10 @@ class PersonFigure:
         return node
 
     def pose(self, joints: NDArray[np.float64], yaw: float) -> None:
-        """Put the limbs between `joints` (len(JOINTS), 3), ENU metres."""
+        """Place the limbs between `joints` (len(JOINTS), 3), ENU metres."""
         starts, ends = np.array(self._bones).T
         along = joints[ends] - joints[starts]
-        # A limb that points straight ahead has no front of its own; lean the reference a little.
+        # The front of a limb pointing straight ahead is undefined, so the reference is tilted.
         forward = np.array([math.cos(yaw), math.sin(yaw), 1e-4])
         ahead = forward - along * ((along @ forward) / np.sum(along * along, axis=1))[:, None]
         ahead *= self._scale / np.linalg.norm(ahead, axis=1, keepdims=True)
@@ -160,7 +160,7 @@ def _limb(start: float, end: float) -> Mesh:
 
 
 def _hand() -> Mesh:
-    """A hand beyond the end of a forearm of length 1."""
+    """A hand at the end of a forearm of length 1."""
     return blob(0.05, rings=5, sides=6).moved((0.0, 0.0, 1.1), scale=(0.75, 0.55, 4.0))
 
 
@@ -170,7 +170,7 @@ def _torso(build: float) -> Mesh:
 
 
 def _vest(cut: VestCut, build: float) -> Mesh:
-    """The torso within a vest, whose hem hangs a little away from the body."""
+    """The torso in a vest, whose hem stands off the body."""
     radii, levels = _CHEST_RADII * _girth(build), _CHEST_LEVELS.copy()
     radii[:2] += cut.flare
     levels[0] = -cut.hem
@@ -178,7 +178,7 @@ def _vest(cut: VestCut, build: float) -> Mesh:
 
 
 def _girth(build: float) -> NDArray[np.float64]:
-    """Factors of a torso's radii: shoulders and neck change less than the belly."""
+    """Factors of a torso's radii by build; shoulders and neck vary less than the belly."""
     return 1.0 + (build - 1.0) * np.array([1.0, 1.0, 0.9, 0.5, 0.4, 0.2])
 
 

@@ -1,4 +1,4 @@
-"""Trees and crops."""
+"""Scene nodes of trees and crops."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from aerodaas.simulation.world import CROWN_SHARE, Thing
 __all__ = ["add_crops", "add_tree"]
 
 _SEGMENT = 2.5
-"""Metres of a row between changes of its height."""
+"""Length of a row's segments of different height, metres."""
 
 _LEAN = 0.45
-"""Radians by which the two strips of a row lean apart, so that they cover from above too."""
+"""Lean of a row's two strips in radians, so that they also cover the ground from above."""
 
 
 _NEAR, _FAR = 22.0, 2000.0
-"""Metres up to which a tree is shown in detail, and at all."""
+"""Distances in metres up to which a tree is rendered in detail, and at all."""
 
 
 def rng_of(thing: Thing) -> np.random.Generator:
-    """Generator of a thing's looks, the same in every process."""
+    """Random generator of an object's appearance, the same in every process."""
     return np.random.default_rng(list(thing.seed.encode()))
 
 
 def add_tree(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
-    """Attach a broad-leaved tree: a trunk, and a crown of bulging clumps of leaves."""
+    """Attach a broad-leaved tree: a trunk, and a crown of clumps of leaves."""
     rng, height = rng_of(thing), thing.height
     radius, middle = CROWN_SHARE * height, 0.62 * height
     girth = 0.035 * height
@@ -59,7 +59,7 @@ def add_tree(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> 
 
 @dataclass(frozen=True)
 class _Clump:
-    """A bulging ball of leaves."""
+    """A clump of leaves, a sphere with bumps."""
 
     centre: tuple[float, float, float]
     radius: float
@@ -83,7 +83,7 @@ def _clumps(radius: float, middle: float, yaw: float, rng: np.random.Generator) 
 def _ball(clump: _Clump, rings: int, sides: int) -> Mesh:
     """Mesh of a clump; a coarser one has the same shape with fewer faces."""
     ball = blob(clump.radius, rings=rings, sides=sides, repeat=3.0)
-    # Waves over the sphere's normals meet at its seam.
+    # Waves are functions of the sphere's normals, and so are continuous at its seam.
     bumps = 1.0 + 0.25 * np.sin(ball.normals @ clump.waves.T + clump.phases).mean(axis=1)
     points = ball.points * bumps[:, None] * (1.0, 1.0, 0.88)
     return Mesh(points, ball.uv, ball.normals, ball.colours, ball.triangles).moved(clump.centre)
@@ -112,7 +112,7 @@ def add_crops(parent: NodePath, thing: Thing, palette: Palette, light: Light) ->
 def _strip(
     ends: tuple[float, float], y: float, heights: tuple[float, float], lean: float, shift: float
 ) -> Mesh:
-    """One leaning strip of plants along x; the light falls on it as on level ground."""
+    """One leaning strip of plants along x, lit as level ground."""
     across, up = math.sin(lean), math.cos(lean)
     foot = y - 0.25 * across * heights[0]
     corners = [

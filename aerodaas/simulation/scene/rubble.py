@@ -1,4 +1,4 @@
-"""Heaps of broken masonry."""
+"""Scene nodes of heaps of broken masonry."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ __all__ = ["add_rubble"]
 _PIECES_PER_SQUARE_METRE = 2.5
 _MOST_PIECES = 60
 _TILT = 0.7
-"""Radians by which a piece leans, at most."""
+"""Greatest tilt of a piece, radians."""
 
 _STUFFS = (("brick", 0.5), ("plaster", 0.3), ("wood", 0.2))
-"""Textures of the pieces and their shares."""
+"""Textures of the pieces and their frequencies."""
 
 
 def add_rubble(parent: NodePath, thing: Thing, palette: Palette, light: Light) -> None:
-    """Attach slabs and blocks that lie about, more and higher towards the middle."""
+    """Attach scattered slabs and blocks, more and higher towards the middle."""
     spec = thing.spec
     if not isinstance(spec, Rubble):
         raise TypeError(f"{thing.id} is no rubble")

@@ -1,4 +1,4 @@
-"""A world as a panda3d scene."""
+"""Scene graph of a world for panda3d."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ __all__ = ["Looks", "Scene"]
 
 
 class Looks:
-    """What the seed gives to things of one kind; another may be more colourful."""
+    """Appearance of objects by their seeds; a subclass may vary it more."""
 
     def palette(self, world: World) -> Palette:
         """Textures of a world."""
@@ -37,27 +37,27 @@ class Looks:
         return Palette()
 
     def outfit(self, thing: Thing) -> Outfit:
-        """Dress a person."""
+        """Choose the outfit of a person."""
         if not isinstance(thing.spec, Person):
             raise TypeError(f"{thing.id} is no person")
         return Outfit.draw(thing.spec, rng_of(thing))
 
     def car(self, thing: Thing) -> CarShape:
-        """Choose the outline of a car."""
+        """Choose the shape of a car."""
         del thing
         return CarShape()
 
     def tower(self, thing: Thing) -> TowerLook:
-        """Choose the build and paint of a tower."""
+        """Choose the construction and paint of a tower."""
         del thing
         return TowerLook()
 
 
 class Scene:
-    """The nodes of a world; `update` moves what moves."""
+    """Scene nodes of a world; `update` moves the moving objects."""
 
     def __init__(self, world: World, looks: Looks | None = None) -> None:
-        """Build everything that stands, and the figures of what moves."""
+        """Build the static objects, and the figures of moving ones."""
         self.looks = looks or Looks()
         self.root = NodePath("world")
         self.palette = self.looks.palette(world)
@@ -101,7 +101,7 @@ class Scene:
             self._people.append((thing, figure, feet))
 
     def update(self, time: float, eye: tuple[float, float, float]) -> None:
-        """Show the world as it is at `time` seconds, seen from `eye` (ENU metres)."""
+        """Update the scene to `time` seconds, seen from `eye` (ENU metres)."""
         self._sky.set_pos(*eye)
         for thing, figure, feet in self._people:
             state = thing.state(time)

@@ -1,5 +1,5 @@
 # ruff: noqa: PLR2004 - the proportions of a drawing
-"""Textures drawn with numpy at start; sides are powers of two, as the software renderer needs."""
+"""Procedural textures, with sides that are powers of two as the software renderer requires."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def noise(size: int, roughness: float, seed: int, stretch: float = 1.0) -> Float
     """Noise (size, size) that repeats seamlessly, with mean 0 and standard deviation 1.
 
     Its amplitude falls with spatial frequency to the power of `roughness`: 0 is white, 1 is
-    cloudy, 2 is smooth. `stretch` > 1 draws it out along the rows' direction.
+    cloudy, 2 is smooth. `stretch` > 1 elongates it along the rows' direction.
     """
     white = np.fft.rfft2(np.random.default_rng(seed).standard_normal((size, size)))
     fy = np.fft.fftfreq(size)[:, None]
@@ -55,26 +55,26 @@ def _texture(name: str, colours: Floats, alpha: Floats | None = None) -> Texture
 
 @dataclass(frozen=True)
 class VestCut:
-    """How a hazard vest is made."""
+    """Design of a hazard vest."""
 
     colour: tuple[float, float, float]
     silver: tuple[float, float, float] = (0.86, 0.87, 0.88)
     """Colour of the reflective bands."""
     bands: tuple[float, ...] = (0.16, 0.40)
-    """Where bands run around, from the hem (0) to the neck (1)."""
+    """Positions of the horizontal bands, from the hem (0) to the neck (1)."""
     band: float = 0.055
-    """Half the width of a band around, likewise."""
+    """Half the width of a horizontal band, in the same unit."""
     straps: bool = True
-    """Bands over the shoulders, down to the lowest band around `straps_from`."""
+    """Whether bands run over the shoulders, down to `straps_from`."""
     straps_from: float = 0.40
     strap: float = 0.03
-    """Half the width of a band over the shoulder, as a share of the way around."""
+    """Half the width of a band over the shoulder, as a fraction of the circumference."""
     open_sides: float = 0.0
-    """Half the width of the gap below the arms in which the shirt shows, likewise."""
+    """Half the width of the gap below the arms that shows the shirt, in the same unit."""
     hem: float = 0.04
-    """How far the vest hangs below the pelvis, as a share of the torso."""
+    """Overhang of the vest below the pelvis, as a fraction of the torso."""
     flare: float = 0.0
-    """Metres by which the hem stands off the body."""
+    """Distance of the hem from the body, metres."""
 
 
 def vest_texture(cut: VestCut, shirt: ArrayLike) -> Texture:
@@ -97,10 +97,10 @@ def vest_texture(cut: VestCut, shirt: ArrayLike) -> Texture:
 
 
 class Palette:
-    """The textures of one world, each drawn when first asked for."""
+    """Textures of one world, each drawn on first use."""
 
     def __init__(self) -> None:
-        """Start with none."""
+        """Start without textures."""
         self._made: dict[str, Texture] = {}
 
     def __getitem__(self, name: str) -> Texture:
@@ -144,7 +144,7 @@ class Palette:
         return _texture("leaves", colours, (leaf + 0.4 * clumps > -0.55).astype(np.float64))
 
     def _crop(self) -> Texture:
-        """Row of young plants: blades that fan out from stems, on nothing."""
+        """Row of young plants: blades that fan out from stems, on a transparent background."""
         width, height, rng = 256, 64, np.random.default_rng(13)
         colours, alpha = np.zeros((height, width, 3)), np.zeros((height, width))
         colours[:] = (0.25, 0.42, 0.12)
@@ -201,7 +201,7 @@ class Palette:
         return _texture("shadow", np.zeros((64, 64, 3)), alpha)
 
     def _facade(self) -> Texture:
-        """A bay of a wall with a window, to be repeated; drawn on plaster."""
+        """One repeatable bay of a plaster wall with a window."""
         size = 128
         colours = np.full((size, size, 3), 0.93) * (1.0 + 0.02 * noise(size, 1.0, 21))[..., None]
         y, x = np.mgrid[0:size, 0:size] / size

@@ -1,4 +1,4 @@
-"""The kinds of models that are recognised, in the order in which they are tried."""
+"""Supported model families, in the order in which they are tried."""
 
 from __future__ import annotations
 
@@ -11,4 +11,4 @@ from aerodaas.analytics.detection.families.yolox import yolox
 __all__ = ["FAMILIES"]
 
 FAMILIES: tuple[ModelFamily, ...] = (yolov5, yolox, ultralytics, end_to_end)
-"""The strictest first: those that must fit the grid of the input's size exactly."""
+"""All families, the strictest first: those that must match the grid of the input size exactly."""

@@ -1,4 +1,4 @@
-"""Array arithmetic that several families share."""
+"""Array arithmetic shared by several families."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["best_class", "corners"]
 
 
 def corners(centred: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Turn N x 4 boxes of centre u, v, width, height into left, top, right, bottom."""
+    """Convert N x 4 boxes of centre u, v, width, height to left, top, right, bottom."""
     half = centred[:, 2:4] / 2
     boxes = np.hstack([centred[:, :2] - half, centred[:, :2] + half])
     return boxes.astype(np.float32, copy=False)
@@ -20,9 +20,8 @@ def best_class(
 ) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.int32], int]:
     """Find the best class of each anchor in C x N `scores`.
 
-    Returns the anchors that reach `min_score`, their scores and classes, and how many anchors
-    had a score that is not a number. The class is looked for only among the anchors kept: of
-    thousands, a few.
+    Returns the anchors that reach `min_score`, their scores and classes, and the number of
+    anchors with a NaN score. The class is computed only for the few anchors kept.
     """
     best = scores.max(axis=0)
     kept = np.flatnonzero(best >= min_score)

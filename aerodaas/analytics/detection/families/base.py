@@ -1,7 +1,7 @@
-"""The plug-in protocol for a kind of model: how pixels go in and how boxes come out.
+"""Plug-in protocol of a model family: preprocessing of pixels and decoding of boxes.
 
-A family is a callable: given a `ModelFile`, it returns a decoder made for that file, or None if
-the file is of another kind. For a model that no family here knows, write one and pass it::
+A family is a callable: given a `ModelFile`, it returns a decoder for that file, or None if the
+file belongs to another family. For an unsupported model, write a family and pass it::
 
     OnnxDetector("rtdetr.onnx", families=[rtdetr, *FAMILIES])
 """
@@ -29,14 +29,14 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Preprocessing:
-    """How a family wants its pixels: letterboxed, then scaled."""
+    """Preprocessing of a family's input: letterboxing, then scaling."""
 
     scale: float = 1 / 255
     """Factor from 0-255 to the network's range."""
     rgb: bool = True
     """Channel order red, green, blue; otherwise blue, green, red."""
     centred: bool = True
-    """Padding on both sides; otherwise the picture lies in the top left corner."""
+    """Padding on both sides; otherwise the image lies in the top left corner."""
     fill: int = 114
     """Grey level of the padding, 0 to 255."""
 
@@ -54,7 +54,7 @@ class Candidates:
     keypoints: NDArray[np.float32] | None = None
     """N x K x 3: u, v, confidence."""
     invalid: int = 0
-    """Outputs that were dropped because they were not finite."""
+    """Number of outputs dropped because they were not finite."""
 
     def __len__(self) -> int:
         """Count the candidates."""
@@ -69,7 +69,7 @@ class Candidates:
 
 
 class Decoder(Protocol):
-    """Turns the raw outputs of one file into candidates; sent to the actor by value."""
+    """Converts the raw outputs of one model to candidates; sent to the actor by value."""
 
     @property
     def family(self) -> str:
@@ -78,12 +78,12 @@ class Decoder(Protocol):
 
     @property
     def classes(self) -> int:
-        """Number of classes that the model tells apart."""
+        """Number of classes of the model."""
         ...
 
     @property
     def preprocessing(self) -> Preprocessing:
-        """How the pixels go in."""
+        """Preprocessing of the input."""
         ...
 
     @property
@@ -94,7 +94,7 @@ class Decoder(Protocol):
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Decode the outputs for one picture, the batch axis already taken off.
+        """Decode the outputs for one image, without the batch axis.
 
         `size` is the height and width of the network's input in pixels.
         """
@@ -102,10 +102,10 @@ class Decoder(Protocol):
 
 
 class ModelFamily(Protocol):
-    """Recognises the files of one kind, by what is in them."""
+    """Recognises the files of one family by their content."""
 
     def __call__(self, model: ModelFile, /) -> Decoder | None:
-        """Return a decoder for `model`, or None if it is of another kind."""
+        """Return a decoder for `model`, or None if it belongs to another family."""
         ...
 
 
@@ -113,12 +113,12 @@ _STRIDES = ((8, 16, 32), (8, 16, 32, 64), (4, 8, 16, 32), (16, 32))
 
 
 def strides_for(size: tuple[int, int], count: int) -> tuple[int, ...] | None:
-    """The strides whose feature maps have `count` cells in all; None if there are none."""
+    """Strides whose feature maps have `count` cells in total; None if there are none."""
     return next((s for s in _STRIDES if _anchor_count(size, s) == count), None)
 
 
 def keep_finite(candidates: Candidates) -> Candidates:
-    """Drop the candidates with a number that is not finite, and count them."""
+    """Drop and count the candidates with a number that is not finite."""
     finite = np.isfinite(candidates.boxes).all(axis=1) & np.isfinite(candidates.scores)
     if candidates.keypoints is not None:
         finite &= np.isfinite(candidates.keypoints).all(axis=(1, 2))
@@ -130,6 +130,6 @@ def keep_finite(candidates: Candidates) -> Candidates:
 
 
 def _anchor_count(size: tuple[int, int], strides: Sequence[int]) -> int:
-    """Cells of all feature maps for an input of `size` (height, width) pixels."""
+    """Number of cells of all feature maps for an input of `size` (height, width) pixels."""
     height, width = size
     return sum(-(-height // stride) * -(-width // stride) for stride in strides)

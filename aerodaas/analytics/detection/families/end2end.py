@@ -1,4 +1,4 @@
-"""Exports whose NMS is built in (`nms=True`) or not needed (YOLOv10 and 26, end to end).
+"""End-to-end exports, whose NMS is built in (`nms=True`) or not needed (YOLOv10 and 26).
 
 One output of shape [batch, detections, 6 + keypoints], at most a few hundred detections: left,
 top, right, bottom in input pixels, score, class, then keypoints; unused rows score zero. Source:
@@ -39,7 +39,7 @@ class EndToEndDecoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Keep the rows above `min_score` whose class exists."""
+        """Keep the rows with a score of at least `min_score` and a valid class."""
         del size
         rows = outputs[0]
         invalid = int(np.count_nonzero(np.isnan(rows[:, _SCORE])))
@@ -54,7 +54,7 @@ class EndToEndDecoder:
 
 
 def end_to_end(model: ModelFile) -> EndToEndDecoder | None:
-    """Recognise rows of six numbers, beside the keypoints that the metadata tells of."""
+    """Recognise rows of six numbers, plus the keypoints declared in the metadata."""
     shape = model.output_shape
     keypoints = keypoint_shape(model)
     depth = _ROW + (keypoints[0] * keypoints[1] if keypoints else 0)

@@ -1,4 +1,4 @@
-"""Heads that give each box an objectness beside its class scores: YOLOv5, v7, YOLOX."""
+"""Helpers for heads with an objectness beside the class scores: YOLOv5, v7, YOLOX."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _OBJECTNESS, _FIRST_CLASS = 4, 5
 def pick(
     rows: NDArray[np.float32], min_score: float
 ) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.int32], int]:
-    """Find the boxes of [boxes, 5 + classes] whose objectness x class score is enough.
+    """Find the boxes of [boxes, 5 + classes] whose objectness x class score reaches `min_score`.
 
-    Returns their indices, scores and classes, and how many scores were not numbers. No class
-    score exceeds 1, so that the objectness alone rules out most boxes.
+    Returns their indices, scores and classes, and the number of NaN scores. No class score
+    exceeds 1, so the objectness alone rules out most boxes.
     """
     objectness = rows[:, _OBJECTNESS]
     invalid = int(np.count_nonzero(np.isnan(objectness)))

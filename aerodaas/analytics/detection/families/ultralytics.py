@@ -44,7 +44,7 @@ class UltralyticsDecoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Pick the anchors above `min_score` first: all else is done for those few."""
+        """Decode only the anchors whose score reaches `min_score`."""
         del size
         raw = outputs[0]
         kept, scores, classes, invalid = best_class(raw[_BOX : _BOX + self.classes], min_score)
@@ -54,7 +54,7 @@ class UltralyticsDecoder:
 
 
 def ultralytics(model: ModelFile) -> UltralyticsDecoder | None:
-    """Recognise an output as deep as its classes or, without their names, as long as the grid."""
+    """Recognise an output by its number of classes or, without class names, of anchors."""
     shape = model.output_shape
     if len(model.outputs) != 1 or len(shape) != _AXES:
         return None
@@ -79,7 +79,7 @@ def keypoint_shape(model: ModelFile) -> tuple[int, int] | None:
 def read_keypoints(
     rows: NDArray[np.float32], shape: tuple[int, int] | None
 ) -> NDArray[np.float32] | None:
-    """N rows of flat keypoints to N x K x 3; a confidence that is not given counts as 1."""
+    """Reshape N rows of flat keypoints to N x K x 3; a missing confidence counts as 1."""
     if shape is None:
         return None
     points = rows.reshape(len(rows), *shape)

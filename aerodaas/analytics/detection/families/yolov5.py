@@ -1,4 +1,4 @@
-"""YOLOv5 and v7 heads with three anchor boxes a cell, decoded by the export.
+"""YOLOv5 and v7 heads with three anchor boxes per cell, decoded by the export.
 
 One output of shape [batch, 3 x cells, 5 + classes]: box centre, width and height in input
 pixels, objectness, class scores, all after the sigmoid. A box's score is objectness x class.
@@ -42,7 +42,7 @@ class YoloV5Decoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Pick the boxes above `min_score`, then turn them into corners."""
+        """Select the boxes whose score reaches `min_score`, and convert them to corners."""
         del size
         rows = outputs[0]
         kept, scores, classes, invalid = pick(rows, min_score)
@@ -50,7 +50,7 @@ class YoloV5Decoder:
 
 
 def yolov5(model: ModelFile) -> YoloV5Decoder | None:
-    """Recognise three boxes for each cell of the grid."""
+    """Recognise an output with three boxes per cell of the grid."""
     classes = objectness_classes(model)
     if classes is None:
         return None

@@ -1,4 +1,4 @@
-"""YOLOX: one box a cell, to be decoded from grid and stride unless the export has done it.
+"""YOLOX heads: one box per cell, decoded from grid and stride unless the export has done it.
 
 One output of shape [batch, cells, 5 + classes]: offsets from the cell in units of the stride,
 logarithms of width and height over the stride, objectness and class scores after the sigmoid.
@@ -47,7 +47,7 @@ class YoloxDecoder:
     def decode(
         self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
     ) -> Candidates:
-        """Pick the cells above `min_score`; only theirs are decoded."""
+        """Decode only the cells whose score reaches `min_score`."""
         rows = outputs[0]
         kept, scores, classes, invalid = pick(rows, min_score)
         boxes = rows[kept, :_BOX]
@@ -61,10 +61,10 @@ class YoloxDecoder:
 
 
 def yolox(model: ModelFile) -> YoloxDecoder | None:
-    """Recognise one box for each cell of the grid.
+    """Recognise an output with one box per cell of the grid.
 
-    Centres already in pixels lie some hundreds of pixels apart; offsets in units of the stride
-    stay near zero. The trial picture tells which.
+    The trial image shows whether the export has decoded the boxes: centres in pixels lie some
+    hundreds of pixels apart, while offsets in units of the stride stay near zero.
     """
     classes = objectness_classes(model)
     if classes is None:
