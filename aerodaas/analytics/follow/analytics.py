@@ -47,9 +47,9 @@ _WIDTH_MEMORY = 0.1
 class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
     """Follows one object of known size at a distance, and stays with that object.
 
-    It locks on to the nearest trusted target of its labels and holds it by its track. Before the
-    first target, and after one was given up, it sends no commands, so that other navigation goes
-    on. The camera must be calibrated (`horizontal_fov` of the sensor).
+    It locks on to the trusted target with the largest product of box area and score and holds it
+    by its track. Before the first target, and after one was given up, it sends no commands, so
+    that other navigation goes on. The camera must be calibrated (`horizontal_fov` of the sensor).
     """
 
     falls: ClassVar[bool] = True
