@@ -30,6 +30,7 @@ from aerodaas.schedulers.lab.run import Spread
 from aerodaas.schedulers.lab.workload import SIX
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.extras import require_extra
 
 __all__ = ["app", "result_table"]
 
@@ -247,6 +248,7 @@ def _progress() -> Progress:
 
 
 def _plot(result: LabResult, names: list[str], resources: Resources, folder: Path) -> None:
+    require_extra("plots", "a plot")
     # Matplotlib takes most of a second to import, which a table alone need not pay.
     from aerodaas.schedulers.lab.plots import (  # noqa: PLC0415
         plot_bars,

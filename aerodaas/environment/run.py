@@ -25,6 +25,7 @@ from aerodaas.types.errors import (
     MissionError,
     RecordingError,
 )
+from aerodaas.types.extras import require_extra
 from aerodaas.types.identifiers import told
 from aerodaas.types.status import MissionState
 
@@ -87,6 +88,8 @@ class Run:
         # Before Ray, which takes seconds: what is wrong with the graph should be told at once.
         check_served("--live-address", self.options.live)
         check_served("--view-address", self.options.page)
+        if self.options.page is not None:
+            require_extra("remote", "--view-address")
         plan = self._plan()
         if self.recording is not None and self.recording.exists():
             raise RecordingError(

@@ -19,6 +19,7 @@ from typing_extensions import Self
 from aerodaas.recording.index import BROKEN, Block, FileIndex, load, read_index
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import RecordingError
+from aerodaas.types.extras import require_extra
 
 __all__ = ["Record", "Recording", "Topic"]
 
@@ -233,6 +234,7 @@ class Recording:
             schema = self._index.schemas.get(channel.schema_id)
             decoder = self._protobuf.decoder_for(channel.message_encoding, schema)
             if decoder is None and channel.message_encoding == "cdr":
+                require_extra("ros", "a ROS 2 message")
                 from mcap_ros2.decoder import DecoderFactory as Ros  # noqa: PLC0415 - rarely met
 
                 decoder = Ros().decoder_for(channel.message_encoding, schema)

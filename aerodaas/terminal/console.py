@@ -19,6 +19,7 @@ from aerodaas.terminal.live import MissionView
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import RecordingError
+from aerodaas.types.extras import has_extra
 from aerodaas.types.identifiers import is_internal
 
 if TYPE_CHECKING:
@@ -221,6 +222,8 @@ def show_results(options: RunOptions, recording: Path | None) -> None:
     width = max(map(len, places))
     for name, path in places.items():
         console.print(f"{name:>{width}}  {_shown(path)}", markup=False)
+    if not has_extra("plots"):
+        console.print(f"{'plots':>{width}}  pip install 'aerodaas[plots]'", markup=False)
 
 
 def _shown(path: Path) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from aerodaas.schedulers.trajectory.travel import Matrix
 from aerodaas.types.errors import SchedulerError
+from aerodaas.types.extras import has_extra
 
 __all__ = ["DroneRoute", "RoutingProblem", "require_solver", "solve_routes"]
 
@@ -52,10 +52,10 @@ class RoutingProblem:
 
 def require_solver(purpose: str) -> None:
     """Raise SchedulerError, which names `purpose`, where PyVRP is not installed."""
-    if importlib.util.find_spec("pyvrp") is None:
+    if not has_extra("routing"):
         raise SchedulerError(
             f"{purpose} needs PyVRP, which exists for Python 3.11 and newer: "
-            "pip install 'pyvrp>=0.13' there, or take another scheduler"
+            "pip install 'aerodaas[routing]' there, or take another scheduler"
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.replay.timetables import read_timetables
 from aerodaas.recording.report.comparison import write_comparison
 from aerodaas.recording.report.difference import difference
-from aerodaas.recording.report.report import write_report
+from aerodaas.recording.report.report import read_report, write_report
 from aerodaas.types.errors import RecordingError
 from aerodaas.types.status import Message
 
@@ -112,3 +113,13 @@ def test_a_huge_length_is_not_believed(tmp_path: Path) -> None:
     with Recording.open(path) as recording:
         assert not recording.complete
         assert sum(1 for _ in recording.records()) < whole
+
+
+def test_a_report_without_plots(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Summary and page are written all the same."""
+    recording = written(tmp_path / "flight.mcap")
+    assert read_report(recording).plots
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    files = write_report(recording, tmp_path / "report")
+    assert files.plots == ()
+    assert files.page.stat().st_size > 1000

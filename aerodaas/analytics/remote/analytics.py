@@ -17,6 +17,7 @@ from aerodaas.analytics.remote.guard import Guard, is_loopback
 from aerodaas.config.model import RemoteConfig
 from aerodaas.types.data import Frame
 from aerodaas.types.errors import ConfigError, SourceError
+from aerodaas.types.extras import require_extra
 
 if TYPE_CHECKING:
     import uvicorn
@@ -54,8 +55,10 @@ class RemoteAnalytics(CommandingAnalytics):
 
         Raises:
             ConfigError: If a setting is invalid, or the address is reachable from other machines
-                without a token, so that anyone on the network could command the drone.
+                without a token, so that anyone on the network could command the drone; or if the
+                packages of the extra `remote` are missing.
         """
+        require_extra("remote", type(self).__name__)
         asked = dict((env_data or {}).get("remote", {}))
         asked |= {"host": host} if host is not None else {}
         asked |= {"port": port} if port is not None else {}

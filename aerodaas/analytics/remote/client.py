@@ -9,6 +9,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from aerodaas.types.errors import ConfigError, MissionError, SourceError
+from aerodaas.types.extras import require_extra
 
 __all__ = ["RemoteClient"]
 
@@ -71,6 +72,7 @@ class RemoteClient:
 
         Raises SourceError if the service cannot be reached or refuses.
         """
+        require_extra("remote", "the stream of the status")
         from websockets.exceptions import ConnectionClosed, InvalidHandshake  # noqa: PLC0415
         from websockets.sync.client import connect  # noqa: PLC0415 - only to follow
 

@@ -11,11 +11,12 @@ import cv2
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.moments import MomentPicture, key_moments, picture_moments
-from aerodaas.recording.report.page.figures import Plot, plots_of
 from aerodaas.recording.report.page.flight import flight_page
+from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.sheet import contact_sheet
 from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.types.errors import RecordingError
+from aerodaas.types.extras import has_extra
 
 __all__ = ["Report", "ReportFiles", "read_report", "write_report"]
 
@@ -51,7 +52,16 @@ def read_report(recording: str | Path) -> Report:
             raise RecordingError(f"{recording} holds no flight: no vehicle states and no latencies")
         moments = picture_moments(opened, key_moments(flight))
         summary = FlightSummary.of(opened, flight)
-    return Report(summary, plots_of(flight), moments)
+    return Report(summary, _plots(flight), moments)
+
+
+def _plots(flight: RecordedFlight) -> list[Plot]:
+    """The plots of a flight; none without the extra `plots`."""
+    if not has_extra("plots"):
+        return []
+    from aerodaas.recording.report.page.figures import plots_of  # noqa: PLC0415 - needs the extra
+
+    return plots_of(flight)
 
 
 def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:

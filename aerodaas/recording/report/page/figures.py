@@ -4,31 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from io import BytesIO
-from typing import NamedTuple
 
 from matplotlib.figure import Figure
 
 from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.plots.latency import latency_figure
 from aerodaas.recording.report.plots.loads import loads_figure
 from aerodaas.recording.report.plots.outcomes import outcomes_figure
 from aerodaas.recording.report.plots.timeline import timeline_figure
 from aerodaas.recording.report.plots.trajectory import profile_figure, trajectory_figure
 
-__all__ = ["Plot", "plots_of"]
+__all__ = ["plots_of"]
 
 _DPI = 200
-
-
-class Plot(NamedTuple):
-    """One plot of a flight."""
-
-    name: str
-    """Of its file."""
-    title: str
-    description: str
-    """For who cannot see it."""
-    png: bytes
 
 
 def plots_of(flight: RecordedFlight) -> list[Plot]:

@@ -8,8 +8,8 @@ import cv2
 
 from aerodaas.recording.report.moments import MomentPicture
 from aerodaas.recording.report.page.document import document, paragraph, picture, section
-from aerodaas.recording.report.page.figures import Plot
 from aerodaas.recording.report.page.tables import sections
+from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.summary import FlightSummary
 
 __all__ = ["flight_page", "origin_line"]

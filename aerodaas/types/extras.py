@@ -1,0 +1,37 @@
+"""Parts of the project that need packages which many never use: the extras of its distribution."""
+
+from __future__ import annotations
+
+import importlib.util
+
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["has_extra", "require_extra"]
+
+_PACKAGES = {
+    "plots": ("matplotlib",),
+    "remote": ("fastapi", "uvicorn", "websockets"),
+    "ros": ("mcap_ros2",),
+    "routing": ("pyvrp",),
+}
+"""Packages to import, by extra."""
+
+
+def has_extra(extra: str) -> bool:
+    """Tell whether the packages of `extra` (`plots`, `remote`, `ros`, `routing`) are installed."""
+    return all(importlib.util.find_spec(package) is not None for package in _PACKAGES[extra])
+
+
+def require_extra(extra: str, purpose: str) -> None:
+    """Require the packages of an extra.
+
+    Args:
+        extra: `plots`, `remote`, `ros` or `routing`.
+        purpose: What needs it, as the subject of the error's sentence, in the singular.
+
+    Raises:
+        ConfigError: If a package is missing; says how to install it.
+    """
+    if not has_extra(extra):
+        packages = ", ".join(_PACKAGES[extra])
+        raise ConfigError(f"{purpose} needs {packages}: pip install 'aerodaas[{extra}]'")
