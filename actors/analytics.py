@@ -35,7 +35,7 @@ _LOOK_INTERVAL = 1.0
 _PARTING = 3.0
 """Wall seconds that an analysis has to finish its item once the run is over."""
 _HUNG = 5.0
-"""Wall seconds on one item after which people are told; a first inference may take some."""
+"""Wall seconds on one item after which an alert is published; a first inference is slow."""
 
 
 @dataclass(frozen=True)
@@ -59,7 +59,7 @@ class NodeSpec:
     dormant: bool
     triggers: tuple[TriggerSpec, ...]
     acknowledges: bool
-    """True in lockstep for an analysis whose results nobody reads."""
+    """True in lockstep for an analysis whose results have no reader."""
     kind: ComputeKind
     """Where its actor stands."""
     answers_always: bool

@@ -101,13 +101,13 @@ def failure_line(error: BaseException) -> str:
     place = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""  # noqa: PTH119
     try:
         said = str(error)
-    except Exception:  # noqa: BLE001 - somebody's class, whose words fail, too
+    except Exception:  # noqa: BLE001 - an application's class, whose text may fail, too
         said = "it cannot say why"
     return f"{type(error).__name__}: {said}{place}"
 
 
 class _AlertHandler(logging.Handler):
-    """What the project's own modules warn of is told to the people who watch."""
+    """Handler that publishes warnings of the project's own modules as alerts."""
 
     def __init__(self, actor: StreamActor) -> None:
         super().__init__(logging.WARNING)
@@ -259,7 +259,7 @@ class StreamActor:
         return self.session.scope(ray.get_runtime_context().get_node_id())
 
     def publisher(self, stream: str, what: str = "") -> Publisher:
-        """Open a stream for writing; `what` is what people know its items as."""
+        """Open a stream for writing; `what` names its items in alerts."""
 
         def unsendable(reason: str) -> None:
             self._problem("unsendable", f"{what or stream}: {reason}")
@@ -268,7 +268,7 @@ class StreamActor:
         return self.publishers[stream]
 
     def reader(self, name: str, depths: dict[str, int], who: str = "") -> Subscriber:
-        """Open streams for reading as `name`; `who` is what people know this reader as."""
+        """Open streams for reading as `name`; `who` names this reader in alerts."""
 
         def unreadable(reason: str) -> None:
             self._problem("unreadable", f"{who or self.name} cannot read {reason}")
@@ -283,11 +283,11 @@ class StreamActor:
                 self.alert(kind, text)
 
     def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401
-        """Tell the people who watch; any thread may."""
+        """Publish an alert at the present mission time; callable from any thread."""
         self.tell(kind, text, self.clock.now(), values)
 
     def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
-        """Tell the people who watch about mission time `stamp`; any thread may.
+        """Publish an alert about mission time `stamp`; callable from any thread.
 
         What was told in the same words within the last seconds is not told again.
         """
@@ -339,7 +339,7 @@ class StreamActor:
             self._run()
         except AeroDaaSError as error:
             self._fail(error)
-        except Exception as error:  # noqa: BLE001 - whatever a plug-in raises ends here
+        except Exception as error:  # noqa: BLE001 - any error of a plug-in ends here
             self._fail(AeroDaaSError(f"{self.name}: {failure_line(error)}"))
         else:
             self._phase = "done"

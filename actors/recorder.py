@@ -76,7 +76,7 @@ class RecorderActor(StreamActor):
         self._acks = self.publisher(f"{ACKS}/recorder") if self.session.lockstep else None
 
     def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
-        """Tell the people who watch, and write it down at once: nobody else reads our alerts."""
+        """Publish an alert and record it at once, as the recorder does not read its own alerts."""
         super().tell(kind, text, stamp, values)
         if self._phase == "new":
             return

@@ -73,7 +73,7 @@ class Session:
 
     @property
     def lockstep(self) -> bool:
-        """True where time moves only as fast as everyone follows."""
+        """True if mission time waits until all actors have worked through it."""
         return self.speed is None
 
     def clock(self) -> Clock:

@@ -1,4 +1,4 @@
-"""`aerodaas cluster check`: what a cluster offers, and what to mend before anybody flies on it."""
+"""`aerodaas cluster check`: the resources of a cluster, and what to mend before a flight."""
 
 from __future__ import annotations
 

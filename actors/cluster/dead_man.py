@@ -1,4 +1,4 @@
-"""The end of a process that nobody can end any more.
+"""Self-termination of a process that no other process can end any more.
 
 An actor is ended through the head of its cluster. Where that is lost, a process that was told to
 stop would stay for ever, so it ends itself.
@@ -30,7 +30,7 @@ def exit_soon(seconds: float = LAST_SECONDS) -> None:
 def leave() -> None:
     """End this actor, whose call it must be, in Ray's own way: then it is not restarted.
 
-    That may take its head to be heard, so it ends soon whatever comes of it.
+    That may take its head to be reached, so the process ends soon in any case.
     """
     exit_soon()
     ray.actor.exit_actor()

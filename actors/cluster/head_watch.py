@@ -16,7 +16,7 @@ _EVERY = 2.0
 _PATIENCE = 3.0
 """Seconds that a connection may take."""
 _LOST_AFTER = 10.0
-"""Seconds without an answer after which people are told."""
+"""Seconds without an answer after which an alert is published."""
 
 
 class HeadWatch:

@@ -1,4 +1,4 @@
-"""What one node of a cluster knows of itself, and of the way to another."""
+"""Probe of a cluster's node: its own properties, and its link to another node."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Probe:
         return os.urandom(size)
 
     def measure(self, other: Any) -> LinkMeasurement:  # noqa: ANN401 - an actor's handle
-        """Measure the way to another node's probe."""
+        """Measure the link to another node's probe."""
         ray.get(other.now.remote())  # the first call also makes the connection
         readings = []
         for _ in range(_ROUND_TRIPS):

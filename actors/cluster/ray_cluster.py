@@ -86,7 +86,7 @@ def connect(address: str | None) -> None:
 
 
 def join(address: str) -> None:
-    """Join the cluster at `address`, whatever its nodes offer; AeroDaaSError if that fails."""
+    """Join the cluster at `address`, without a check of its resources; raises AeroDaaSError."""
     if ray.is_initialized():
         return
     _set_variables()

@@ -1,4 +1,4 @@
-"""The process that keeps a local Ray: starts it, ends it when nobody needs it, and tidies up.
+"""Supervisor process of a local Ray: starts it, ends it after its last user, and tidies up.
 
 It is run as a script, needs the standard library only (10 MB), and is in a session of its own, so
 that neither Ctrl-C nor a `kill -9` of the application ends it or its Ray. The Ray is ended once
@@ -59,7 +59,7 @@ def main(application: int, words: list[str]) -> None:
     """Keep a Ray started by `ray start` with `words` for the process `application`."""
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    # Whatever a process of this Ray leaves behind becomes a child of this one.
+    # Orphans of this Ray's processes become children of this one.
     ctypes.CDLL(None).prctl(_SUBREAPER, 1, 0, 0, 0)
     client = _Client(application)
     base = Path(tempfile.gettempdir())
@@ -70,7 +70,7 @@ def main(application: int, words: list[str]) -> None:
         (folder / LOCKS).mkdir()
         with (folder / LOCKS / _OWN_LOCK).open("w") as own:
             fcntl.lockf(own, fcntl.LOCK_EX)
-            # It gets its name only now, so that nobody finds it without an owner.
+            # It gets its name only now, so that no application finds it without an owner.
             Path(own.name).rename(folder / _OWN_LOCK)
             _keep(client, folder, words)
     finally:
@@ -225,7 +225,7 @@ def _orphaned(folder: Path) -> bool:
     with contextlib.suppress(OSError):
         own = folder / _OWN_LOCK
         return own.exists() and not _held(own) and not _under_way(folder)
-    return False  # somebody else's
+    return False  # of another user
 
 
 def _belongs(pid: int, folder: Path) -> bool:

@@ -13,7 +13,7 @@ __all__ = ["RunLock"]
 
 
 class RunLock:
-    """Held from its making on; on a cluster, which nobody here may end, it does nothing.
+    """Lock held from construction on; does nothing on a cluster, which no run here may end.
 
     It is a POSIX record lock, which a process' children do not inherit.
     """

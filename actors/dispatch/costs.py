@@ -1,4 +1,4 @@
-"""What a node costs: the way there and back by size, and the execution of each analysis.
+"""Costs of a node: the round trip by message size, and the execution of each analysis.
 
 All of it is observed, in seconds of the host; a few newest observations count, so that estimates
 follow the network, and quantiles rather than means, so that one odd value does not move them.
@@ -28,7 +28,7 @@ def quantile(values: Sequence[float], share: float) -> float:
 
 
 class LinkEstimate:
-    """The way to a node and back: `seconds = latency + size / bandwidth`. Threads may share it."""
+    """Round trip to a node: `seconds = latency + size / bandwidth`. Threads may share it."""
 
     def __init__(self) -> None:
         self._latencies: deque[float] = deque(maxlen=_LINK_KEPT)
@@ -99,7 +99,7 @@ class Uplink:
     def depart(self, name: object, size: float, at: float, work: float = 0.0) -> None:
         """Something of so many bytes is handed to the link at `at`, seconds.
 
-        Its answer takes `work` seconds more than the way there and back.
+        Its answer takes `work` seconds more than the round trip.
         """
         self._under_way[name] = size, at, work
 

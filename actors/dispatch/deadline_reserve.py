@@ -1,4 +1,4 @@
-"""What the live system adds to an execution: the way to an executor and back, and late timers."""
+"""Overhead of the live system per execution: the round trip to an executor, and late timers."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class Managed:
     profile: Profile
     """Its model's name is the stream."""
     acknowledges: bool = False
-    """True in lockstep for an analysis whose results nobody reads."""
+    """True in lockstep for an analysis whose results have no reader."""
     open_times: frozenset[str] = frozenset()
     """Times of the profile that the user left to be measured."""
     triggers: tuple[TriggerSpec, ...] = ()
@@ -129,7 +129,7 @@ class DispatcherActor(StreamActor):
         self._gone: set[str] = set()
         """Models whose executor on the edge will not come back."""
         self._complaints: deque[str] = deque(maxlen=_COMPLAINTS_KEPT)
-        """Failures in the cloud that people were told of."""
+        """Failures in the cloud that were published as alerts."""
         self._counts = Counts()
         self._cloud: ExecutorPool | None = None
         self._liveness_monitor: LivenessMonitor | None = None

@@ -87,7 +87,7 @@ class CloudExecutor:
         leave()
 
     def ping(self, data: bytes) -> int:
-        """Answer at once, to measure the way here; returns the number of bytes."""
+        """Answer at once, to measure the link; returns the number of bytes."""
         return len(data)
 
     def execute(
@@ -135,7 +135,7 @@ class CloudExecutor:
 
 
 class _Context:
-    """What an analysis may ask of the cloud: the time of its item, and nobody to alert."""
+    """Context of an analysis in the cloud: the time of its item; it cannot alert."""
 
     kind: ComputeKind = "cloud"
 

@@ -48,7 +48,7 @@ class ExecutorPool:
         return sum(self._slots[site] for site in present)
 
     def expected(self, model: str) -> float | None:
-        """Seconds from sending a task to its result; None while nobody knows."""
+        """Seconds expected from sending a task to its result; None before the first result."""
         known = [cloud.expected(model) for cloud in self._able(model)]
         return min((seconds for seconds in known if seconds is not None), default=None)
 

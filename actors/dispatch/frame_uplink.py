@@ -1,4 +1,4 @@
-"""The way of frames to one node: each crosses the link once, coded as is faster, and is timed."""
+"""Uplink of frames to one node: each crosses the link once, coded as is faster, and is timed."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class FrameTransfer:
 
 
 class FrameUplink:
-    """Everything about the way to one node. `later` runs things in the thread that packs."""
+    """State of the uplink to one node. `later` runs calls in the packing thread."""
 
     def __init__(self, compression: str) -> None:
         """`compression` is that of `ComputeConfig`."""

@@ -1,4 +1,4 @@
-"""A scheduler in flight is somebody's code: its thinking is kept apart, timed and cut off."""
+"""Guard around a scheduler in flight: its calls run in a thread, are timed and cut off."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ _SLOW = 0.05
 _SLOW_IN_A_ROW = 5
 """... and slow answers in a row that are too many: a single one may be the machine's fault."""
 _LIMIT = 2.0
-"""Seconds on one event after which nobody waits any longer."""
+"""Longest wait for the scheduler's answer to one event, seconds."""
 _PATIENT_LIMIT = 10.0
-"""The same for `start`, which may load something, and where nobody is in a hurry."""
+"""The same for `start`, which may load something and delays no task."""
 
 _Answer = tuple[Any, BaseException | None, float]
 

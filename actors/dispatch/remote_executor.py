@@ -117,7 +117,7 @@ class RemoteExecutor:
         self._wake = wake
         self._started: dict[int, _Sent] = {}
         self._overdue: dict[int, _Sent] = {}
-        """Given up, but their frames may still be on the way."""
+        """Executions given up whose frames may still cross the link."""
         self._answered: deque[_Sent] = deque()
         self._answered_since = -1
         """When the newest execution that was answered had been sent."""
@@ -213,7 +213,7 @@ class RemoteExecutor:
             self._answer(sent)
 
     def _forget_overdue(self) -> None:
-        """What was sent later has been answered, so nothing is on the way any more."""
+        """Forget overdue executions: an answer to a later one shows that the link is empty."""
         for sent in self._overdue.values():
             self.frame_uplink.uplink.lose(sent.way)
         self._overdue.clear()
@@ -253,7 +253,7 @@ class RemoteExecutor:
             reference = execute.remote(sent.task.profile.model, transfer.name, data, left)
             future = sent.future = reference.future()
             future.add_done_callback(lambda _: self._came_back(sent))
-        except Exception as error:  # noqa: BLE001 - whatever it is, it must not be silence
+        except Exception as error:  # noqa: BLE001 - any error is reported as the execution's
             sent.problem = f"{type(error).__name__}: {error}"
             self._came_back(sent)
 

@@ -1,8 +1,8 @@
-"""The drone's actor: the 20 Hz setpoint loop beside the vehicle, whatever the rest does.
+"""The drone's actor: the 20 Hz setpoint loop beside the vehicle, independent of other actors.
 
 In real time each robot has an actor of its own. In lockstep one actor flies all the simulated
 robots of a run and conducts mission time: it moves to the next due moment, publishes what is
-measured there, and goes on once everyone whose work can reach a drone is done.
+measured there, and goes on once every actor whose work can reach a drone is done.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Calls that other threads make and a loop carries out in its own thread, between its turns.
 
-What a loop works on needs no lock then: nobody else ever touches it.
+State that only the loop's thread touches needs no lock.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ class LoopCalls:
         return len(answers)
 
     def close(self, why: str) -> None:
-        """The loop is over, for the reason `why`: whoever waits or comes later is told so."""
+        """End the loop for the reason `why`: waiting and later callers get LoopOverError."""
         self._over = why
         self._refuse()
 

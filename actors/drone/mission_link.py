@@ -1,4 +1,4 @@
-"""The way from an analysis to the mission and back: numbered requests, replies, status."""
+"""Link between an analysis and the mission: numbered requests, replies, status."""
 
 from __future__ import annotations
 
@@ -85,5 +85,5 @@ class StreamLink:
         return self.command(StreamItem(self._node, navigation, index=index, replaces=False))
 
     def alert(self, alert: Alert) -> None:
-        """Tell the people who watch."""
+        """Publish an alert."""
         self._actor.alert(alert.kind, alert.text, **alert.values)

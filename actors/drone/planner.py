@@ -31,7 +31,7 @@ class _PlannerActor:
 
     @ray.method(max_task_retries=-1)
     def load(self, *_: object) -> None:
-        """Arrive with one's arguments, however often the process dies on the way."""
+        """Load the classes of the arguments; tried again whenever the process dies meanwhile."""
         be_nice(_NICENESS)
 
     def call(self, function: Callable[..., T], *args: Any, **kwargs: Any) -> T:  # noqa: ANN401

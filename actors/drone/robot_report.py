@@ -1,4 +1,4 @@
-"""What a drone's actor publishes of one robot each turn, for whoever asks."""
+"""Immutable report of one robot, replaced by its actor each turn of the setpoint loop."""
 
 from __future__ import annotations
 

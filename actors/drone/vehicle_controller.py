@@ -59,7 +59,7 @@ _PLANS_PATIENCE = 4.0
 _TURNS_FAILED = 20
 """Turns in a row that raise, a second of them, after which the vehicle is left to itself."""
 _LEAST_PATIENCE = 5.0
-"""Wall seconds; enough for an actor that is starting anew, whatever the speed of the mission."""
+"""Wall seconds; enough for a restarting actor at any speed of the mission."""
 
 
 def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
@@ -79,7 +79,7 @@ class RobotSpec:
 
     robot: RobotConfig
     sensors: tuple[SensorConfig, ...]
-    """The vehicle's own sensors (no cameras) that somebody reads."""
+    """The vehicle's own sensors (no cameras) that have a reader."""
     navigation: tuple[str, ...]
     """Streams that feed its mission."""
     commands: tuple[str, ...]
@@ -109,7 +109,7 @@ class VehicleController:
         self._failures = 0
         """Turns in a row that raised."""
         self._blamed: set[tuple[str, type[Exception]]] = set()
-        """Whose failure people have been told of already."""
+        """Sources and kinds of the failures that were published as alerts."""
         self._alerts: list[Alert] = []
         plugin = load_plugin("drivers", spec.robot.driver)
         self.vehicle: Vehicle = plugin(spec.robot, session.environment)
@@ -205,7 +205,7 @@ class VehicleController:
             return self._refuse(source, error, now)
 
     def _refuse(self, source: str, error: Exception, now: int) -> Answer:
-        """Take note of what `source` brought upon itself; people are told once of each kind."""
+        """Refuse a command of `source`; each kind of its errors is published as an alert once."""
         text = f"{source} failed: {failure_line(error)}"
         if (source, type(error)) not in self._blamed:
             self._blamed.add((source, type(error)))
@@ -240,7 +240,7 @@ class VehicleController:
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
         """One turn of the setpoint loop; publishes what was decided.
 
-        A turn that raises, for what somebody's data did to the mission, empties the queue and lets
+        A turn that raises, because of an item's or a plug-in's data, empties the queue and lets
         the drone hover; the error is raised only once a second of turns has ended so.
         """
         try:

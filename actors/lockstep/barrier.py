@@ -1,4 +1,4 @@
-"""Lockstep: mission time waits until everyone has worked through what was measured.
+"""Lockstep barrier: mission time waits until all readers have processed each measurement.
 
 Each measurement is known by its source and stamp. An analysis answers every item with exactly
 one message, empty if it has nothing to say, so the readers at the ends of all paths tell that
@@ -18,7 +18,7 @@ def paths(graph: Graph, stream: str, steering: set[str], *, recorded: bool) -> i
     """How many acknowledgements one message of `stream` leads to.
 
     The recorder, the drones' actor if the stream is among the `steering` ones, and an analysis
-    whose results nobody reads each give one.
+    whose results have no reader each give one.
     """
     ends = int(recorded) + (stream in steering)
     for node in graph.downstream(stream):
@@ -57,7 +57,7 @@ class Barrier:
     def acknowledge(self, source: str, stamp: int) -> None:
         """One reader is done; the word may come before the measurement is expected.
 
-        Sources without a window are nobody's to wait for.
+        Sources without a window are not waited for.
         """
         if source in self.windows and stamp > self._forgotten.get(source, -1):
             self.expect(source, stamp, -1)

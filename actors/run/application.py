@@ -1,8 +1,8 @@
 """What the application's own files define, as every process of its run is given it.
 
 The session carries it: modules as source text, and the classes of files that run as `__main__`,
-which nobody can import, as pickles. An actor gets its session before anything else, so that
-whatever it is sent later finds its classes there.
+which no other process can import, as pickles. An actor gets its session before anything else, so
+that messages sent later find their classes there.
 """
 
 from __future__ import annotations

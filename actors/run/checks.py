@@ -1,6 +1,6 @@
 """What an environment and a graph must be before anything starts, each fault with its remedy.
 
-Whatever an actor would refuse when it opens is refused here first, as far as it can be known: Ray
+Errors that an actor would raise when it opens are raised here first, as far as possible: Ray
 takes seconds to start, and a fleet on its way to the field does not come back for a typing error.
 """
 

@@ -154,7 +154,7 @@ class Flight:
         self._head = HeadWatch(ray.get_runtime_context().gcs_address, self._note)
 
     def _start(self, members: list[Member]) -> None:
-        # Those that only listen go first, so that nobody speaks to an empty room.
+        # Subscribers start first, so that no message is published before its readers are there.
         for member in reversed(members):
             member.handle.start.remote(self._origin)
             member.report = ActorReport("running")
@@ -162,7 +162,7 @@ class Flight:
         self._liveness_monitor.append(LivenessMonitor(mortal, self._life_of))
 
     def poll(self, newest: int = 200) -> FlightState:
-        """Ask how everyone fares, with the `newest` latencies of each robot.
+        """Poll all actors, with the `newest` latencies of each robot.
 
         Also tells the drones that the application is alive.
         """
@@ -311,7 +311,7 @@ class Flight:
         return {m.name: m.info for m in self._members.values() if m.info is not None}
 
     def publisher(self, stream: str) -> tuple[Any, str] | None:
-        """Who publishes `stream`, an actor's handle, and its node; None if nobody does."""
+        """The actor that publishes `stream`, as a handle, and its node; None without one."""
         for name, info in self.infos().items():
             if stream in info.publishes:
                 return self._members[name].handle, info.node_id

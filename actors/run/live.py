@@ -37,7 +37,7 @@ class _Source(Protocol):
 
 
 class _Asking:
-    """Asks the publisher for its newest messages: nobody can call an application."""
+    """Polls the publisher for its newest messages, as no actor can call an application."""
 
     def __init__(self, publisher: Any, stream: str) -> None:  # noqa: ANN401 - Ray's handle
         self._publisher = publisher

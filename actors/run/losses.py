@@ -1,4 +1,4 @@
-"""What people are told of a drone whose actor has gone: whose it was, and what it does now."""
+"""Alert texts for a lost drone actor: which drone, and what its autopilot does now."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ending the actors of a run: what still writes comes last, and nobody is waited for for ever."""
+"""Shutdown of a run's actors: those that write end last, and each wait is bounded."""
 
 from __future__ import annotations
 

@@ -115,7 +115,7 @@ def _is_own(path: Path) -> bool:
 
 @lru_cache(maxsize=1024)
 def imported_names(text: bytes, package: str) -> tuple[str, ...]:
-    """Names that a source imports, at whatever place; `package` is what relative ones refer to."""
+    """Names that a source imports anywhere; relative ones refer to `package`."""
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError):

@@ -2,7 +2,8 @@
 
 Layout: u32 number of buffers, u32 length of the envelope's pickle, u32 length of the item's, u64
 length of each buffer, the two pickles, then each buffer, aligned to 64 bytes. Little-endian, as
-both ends run the same host. The envelope is apart so that it can be read whatever the item is.
+both ends run the same host. The envelope is apart so that it is readable without the item's
+classes.
 """
 
 from __future__ import annotations
@@ -123,7 +124,7 @@ def _pickled(message: Message[Any]) -> tuple[bytes, list[pickle.PickleBuffer]]:
     if message.stream not in _defined:
         try:
             return pickle.dumps(message.item, protocol=5, buffer_callback=buffers.append), buffers
-        except Exception:  # noqa: BLE001 - whatever it is, the other way tells
+        except Exception:  # noqa: BLE001 - the other pickler names the cause
             buffers = []
     try:
         data = _definitions.pickled(message.item, buffers.append)

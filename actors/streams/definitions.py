@@ -2,7 +2,7 @@
 
 Pickle names a class by its module, and the module `__main__` is another one in every process. The
 run hands all its processes the definitions of its application's classes beforehand (`define`), so
-that a message only names them. A class that nobody knew of then, such as one made in flight,
+that a message only names them. A class unknown then, such as one made in flight,
 travels with each message that needs it. Either way a process builds a class once, and
 `isinstance` holds wherever an item goes.
 """

@@ -30,7 +30,7 @@ def culprit(item: object, error: Exception) -> str:
 
 
 def _search(item: object, error: Exception, depth: int) -> tuple[str, Exception]:
-    """The way to the innermost part that fails, and why it does."""
+    """Path to the innermost part that fails, and its reason."""
     if depth < _DEEPEST:
         for name, part in _parts(item):
             reason = _failure(part)

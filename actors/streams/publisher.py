@@ -24,7 +24,7 @@ _MESSAGES_KEPT = 4
 class Publisher:
     """Publishes one stream: in shared memory on this node, by reference to other nodes.
 
-    An item that cannot be sent leaves its message empty, so that everyone who waits for it goes on.
+    An item that cannot be sent leaves its message empty, so that readers that wait for it go on.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Publisher:
     def since(self, seq: int) -> list[bytes]:
         """Encoded messages from number `seq` on, of the newest few; any thread may ask.
 
-        They are kept from the first question on. Whoever is ahead of this publisher has known one
+        They are kept from the first question on. A reader ahead of this publisher has known one
         before it, and is given all.
         """
         if self._kept is None:

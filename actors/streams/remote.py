@@ -1,4 +1,4 @@
-"""The way to another node: a few messages under way, the newest kept back.
+"""Transport to another node: a few messages under way, the newest kept back.
 
 What a call carries arrives with it, up to Ray's RAY_max_direct_call_object_size; what lies in the
 object store costs its reader four or five round trips more. So a message for one reader goes in
@@ -36,7 +36,7 @@ class _Transfer:
         """What the call is given."""
         if not self._shared:
             return self._data
-        # Two threads may both put it; that costs a copy and harms nobody.
+        # Two threads may both put it, which costs a copy only.
         if self._reference is None:
             self._reference = ray.put(self._data)
         return self._reference

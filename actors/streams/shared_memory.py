@@ -25,7 +25,7 @@ MAX_BORROWED = 16
 """Messages that a reader may hold on to while it goes on receiving."""
 _INITIAL_BYTES = 4096
 _COPIED_BYTES = 65536
-"""Messages up to this size are copied, which takes microseconds, so that nobody borrows them."""
+"""Messages up to this size are copied, which takes microseconds, so that no reader borrows them."""
 
 
 @functools.cache
@@ -40,7 +40,7 @@ def shared_memory_available() -> bool:
     """Tell whether this host can carry streams in shared memory."""
     try:
         _node()
-    except Exception:  # noqa: BLE001 - whatever the library raises, the answer is no
+    except Exception:  # noqa: BLE001 - with any error of the library the answer is no
         return False
     return True
 

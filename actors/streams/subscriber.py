@@ -87,7 +87,7 @@ class Subscriber:
         """Return what has arrived, in order within each stream; wait up to `timeout` seconds.
 
         Returns early, perhaps empty-handed, when woken. Streams come in the order in which they
-        were named, whatever the order of arrival.
+        were named, regardless of the order of arrival.
         """
         self.subscribe_added()
         messages = self._collect()
