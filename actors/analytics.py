@@ -40,7 +40,7 @@ _HUNG = 5.0
 
 @dataclass(frozen=True)
 class Wake:
-    """Tells a dormant analysis to work from now on."""
+    """Message that wakes a dormant analysis."""
 
 
 @dataclass(frozen=True)
@@ -80,13 +80,13 @@ class AnalyticsActor(StreamActor):
         self._threads: list[threading.Thread] = []
 
     def prepare(self, *nodes: NodeSpec) -> ActorInfo:
-        """Open the analyses `nodes`; raises what their `open` raises."""
+        """Open the analyses `nodes`; raises the errors of their `open`."""
         # Not in the constructor: Ray would keep the models in its object store for restarts.
         self._workers = [_Worker(self, node) for node in nodes]
         return super().prepare()
 
     def join(self, *nodes: NodeSpec) -> ActorInfo:
-        """Run further analyses in flight; raises what their `open` raises, and runs none then."""
+        """Run further analyses in flight; raises the errors of their `open`, and runs none then."""
         fresh = [_Worker(self, node) for node in nodes]
         before = set(self.publishers)
         try:
@@ -141,7 +141,7 @@ class AnalyticsActor(StreamActor):
                 worker.subscriber.deliver(stream, data)
 
     def stop(self) -> Any:  # noqa: ANN401 - the base's report
-        """Finish what is under way, close everything, and report for the last time."""
+        """Finish the items under way, close everything, and return the last report."""
         self._stopping.set()
         for worker in self._workers:
             worker.wake()
@@ -152,7 +152,7 @@ class AnalyticsActor(StreamActor):
         return sorted({stream for worker in self._workers for stream in worker.depths})
 
     def counts(self) -> dict[str, StreamCount]:
-        """What each analysis received and dropped of its inputs, as `stream>analysis`."""
+        """Counts of each analysis' received and dropped inputs, as `stream>analysis`."""
         return {
             f"{stream}>{worker.node.stream}": StreamCount(
                 worker.subscriber.received[stream], worker.subscriber.dropped[stream]
@@ -216,7 +216,7 @@ class _Worker:
         self.opened = True
 
     def acknowledge(self, *, wanted: bool) -> None:
-        """Say, or say no longer, when an item has been worked through."""
+        """Start or stop acknowledging processed items."""
         stream = f"{ACKS}/{self.node.stream}"
         known = self._actor.publishers.get(stream)
         self._acks = (known or self._actor.publisher(stream)) if wanted else None
@@ -286,7 +286,7 @@ class _Worker:
             self._acknowledge(self._results.measure(item, header, captured))
 
     def _receive(self, timeout: float) -> list[Message[Any]]:
-        """Take note of what has arrived, and return it."""
+        """Return the messages that have arrived, and store states and wake-ups among them."""
         messages = self.subscriber.receive(timeout)
         if messages and self._actor.session.lockstep:
             # A state is published before what was measured in it, but may arrive in between.
@@ -348,7 +348,7 @@ class _Worker:
             self._acks.derive(done, message, host_time_ns(), message.stamp)
 
     def look_after(self) -> None:
-        """Say once of an item that it takes too long."""
+        """Publish an alert, once, about an item that takes too long."""
         since = self._at_work_since
         if since is None or since == self._hung_since or time.perf_counter() - since < _HUNG:
             return

@@ -1,4 +1,4 @@
-"""What all actors share: a life in four steps, a subscriber, publishers, and a report.
+"""The base of all actors: a life in four steps, a subscriber, publishers, and a report.
 
 The driver's process creates all actors at once, then calls on each `prepare` (open models and
 cameras, join the streams), `start` (run in a thread of the actor's own), any number of `report`,
@@ -40,7 +40,7 @@ __all__ = [
 
 _ALERTS_KEPT = 50
 _REPEATED = 5 * NANOSECONDS
-"""Mission time within which an alert in the same words is the same alert."""
+"""Mission time within which an alert with the same text is the same alert."""
 _LISTENING = 5.0
 """Wall seconds that an actor's own thread may take to turn to further streams."""
 Phase = Literal["new", "ready", "running", "done", "failed"]
@@ -56,12 +56,12 @@ class ActorInfo:
     publishes: tuple[str, ...]
     reads: tuple[str, ...]
     clock: int
-    """What its machine's clock read when it was ready, host time in nanoseconds."""
+    """Reading of the machine's clock when the actor was ready, host time in nanoseconds."""
 
 
 @dataclass(frozen=True)
 class StreamCount:
-    """What an actor has seen of one stream."""
+    """Counts of one stream that an actor reads."""
 
     received: int
     dropped: int
@@ -69,7 +69,7 @@ class StreamCount:
 
 @dataclass(frozen=True)
 class SentCount:
-    """What an actor has published on one stream."""
+    """Counts of one stream that an actor publishes."""
 
     count: int
     median_ms: float | None
@@ -86,17 +86,17 @@ class ActorReport:
     streams: dict[str, StreamCount] = field(default_factory=dict)
     sent: dict[str, SentCount] = field(default_factory=dict)
     vitals: Vitals | None = None
-    """What its process takes; None before it has said anything."""
+    """Resources used by the actor's process; None before the first measurement."""
     alerts: tuple[Alert, ...] = ()
     """The newest alerts, oldest first."""
     problems: tuple[str, ...] = ()
-    """What could not be sent or read."""
+    """Items that could not be sent or read, with the reason."""
     values: dict[str, Any] = field(default_factory=dict)
     """Figures of the actor's own."""
 
 
 def failure_line(error: BaseException) -> str:
-    """Where an exception was raised, by file and line, and what it says."""
+    """The text of an exception, with the file and line that raised it."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""  # noqa: PTH119
     try:
@@ -135,7 +135,7 @@ class StreamActor:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._told: dict[tuple[str, str], int] = {}
-        """When each of the newest alerts was last told, by kind and words."""
+        """Mission time of the newest alerts, by kind and text."""
         self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
         # Reentrant: an alert may be found to be unsendable while it is sent.
         self._alerting = threading.RLock()
@@ -144,7 +144,7 @@ class StreamActor:
         self.publishers: dict[str, Publisher] = {}
 
     def prepare(self) -> ActorInfo:
-        """Open everything; raises the project's errors for what cannot be opened."""
+        """Open streams and devices; raises the project's errors."""
         be_nice(self.niceness)
         logging.captureWarnings(capture=True)
         logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
@@ -155,7 +155,7 @@ class StreamActor:
         return self.info()
 
     def info(self) -> ActorInfo:
-        """Where the actor lives, and what it reads and publishes by now."""
+        """The actor's node and process, and the streams that it reads and publishes."""
         return ActorInfo(
             ray.get_runtime_context().get_node_id(),
             os.getpid(),
@@ -175,7 +175,7 @@ class StreamActor:
         return self.info()
 
     def learn(self, application: Application) -> None:
-        """Know what the application has defined since the session was made."""
+        """Take over classes that the application has defined since the session was made."""
         del application  # to arrive is enough
 
     def connect(self, readers: dict[str, list[Any]]) -> None:
@@ -228,7 +228,7 @@ class StreamActor:
         )
 
     def stop(self) -> ActorReport:
-        """Finish what is under way, close everything, and report for the last time.
+        """Finish the work under way, close everything, and return the last report.
 
         The process ends soon afterwards, at the latest by itself.
         """
@@ -276,7 +276,7 @@ class StreamActor:
         return Subscriber(self.scope, name, depths, unreadable)
 
     def _problem(self, kind: str, text: str) -> None:
-        """Say once what cannot be sent or read; it is told again when the run ends."""
+        """Publish a problem with an item once; the report repeats it at the end of the run."""
         with self._alerting:
             if text not in self._problems and len(self._problems) < _ALERTS_KEPT:
                 self._problems.append(text)
@@ -307,7 +307,7 @@ class StreamActor:
             self._newest_alerts.append(alert)
 
     def follow(self, stamp: int) -> None:
-        """In lockstep mission time is what the newest message says, but for who conducts it."""
+        """In lockstep, advance this actor's mission time to a message's; not in the conductor."""
         with self._alerting:
             if isinstance(self.clock, LockstepClock) and stamp > self.clock.now():
                 self.clock.advance_to(stamp)
@@ -317,7 +317,7 @@ class StreamActor:
         return list(self._reads)
 
     def counts(self) -> dict[str, StreamCount]:
-        """What was received and dropped, by stream."""
+        """Received and dropped messages, by stream."""
         if self.subscriber is None:
             return {}
         return {
@@ -326,7 +326,7 @@ class StreamActor:
         }
 
     def sent(self) -> dict[str, SentCount]:
-        """What was published, by stream."""
+        """Published messages, by stream."""
         return {stream: _sent(publisher) for stream, publisher in self.publishers.items()}
 
     @property

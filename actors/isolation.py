@@ -32,7 +32,7 @@ _INSTALL_TIMEOUT = 600.0
 
 @dataclass(frozen=True)
 class _Installed:
-    """What a node said."""
+    """A node's answer."""
 
     command: tuple[str, ...] = ()
     """Starts a Python that has the packages."""

@@ -1,4 +1,4 @@
-"""What the operating system grants a process that must be punctual: niceness, real time, memory.
+"""Priority of a process that must be punctual: niceness, real time scheduling, locked memory.
 
 Linux knows niceness by thread, so that a process which Ray started niced is raised thread by
 thread. Elsewhere nothing is granted, and nothing is asked for.
@@ -35,7 +35,7 @@ _REAL_TIME_PRIORITY = 1
 _SWITCH_INTERVAL = 0.001
 """Seconds after which a thread of the interpreter gives way to the loop; Python's own: 5 ms."""
 _CURRENT, _ON_FAULT = 1, 4
-"""Of `mlockall`: what is mapped already, and of that only what is touched."""
+"""Flags of `mlockall`: present mappings, and of these only touched pages."""
 _YOUNG_EVERY = 20
 _ALL_EVERY = 600
 """Turns of a loop between two collections of new, and of all, garbage."""
@@ -52,7 +52,7 @@ def niceness() -> int:
 
 
 def raise_niceness() -> int:
-    """Bring all threads of this process to normal niceness; returns what this one has then."""
+    """Set all threads of this process to normal niceness; returns this thread's niceness."""
     if wanted():
         _set_all(lambda now: min(now, 0))
     return niceness()
@@ -98,7 +98,7 @@ def ordinary() -> None:
 
 
 def lock_memory() -> str:
-    """Keep what this process has mapped and touches in memory; returns why not, or nothing.
+    """Lock this process' touched memory; returns the reason of a failure, or nothing.
 
     What it maps later is not locked, so that it does not grow by what it never uses.
     """
@@ -139,7 +139,7 @@ class Slack:
 
 @contextlib.contextmanager
 def punctual() -> Iterator[tuple[str, ...]]:
-    """Run the loop inside as punctually as this machine grants; yields what it does not grant.
+    """Run the loop inside as punctually as this machine grants; yields the refused means.
 
     Garbage is collected only when asked for (`Slack`), and what is there already never again.
     """

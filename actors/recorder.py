@@ -86,7 +86,7 @@ class RecorderActor(StreamActor):
         self._write(Message(stream, count, stamp, alert.header, host_time_ns(), (), alert))
 
     def vitals(self, readings: dict[str, Vitals]) -> None:
-        """Record what the run's processes take, by `actor@machine`."""
+        """Record the resources used by the run's processes, by `actor@machine`."""
         stamp = self.clock.now()
         self._readings += 1
         for source, reading in readings.items():
@@ -126,7 +126,7 @@ class RecorderActor(StreamActor):
             self.alert("recording_stopped", self._failure)
 
     def _note_drops(self) -> None:
-        """Record what was lost on its way here as it happens: the run may be killed."""
+        """Record losses before the recorder as they happen, as the run may be killed."""
         assert self.subscriber is not None  # noqa: S101 - prepare came first
         for stream, dropped in self.subscriber.dropped.items():
             if dropped > self._lost[stream]:

@@ -20,7 +20,7 @@ __all__ = ["SensorActor"]
 
 
 class SensorActor(StreamActor):
-    """Asks a camera for its newest picture at the sensor's rate and publishes it as a Frame."""
+    """Asks a camera for its newest image at the sensor's rate and publishes it as a Frame."""
 
     niceness = 5
 
@@ -35,7 +35,7 @@ class SensorActor(StreamActor):
         self._vehicle: VehicleState | None = None
 
     def prepare(self, ends: bool = False) -> ActorInfo:  # noqa: FBT001, FBT002 - Ray's
-        """Open the camera; with `ends`, the mission is over once it has no more pictures."""
+        """Open the camera; with `ends`, the mission ends with its last image."""
         self._ends = ends
         return super().prepare()
 

@@ -1,4 +1,4 @@
-"""What every actor of one run knows."""
+"""Data of one run that all its actors share."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MESSAGE_DEPTH = 32
 NEVER = 2**63 - 1
 """A stamp that does not come."""
 CONTROL_RATE = 20.0
-"""Turns of the setpoint loop in a second: ten times what PX4 asks for in offboard mode."""
+"""Turns of the setpoint loop in a second: ten times the least rate of PX4's offboard mode."""
 CONTROL_PERIOD_NS = int(NANOSECONDS / CONTROL_RATE)
 
 
@@ -46,7 +46,7 @@ class Session:
     timetables: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     """Stamps in nanoseconds, in order, at which sources are due that go by no rate."""
     application: Application = field(default_factory=Application)
-    """What the application's own files define."""
+    """Definitions of the application's own files."""
 
     def next_due(self, source: str, rate: float, after: int) -> int:
         """The first stamp later than `after` at which `source`, of `rate` Hz, is due.
@@ -60,7 +60,7 @@ class Session:
         return stamps[place] if place < len(stamps) else NEVER
 
     def is_due(self, source: str, rate: float, stamp: int) -> bool:
-        """Tell whether `source`, of `rate` Hz, is due at `stamp`."""
+        """Whether `source`, of `rate` Hz, is due at `stamp`."""
         return self.next_due(source, rate, stamp - 1) == stamp
 
     def scope(self, node_id: str) -> str:

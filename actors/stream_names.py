@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 ACKS = f"{INTERNAL}acks"
-"""Prefix of the streams on which readers without readers of their own say that they are done."""
+"""Prefix of the acknowledgement streams of analyses whose results have no reader."""
 DECISIONS = f"{INTERNAL}decisions"
 """Stream of the analytics scheduler's decisions and their outcomes."""
 
@@ -47,17 +47,17 @@ def reply_stream(node: str) -> str:
 
 
 def setpoint_stream(robot: str) -> str:
-    """Name of the stream of what a robot's mission decided in each turn."""
+    """Name of the stream of a robot's setpoint records."""
     return internal(robot, "setpoints")
 
 
 def end_stream(camera: str) -> str:
-    """Name of the stream on which a camera says that it has no more pictures."""
+    """Name of the stream on which a camera announces its end."""
     return internal(camera, "commands")
 
 
 def trigger_stream(target: str, source: str) -> str:
-    """Name of the stream of what the analysis `source` has a robot or another analysis do."""
+    """Name of the stream of commands and wake-ups from the analysis `source`."""
     return f"{internal(target, 'commands')}/{source}"
 
 
@@ -77,5 +77,5 @@ def alert_stream(actor: str) -> str:
 
 
 def vitals_stream(actor: str) -> str:
-    """Name of the stream of what an actor's process takes."""
+    """Name of the stream of an actor's process figures."""
     return f"{INTERNAL}vitals/{actor}"

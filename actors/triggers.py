@@ -1,4 +1,4 @@
-"""Triggers: what a result wakes or commands, wherever it was made."""
+"""Triggers: the wake-ups and commands that a result causes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Triggers:
         stamp: int,
         complain: Callable[[Exception], None],
     ) -> None:
-        """Publish what a result made of `origin` asks for; what a condition raises is told."""
+        """Publish the commands that a result made of `origin` triggers; errors are complaints."""
         for one in self._specs:
             try:
                 wanted = one.when is None or one.when(result)

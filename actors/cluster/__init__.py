@@ -1,1 +1,1 @@
-"""Ray itself: a local one, a cluster to join, what ends them, and what watches over them."""
+"""Ray itself: a local one, a cluster to join, their ends, and the watch over their actors."""

@@ -20,14 +20,14 @@ __all__ = ["check_cluster"]
 _PATIENCE = 60.0
 """Seconds that a node may take to start a probe; a first import takes some."""
 _CLOCKS_APART = 0.1
-"""Seconds beyond which latencies that cross nodes say nothing."""
+"""Offset of clocks, in seconds, beyond which latencies between nodes are meaningless."""
 _SLOW_RTT = 0.25
 _SLOW_BITS = 5e6
 _KINDS = ("edge", "cloud")
 
 
 def check_cluster(address: str) -> Iterator[Finding]:
-    """Join the cluster at `address` and yield what is found there.
+    """Join the cluster at `address` and yield the findings.
 
     Raises AeroDaaSError or ConfigError where it cannot be joined at all.
     """

@@ -16,7 +16,7 @@ _ADVICE = "clusters/certificates.sh makes certificates, docs/cluster.md says whe
 
 
 def require_same_encryption(address: str, listener: tuple[str, int]) -> None:
-    """Make sure that the cluster at `address`, host and port `listener`, speaks TLS if we do.
+    """Require that the cluster at `address`, host and port `listener`, speaks TLS if we do.
 
     Raises AeroDaaSError if only one does, or one does not trust the other; ConfigError for files
     of ours that cannot be used.

@@ -1,4 +1,4 @@
-"""Asking the head of a cluster who it is, before Ray tries to join it.
+"""Handshake with a cluster's head: its version and token, before Ray tries to join it.
 
 Ray answers a wrong token after half a minute of repeated log lines, and other versions of itself
 with a traceback; its head tells both at once to who asks.
@@ -56,7 +56,7 @@ def greet(address: str) -> None:
 
 
 def listener_of(address: str) -> tuple[str, int] | None:
-    """Host and port of a cluster's address; None for "auto" and what else only Ray understands."""
+    """Host and port of a cluster's address; None for "auto" and other forms of Ray's."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     return (host.strip("[]"), int(port)) if host and port.isdigit() else None
 
@@ -76,7 +76,7 @@ def take_up_token() -> None:
 
 
 def _metadata(address: str) -> dict[str, Any]:
-    """What the head says of itself."""
+    """The head's metadata."""
     try:
         with hushed():
             client = GcsClient(address=address)
@@ -126,7 +126,7 @@ def _level(logger: logging.Logger, level: int) -> Iterator[None]:
 
 @contextlib.contextmanager
 def hushed() -> Iterator[None]:
-    """Ray's C++ part writes to standard error what is raised a moment later."""
+    """Silence Ray's C++ part, which prints errors that are raised a moment later."""
     kept = os.dup(2)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)

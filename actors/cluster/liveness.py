@@ -1,4 +1,4 @@
-"""Word of actors that die and come back, from Ray itself, as soon as it knows."""
+"""Liveness of actors: their deaths and restarts, as soon as Ray notices them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ ASKED_AGAIN = 0.1
 
 
 class LivenessMonitor:
-    """One call waits in each actor for as long as it lives; its end is the news."""
+    """Watches actors by one call that waits in each for as long as it lives."""
 
     def __init__(self, actors: Mapping[str, Any], tell: Callable[[str, Life], None]) -> None:
-        """Watch over Ray actor handles by name; `tell` is called, from any thread, with news.
+        """Watch Ray actor handles by name; `tell` is called, from any thread, with each change.
 
         An actor has the methods `await_start` and `await_stop` and the concurrency group LIFE.
         """

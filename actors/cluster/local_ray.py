@@ -69,7 +69,7 @@ class LocalRay:
         return self._address
 
     def end(self) -> None:
-        """Say goodbye; returns when all is gone, or at once where a drone still has to land."""
+        """Release the supervisor; returns after its end, or at once while a drone still lands."""
         assert self._process.stdin is not None  # noqa: S101 - asked for
         self._process.stdin.close()
         if "flying" not in self._next(_END_SECONDS):
@@ -82,7 +82,7 @@ class LocalRay:
         self._lines.put("{}")
 
     def _next(self, timeout: float) -> dict[str, object]:
-        """What the supervisor says next; empty if it has ended or is silent for too long."""
+        """The supervisor's next line; empty if it has ended or is silent for too long."""
         try:
             return dict(json.loads(self._lines.get(timeout=timeout)))
         except Empty:

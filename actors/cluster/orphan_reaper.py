@@ -25,9 +25,9 @@ from aerodaas.actors.run.shutdown import end_actors, may_fly
 __all__ = ["OrphanReaper"]
 
 _LAUNCH = 200.0
-"""Wall seconds that an application has to start its run, before its first word."""
+"""Wall seconds that an application has from its start to its first call."""
 _SILENCE = 5.0
-"""Wall seconds without a word from the application after which it is taken for dead."""
+"""Wall seconds without a call of the application after which it is taken for dead."""
 _LOOK_INTERVAL = 1.0
 
 

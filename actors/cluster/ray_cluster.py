@@ -36,7 +36,7 @@ __all__ = [
 
 _KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
 _SHARE = 0.001
-"""Share of a node's `edge` or `cloud` resource that an actor takes: it says where, not how much."""
+"""Share of a node's `edge` or `cloud` resource that an actor takes: placement, no amount."""
 _NAMESPACE = "aerodaas"
 """Ray's, for the names of actors that outlive their application."""
 
@@ -52,7 +52,7 @@ class Placement:
 
     kind: Literal["edge", "cloud"] = "edge"
     node: str | None = None
-    """IP address of one node, where the kind alone does not say."""
+    """IP address of one node, where several are of the kind."""
 
 
 def begin(address: str | None) -> None:
@@ -114,7 +114,7 @@ def _init(address: str, **more: Any) -> None:  # noqa: ANN401 - as Ray takes the
 
 
 def _silence_nodes() -> None:
-    """Ray prints what its nodes say of processes that die; the run tells of them by name.
+    """Silence Ray's printing of its nodes' reports of dead processes; the run names them.
 
     `log_to_driver` does not cover it, nor does anything else that Ray lets one choose.
     """
@@ -125,7 +125,7 @@ def _silence_nodes() -> None:
 
 @contextlib.contextmanager
 def _fatal_only() -> Iterator[None]:
-    """Ray's C++ part, which reads this once, writes its errors to the terminal; we tell them."""
+    """Silence Ray's C++ part, which reads this once and prints errors that are raised, too."""
     name = "RAY_BACKEND_LOG_LEVEL"
     if name in os.environ:
         yield
@@ -154,7 +154,7 @@ def _require_edge(address: str) -> None:
 
 
 def is_local() -> bool:
-    """Tell whether the connected Ray was started for this process alone."""
+    """Whether the connected Ray was started for this process alone."""
     return _local is not None
 
 

@@ -40,7 +40,7 @@ _TOO_SLOW = "timed out during startup"
 """Ray gives its node half a minute to start, which a busy machine may not have to give."""
 _START_SECONDS = 180.0
 _GRACE_SECONDS = 3.0
-"""For actors that were told to end and hold their locks a moment longer."""
+"""Seconds for actors that are ending and hold their locks a moment longer."""
 _DYING_SECONDS = 10.0
 _LOOK_SECONDS = 0.2
 _LONGEST = 40
@@ -56,7 +56,7 @@ _RAY = (
 
 
 def main(application: int, words: list[str]) -> None:
-    """Keep a Ray started by `ray start` with `words` for the process `application`."""
+    """Keep a Ray started by `ray start` with arguments `words` for the process `application`."""
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     # Orphans of this Ray's processes become children of this one.
@@ -112,11 +112,11 @@ class _Client:
         self._poll.register(sys.stdin.fileno(), select.POLLIN | select.POLLHUP)
 
     def gone(self, timeout: float) -> bool:
-        """Whether it has died or said goodbye, waiting for that up to `timeout` seconds."""
+        """Whether it has died or left, waiting for that up to `timeout` seconds."""
         return bool(self._poll.poll(timeout * 1000.0))
 
     def tell(self, **words: object) -> None:
-        """Say something, if it is still there."""
+        """Send a line to the application, if it still runs."""
         with contextlib.suppress(OSError):
             print(json.dumps(words), flush=True)  # noqa: T201 - this is the pipe
 
@@ -211,7 +211,7 @@ def _command(pid: int) -> str:
 
 
 def _prune(base: Path) -> None:
-    """Remove what a supervisor that was killed has left, but where a drone still flies."""
+    """Remove the remains of supervisors that were killed, unless a drone still flies there."""
     for folder in base.glob(f"{PREFIX}*"):
         if _orphaned(folder):
             for pid, _ in list(_processes()):

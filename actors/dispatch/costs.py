@@ -15,7 +15,7 @@ __all__ = ["ExecutionEstimates", "LinkEstimate", "Uplink", "quantile"]
 _KEPT = 11
 _LINK_KEPT = 5
 _LARGE = 16384
-"""Bytes from which a transfer tells about the bandwidth, below which about the latency."""
+"""Size in bytes from which a transfer measures bandwidth, and below which latency."""
 _SURE = 0.9
 """Quantile of the execution times that one may count on."""
 
@@ -42,7 +42,7 @@ class LinkEstimate:
             self._transfers.append((size, seconds))
 
     def forget(self) -> None:
-        """What was known of the bandwidth has turned out to be wrong."""
+        """Discard the estimate of the bandwidth, which was found wrong."""
         self._transfers.clear()
 
     @property
@@ -65,10 +65,10 @@ class LinkEstimate:
 
 
 class Uplink:
-    """What is under way on a link that carries one thing after another. Threads may share it."""
+    """Transfers under way on a link that carries one after another. Threads may share it."""
 
     def __init__(self, link: LinkEstimate, clock: Callable[[], float] = time.perf_counter) -> None:
-        """Learn about `link` from what it carries; `clock` tells the seconds of `depart`."""
+        """Estimate `link` from its transfers; `clock` gives the seconds of `depart`."""
         self._link = link
         self._clock = clock
         self._under_way: dict[object, tuple[float, float, float]] = {}
@@ -76,7 +76,7 @@ class Uplink:
 
     @property
     def waiting(self) -> float:
-        """Bytes that must arrive before what is sent now."""
+        """Bytes ahead of the next transfer."""
         return sum(size for size, _, _ in tuple(self._under_way.values()))
 
     def seconds(self, size: float) -> float:
@@ -104,7 +104,7 @@ class Uplink:
         self._under_way[name] = size, at, work
 
     def arrive(self, name: object, at: float) -> None:
-        """It was there, and answered but for the work, at `at`; learn what the link took for it.
+        """Record a transfer answered, less the work, at `at`, and estimate the link from it.
 
         What it waited for others is theirs: counted twice, a queue would look like a slow link.
         """

@@ -11,7 +11,7 @@ __all__ = ["DeadlineReserve"]
 
 _KEPT = 200
 _ENOUGH = 20
-"""Samples before what was measured is believed."""
+"""Samples needed before a measurement counts."""
 _AT_FIRST = 5 * MILLISECOND
 _QUANTILE = 0.95
 _LARGEST_SHARE = 0.1
@@ -19,7 +19,7 @@ _LARGEST_SHARE = 0.1
 
 
 class DeadlineReserve:
-    """Measures what a scheduler cannot know, so that every scheduler gets the same reserve.
+    """Measures overheads outside the scheduler's model; the same reserve for each scheduler.
 
     A table of execution times and a simulator know nothing of messages and thread switches. A
     scheduler that defers to the last moment would miss by them, so each task's deadline is moved
@@ -33,7 +33,7 @@ class DeadlineReserve:
         self._news = 0
 
     def travelled(self, answer: Message[object], taken: int) -> None:
-        """An execution on the edge took `taken`, of which its executor's span tells the work."""
+        """Record an execution on the edge of duration `taken`; its executor's span is the work."""
         work = answer.spans[-1].published - answer.spans[-1].received
         self._ways.append(max(0, taken - work))
         self._refresh()
@@ -44,7 +44,7 @@ class DeadlineReserve:
         self._refresh()
 
     def reserve(self, deadline: int) -> int:
-        """What to take off a relative deadline, nanoseconds."""
+        """Time to subtract from a relative deadline, nanoseconds."""
         return min(self._reserve, int(_LARGEST_SHARE * deadline))
 
     def _refresh(self) -> None:

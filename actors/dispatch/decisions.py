@@ -1,4 +1,4 @@
-"""What the dispatcher tells of its scheduler: each decision with its reason, and the sums."""
+"""The dispatcher's record of its scheduler: each decision with its reason, and the sums."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Counts", "DecisionLog"]
 
 
 class DecisionLog:
-    """Publishes what became of each task."""
+    """Publishes each task's decisions and outcome."""
 
     def __init__(self, publisher: Publisher, many: set[str]) -> None:
         """Publish on `publisher`; `many` are the analyses that watch several cameras."""
@@ -56,7 +56,7 @@ class DecisionLog:
 
 
 class Counts:
-    """What a run is judged by, as in the lab."""
+    """Metrics of a run, as in the lab."""
 
     def __init__(self) -> None:
         """Nothing has happened yet."""

@@ -1,4 +1,4 @@
-"""The dispatcher's actor: an analytics scheduler decides live what runs where, and when.
+"""The dispatcher's actor: an analytics scheduler decides live where each task runs, and when.
 
 The scheduler is the very class that the lab studies, driven through the same `Dispatch`. Each
 frame becomes a task for each managed analysis. The edge executor is serial, as in the model that
@@ -115,7 +115,7 @@ class DispatcherActor(StreamActor):
         self._estimates = Estimates(session.speed or 1.0, scheduler.learns)
         self._now = 0
         self._figures: dict[int, dict[str, float]] = {}
-        """What an execution in the cloud took, by task."""
+        """Figures of executions in the cloud, by task."""
         self._why: dict[int, str] = {}
         """Why an execution failed, by task."""
         self._lost: set[int] = set()
@@ -134,7 +134,7 @@ class DispatcherActor(StreamActor):
         self._cloud: ExecutorPool | None = None
         self._liveness_monitor: LivenessMonitor | None = None
         self._lives: deque[tuple[str, Life]] = deque()
-        """News of executors on the edge, from other threads."""
+        """Changes of executors on the edge, from other threads."""
 
     def prepare(
         self,
@@ -283,7 +283,7 @@ class DispatcherActor(StreamActor):
             self._require_decisions(now)
 
     def _wake_scheduler(self) -> None:
-        """Real time: tell of the timers that are due, before anything that came after them."""
+        """Real time: fire the timers that are due, before any later event."""
         while not self.session.lockstep and self._timers and self._timers[0] <= self._time():
             self._way.delayed(self._now - heapq.heappop(self._timers))
             self._guarded("timer", self._now)
@@ -355,7 +355,7 @@ class DispatcherActor(StreamActor):
                 return
 
     def _guarded(self, event: str, *args: Any) -> None:  # noqa: ANN401
-        """Tell the scheduler; one that raises, talks nonsense or is slow is replaced."""
+        """Call the scheduler; one that raises, returns invalid decisions or is slow is replaced."""
         now = next(arg for arg in reversed(args) if isinstance(arg, int))
         try:
             getattr(self._dispatch, event)(*args)

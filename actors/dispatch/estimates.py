@@ -1,4 +1,4 @@
-"""What a scheduler is told of each analysis: the user's figures, or else what was measured."""
+"""The profile that a scheduler gets of each analysis: the user's figures, or measured ones."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from aerodaas.types.clock import NANOSECONDS
 __all__ = ["Estimates"]
 
 _WORTH_TELLING = 0.05
-"""Relative difference between what was told and what is measured that is told."""
+"""Relative difference between the given and the measured time that is reported."""
 
 
 class Estimates:
-    """Profiles whose times follow what is measured, where the user left them out."""
+    """Profiles with measured times where the user gave none."""
 
     def __init__(self, speed: float, learnt: frozenset[str]) -> None:
         """Mission time runs at `speed`; the scheduler learns the times named in `learnt` itself.

@@ -28,7 +28,7 @@ from aerodaas.types.vehicle import VehicleState
 __all__ = ["FRAMES_KEPT", "CloudExecutor", "Executed", "MissingFrameError", "UnpreparedError"]
 
 _NICENESS = 10
-"""Of its process: on one machine, what flies goes before."""
+"""Niceness of its process, so that on one machine the setpoint loop comes first."""
 FRAMES_KEPT = 8
 """Frames that can be named; the oldest gives way to the next."""
 _UNPACKING = 2.0
@@ -40,20 +40,20 @@ class UnpreparedError(AeroDaaSError):
 
 
 class MissingFrameError(AeroDaaSError):
-    """An executor does not know the frame that a call names."""
+    """An executor does not hold the frame that a call names."""
 
 
 class Executed(NamedTuple):
-    """What an execution gives back."""
+    """The answer of an execution."""
 
     message: bytes
-    """The message, encoded, with the result in it; its last span tells how long it was here."""
+    """The encoded message with the result; its last span is the executor's."""
     decoding: float
     """Seconds of it that went into decompressing the frame; 0 where the frame was named."""
 
 
 class CloudExecutor:
-    """Holds the analyses of `prepare`; Ray runs as many `execute` at once as it was told."""
+    """Holds the analyses of `prepare`; Ray runs several `execute` at once, up to its slots."""
 
     def __init__(self, application: Application | None = None) -> None:
         """Hold nothing yet: the analyses would be kept for restarts.
@@ -113,7 +113,7 @@ class CloudExecutor:
         return Executed(encode_message(replace(message, spans=spans, item=result)), decoding)
 
     def _unpack(self, frame: tuple[str, int], data: bytes) -> tuple[Message[Any], float]:
-        """The message with its picture decompressed, and the seconds that this took."""
+        """The message with its image decompressed, and the seconds of decompressing."""
         message, decoding = decode_message(memoryview(data)), 0.0
         if isinstance(message.item, CodedFrame):
             began = time.perf_counter()

@@ -1,4 +1,4 @@
-"""All of the cloud as the dispatcher sees it: which executor takes a task, and what that takes."""
+"""All executors of the cloud: which one takes a task, and its expected duration."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class ExecutorPool:
 
     @property
     def slots(self) -> int:
-        """Executions that may be under way at once, on what is not gone."""
+        """Executions that may be under way at once on the executors that are not gone."""
         present = {cloud.executor.site for cloud in self._clouds if not cloud.gone}
         return sum(self._slots[site] for site in present)
 
@@ -53,7 +53,7 @@ class ExecutorPool:
         return min((seconds for seconds in known if seconds is not None), default=None)
 
     def on_the_way(self, model: str) -> float:
-        """Seconds that the link alone takes for a frame sent now, what is queued on it included."""
+        """Seconds of the link alone for a frame sent now, its queue included."""
         return min((cloud.frame_uplink.expected for cloud in self._able(model)), default=0.0)
 
     def send(self, task: Task, message: Message[Any], now: int, budget: float) -> None:
@@ -74,7 +74,7 @@ class ExecutorPool:
             best.send(task, message, now, budget)
 
     def answers(self, now: int) -> Iterator[RemoteResult]:
-        """Yield what has come back, timed out, or could not be sent."""
+        """Yield the executions that were answered, timed out, or could not be sent."""
         while self._homeless:
             yield self._homeless.popleft()
         for cloud in self._clouds:
@@ -86,12 +86,12 @@ class ExecutorPool:
             cloud.probe(now)
 
     def finish(self, timeout: float) -> None:
-        """Wait up to `timeout` seconds for what is under way."""
+        """Wait up to `timeout` seconds for the executions under way."""
         for cloud in self._clouds:
             cloud.finish(timeout)
 
     def values(self) -> dict[str, Any]:
-        """What is known of each site: milliseconds, Mbit/s, frames by coding."""
+        """Estimates of each site: milliseconds, Mbit/s, frames by coding."""
         return {
             site: {
                 "latency_ms": frame_uplink.link.latency * 1e3,

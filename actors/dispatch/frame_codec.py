@@ -49,7 +49,7 @@ _WEIGHT = 0.3
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class CodedFrame:
-    """A frame whose picture is compressed."""
+    """A frame whose image is compressed."""
 
     header: Header
     data: NDArray[np.uint8]
@@ -63,7 +63,7 @@ class CodedFrame:
 
 @dataclass(frozen=True)
 class CodingCost:
-    """What a coding makes of a picture."""
+    """The cost of a coding for an image."""
 
     size: float
     """Bytes that travel."""
@@ -81,7 +81,7 @@ class CodingCost:
 def fastest(
     costs: Mapping[Coding, CodingCost], link: Callable[[float], float]
 ) -> tuple[Coding, float]:
-    """The coding with which a picture is there first, and the seconds that it takes.
+    """The coding with which an image arrives first, and the seconds until then.
 
     `link` gives the seconds that a number of bytes is on its way.
     """
@@ -93,7 +93,7 @@ def fastest(
 
 
 def decoded(item: Frame | CodedFrame) -> Frame:
-    """The frame as it was, or nearly so; raises SourceError for data that is no picture."""
+    """The decoded frame; raises SourceError for data that is no image."""
     if isinstance(item, Frame):
         return item
     image = cv2.imdecode(item.data, cv2.IMREAD_COLOR)
@@ -105,14 +105,14 @@ def decoded(item: Frame | CodedFrame) -> Frame:
 
 
 class Coder:
-    """Knows what each coding makes of each camera's pictures. One thread at a time."""
+    """Measures the cost of each coding for each camera's images. One thread at a time."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, tuple[int, ...]], dict[Coding, CodingCost]] = {}
         self._count = 0
 
     def costs(self, frame: Frame, allowed: tuple[Coding, ...]) -> dict[Coding, CodingCost]:
-        """What each allowed coding costs with pictures like this one, measured at first sight."""
+        """The cost of each allowed coding for images like this one, measured at the first one."""
         known = self._known.setdefault((frame.header.source, frame.image.shape), {})
         for coding in allowed:
             if coding not in known:
@@ -137,7 +137,7 @@ class Coder:
         return CodedFrame(frame.header, data, coding, frame.camera, frame.odometry, depth)
 
     def took_to_decode(self, frame: Frame, coding: Coding, seconds: float) -> None:
-        """Learn what decoding took at the other end."""
+        """Record the seconds of decoding at the other end."""
         known = self._known.get((frame.header.source, frame.image.shape), {})
         if coding in known:
             old = known[coding]

@@ -20,7 +20,7 @@ __all__ = ["FrameTransfer", "FrameUplink"]
 
 _KEPT = 8
 _PING_EVERY = 2.0
-"""Seconds between two looks at the link while nothing else tells about it."""
+"""Seconds between two probes of a link without other traffic."""
 _LARGE_EVERY = 5.0
 """Seconds without a frame after which a ping carries `_LARGE`, to see the bandwidth, too."""
 _LARGE = 65536
@@ -67,11 +67,11 @@ class FrameUplink:
         self._pinging: Future[Any] | None = None
 
     def later(self, work: Callable[[], None]) -> None:
-        """Do `work` in the packing thread, after what was asked for before."""
+        """Do `work` in the packing thread, after earlier requests."""
         self._packer.submit(work)
 
     def announce(self, message: Message[Any]) -> None:
-        """A message will be packed: it counts among what must cross the link first."""
+        """Announce a message that will be packed, so that it counts in the link's queue."""
         name = (message.stream, message.seq)
         if name not in self._transfers:
             self._announced[name] = None

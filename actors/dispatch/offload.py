@@ -1,4 +1,4 @@
-"""Which of the managed analyses may run where in the cloud, and at what price."""
+"""Where in the cloud each managed analysis may run, and at what price."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def cloud_processes(
 
 
 def priced(profile: Profile, resources: Sequence[ComputeConfig]) -> Profile:
-    """The profile at what the cloud costs: the dearest of `resources`; without any, too much."""
+    """The profile at the cloud's price: the highest of `resources`; without any, too high."""
     costs = [
         profile.cloud_cost
         if resource.endpoint is None or resource.endpoint.cost is None

@@ -33,10 +33,10 @@ class MissingFrame:
 
 
 class FrameReferences:
-    """The sender's side: tells which frames a task may name."""
+    """The sender's side: decides which frames a task may name."""
 
     def __init__(self) -> None:
-        """Know no frame yet."""
+        """Start without frames."""
         self._newest: dict[str, int] = {}
 
     def note(self, message: Message[Any]) -> None:
@@ -44,7 +44,7 @@ class FrameReferences:
         self._newest[message.stream] = message.seq
 
     def item(self, message: Message[Any]) -> object:
-        """What a task about `message` carries: its name, or the frame once no reader keeps it."""
+        """Content of a task about `message`: its name, or the frame once no reader keeps it."""
         newest = self._newest.get(message.stream, message.seq)
         if isinstance(message.item, Frame) and 0 <= newest - message.seq < FRAME_DEPTH:
             return FrameReference(message.stream, message.seq)

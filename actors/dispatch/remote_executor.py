@@ -1,4 +1,4 @@
-"""The dispatcher's way to one executor of the cloud: what is under way, and whether it is there.
+"""The dispatcher's link to one executor of the cloud: its executions and its liveness.
 
 The executor is gone when its process or node is, or when an execution has timed out and nothing
 sent later was answered. From then on it is probed, a few bytes a second, until it answers.
@@ -33,7 +33,7 @@ __all__ = ["Executor", "RemoteExecutor", "RemoteResult"]
 
 _PROBE_EVERY = NANOSECONDS
 _PATIENCE = 4
-"""An execution that takes so many times what was expected is lost, ..."""
+"""An execution that takes so many times its expected duration is lost, ..."""
 _LEAST_PATIENCE = NANOSECONDS
 """... but not before this."""
 _SETTLING = NANOSECONDS
@@ -58,20 +58,20 @@ class Executor:
 
 @dataclass(frozen=True)
 class RemoteResult:
-    """What came of an execution in the cloud."""
+    """The outcome of an execution in the cloud."""
 
     task: Task
     message: Message[Any] | None = None
     """The result."""
     timed_out: bool = False
     lost: bool = False
-    """Its executor is gone, or lacks the frame; `error` tells."""
+    """Its executor is gone, or lacks the frame; `error` says which."""
     error: str = ""
-    """What the analysis raised."""
+    """The error that the analysis raised."""
     way: str = ""
     """Where the frame went, and how."""
     figures: dict[str, float] | None = None
-    """What it took: milliseconds and kilobytes."""
+    """Durations in milliseconds and sizes in kilobytes."""
 
 
 @dataclass
@@ -124,7 +124,7 @@ class RemoteExecutor:
         self._probe: Future[bool] | None = None
         self._preparing: Future[None] | None = None
         self._carried: deque[tuple[str, int]] = deque(maxlen=FRAMES_KEPT)
-        """Frames that the executor knows."""
+        """Frames that the executor holds."""
         self._probed = 0
 
     @property
@@ -146,7 +146,7 @@ class RemoteExecutor:
         self.frame_uplink.later(partial(self._carry, sent, message, until))
 
     def answers(self, now: int) -> Iterator[RemoteResult]:
-        """Yield what has come back or timed out.
+        """Yield the executions that were answered or timed out.
 
         What comes after its time-out tells of the link only.
         """
@@ -207,7 +207,7 @@ class RemoteExecutor:
             self._probe = future
 
     def _hear_late(self, sent: _Sent) -> None:
-        """Learn from an answer after its time-out: by what was known it would have come sooner."""
+        """Learn from an answer after its time-out: the estimates were too low."""
         if sent.future is not None and sent.future.exception() is None:
             self.frame_uplink.link.forget()
             self._answer(sent)
@@ -219,7 +219,7 @@ class RemoteExecutor:
         self._overdue.clear()
 
     def finish(self, timeout: float) -> None:
-        """Wait up to `timeout` seconds for what is under way, so that its executor may be ended."""
+        """Wait up to `timeout` seconds for executions under way, so that the executor may end."""
         futures = [sent.future for sent in self._started.values() if sent.future is not None]
         if futures and not self.gone:
             wait(futures, timeout)
@@ -285,7 +285,7 @@ class RemoteExecutor:
             return RemoteResult(sent.task, error=f"cannot be read: {error}", way=self.executor.site)
 
     def _learned(self, sent: _Sent, executed: Executed) -> RemoteResult:
-        """Take what an execution tells about the link, the coding and the work."""
+        """Update the estimates of the link, the coding and the work from an execution."""
         message: Message[Any] = decode_message(memoryview(executed.message))
         transfer, span = sent.transfer, message.spans[-1]
         assert transfer is not None  # noqa: S101 - it was sent

@@ -49,7 +49,7 @@ from aerodaas.types.vehicle import VehicleState
 __all__ = ["COMMANDS", "DroneActor", "LockstepSchedule"]
 
 _APPLICATION_TIMEOUT = 5.0
-"""Seconds without a word from the application's process after which the drone comes home."""
+"""Seconds without a call of the application's process after which the drone comes home."""
 _ANSWER_TIMEOUT = 4.0
 """Wall seconds within which the loop must have come to a command; less than its sender waits."""
 COMMANDS = "commands"
@@ -58,7 +58,7 @@ COMMANDS = "commands"
 
 @dataclass(frozen=True)
 class LockstepSchedule:
-    """What the conductor of a lockstep run must know about it."""
+    """The lockstep run as its conductor needs it."""
 
     rates: dict[str, float] = field(default_factory=dict)
     """Sources that others publish (cameras, external analyses), and their rates in Hz."""
@@ -106,7 +106,7 @@ class DroneActor(StreamActor):
         self._due: dict[str, int] = {}
         self._late = 0
         self._refused: tuple[str, ...] = ()
-        """What this machine does not grant the loop."""
+        """Priorities that this machine does not grant the loop."""
         self._heard = time.monotonic()
         self._orphaned = False
 
@@ -126,7 +126,7 @@ class DroneActor(StreamActor):
         self._publish_reports()
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Tell one robot's mission something; called by the application's process.
+        """Execute a command of the application's process on one robot's mission.
 
         Raises MissionError if the loop does not come to it.
         """
@@ -186,11 +186,11 @@ class DroneActor(StreamActor):
                 self._due.setdefault(source, self._next_due(source, self.clock.now()))
 
     def note(self, kind: str, text: str) -> None:
-        """Have recorded what the application has found out."""
+        """Record a finding of the application as an alert."""
         self.alert(kind, text)
 
     def wait_no_longer(self) -> None:
-        """In lockstep, go on without what is under way: who should have answered died or is new."""
+        """In lockstep, stop waiting for readers that died or are new."""
         if self.session.lockstep:
             with contextlib.suppress(LoopOverError):
                 self._calls.ask(self._barrier.forget, _ANSWER_TIMEOUT)
@@ -208,7 +208,7 @@ class DroneActor(StreamActor):
         }
 
     def _publish_reports(self) -> None:
-        """Let others know how each robot fares; in the loop's thread only."""
+        """Replace the reports that others read; in the loop's thread only."""
         self._reports = {
             name: RobotReport(controller.status, controller.state, (), self._late)
             for name, controller in self._controllers.items()
@@ -287,7 +287,7 @@ class DroneActor(StreamActor):
         return self.session.next_due(source, self._conduct.rates[source], after)
 
     def _measure(self, now: int) -> None:
-        """Publish what is known now, and expect what the sensors that are due make of it."""
+        """Publish the measurements that are due, and expect their acknowledgements."""
         counts = self._conduct.acknowledgements
         for source, stamp in self._due.items():
             if stamp == now:
@@ -385,14 +385,14 @@ class DroneActor(StreamActor):
 
 
 def _streams(robots: tuple[RobotSpec, ...], conduct: LockstepSchedule) -> list[str]:
-    """What the actor of these robots reads."""
+    """Streams that the actor of these robots reads."""
     streams = [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
     streams += [request_stream(node) for robot in robots for node in robot.requesters]
     return [*streams, *conduct.readers]
 
 
 def _order(message: Message[Any]) -> tuple[bool, str, int]:
-    """What was made of a camera's last picture counts before the word that it was the last."""
+    """Order of messages: results of a camera's last frame come before its end."""
     return message.stream.endswith(end_stream("")), message.stream, message.seq
 
 

@@ -1,4 +1,4 @@
-"""Publishing beside a loop: what it has to say is encoded and sent by another thread."""
+"""Publishing beside a loop: another thread encodes and sends."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _log = logging.getLogger(__name__)
 _MOST_WAITING = 512
 """Messages, some seconds' worth, beyond which the newest are dropped: a loop never waits."""
 _CLOSING = 2.0
-"""Seconds given to what still waits at the end."""
+"""Seconds for waiting work at the end."""
 
 
 class BackgroundPublisher:
-    """Does what one thread hands over, in order, in another one; at once before `start`."""
+    """Does one thread's work, in order, in another one; at once before `start`."""
 
     def __init__(self, on_drop: Callable[[int], None] = lambda _: None) -> None:
         """Publish in the caller's own thread, as lockstep needs it.
@@ -39,7 +39,7 @@ class BackgroundPublisher:
         self._thread.start()
 
     def do(self, work: Callable[[], object]) -> None:
-        """Have `work` done; in its own thread, what it raises is warned of."""
+        """Do `work` in the background; its errors there become warnings."""
         if self._thread is None:
             work()
         elif self._waiting.qsize() < _MOST_WAITING:
@@ -48,7 +48,7 @@ class BackgroundPublisher:
             self.dropped += 1
 
     def close(self) -> None:
-        """Finish what waits; what comes later is done at once again."""
+        """Finish the waiting work; later work is done at once again."""
         thread, self._thread = self._thread, None
         if thread is not None:
             self._waiting.put(None)

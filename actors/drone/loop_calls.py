@@ -40,7 +40,7 @@ class LoopCalls:
         self._over = ""
 
     def ask(self, call: Callable[[], T], timeout: float) -> T:
-        """Have the loop make `call` and return what it does; raises what the call raises.
+        """Have the loop make `call` and return its result; raises the call's errors.
 
         Raises LoopOverError if the loop is over, and MissionError if it does not come to the call
         within `timeout` wall seconds; then it is not made later, either.

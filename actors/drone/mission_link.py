@@ -24,12 +24,12 @@ _REPLIES_WAITING = 64
 
 
 class StreamLink:
-    """A `MissionLink` over the streams of one analysis; its worker passes on what arrives."""
+    """A `MissionLink` over the streams of one analysis, fed by the analysis' worker."""
 
     def __init__(self, actor: StreamActor, node: str, robot: str) -> None:
-        """Speak for the analysis `node` to the mission of `robot`."""
+        """Link the analysis `node` to the mission of `robot`."""
         self.depths = {status_stream(robot): 1, reply_stream(node): _REPLIES_WAITING}
-        """What the worker must read."""
+        """Depths of the streams that the worker must read."""
         self._actor = actor
         self._node = node
         # An actor that was restarted must not take replies to its predecessor for its own.
@@ -44,7 +44,7 @@ class StreamLink:
         self._requests = self._actor.publisher(request_stream(self._node))
 
     def note(self, message: Message[Any]) -> None:
-        """Take what the worker has received."""
+        """Process a message that the worker has received."""
         item = message.item
         if isinstance(item, MissionStatus):
             self._status = item
@@ -57,7 +57,7 @@ class StreamLink:
                 waiting.set_result(item.answer)
 
     def status(self) -> MissionStatus | None:
-        """The newest word of the mission."""
+        """The mission's newest status."""
         return self._status
 
     def vehicle(self) -> VehicleState | None:

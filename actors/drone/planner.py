@@ -23,10 +23,10 @@ _NICENESS = 10
 
 
 class _PlannerActor:
-    """Calls what it is given; holds no state, so that a restart loses nothing."""
+    """Runs functions; holds no state, so that a restart loses nothing."""
 
     def __init__(self, application: Application | None) -> None:
-        """Know what the application defines, after a restart, too."""
+        """Load the application's definitions, after a restart, too."""
         del application
 
     @ray.method(max_task_retries=-1)

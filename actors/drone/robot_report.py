@@ -24,7 +24,7 @@ class RobotReport:
 
 
 class Latencies:
-    """Figures that one thread appends, and others may read: what is there is never changed."""
+    """Figures that one thread appends and others read; an entry is never changed."""
 
     def __init__(self) -> None:
         self._values = array("d")

@@ -63,7 +63,7 @@ _LEAST_PATIENCE = 5.0
 
 
 def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
-    """What a sensor that reads the vehicle itself yields; None where the vehicle cannot tell."""
+    """The item of a sensor of the vehicle itself; None where the vehicle has no reading."""
     readings: dict[str, object] = {
         "odometry": state.odometry,
         "gps": state.gps,
@@ -136,7 +136,7 @@ class VehicleController:
         give(self.id, self.spec.initial, lambda command: self.handle(command, 0))
 
     def make_planner(self, scheduler: TrajectoryScheduler) -> Planner:
-        """What plans by `scheduler`; may take seconds to start."""
+        """The planner for `scheduler`; may take seconds to start."""
         # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
         if self._session.lockstep:
             return InlinePlanner(scheduler)
@@ -174,13 +174,13 @@ class VehicleController:
         self.handle(Start(), clock.now())
 
     def grow(self, spec: RobotSpec, publishers: dict[str, Publisher]) -> None:
-        """Hear further streams; answer analyses that command the mission through `publishers`."""
+        """Read further streams; answer commanding analyses through `publishers`."""
         self.spec = spec
         self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
         self._publishers.update(publishers)
 
     def use_planner(self, planner: Planner) -> None:
-        """Plan by `planner` from now on, beginning with what is queued."""
+        """Plan with `planner` from now on, beginning with the whole queue."""
         former, self._planner = self._planner, planner
         self.mission.use_planner(planner)
         if isinstance(former, BackgroundPlanner):
@@ -192,7 +192,7 @@ class VehicleController:
             self.vehicle.advance_to(stamp)
 
     def handle(self, command: Command, now: int) -> Answer:
-        """Pass a command on to the mission; what it raises is refused, and told."""
+        """Pass a command on to the mission; one that raises is refused, with an alert."""
         return self._obey(command, now, f"the command {type(command).__name__}")
 
     def _obey(self, command: Command, now: int, source: str) -> Answer:
@@ -216,7 +216,7 @@ class VehicleController:
         self._alerts.append(Alert(Header(len(self._alerts), now, self.id), kind, text))
 
     def take(self, message: Message[Any], now: int) -> None:
-        """Pass on what came by stream: navigation, or a command of a trigger."""
+        """Pass on a stream's item: navigation, a trigger's command, or a request."""
         try:
             self._take(message, now)
         except Exception as error:  # noqa: BLE001 - the item's failure, never the loop's
@@ -238,7 +238,7 @@ class VehicleController:
             self._publish(self._replies[message.stream], reply, now)
 
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
-        """One turn of the setpoint loop; publishes what was decided.
+        """One turn of the setpoint loop; publishes the decision.
 
         A turn that raises, because of an item's or a plug-in's data, empties the queue and lets
         the drone hover; the error is raised only once a second of turns has ended so.
@@ -297,11 +297,11 @@ class VehicleController:
 
     @property
     def status(self) -> MissionStatus:
-        """What the mission says about itself."""
+        """The mission's status."""
         return self.mission.status
 
     def new_alerts(self) -> list[Alert]:
-        """What the mission has had to say since the last call."""
+        """Alerts since the last call."""
         alerts = list(self.mission.alerts[self._told :])
         self._told += len(alerts)
         alerts += self._alerts

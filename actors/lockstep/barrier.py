@@ -38,7 +38,7 @@ def widest(graph: Graph, stream: str) -> int:
 
 
 class Barrier:
-    """Counts what is still under way, by source."""
+    """Counts the acknowledgements under way, by source."""
 
     def __init__(self, windows: dict[str, int]) -> None:
         """Let `windows[source]` measurements of each source be under way while time goes on."""
@@ -55,7 +55,7 @@ class Barrier:
             del missing[stamp]
 
     def acknowledge(self, source: str, stamp: int) -> None:
-        """One reader is done; the word may come before the measurement is expected.
+        """Count one reader's acknowledgement; it may come before the measurement is expected.
 
         Sources without a window are not waited for.
         """
@@ -69,7 +69,7 @@ class Barrier:
         self._missing.clear()
 
     def clear(self, *, drain: bool = False) -> bool:
-        """Tell whether time may go on; with `drain`, whether nothing at all is under way."""
+        """Whether time may go on; with `drain`, whether nothing at all is under way."""
         return all(
             len(missing) <= (0 if drain else self.windows[source])
             for source, missing in self._missing.items()

@@ -1,4 +1,4 @@
-"""What the application's own files define, as every process of its run is given it.
+"""Definitions of the application's own files, for every process of its run.
 
 The session carries it: modules as source text, and the classes of files that run as `__main__`,
 which no other process can import, as pickles. An actor gets its session before anything else, so
@@ -44,7 +44,7 @@ class Application:
     """By the name of a module that is the application's own file: definitions by attribute."""
 
     def and_later(self, later: Application) -> Application:
-        """Everything of both: what was defined by then, and what has been since."""
+        """The definitions of both; the later one's come last."""
         plugins = {**self.plugins}
         for name, attributes in later.plugins.items():
             plugins[name] = {**plugins.get(name, {}), **attributes}
@@ -55,7 +55,7 @@ class Application:
         )
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
-        """Arrive by serving what it holds."""
+        """Rebuild by loading its definitions."""
         return _arrived, (dict(self.sources), dict(self.definitions), dict(self.plugins))
 
 
@@ -81,7 +81,7 @@ def _defined(module: str, attributes: dict[str, str], name: str) -> Any:  # noqa
 
 
 def capture(graph: Graph, config: EnvironmentConfig, *plugins: object) -> Application:
-    """Gather what the application and its guests define; in their own process.
+    """Collect the definitions of the application and its guests; in their own process.
 
     `plugins` are instances of its classes that are not in the graph, such as schedulers.
     """
@@ -109,7 +109,7 @@ def capture(graph: Graph, config: EnvironmentConfig, *plugins: object) -> Applic
 
 
 def _define(prefix: str, found: Iterable[Any]) -> dict[str, bytes]:
-    """Pickle classes one by one: what cannot be sent costs only itself."""
+    """Pickle classes one by one, so that one that cannot be sent costs only itself."""
     definitions: dict[str, bytes] = {}
     for one in found:
         # A class that cannot be pickled is told of where it is used.
@@ -182,7 +182,7 @@ def _functions(namespace: dict[str, Any], wanted: set[str]) -> Iterator[Any]:
 
 
 def _mentioned(used: Iterable[object]) -> list[type]:
-    """Classes of what is used, their bases, and the classes in brackets behind those."""
+    """Classes of the used objects, their bases, and the classes in brackets behind those."""
     found: dict[type, None] = {}
     waiting: list[object] = [one if isinstance(one, type) else type(one) for one in used]
     while waiting:
@@ -207,7 +207,7 @@ def _plugin_names(config: EnvironmentConfig) -> list[str]:
 
 
 def _imports_of(namespace: dict[str, Any]) -> list[tuple[str, list[str]]]:
-    """What a file that runs as `__main__` imports."""
+    """Modules that a file that runs as `__main__` imports."""
     try:
         file = Path(namespace["__file__"]).resolve()
         text = file.read_bytes()
@@ -218,7 +218,7 @@ def _imports_of(namespace: dict[str, Any]) -> list[tuple[str, list[str]]]:
 
 
 def require_sendable(graph: Graph, *plugins: object) -> None:
-    """Raise GraphError, by name, for what must reach another process and cannot be sent."""
+    """Raise GraphError, by name, for an object that must be sent and cannot be."""
     for node in graph.nodes.values():
         for trigger in node.triggers:
             _require(trigger.when, f"the condition of {node.id}'s trigger")

@@ -38,7 +38,7 @@ class ApplicationProcess:
         return here == self.node and _pid_namespace() == self.pids
 
     def ended(self) -> bool:
-        """Whether it has ended, for who is near."""
+        """Whether it has ended, for a caller on the same machine."""
         try:
             process = psutil.Process(self.pid)
             # A number may be used again.

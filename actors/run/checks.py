@@ -1,4 +1,4 @@
-"""What an environment and a graph must be before anything starts, each fault with its remedy.
+"""Checks of an environment and a graph before anything starts, each fault with its remedy.
 
 Errors that an actor would raise when it opens are raised here first, as far as possible: Ray
 takes seconds to start, and a fleet on its way to the field does not come back for a typing error.
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["check_environment", "check_graph", "check_plugins", "check_served", "check_tasks"]
 
 _PLAYED = {"folder", "mcap", "recorded", "video"}
-"""Cameras that read what the setting `path` names."""
+"""Cameras that read the setting `path`."""
 _CAMERA = ("open", "capture", "close")
 _VEHICLE = (
     "connect", "read", "preflight", "take_off", "send", "hold", "return_home", "land", "close"

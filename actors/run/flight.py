@@ -139,7 +139,7 @@ class Flight:
         self.stop()
 
     def launch(self, progress: Callable[[str], None] = lambda _: None) -> None:
-        """Open everything and start flying; raises what an actor could not open.
+        """Open all actors and start flying; raises the errors of their `open`.
 
         `progress` is told what has become ready.
         """
@@ -180,7 +180,7 @@ class Flight:
         return FlightState(robots, self.reports(), over)
 
     def _robots_of(self, name: str, newest: int) -> dict[str, RobotReport]:
-        """What a drone's actor says; its last word while it is too busy to say anything."""
+        """A drone's report; its last one while its actor is too busy to answer."""
         before = self._answers.get(name)
         try:
             robots: dict[str, RobotReport] = ask(self._members[name].handle.robots.remote(newest))
@@ -212,7 +212,7 @@ class Flight:
         return ray.is_initialized() and ray.get_runtime_context().get_job_id() == self._job
 
     def learn(self, application: Application) -> None:
-        """Have every actor know what the application defines by now."""
+        """Send the application's newest definitions to every actor."""
         application = self.plan.session.application.and_later(application)
         session = replace(self.plan.session, application=application)
         self.plan = replace(self.plan, session=session)
@@ -296,7 +296,7 @@ class Flight:
         return self._head.address if self._head is not None and self._head.lost else ""
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Tell a robot's mission something."""
+        """Send a command to a robot's mission."""
         handle = self._members[self._drones[robot]].handle
         method = handle.command.options(concurrency_group=COMMANDS)
         answer: Answer = ask(method.remote(robot, command))
@@ -458,7 +458,7 @@ class Flight:
             ask(reference)
 
     def _connect(self, member: Member) -> Any:  # noqa: ANN401 - Ray's reference
-        """Tell a publisher of its readers on other nodes, or without shared memory."""
+        """Register the readers of a publisher on other nodes, or without shared memory."""
         return member.handle.connect.remote(routes(member, self._members.values()))
 
     def _gather_reports(self) -> None:
@@ -483,7 +483,7 @@ class Flight:
                 member.report = replace(member.report, error=reason)
 
     def _record_vitals(self) -> None:
-        """Have the recorder note what each process takes; it alone could not ask other nodes."""
+        """Have the recorder record each process' resources, as it could not ask other nodes."""
         recorder = self._members.get("recorder")
         if recorder is None or recorder.report.phase != "running":
             return

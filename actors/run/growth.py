@@ -1,4 +1,4 @@
-"""What a graph that has grown in flight needs beyond the actors that run already."""
+"""Additions to a running plan for a graph that has grown in flight."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Growth:
     cameras: tuple[Cameras, ...]
     """To be started."""
     ending: dict[str, bool]
-    """Running cameras whose last picture ends the mission now, or no longer does, by stream."""
+    """Running cameras whose last frame ends the mission now, or no longer does, by stream."""
     analyses: tuple[AnalyticsActorPlan, ...]
     """Actors to be started."""
     joining: dict[str, tuple[NodeSpec, ...]]

@@ -27,12 +27,12 @@ _DEPTH = 4
 _PAUSE = 0.02
 """Seconds between two questions to a publisher."""
 _ANSWER = 0.2
-"""Seconds that a question may take, however little time there is."""
+"""Least seconds for a poll."""
 
 
 class _Source(Protocol):
     def receive(self, timeout: float) -> list[Message[Any]]:
-        """Return what has arrived; wait up to `timeout` seconds for it."""
+        """Return the messages that have arrived; wait up to `timeout` seconds for some."""
         ...
 
 
@@ -46,7 +46,7 @@ class _Asking:
         self._question: Any = None
 
     def receive(self, timeout: float) -> list[Message[Any]]:
-        """Return what has arrived; wait up to `timeout` seconds for it."""
+        """Return the messages that have arrived; wait up to `timeout` seconds for some."""
         until = time.monotonic() + timeout
         while True:
             messages = self._ask(max(_ANSWER, until - time.monotonic()))
@@ -107,7 +107,7 @@ class LiveReader:
         self._over = over
 
     def next(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
-        """Return the next item that says something.
+        """Return the next item that is not empty.
 
         Raises TimeoutError after `timeout` seconds, StopIteration once the flight is over.
         """

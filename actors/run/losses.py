@@ -10,7 +10,7 @@ from aerodaas.types.errors import MissionError
 __all__ = ["ALONE", "DeadError", "SilentError", "SuspensionMonitor", "drone_lost"]
 
 ALONE = "alone"
-"""Key of a drone's report: what each vehicle does without its actor, by robot."""
+"""Key of a drone's report: each vehicle's behaviour without its actor, by robot."""
 _FROZEN = 5.0
 """Seconds of silence after which the drones have taken the application for dead."""
 
@@ -24,7 +24,7 @@ class DeadError(MissionError):
 
 
 class SuspensionMonitor:
-    """Knows when this process was stopped from outside for so long that its drones came home."""
+    """Detects that this process was stopped from outside for so long that its drones came home."""
 
     def __init__(self) -> None:
         self._last = float("inf")
@@ -40,7 +40,7 @@ class SuspensionMonitor:
 
 
 def drone_lost(name: str, report: ActorReport, frozen: float) -> MissionError:
-    """The error for the drone's actor `name`, whose last word was `report`."""
+    """The error for the drone's actor `name`, whose last report was `report`."""
     robots = ", ".join(name.rpartition("/")[2].split("+"))
     if frozen:
         return MissionError(

@@ -1,4 +1,4 @@
-"""One actor of a run, as the application's process knows it."""
+"""One actor of a run, as seen by the application's process."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Member:
 
 
 def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN401 - as it says
-    """What a call to an actor returns; raises the project's errors, SilentError after `timeout`."""
+    """Result of a call to an actor; raises the project's errors, SilentError after `timeout`."""
     try:
         return ray.get(reference, timeout=timeout)
     except RayTaskError as error:
@@ -74,7 +74,7 @@ def routes(member: Member, members: Iterable[Member]) -> dict[str, list[Any]]:
 
 
 def require_clock(name: str, info: ActorInfo, began: int) -> None:
-    """A clock that reads what it cannot have read while `prepare` was under way is wrong."""
+    """A clock with an impossible reading while `prepare` was under way is wrong."""
     ahead = max(info.clock - host_time_ns(), 0) - max(began - info.clock, 0)
     if abs(ahead) > _CLOCKS_APART * NANOSECONDS:
         side = "ahead of" if ahead > 0 else "behind"

@@ -152,7 +152,7 @@ class _Planner:
         return state_stream(self.robot_of(node))
 
     def reaches_a_drone(self, stream: str, asked: frozenset[str] = frozenset()) -> bool:
-        """Tell whether what `stream` carries can change what a drone does.
+        """Whether the items of `stream` can change a drone's flight.
 
         By navigation, by a trigger's command, or by waking an analysis that can; `asked` are the
         streams that the question came through.
@@ -263,7 +263,7 @@ class _Planner:
         return FRAME_DEPTH if frames else MESSAGE_DEPTH
 
     def edge_of(self, robot: str | None) -> Placement:
-        """The edge beside a robot; that of all drones for what no robot carries."""
+        """The edge beside a robot; that of all drones for analyses without a robot."""
         named = next((r.edge for r in self.robots if r.id == robot), None)
         return Placement("edge", self.compute[named].node) if named is not None else Placement()
 
@@ -284,7 +284,7 @@ class _Planner:
         return endpoint_analysis(work, short_name(node), resource, strict=False)
 
     def runtime_env_of(self, node: Node) -> RuntimeEnvConfig | None:
-        """What an analysis has for itself: the environment file's word comes last."""
+        """An analysis' own packages; the environment file overrides the application."""
         return told(node.id, self.session.environment.runtime_env) or node.runtime_env
 
     def analyses_by_actor(self) -> tuple[AnalyticsActorPlan, ...]:
@@ -327,7 +327,7 @@ class _Planner:
         )
 
     def _room(self, source: str) -> int:
-        """Measurements beyond the newest whose results fit into what readers may leave waiting."""
+        """Measurements beyond the newest whose results fit into the readers' queues."""
         return max(0, MESSAGE_DEPTH // widest(self.graph, source) - 1)
 
     def conduct(

@@ -19,7 +19,7 @@ _ANSWER_TIMEOUT = 5.0
 
 
 def may_fly(drone: Any) -> bool:  # noqa: ANN401 - an actor's handle
-    """Whether the mission of a drone's actor goes on, or may do so as far as anyone can tell."""
+    """Whether the mission of a drone's actor goes on, or may go on for all that is known."""
     try:
         report = cast("ActorReport", ray.get(drone.report.remote(), timeout=_ANSWER_TIMEOUT))
     except RayActorError:

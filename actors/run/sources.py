@@ -175,7 +175,7 @@ _finder = _Finder()
 
 
 def serve(sources: Mapping[str, Source]) -> None:
-    """Have this process import the modules `sources` from what is given, by name."""
+    """Import the modules `sources` in this process from the given source texts, by name."""
     if _finder not in sys.meta_path:
         sys.meta_path.insert(0, _finder)
     _finder.sources.update(sources)

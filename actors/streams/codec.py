@@ -31,7 +31,7 @@ _defined: set[str] = set()
 
 
 class UnsendableError(AeroDaaSError):
-    """An item cannot be pickled; the text says what of it."""
+    """An item cannot be pickled; the text names the part."""
 
 
 class UnreadableError(AeroDaaSError):

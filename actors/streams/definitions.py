@@ -46,7 +46,7 @@ def register(name: str, definition: type) -> None:
 
 
 def name_of(definition: object) -> str | None:
-    """What a class that was registered in this process is called; None for any other."""
+    """The name of a class that was registered in this process; None for any other."""
     with _lock:
         _, (build, arguments) = _references.get(id(definition), (None, (None, ())))
         return arguments[0] if build is named else None
@@ -70,13 +70,13 @@ def _carried(name: str, data: bytes) -> Any:  # noqa: ANN401 - a class
 
 
 def pickled_class(definition: object) -> bytes:
-    """A class or a function with everything that it needs; raises what pickling raises."""
+    """A pickled class or function with everything that it needs; raises pickling's errors."""
     data: bytes = cloudpickle.dumps(definition, protocol=5)  # pyright: ignore[reportPrivateImportUsage]
     return data
 
 
 def pickled(item: object, buffers: Callable[[pickle.PickleBuffer], Any]) -> bytes:
-    """Pickle an item whose classes may be the application's; raises what pickling raises."""
+    """Pickle an item whose classes may be the application's; raises pickling's errors."""
     file = io.BytesIO()
     pickler: Any = _Pickler
     pickler(file, protocol=5, buffer_callback=buffers).dump(item)
@@ -103,7 +103,7 @@ def _reference(definition: type) -> tuple[Any, ...]:
 
 
 def _find(definition: type) -> bool:
-    """Tell whether a class that came here another way is one that the run has a name for."""
+    """Whether a class that came here by another path is one that the run has a name for."""
     for name in [one for one in _unbuilt if one.partition("/")[2] == definition.__qualname__]:
         # Cloudpickle keeps track of the classes that it has built: the same one comes back.
         if named(name) is definition:

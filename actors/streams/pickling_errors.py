@@ -1,4 +1,4 @@
-"""What of an object cannot be pickled, in words that its author recognises."""
+"""Errors of pickling, in terms of the object's own attributes and items."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MOST = 1000
 
 
 def culprit(item: object, error: Exception) -> str:
-    """Say which part of `item` cannot be sent, and why; `error` is what came of the whole.
+    """Name the part of `item` that cannot be sent; `error` is the error for the whole.
 
     >>> import threading
     >>> culprit({"lock": threading.Lock()}, TypeError("cannot pickle '_thread.lock' object"))
@@ -73,7 +73,7 @@ def _attributes(item: object) -> Iterator[tuple[str, object]]:
 
 
 def _state(item: object) -> object:
-    """What of an object is pickled: its attributes, unless its class says otherwise."""
+    """The pickled parts of an object: its attributes, unless its class says otherwise."""
     told = getattr(item, "__getstate__", None)
     if callable(told):
         with contextlib.suppress(Exception):

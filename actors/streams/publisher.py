@@ -56,7 +56,7 @@ class Publisher:
         received: int,
         stamp: int,
     ) -> Message[Any]:
-        """Publish what was made from `origin`, which arrived at host time `received`."""
+        """Publish an item made from `origin`, which arrived at host time `received`."""
         spans = (*origin.spans, TraceSpan(self.stream, received, host_time_ns()))
         return self._send(stamp, origin.header, origin.captured, spans, item)
 

@@ -33,7 +33,7 @@ class _Transfer:
         self._reference: ray.ObjectRef[bytes] | None = None
 
     def content(self) -> bytes | ray.ObjectRef[bytes]:
-        """What the call is given."""
+        """The argument of the call: the bytes, or a reference to them."""
         if not self._shared:
             return self._data
         # Two threads may both put it, which costs a copy only.

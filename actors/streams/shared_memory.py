@@ -1,4 +1,4 @@
-"""The only file that knows iceoryx2: publish-subscribe and event services of one stream.
+"""Publish-subscribe and event services of iceoryx2 for one stream; its only importer.
 
 Its Python API is young; the version is pinned in pyproject.toml. A publisher writes a message
 once into shared memory, a reader maps it without a copy, and a full reader loses its oldest
@@ -37,7 +37,7 @@ def _iceoryx() -> Any:  # noqa: ANN401 - the library ships no types
 
 @functools.cache
 def shared_memory_available() -> bool:
-    """Tell whether this host can carry streams in shared memory."""
+    """Whether this host can carry streams in shared memory."""
     try:
         _node()
     except Exception:  # noqa: BLE001 - with any error of the library the answer is no

@@ -68,7 +68,7 @@ class Subscriber:
         return subscribed
 
     def subscribe_added(self) -> None:
-        """Subscribe to what was added; for the reading thread, whose `receive` does it, too."""
+        """Subscribe to added streams; for the reading thread, whose `receive` calls it, too."""
         while not self._added.empty():
             depths, subscribed = self._added.get()
             fresh = {name: depth for name, depth in depths.items() if name not in self._delivered}
@@ -84,10 +84,10 @@ class Subscriber:
         return self._waiter is not None
 
     def receive(self, timeout: float) -> list[Message[Any]]:
-        """Return what has arrived, in order within each stream; wait up to `timeout` seconds.
+        """Return the messages that have arrived, in order within each stream.
 
-        Returns early, perhaps empty-handed, when woken. Streams come in the order in which they
-        were named, regardless of the order of arrival.
+        Waits up to `timeout` seconds for one; returns early, perhaps empty-handed, when woken.
+        Streams come in the order in which they were named, regardless of the order of arrival.
         """
         self.subscribe_added()
         messages = self._collect()

@@ -1,4 +1,4 @@
-"""Messages as bytes: our JSON channels, and what a converter hands to the recorder."""
+"""Messages as bytes: our JSON channels, and the entries that converters yield."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Entry(NamedTuple):
     """Of the channel; its encoding is `protobuf` or `jsonschema`."""
     data: bytes
     stamp: int | None = None
-    """Mission clock of what is described, where it isn't the message's own measurement."""
+    """Mission clock of the described moment, where it isn't the message's own measurement."""
 
 
 @lru_cache(maxsize=4096)
@@ -66,7 +66,7 @@ def stream_of(name: str) -> str:
 
 
 def json_schema(name: str, **properties: str | dict[str, Any]) -> Schema:
-    """Schema of a JSON channel; a property given by a word is of that JSON type."""
+    """Schema of a JSON channel; a property given by a string is of that JSON type."""
     body = {
         "type": "object",
         "properties": {
@@ -80,7 +80,7 @@ def json_schema(name: str, **properties: str | dict[str, Any]) -> Schema:
 
 
 def json_bytes(value: dict[str, Any]) -> bytes:
-    """Encode anything as strict JSON: what JSON does not know becomes what `plain` makes of it."""
+    """Encode any object as strict JSON; unknown types are converted by `plain`."""
     try:
         return json.dumps(value, default=plain, allow_nan=False, separators=(",", ":")).encode()
     except (ValueError, TypeError, RecursionError):
@@ -89,7 +89,7 @@ def json_bytes(value: dict[str, Any]) -> bytes:
 
 
 def plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - any JSON value
-    """Reduce any object to JSON's types; never raises, whatever an object's own methods do.
+    """Reduce any object to JSON's types; never raises, even if the object's methods do.
 
     Numbers that are not finite become None, large arrays their shape and type, members of an
     enumeration their name, objects with fields those fields, and others what they print as.
@@ -127,7 +127,7 @@ def _plain_container(value: object, depth: int) -> Any:  # noqa: ANN401 - any JS
 
 
 def _fields(value: Any) -> dict[str, Any]:  # noqa: ANN401 - any object
-    """What an object says that it consists of; nothing for one of Python's own."""
+    """The fields that an object declares; nothing for one of Python's own."""
     dump = getattr(value, "model_dump", None) or getattr(value, "get_data", None)
     if callable(dump):
         data = dump()

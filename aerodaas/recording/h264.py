@@ -1,4 +1,4 @@
-"""Pictures as H.264 the way Foxglove's CompressedVideo wants it, and back.
+"""Images as H.264 for Foxglove's CompressedVideo, and back.
 
 One frame a message, Annex B, no B-frames, parameter sets before every key frame: a reader may
 begin at any of them. PyAV is loaded only where a video is.
@@ -25,11 +25,11 @@ if TYPE_CHECKING:
 __all__ = ["H264Decoder", "H264Encoder", "is_key_frame", "require_encoder"]
 
 KEY_FRAME_NS = NANOSECONDS
-"""Mission time between key frames: what seeking must decode at most."""
+"""Mission time between key frames: the most that seeking must decode."""
 _ENCODER = "libx264"
 _UNIT = re.compile(rb"\x00\x00\x01(.)", re.DOTALL)
 _PICTURE = frozenset({1, 5})
-"""Types of the NAL units that are slices of a picture (ITU-T H.264, table 7-1)."""
+"""Types of the NAL units that are slices of an image (ITU-T H.264, table 7-1)."""
 _KEY = 5
 _TICKS = 90_000
 
@@ -46,10 +46,10 @@ def require_encoder() -> None:
 
 
 class H264Encoder:
-    """One camera's pictures of one size, each encoded as it comes."""
+    """Encoder of one camera's images of one size, each encoded on arrival."""
 
     def __init__(self, width: int, height: int, quality: int) -> None:
-        """Encode pictures of `width` x `height` at x264's constant rate factor `quality`.
+        """Encode images of `width` x `height` at x264's constant rate factor `quality`.
 
         Sizes that are odd grow by a pixel, for colours have half the resolution.
         """
@@ -83,7 +83,7 @@ class H264Encoder:
         self._next_key: int | None = None
 
     def encode(self, image: NDArray[np.uint8], stamp: int) -> bytes:
-        """Encode a picture (BGR) taken at mission time `stamp`.
+        """Encode an image (BGR) taken at mission time `stamp`.
 
         After an error the next picture is a key frame; raises ValueError for a picture that
         cannot be encoded.
@@ -109,7 +109,7 @@ class H264Encoder:
 
 
 def is_key_frame(data: bytes) -> bool:
-    """Tell whether decoding may begin with the frame `data` (H.264, Annex B)."""
+    """Whether decoding may begin with the frame `data` (H.264, Annex B)."""
     for unit in _UNIT.finditer(data):
         kind = unit[1][0] & 0x1F
         if kind in _PICTURE:

@@ -1,4 +1,4 @@
-"""Pictures as others record them, too: Foxglove's and ROS 2's, compressed or raw, to BGR.
+"""Decoding of recorded images: Foxglove's and ROS 2's, compressed or raw, to BGR.
 
 And the depth pictures that this project records: raw, 16UC1.
 """
@@ -26,13 +26,13 @@ __all__ = [
 _COMPRESSED = frozenset({"foxglove.CompressedImage", "sensor_msgs/msg/CompressedImage"})
 _RAW = frozenset({"foxglove.RawImage", "sensor_msgs/msg/Image"})
 IMAGE_SCHEMAS = _COMPRESSED | _RAW
-"""Schemas whose messages `decode_image` knows."""
+"""Schemas whose messages `decode_image` reads."""
 VIDEO_SCHEMAS = frozenset({"foxglove.CompressedVideo", "foxglove_msgs/msg/CompressedVideo"})
 """Schemas of messages that are decoded together with those before them."""
 
 
 class _Layout(NamedTuple):
-    """How a raw picture's pixels lie in memory."""
+    """Memory layout of a raw image's pixels."""
 
     channels: int
     kind: str
@@ -119,14 +119,14 @@ def _pixels(
 
 
 def picture_bytes(value: Any) -> bytes:  # noqa: ANN401
-    """The encoded picture in a message."""
+    """The encoded image in a message."""
     data = picture_field(value, "data")
     # JSON carries bytes as Base64.
     return base64.b64decode(data) if isinstance(data, str) else bytes(data)
 
 
 def picture_field(value: Any, name: str, default: Any = None) -> Any:  # noqa: ANN401
-    """A field of a message, whatever it was encoded as."""
+    """A field of a message in any of its encodings."""
     if isinstance(value, dict):
         return value.get(name, default)
     return getattr(value, name, default)

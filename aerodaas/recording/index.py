@@ -35,7 +35,7 @@ BROKEN = (
     RuntimeError,
     zstandard.ZstdError,
 )
-"""What reading damaged bytes may raise."""
+"""Exceptions of reading damaged bytes."""
 
 _MAGIC = 8
 _RECORD_HEAD = 9

@@ -20,7 +20,7 @@ _BACKLOG = 256
 
 
 class LiveServer(ServerListener):
-    """Serves entries to whoever connects; nobody connected costs next to nothing.
+    """Serves entries to connected viewers; almost free without one.
 
     A client that comes later, or turns a channel on, gets the channel's last message at once:
     the plan, the fence and the calibration are written only when they change.
@@ -61,7 +61,7 @@ class LiveServer(ServerListener):
         channel.log(entry.data, log_time=log_time)
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
-        """Repeat a channel's last message for who has just begun to listen."""
+        """Repeat a channel's last message for a new viewer."""
         del client
         with self._lock:
             last = self._last.get(channel.topic)
@@ -71,7 +71,7 @@ class LiveServer(ServerListener):
             known.log(data, log_time=log_time)
 
     def close(self) -> None:
-        """Send everyone away."""
+        """Disconnect all viewers."""
         self._server.stop()
 
     def __enter__(self) -> Self:

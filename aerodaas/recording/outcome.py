@@ -1,4 +1,4 @@
-"""What became of a recording."""
+"""The outcome of a recording."""
 
 from __future__ import annotations
 

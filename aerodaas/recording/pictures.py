@@ -1,4 +1,4 @@
-"""Pictures and detections of a recording, as the types that streams carry."""
+"""Images and detections of a recording, as the types that streams carry."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ _PICTURE_SCHEMAS = IMAGE_SCHEMAS | VIDEO_SCHEMAS
 _DEPTH = "/aligned_depth"
 """End of the topic of our frames' depth, whose frames are described beside it."""
 _AHEAD = 4
-"""Pictures decoded before they are asked for."""
+"""Images decoded ahead."""
 
 
 @dataclass
@@ -60,7 +60,7 @@ class _Video:
 
 @dataclass(frozen=True, slots=True)
 class _VideoFrame:
-    """A frame of a video, with what it takes to decode it."""
+    """A frame of a video, with the data needed to decode it."""
 
     decoder: H264Decoder
     group: list[bytes]
@@ -72,7 +72,7 @@ class _VideoFrame:
 
 @dataclass(frozen=True, slots=True)
 class Shot:
-    """A picture of a recording, not decoded yet."""
+    """An image of a recording, not decoded yet."""
 
     header: Header
     odometry: Odometry | None
@@ -82,17 +82,17 @@ class Shot:
     size: tuple[int, int] | None = None
     """Width and height in pixels, where they were recorded."""
     decoded: Callable[[], NDArray[np.uint8] | None] | None = None
-    """Gives the picture where it is being decoded already."""
+    """Returns the image where it is being decoded already."""
     measured: Record | None = None
     """Its depth, where the camera measured it."""
 
     @property
     def format(self) -> str:
-        """What the picture is encoded in, such as `jpeg`; empty for raw pixels."""
+        """The image's encoding, such as `jpeg`; empty for raw pixels."""
         return str(picture_field(self.record.value, "format", ""))
 
     def image(self) -> NDArray[np.uint8] | None:
-        """Decode the picture, BGR; None if it is broken, SourceError for an unknown format."""
+        """Decode the image, BGR; None if it is broken, SourceError for an unknown format."""
         if self.decoded is not None:
             return self.decoded()
         if self.video is None:
@@ -108,7 +108,7 @@ class Shot:
         return image[:height, :width]
 
     def depth(self) -> NDArray[np.uint16] | None:
-        """Decode the depth: height x width of millimetres, as in a `Frame`; None if there is none.
+        """Decode the depth: height x width of millimetres, as in a `Frame`; None without depth.
 
         A depth that is broken, or not of the picture's size, counts as none.
         """
@@ -119,14 +119,14 @@ class Shot:
 
 
 def picture_topics(recording: Recording) -> list[str]:
-    """Topics that hold pictures, in order; the depth of our frames is none by itself."""
+    """Topics that hold images, in order; depth belongs to its image's topic."""
     known = recording.topics
     found = (name for name, one in known.items() if one.schema in _PICTURE_SCHEMAS)
     return sorted(name for name in found if not _is_depth(name, known))
 
 
 def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterator[Shot]:
-    """Every picture in the order of recording; nothing is decoded.
+    """Every image in the order of recording; nothing is decoded.
 
     A recording of others has no frame numbers: the message's sequence and frame id serve.
     """
@@ -182,7 +182,7 @@ def frames(
     topics: Collection[str] | None = None,
     stamps: Collection[int] | None = None,
 ) -> Iterator[Frame]:
-    """Every picture in the order of recording, decoded; a broken one is left out.
+    """Every image in the order of recording, decoded; a broken one is left out.
 
     With `stamps`, only pictures captured at these mission times, and no other is decoded.
     """
@@ -203,7 +203,7 @@ def detections(recording: Recording) -> Iterator[tuple[str, Detections]]:
 
 
 def detections_by_frame(recording: Recording) -> dict[tuple[str, int], list[Detection]]:
-    """What was found in each frame, by the frame's camera and stamp.
+    """Detections of each frame, by the frame's camera and stamp.
 
     A tracker repeats what its detector found, and adds to it: the later word counts.
     """
@@ -215,13 +215,13 @@ def detections_by_frame(recording: Recording) -> dict[tuple[str, int], list[Dete
 
 
 def _heads(topic: str) -> tuple[str, str]:
-    """Topics on which the frame of a picture on `topic` is described."""
+    """Topics of the metadata of an image on `topic`."""
     stream = topic.removesuffix("/image")
     return stream, f"{stream}/frame"
 
 
 def _depth_of(topic: str) -> str:
-    """Topic of the depth that belongs to the pictures on `topic`."""
+    """Topic of the depth that belongs to the images on `topic`."""
     return topic.removesuffix("/image") + _DEPTH
 
 

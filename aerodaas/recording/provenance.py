@@ -1,4 +1,4 @@
-"""Where a recording comes from: what is needed to fly it again."""
+"""Provenance of a recording: all that is needed to fly it again."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Provenance:
     started_ns: int = field(default_factory=time.time_ns)
     """Wall time (Unix, nanoseconds) at which the mission clock read zero."""
     name: str = ""
-    """What was flown, for a title."""
+    """The application's name, for a title."""
     seed: int | None = None
     speed: str = ""
     """`--speed` as given."""

@@ -48,14 +48,14 @@ class Record:
     stamp: int
     """Mission clock when it was recorded, nanoseconds."""
     captured: int
-    """Mission clock of what it describes, nanoseconds."""
+    """Mission clock of the described moment, nanoseconds."""
     sequence: int
     value: Any
     """A dictionary for JSON, an object with fields for protobuf and ROS 2, or else bytes."""
 
 
 class Recording:
-    """An open MCAP file. What a cut-off or damaged file still holds is read; the rest counted."""
+    """An open MCAP file. Of a cut-off or damaged file the intact part is read, the rest counted."""
 
     def __init__(self, path: Path, file: BinaryIO, index: FileIndex) -> None:
         """Wrap an open file; use `Recording.open`."""
@@ -138,7 +138,7 @@ class Recording:
         return list(self._index.attachments)
 
     def attachment(self, name: str) -> bytes:
-        """Contents of an attachment; RecordingError if there is none of this name."""
+        """Contents of an attachment; raises RecordingError for an unknown name."""
         if name not in self._index.attachments:
             known = ", ".join(self._index.attachments) or "none"
             raise RecordingError(f"{self.path} has no attachment {name!r}; it has: {known}")

@@ -37,7 +37,7 @@ from aerodaas.types.status import Message
 __all__ = ["FLUSH_SECONDS", "FlightRecorder"]
 
 FLUSH_SECONDS = 0.5
-"""What a killed process loses at most, in seconds of the host."""
+"""The most that a killed process loses, in seconds of the host."""
 _CHUNK = 1 << 20
 _MILLISECOND = 1_000_000
 
@@ -54,7 +54,7 @@ LATENCY = json_schema(
 
 
 class FlightRecorder:
-    """Writes what streams carry to a new MCAP file. Any thread may call it.
+    """Writes messages of streams to a new MCAP file. Any thread may call it.
 
     Messages are logged at their mission time of publishing and published at the time of the
     measurement, both counted from `provenance.started_ns`. Whatever was written half a second
@@ -144,7 +144,7 @@ class FlightRecorder:
                 self._fail(error)
 
     def close(self) -> RecordingSummary:
-        """Finish the file and say what it holds. May be called again; never raises."""
+        """Finish the file and summarise it. May be called again; never raises."""
         self._closing.set()
         self._flusher.join()
         with self._lock:

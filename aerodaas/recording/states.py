@@ -53,5 +53,5 @@ def _state(value: dict[str, Any]) -> VehicleState:
 
 
 def _number(value: float | None) -> Any:  # noqa: ANN401 - an int stays one
-    """JSON has no NaN: what was not finite was written as null."""
+    """NaN for null: JSON has no NaN, so values that are not finite were written as null."""
     return math.nan if value is None else value

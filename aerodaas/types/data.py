@@ -37,7 +37,7 @@ E = TypeVar("E")
 
 
 class Header(NamedTuple):
-    """Who measured something, which measurement it was, and when.
+    """Identity of a measurement: its source, its number, and its timestamp.
 
     A result carries the header of the measurement it was made from, so that its age is known
     wherever it arrives.
@@ -69,7 +69,7 @@ class Odometry:
     yaw_rate: float = 0.0
     """rad/s, counter-clockwise."""
     position_sigma: float = 0.0
-    """Standard deviation of the position in metres, zero where the driver cannot tell."""
+    """Standard deviation of the position in metres, zero if the driver gives none."""
 
     @property
     def height(self) -> float:
@@ -108,7 +108,7 @@ class Battery:
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """An immutable picture with what is needed to place it in the world."""
+    """An immutable image with the data needed to place it in the world."""
 
     header: Header
     image: NDArray[np.uint8]
@@ -122,7 +122,7 @@ class Frame:
     None from cameras that measure none."""
 
     def __post_init__(self) -> None:
-        """Refuse anything but 8-bit BGR, and depth that is not the picture's."""
+        """Require 8-bit BGR, and depth of the image's size."""
         bgr_axes, bgr_channels = 3, 3
         image = self.image
         if image.dtype != np.uint8 or image.ndim != bgr_axes or image.shape[2] != bgr_channels:
@@ -151,7 +151,7 @@ class Frame:
 
     @property
     def nbytes(self) -> int:
-        """Bytes of the picture and its depth, as they are."""
+        """Size in bytes of the image and its depth."""
         return self.image.nbytes + (0 if self.depth is None else self.depth.nbytes)
 
 
@@ -188,7 +188,7 @@ class Detection:
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class Detections(Sequence[Detection]):
-    """Everything found in one frame, best first, with what is known of that frame."""
+    """All detections in one frame, best first, with that frame's metadata."""
 
     header: Header
     items: tuple[Detection, ...]
@@ -233,7 +233,7 @@ class Detections(Sequence[Detection]):
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class Alert:
-    """Something that a person should know: raised by monitoring, emergencies, the watchdogs."""
+    """An alert for the operator: raised by monitoring, emergencies, the watchdogs."""
 
     header: Header
     kind: str
@@ -247,7 +247,7 @@ class Alert:
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class Readings:
-    """What monitoring read, by name, in SI units; a compound reading is `gps.latitude` and so on.
+    """Readings of monitoring by name, in SI units; a compound one is `gps.latitude` and so on.
 
     `state` is the index of the mission's state in `MissionState`.
     """

@@ -1,4 +1,4 @@
-"""What a depth picture, aligned with the camera's, tells of a box in it.
+"""Distance of a box from a depth image that is aligned with the camera's.
 
 Depth pictures are height x width of uint16: millimetres along the optical axis, 0 where nothing
 was measured, as REP 118 of ROS has them.
@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 __all__ = ["METRE", "depth_in_box", "nearest_in_cells"]
 
 METRE = 1000.0
-"""Units of a depth picture in one metre."""
+"""Units of a depth image in one metre."""
 _INNER = 0.25
-"""Part of a box's sides left out at each edge: what is behind shows beside a body."""
+"""Part of a box's sides left out at each edge, where the background shows beside a body."""
 _LEAST = 0.3
 """Part of the pixels in the inner box that must have been measured."""
 _ROWS, _COLUMNS = 18, 32
-"""Cells of a coarse picture."""
+"""Cells of a coarse image."""
 _STEP = 2
 """Of a cell's pixels, every second in both directions is looked at."""
 _SPECKLE = 0.05

@@ -137,5 +137,5 @@ class EnergyMeter:
     def route(
         self, start: Vector, waypoints: Iterable[Waypoint], home: Vector, speed: float
     ) -> float:
-        """Charge for a route and the way home, by the model as scaled."""
+        """Charge for a route and the return home, by the scaled model."""
         return self.scale * self.model.route(start, waypoints, home, speed)

@@ -1,4 +1,4 @@
-"""The exceptions of the project: one small tree, every message says what to do.
+"""The exceptions of the project: one small tree; every message gives a remedy.
 
 `exit_code` is what the command line returns: 2 when the user's input is wrong (usage), 1 when
 something failed that the input could not have told.
@@ -39,12 +39,12 @@ class ConfigError(AeroDaaSError):
 
 
 class UnknownIdError(AeroDaaSError):
-    """A robot, sensor, compute resource or plug-in was asked for that nobody declared."""
+    """An unknown robot, sensor, compute resource or plug-in was requested."""
 
     exit_code = 2
 
     def __init__(self, kind: str, wanted: str, known: list[str]) -> None:
-        """Say which `kind` of thing was `wanted` and which ones are `known`."""
+        """Name the `kind` of thing, the one that was `wanted`, and the `known` ones."""
         choices = ", ".join(sorted(known)) or "none"
         # Scoped names are known by their last part, too.
         names = {name: None for one in known for name in (one, one.rpartition("/")[2])}
@@ -64,7 +64,7 @@ class AmbiguousIdError(AeroDaaSError):
     exit_code = 2
 
     def __init__(self, kind: str, wanted: str, fitting: list[str]) -> None:
-        """Say which `kind` of thing was `wanted` and by which names the `fitting` ones go."""
+        """Name the `kind` of thing, the `wanted` name, and the full names of the `fitting` ones."""
         choices = " or ".join(sorted(fitting))
         super().__init__(f"more than one {kind} is called {wanted!r}; say {choices}")
         self._args = (kind, wanted, fitting)
@@ -87,7 +87,7 @@ class InvalidWaypointError(AeroDaaSError, ValueError):
 
 
 class ModelError(AeroDaaSError):
-    """A model file cannot be loaded or is not what the analytics needs."""
+    """A model file cannot be loaded or does not fit the analysis."""
 
     exit_code = 2
 
@@ -99,7 +99,7 @@ class SchedulerError(AeroDaaSError):
 
 
 class SourceError(AeroDaaSError):
-    """A camera, folder of pictures, video or sensor feed cannot be read."""
+    """A camera, folder of images, video or sensor feed cannot be read."""
 
     exit_code = 2
 

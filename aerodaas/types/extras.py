@@ -18,7 +18,7 @@ _PACKAGES = {
 
 
 def has_extra(extra: str) -> bool:
-    """Tell whether the packages of `extra` (`plots`, `remote`, `ros`, `routing`) are installed."""
+    """Whether the packages of `extra` (`plots`, `remote`, `ros`, `routing`) are installed."""
     return all(importlib.util.find_spec(package) is not None for package in _PACKAGES[extra])
 
 

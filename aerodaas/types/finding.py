@@ -1,4 +1,4 @@
-"""What an examination of a machine or a cluster finds."""
+"""A finding of an examination of a machine or a cluster."""
 
 from __future__ import annotations
 
@@ -15,4 +15,4 @@ class Finding:
     text: str
     ok: bool = True
     remedy: str = ""
-    """What to do about it; empty where it is well."""
+    """The remedy; empty for a good finding."""

@@ -1,4 +1,4 @@
-"""What the machine's graphics processors are busy with, where NVIDIA's library tells."""
+"""Load of the machine's NVIDIA GPUs."""
 
 from __future__ import annotations
 

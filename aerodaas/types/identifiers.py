@@ -1,4 +1,4 @@
-"""What ids and names may look like, and what keeps the project's own streams apart from them.
+"""Syntax of ids and names, and their separation from the project's own streams.
 
 Streams are named `robot/sensor`, `robot/analysis`, or by the id alone where no robot is meant.
 Streams of the project's own (a robot's states, commands, acknowledgements) hold `INTERNAL`, which
@@ -51,7 +51,7 @@ def internal(owner: str, name: str) -> str:
 
 
 def is_internal(stream: str) -> bool:
-    """Tell whether a stream is the project's own rather than a sensor's or an analysis'."""
+    """Whether a stream is the project's own rather than a sensor's or an analysis'."""
     return INTERNAL in stream
 
 

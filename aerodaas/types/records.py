@@ -13,11 +13,11 @@ __all__ = ["fast_pickle", "valued"]
 
 C = TypeVar("C", bound=type[Any])
 _HASHED = 16
-"""Numbers of an array that its hash goes by: enough to tell most apart, few enough to be quick."""
+"""Elements of an array that its hash uses: enough to tell most apart, few enough to be quick."""
 
 
 def valued(cls: C) -> C:
-    """Compare and hash a dataclass by what its fields hold.
+    """Compare and hash a dataclass by the contents of its fields.
 
     The methods that `dataclass` writes raise on arrays, and on hashing dictionaries and lists.
     Arrays are equal by shape and numbers, whatever their number type; NaN equals NaN, so that a

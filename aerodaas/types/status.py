@@ -1,4 +1,4 @@
-"""What a running mission says about itself: states, setpoints, decisions, message envelopes."""
+"""Messages of a running mission: states, setpoints, decisions, message envelopes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class MissionState(str, enum.Enum):
     LANDED = "landed"
     """On the ground after a flight; the mission is over."""
     ABORTED = "aborted"
-    """Over without having been completed: refused, taken over or lost; the reason says which."""
+    """Over without having been completed: refused, taken over or lost, as the reason says."""
 
 
 @fast_pickle
@@ -71,7 +71,7 @@ class MissionStatus:
     distance: float = 0.0
     """Metres flown since take-off."""
     faults: tuple[str, ...] = ()
-    """What the safety layer complains about at present."""
+    """Present faults, as the safety layer names them."""
 
     @property
     def waypoint_counts(self) -> tuple[int, int]:
@@ -90,7 +90,7 @@ class MissionStatus:
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class SetpointRecord:
-    """One turn of the setpoint loop: what the mission asked for and what the vehicle was sent."""
+    """One turn of the setpoint loop: the requested and the sent setpoint."""
 
     stamp: int
     asked: Setpoint | None
@@ -140,7 +140,7 @@ class Message(Generic[E]):
     """`clock.host_time_ns` at that measurement's capture."""
     spans: tuple[TraceSpan, ...]
     item: E | None
-    """None: processed, with nothing to say."""
+    """The item; None if it was processed without a result."""
 
     @property
     def latency_ns(self) -> int:

@@ -1,4 +1,4 @@
-"""What every drone looks like to the mission: state in, setpoints out, one protocol.
+"""The protocol of all vehicles: state in, setpoints out.
 
 A driver (`aerodaas.drivers`) implements `Vehicle` for one kind of drone and converts frames and
 units once. Nothing above a driver knows which kind it flies.
@@ -31,7 +31,7 @@ __all__ = [
 
 
 class VehicleMode(str, enum.Enum):
-    """What the vehicle is doing by its own word."""
+    """The vehicle's flight mode, as it reports it."""
 
     GROUNDED = "grounded"
     TAKING_OFF = "taking_off"
@@ -45,18 +45,18 @@ class VehicleMode(str, enum.Enum):
     FAILSAFE = "failsafe"
     """The vehicle's own protection has taken over; we must not send."""
     LOST = "lost"
-    """No word from the vehicle within its link time-out."""
+    """No message from the vehicle within its link time-out."""
 
 
 class FlightEnd(str, enum.Enum):
-    """How a flight ended, by the word of a driver that can tell."""
+    """How a flight ended, as reported by a driver that can tell."""
 
     LANDED = "landed"
-    """It came down gently and stands, asked to or by itself, at whatever height."""
+    """It came down gently and stands, on command or of its own accord, at any height."""
     FELL = "fell"
     """Its motors stopped in the air, or it hit the ground."""
     UNHEARD = "unheard"
-    """It came down while nothing was heard of it, and stands."""
+    """It came down while its link was silent, and stands."""
 
 
 @fast_pickle
@@ -83,7 +83,7 @@ Setpoint: TypeAlias = PositionSetpoint | VelocitySetpoint
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a driver offers; can be asked before connecting."""
+    """Capabilities of a driver; available before connecting."""
 
     driver: str
     position_setpoints: bool = True
@@ -96,9 +96,9 @@ class Capabilities:
     max_climb: float = 3.0
     """m/s that the vehicle itself can do vertically."""
     alone: str = "its own failsafe is what remains"
-    """What the vehicle does once the driver's process is gone, for people."""
+    """The vehicle's behaviour once the driver's process is gone, for the operator."""
     obeys: bool = True
-    """False for a recorded vehicle, which flies as it flew whatever it is told."""
+    """False for a recorded vehicle, which obeys no command."""
 
 
 @fast_pickle
@@ -116,24 +116,24 @@ class VehicleState:
     truth: Odometry | None = None
     """The simulator's exact state; None for a real vehicle. Only simulated sensors may use it."""
     faults: tuple[str, ...] = ()
-    """What the vehicle complains about at present, one sentence each."""
+    """Present complaints of the vehicle, one sentence each."""
     extra: dict[str, float] = field(default_factory=dict)
     """Further figures by name in SI units, such as temperature or link quality."""
     ended: FlightEnd | None = None
-    """How the latest flight ended; None before and during one, and if the driver cannot tell."""
+    """How the latest flight ended; None before and during one, or if the driver cannot tell."""
 
 
 @runtime_checkable
 class Vehicle(Protocol):
-    """One drone. Every method returns at once unless it says otherwise."""
+    """One drone. Every method returns at once unless stated otherwise."""
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this driver offers."""
+        """Capabilities of this driver."""
         ...
 
     def connect(self, timeout: float = 10.0) -> None:
-        """Connect within `timeout` seconds, or raise VehicleError that says why not."""
+        """Connect within `timeout` seconds; raises VehicleError with the reason of a failure."""
         ...
 
     def read(self) -> VehicleState:
@@ -193,5 +193,5 @@ class PlayedVehicle(SteppedVehicle, Protocol):
 
     @property
     def finished(self) -> bool:
-        """True once there is nothing more to show."""
+        """True at the end of the recording."""
         ...

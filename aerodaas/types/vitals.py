@@ -1,4 +1,4 @@
-"""What a process takes of its machine, and what the machine is busy with."""
+"""Resources used by a process, and the load of its machine."""
 
 from __future__ import annotations
 

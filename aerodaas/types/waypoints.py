@@ -1,4 +1,4 @@
-"""What a drone can be told: waypoints and velocity commands."""
+"""Commands for a drone: waypoints and velocity commands."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ DEFAULT_PRIORITY = 5
 
 
 class WaypointType(str, enum.Enum):
-    """What a waypoint's x, y and z mean."""
+    """The reference of a waypoint's x, y and z."""
 
     RELATIVE = "relative"
     """Metres east, north and up of the place where this robot took off."""
@@ -73,7 +73,7 @@ def _require_names(owner: str, waypoint_id: object, priority: object) -> None:
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class Waypoint:
-    """A place to fly to, and what to do there.
+    """A place to fly to, with hover time, yaw, speed and priority.
 
     Raises InvalidWaypointError for numbers that are not finite or out of range.
     """
@@ -91,7 +91,7 @@ class Waypoint:
     yaw: float | None = None
     """Radians counter-clockwise from east on arrival; None keeps the direction of flight."""
     speed: float | None = None
-    """m/s on the way there; None takes the robot's cruise speed."""
+    """m/s towards it; None takes the robot's cruise speed."""
     priority: int = DEFAULT_PRIORITY
     """Smaller is more urgent; a more urgent waypoint preempts the plan."""
     deadline: float | None = None

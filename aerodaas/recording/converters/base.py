@@ -1,4 +1,4 @@
-"""The dispatch on an item's type, what converters share, and the fallback for unknown types."""
+"""Dispatch on an item's type, the state of converters, and the fallback for unknown types."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ VALUE = json_schema("Value", stamp="integer", source="string", type="string", va
 
 @dataclass(slots=True)
 class Session:
-    """What converters know about the recording that they write for."""
+    """Data of the recording that converters write for."""
 
     config: RecordingConfig
     epoch_ns: int
@@ -35,9 +35,9 @@ class Session:
     home: GeodeticOrigin | None = None
     """Pins the local frame on the globe, for maps."""
     last: dict[tuple[str, str], Any] = field(default_factory=dict)
-    """What a converter wrote last, by its own name and the stream's, to write changes only."""
+    """A converter's last output, by its name and the stream's, to write changes only."""
     videos: dict[str, H264Encoder] = field(default_factory=dict)
-    """By stream, where pictures are recorded as video."""
+    """Video encoders by stream, where images are recorded as video."""
 
     def time(self, stamp: int) -> Timestamp:
         """Foxglove's timestamp of a mission time."""
@@ -54,7 +54,7 @@ class Session:
 
 @singledispatch
 def convert(item: object, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Yield what `item` becomes; of a type that nobody registered, generic JSON."""
+    """Yield the entries of `item`; for an unregistered type, generic JSON."""
     del session
     value = {
         "stamp": message.header.stamp,

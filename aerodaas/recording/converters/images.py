@@ -1,4 +1,4 @@
-"""Frames and what was found in them: pictures, calibration, mount, boxes and keypoints."""
+"""Frames and detections: images, calibration, mount, boxes and keypoints."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ _BLACK = Color(r=0.0, g=0.0, b=0.0, a=0.7)
 
 @convert.register
 def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a picture, and its camera when that has changed."""
+    """Write an image, and its camera when that has changed."""
     header, stream = item.header, message.stream
     if item.camera is not None and session.changed("camera", stream, item.camera):
         yield from _camera(item.camera, header.source, stream, header.stamp, session)
@@ -86,7 +86,7 @@ def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entr
 
 @convert.register
 def detections(item: Detections, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write boxes and keypoints to be drawn over the picture, and the same as exact JSON."""
+    """Write boxes and keypoints as annotations of the image, and the same as exact JSON."""
     header, stream = item.header, message.stream
     annotations = ImageAnnotations(
         # Foxglove pairs annotations with the picture of exactly this time.

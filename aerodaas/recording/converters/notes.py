@@ -1,4 +1,4 @@
-"""What is told to people: alerts and log lines."""
+"""Alerts and log lines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plans and fences as people see them: in the 3D scene, as poses, and on the map."""
+"""Plans and fences for display: in the 3D scene, as poses, and on the map."""
 
 from __future__ import annotations
 

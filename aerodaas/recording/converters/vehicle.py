@@ -127,7 +127,7 @@ def battery(item: Battery, message: Message[Any], session: Session) -> Iterator[
 
 @convert.register
 def setpoint(item: SetpointRecord, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write what was asked for, what was sent, and what changed it in between."""
+    """Write the requested and the sent setpoint, and the limits that changed it."""
     del session
     value = {
         "stamp": item.stamp,

@@ -100,7 +100,7 @@ def _known(recording: Recording, topic: str) -> str:
 
 
 def _plain(message: Message) -> dict[str, Any]:
-    """A protobuf message as a dictionary; bytes by their length, for Base64 helps nobody."""
+    """A protobuf message as a dictionary; bytes by their length, not as Base64."""
     lengths = {
         field.name: f"<{len(value)} bytes>"
         for field, value in message.ListFields()

@@ -21,7 +21,7 @@ __all__ = ["write_gpx", "write_kml"]
 _GPX = "http://www.topografix.com/GPX/1/1"
 _KML = "http://www.opengis.net/kml/2.2"
 _INTERVAL = NANOSECONDS // 2
-"""A point each half second: finer than a receiver knows."""
+"""Interval of points, half a second: finer than a GPS receiver's resolution."""
 
 
 class _Place(NamedTuple):

@@ -1,4 +1,4 @@
-"""A camera's recording as MP4 (H.264), at the times at which the pictures were taken."""
+"""A camera's recording as MP4 (H.264), with the timestamps of its images."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class _Video:
         self._last = -1
 
     def add(self, image: NDArray[np.uint8], stamp: int) -> None:
-        """Add a picture; one that is not later than the last is left out."""
+        """Add an image; one that is not later than the last is left out."""
         width, height = self._size
         ticks = (stamp - self._start) * _TICKS // NANOSECONDS
         if ticks <= self._last or image.shape[0] < height or image.shape[1] < width:

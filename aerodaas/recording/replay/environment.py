@@ -14,7 +14,7 @@ from aerodaas.types.errors import RecordingError
 __all__ = ["replay_environment"]
 
 _FINITE = frozenset({"folder", "recorded", "video", "mcap"})
-"""Cameras that may run out of pictures, which ends a mission that flies by them."""
+"""Cameras that may run out of images, which ends a mission that flies by them."""
 
 
 def replay_environment(path: str | Path) -> EnvironmentConfig:

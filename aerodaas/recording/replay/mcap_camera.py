@@ -1,4 +1,4 @@
-"""Cameras that play the pictures of an MCAP recording, ours or another's."""
+"""Cameras that play the images of an MCAP recording, ours or another's."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _log = logging.getLogger(__name__)
 
 
 class McapCamera:
-    """Plays a recording's pictures at the pace at which they were taken, from the first one on.
+    """Plays a recording's images at their recorded pace, from the first one on.
 
     Settings: `path` of the MCAP file, `topic` where it holds pictures of several cameras,
     `loop`, and the lens and mount of `CameraConfig`. Reads Foxglove's CompressedImage,
@@ -45,21 +45,21 @@ class McapCamera:
 
     @property
     def model(self) -> CameraModel | None:
-        """Calibration for the size of the newest picture; None before `open`."""
+        """Calibration for the size of the newest image; None before `open`."""
         return self._model
 
     @property
     def finished(self) -> bool:
-        """True once the last picture was given; never for a recording that loops."""
+        """True once the last image was given; never for a recording that loops."""
         return self._next is None
 
     @property
     def skipped(self) -> int:
-        """Pictures that are broken, or older than the one before."""
+        """Images that are broken, or older than the one before."""
         return self._skipped
 
     def open(self) -> None:
-        """Open the recording; raises SourceError if it has no pictures that can be decoded."""
+        """Open the recording; raises SourceError if it has no image that can be decoded."""
         try:
             self._recording = Recording.open(self._path)
         except RecordingError as error:
@@ -74,7 +74,7 @@ class McapCamera:
         raise SourceError(f"none of the pictures on {self._topic} of {self._path} can be decoded")
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the newest picture due at `stamp`; None if it was given or is broken."""
+        """Return the newest image due at `stamp`; None if it was given or is broken."""
         del pose
         due: Shot | None = None
         while self._next is not None and self._due_at(self._next, stamp) <= stamp:
@@ -102,7 +102,7 @@ class McapCamera:
         return picture
 
     def _due_at(self, shot: Shot, stamp: int) -> int:
-        """Mission time at which a picture is due; the first one is due at once."""
+        """Mission time at which an image is due; the first one is due at once."""
         if self._offset is None:
             self._offset = stamp - shot.record.captured
         return shot.record.captured + self._offset
@@ -154,7 +154,7 @@ class ReplayedCamera(McapCamera):
 
     @property
     def finished(self) -> bool:
-        """True once the last picture was given, of a camera that came to an end in flight, too."""
+        """True once the last image was given, also of a camera that ended in flight."""
         return super().finished and not self._settings.loop
 
     def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:

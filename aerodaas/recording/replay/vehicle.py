@@ -1,4 +1,4 @@
-"""A vehicle that plays the states of a recording and obeys nobody."""
+"""A vehicle that plays the states of a recording and obeys no command."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class ReplayedVehicle:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What the recorded vehicle's driver offered."""
+        """Capabilities of the recorded vehicle's driver."""
         return self._capabilities
 
     @property

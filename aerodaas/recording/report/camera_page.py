@@ -1,4 +1,4 @@
-"""A web page that shows what the cameras see, with boxes and the mission's state drawn in.
+"""A web page of the cameras' images, with boxes and the mission's state drawn in.
 
 Each camera is a stream of JPEG pictures (`multipart/x-mixed-replace`), which every browser shows
 without a script. Pictures are encoded only while somebody looks.
@@ -32,7 +32,7 @@ __all__ = ["CameraPage"]
 _FRAMES_KEPT = 8
 """Of each camera: boxes are drawn into the frame that they were found in, which is past by then."""
 _RATE = 10.0
-"""Pictures per second and viewer, at most."""
+"""Images per second and viewer, at most."""
 _BOUNDARY = "picture"
 _STOPPING = 5.0
 
@@ -42,7 +42,7 @@ class _Camera:
     frames: dict[int, NDArray[np.uint8]] = field(default_factory=dict)
     """The newest ones, by stamp."""
     found: dict[int, dict[str, tuple[Detection, ...]]] = field(default_factory=dict)
-    """What each analysis found in them, by stamp."""
+    """Detections of each analysis in them, by stamp."""
 
 
 class CameraPage:
@@ -99,7 +99,7 @@ class CameraPage:
                 self._states[source.partition("/")[0]] = text
 
     def picture(self, source: str) -> NDArray[np.uint8] | None:
-        """The newest picture of a camera in which somebody has looked for something, drawn upon.
+        """The newest analysed image of a camera, with the detections drawn in.
 
         Where nobody does, the newest; None before the first.
         """

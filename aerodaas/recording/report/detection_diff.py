@@ -32,7 +32,7 @@ class DetectionDiff:
     """Largest difference of a pair's scores."""
 
     def __str__(self) -> str:
-        """In words."""
+        """The difference as text."""
         text = f"{self.paired} objects found again, {self.lost} lost, {self.new} new"
         if not self.paired:
             return text

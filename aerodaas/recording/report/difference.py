@@ -29,14 +29,14 @@ class StreamDifference:
     """One stream in both recordings."""
 
     what: str
-    """Stream and kind of data, for people."""
+    """Stream and kind of data, for display."""
     same: int
     differing: int
     """Made from the same measurement, with another content."""
     only_first: int
     only_second: int
     example: str = ""
-    """The first difference, in words."""
+    """The first difference, as text."""
     boxes: DetectionDiff | None = None
     """How far boxes moved, of detections that differ."""
 
@@ -101,7 +101,7 @@ def _last_turn(path: str | Path) -> int | None:
 
 
 def _contents(path: str | Path, end: int | None) -> dict[str, dict[Key, Content]]:
-    """What is compared up to mission time `end`, by stream, and within by what it is paired by."""
+    """Compared values up to mission time `end`, by stream, and within by their pairing key."""
     found: dict[str, dict[Key, Content]] = defaultdict(dict)
     states: dict[str, list[str]] = defaultdict(list)
     with Recording.open(path) as recording:

@@ -1,4 +1,4 @@
-"""A recording as arrays: what reports, comparisons and notebooks ask of a flight."""
+"""A recording as arrays, for reports, comparisons and notebooks."""
 
 from __future__ import annotations
 
@@ -51,18 +51,18 @@ class RecordedDetection:
 
 @dataclass(frozen=True, slots=True)
 class RecordedDecision:
-    """One word of the analytics scheduler about one task."""
+    """One record of the analytics scheduler about one task."""
 
     time: float
     """Mission seconds."""
     analysis: str
     action: str
-    """`edge`, `cloud` and `drop` are decisions; `done`, `late` and the like what came of them."""
+    """`edge`, `cloud` and `drop` are decisions; `done`, `late` and the like are outcomes."""
 
 
 @dataclass
 class Load:
-    """What a process, or a machine, was busy with over time."""
+    """Load of a process, or a machine, over time."""
 
     time: list[float] = field(default_factory=list)
     """Mission seconds."""
@@ -127,12 +127,12 @@ class RobotFlight:
 
 @dataclass
 class StreamLatency:
-    """What the messages of one stream took, in milliseconds of the host's clock."""
+    """Latencies of one stream's messages, in milliseconds of the host's clock."""
 
     total: list[float] = field(default_factory=list)
     """From capture to publishing."""
     overhead: list[float] = field(default_factory=list)
-    """The part of it in which nobody worked: on the way between actors, or waiting for one."""
+    """The overhead in it: transport between actors, and waiting for one."""
     wait: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     """From the previous actor's publishing to this one's receiving, by actor."""
     work: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
@@ -141,7 +141,7 @@ class StreamLatency:
 
 @dataclass
 class RecordedFlight:
-    """Everything in a recording but the pictures."""
+    """Everything in a recording but the images."""
 
     robots: dict[str, RobotFlight] = field(default_factory=lambda: defaultdict(RobotFlight))
     latencies: dict[str, StreamLatency] = field(default_factory=lambda: defaultdict(StreamLatency))
@@ -159,7 +159,7 @@ class RecordedFlight:
     reasons: Counter[tuple[str, str]] = field(default_factory=Counter)
     """Scheduler decisions and outcomes, by action and reason."""
     utility: dict[str, float] = field(default_factory=dict)
-    """What the analytics scheduler gained: `QoS`, and `QoE`, the bonuses of its windows."""
+    """Utility of the analytics scheduler: `QoS`, and `QoE`, the bonuses of its windows."""
     loads: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
     """By actor."""
     machines: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
@@ -173,7 +173,7 @@ class RecordedFlight:
 
     @classmethod
     def read(cls, recording: Recording) -> RecordedFlight:
-        """Read a recording in one pass; what it lacks stays empty."""
+        """Read a recording in one pass; missing data stays empty."""
         flight = cls()
         for record in recording.records(schemas=_READERS):
             # Another version's message: the rest of the flight is still worth showing.

@@ -1,4 +1,4 @@
-"""The moments of a flight that are worth a picture."""
+"""Key moments of a flight, to be shown as images."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def key_moments(flight: RecordedFlight, most: int = _MOST) -> list[Moment]:
 
 
 def picture_moments(recording: Recording, moments: list[Moment]) -> list[MomentPicture]:
-    """Fetch the frames of `moments` and draw what was found in them; those without are left out."""
+    """Fetch the frames of `moments` with detections drawn in; those without are left out."""
     wanted = {(moment.source, moment.stamp): moment for moment in moments}
     stamps = {moment.stamp for moment in moments}
     found = detections_by_frame(recording)

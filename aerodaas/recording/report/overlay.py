@@ -1,4 +1,4 @@
-"""Boxes, keypoints and words drawn into a picture, as Foxglove would lay them over it."""
+"""Boxes, keypoints and text drawn into an image, as Foxglove's annotations."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def draw_line(image: Image, text: str) -> None:
 
 
 def _write(image: Image, text: str, at: tuple[int, int], size: float) -> None:
-    """Write white on black, inside the picture; the font knows ASCII only."""
+    """Write white on black, inside the image; the font has ASCII only."""
     text = text.encode("ascii", "replace").decode()
     weight = max(1, round(2 * size))
     (width, height), below = cv2.getTextSize(text, _FONT, size, weight)

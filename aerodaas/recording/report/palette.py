@@ -1,4 +1,4 @@
-"""Colours that colour-blind readers tell apart (Okabe and Ito, 2008)."""
+"""Colours that colour-blind readers can distinguish (Okabe and Ito, 2008)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From a recording to the files that people look at."""
+"""From a recording to the files of its report."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class ReportFiles:
-    """What `write_report` has written; pictures for which there was no data are missing."""
+    """Files of a report; plots without data are missing."""
 
     summary: FlightSummary
     page: Path
@@ -42,7 +42,7 @@ class ReportFiles:
 
 
 def read_report(recording: str | Path) -> Report:
-    """Work out what there is to say and to show about a recording.
+    """Compute the report of a recording.
 
     Raises RecordingError if it cannot be read, or holds no flight.
     """

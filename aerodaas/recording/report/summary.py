@@ -1,4 +1,4 @@
-"""A flight in figures, for people and as JSON."""
+"""A flight in figures, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ class LatencyFigures:
     median_ms: float
     p99_ms: float
     overhead_ms: float
-    """Median of the part in which nobody worked: on the way, or waiting for an actor."""
+    """Median of the overhead: transport, and waiting for an actor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class FlightSummary:
     reasons: dict[str, int] = field(default_factory=dict)
     """Scheduler decisions and outcomes, by `action: reason`."""
     utility: dict[str, float] = field(default_factory=dict)
-    """What the analytics scheduler gained: `QoS` and `QoE`."""
+    """Utility of the analytics scheduler: `QoS` and `QoE`."""
     alerts: list[dict[str, Any]] = field(default_factory=list)
     drops: dict[str, int] = field(default_factory=dict)
     """Messages that did not reach the recorder, by stream."""
@@ -105,7 +105,7 @@ class FlightSummary:
 
     @property
     def begun(self) -> str:
-        """Date and time of day at which it began, with the zone; empty where nobody knows."""
+        """Date and time of day at which it began, with the zone; empty if unknown."""
         try:
             seconds = int(self.provenance["epoch_ns"]) / NANOSECONDS
             began = datetime.fromtimestamp(seconds, timezone.utc).astimezone()

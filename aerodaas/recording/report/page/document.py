@@ -1,4 +1,4 @@
-"""HTML in small pieces; whatever comes from a recording is escaped."""
+"""HTML in small pieces; all text from a recording is escaped."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def paragraph(text: str, kind: str = "") -> str:
 
 
 def picture(data: bytes, alt: str, *, media: str = "image/png", caption: str = "") -> str:
-    """A picture inside the page."""
+    """An image inside the page."""
     text = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     kind = "" if caption else ' class="plot"'
     source = f"data:{media};base64,{base64.b64encode(data).decode()}"

@@ -21,7 +21,7 @@ _DPI = 200
 
 
 def plots_of(flight: RecordedFlight) -> list[Plot]:
-    """Every plot that there is data for, in the order in which people ask."""
+    """Every plot that has data, in the order of the page."""
     flown = any(robot.states for robot in flight.robots.values())
     makers: list[tuple[str, str, str, Callable[[RecordedFlight], Figure], bool]] = [
         (

@@ -15,7 +15,7 @@ from aerodaas.recording.report.summary import FlightSummary
 __all__ = ["flight_page", "origin_line"]
 
 _THUMBNAIL = 640
-"""Width in pixels of the pictures in the page."""
+"""Width in pixels of the images in the page."""
 _QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 80]
 
 

@@ -40,7 +40,7 @@ def figures(summary: FlightSummary) -> dict[str, object]:
 
 
 def sections(summary: FlightSummary) -> Iterator[str]:
-    """Figures, latencies, alerts, and what was dropped."""
+    """Figures, latencies, alerts, and drops."""
     yield section("Figures", table(["", ""], figures(summary).items()))
     if summary.latencies:
         rows = [

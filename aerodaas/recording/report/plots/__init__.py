@@ -1,1 +1,1 @@
-"""A flight's pictures, one module each; no picture is read by colour alone."""
+"""A flight's plots, one module each; none depends on colour alone."""

@@ -1,4 +1,4 @@
-"""Latency as violins: on the way to each actor, in it, since capture, and what is overhead."""
+"""Latency as violins: transport to each actor, work in it, since capture, and overhead."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["latency_figure"]
 
 _SMALLEST_MS = 0.001
 _TELLING = 0.01
-"""Milliseconds below which a figure says no more than that."""
+"""Resolution in milliseconds, below which a figure is drawn as this."""
 _MOST = 50_000
 """Values that a violin is drawn from: more change nothing that could be seen."""
 _COLOURS = {"wait": "sky", "work": "blue", "total": "orange", "overhead": "yellow"}
@@ -74,7 +74,7 @@ def latency_figure(flight: RecordedFlight) -> Figure:
 
 
 def _rows(flight: RecordedFlight) -> list[tuple[str, str, Floats]]:
-    """Label, kind and milliseconds, in the order of the way."""
+    """Label, kind and milliseconds, in the order of the stages."""
     longest = max(flight.latencies.values(), key=lambda latency: len(latency.work), default=None)
     nodes = dict.fromkeys(
         node

@@ -1,4 +1,4 @@
-"""What the plots share: size, type and legends that serve a phone, a page and a screen alike."""
+"""Common style of the plots: size, type and legends for a phone, a page and a screen."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ def trajectory_figure(flight: RecordedFlight) -> Figure:
 
 
 def profile_figure(flight: RecordedFlight) -> Figure:
-    """The flight from the side: height over the way flown, one row for each robot."""
+    """The flight from the side: height over the distance flown, one row for each robot."""
     robots = {name: robot for name, robot in flight.robots.items() if robot.states}
     figure = new_figure(1.1 + 1.9 * max(1, len(robots)))
     rows = figure.subplots(max(1, len(robots)), 1, squeeze=False)[:, 0]
@@ -204,7 +204,7 @@ def _draw_sightings(
 
 
 def _arrow(axes: Axes, piece: Floats, colour: str) -> None:
-    """An arrow head half-way along a path, by the way flown."""
+    """An arrow head half-way along a path, by the distance flown."""
     way = np.cumsum(np.linalg.norm(np.diff(piece, axis=0), axis=1))
     middle = int(np.searchsorted(way, way[-1] / 2))
     # Over a tenth of the way, so that noise of the position does not turn it.
