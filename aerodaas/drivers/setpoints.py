@@ -1,4 +1,4 @@
-"""What every driver asks of a setpoint before it sends it."""
+"""Checks of a setpoint that every driver makes before it sends it."""
 
 from __future__ import annotations
 

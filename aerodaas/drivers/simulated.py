@@ -73,7 +73,7 @@ class SimulatedVehicle:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this driver offers."""
+        """Capabilities of this driver."""
         return Capabilities(
             "simulated",
             global_position=self._origin is not None,

@@ -31,7 +31,7 @@ def main(
         bool, typer.Option("--set-failsafes", help="Set the failsafes that are found unsafe.")
     ] = False,
 ) -> None:
-    """Connect, say what the vehicle is, what it objects to and what leaves it unprotected."""
+    """Connect, and print the vehicle's identity, its objections and its missing protections."""
     settings = {"url": url, "system": system, "failsafes": "ignore"}
     robot = RobotConfig(id="vehicle", driver="mavlink", settings=settings)
     vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))

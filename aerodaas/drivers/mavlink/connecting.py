@@ -1,4 +1,4 @@
-"""From the first HEARTBEAT to a vehicle that knows where it is and protects itself."""
+"""Connecting: from the first HEARTBEAT to a vehicle with a position and its failsafes set."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ __all__ = ["CHECKS", "Connection", "establish"]
 _log = logging.getLogger(__name__)
 
 CHECKS = 4.0
-"""Seconds between requests to run the arming checks and say what they find."""
+"""Seconds between requests to run and report the arming checks."""
 _WORDS = 40.0
-"""Seconds that the autopilot's words may be old to explain why it is not ready."""
+"""Greatest age in seconds of an autopilot's text that explains why it is not ready."""
 _FAR = 20.0
-"""Metres between where home says that it stands and where it believes to be."""
+"""Allowed metres between its position and the environment's home."""
 
 
 @dataclass(frozen=True)
 class Connection:
-    """What stays the same for as long as a vehicle is connected."""
+    """Constants of one connection to a vehicle."""
 
     link: MavlinkLink
     autopilot: Autopilot
@@ -84,7 +84,7 @@ def _await_ready(
     settings: MavlinkSettings,
     pause: Callable[[], None],
 ) -> None:
-    """Until it knows its place, and would arm; the latter is not insisted upon here."""
+    """Wait for its position, and for passing arming checks; the latter are not required here."""
     began = time.monotonic()
     checked_at = began
     while True:

@@ -24,7 +24,7 @@ _OURS = {
     mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
     mavlink.MAV_CMD_NAV_LAND,
 }
-"""What every mission of ours begins and ends with anyway."""
+"""Items with which every mission of ours begins and ends anyway."""
 _RELATIVE = {
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,

@@ -1,4 +1,4 @@
-"""What an environment file says of a vehicle that speaks MAVLink."""
+"""Settings of a MAVLink vehicle in an environment file."""
 
 from __future__ import annotations
 

@@ -96,7 +96,7 @@ class MavlinkVehicle:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this driver offers."""
+        """Capabilities of this driver."""
         settings = self._settings
         known = Capabilities("mavlink", max_speed=settings.max_speed, max_climb=settings.max_climb)
         if self._connection is None:
@@ -109,7 +109,7 @@ class MavlinkVehicle:
         self._watchdog.belong()
 
     def connect(self, timeout: float = 10.0) -> None:
-        """Find the vehicle within `timeout` seconds, and wait until it knows where it is.
+        """Find the vehicle within `timeout` seconds, and wait for its position.
 
         The latter may take `ready_timeout` seconds more: an autopilot needs up to a minute after
         its start. Raises VehicleError that says what is missing.
@@ -172,7 +172,7 @@ class MavlinkVehicle:
         time.sleep(0.02)
 
     def close(self) -> None:
-        """Let go; a vehicle in the air that we fly is told to land."""
+        """Disconnect; a vehicle in the air that we fly is commanded to land."""
         link, self._link = self._link, None
         if link is None:
             return
@@ -255,7 +255,7 @@ class MavlinkVehicle:
             departure.begin(orders, height, time.monotonic())
 
     def _reasons(self) -> list[str]:
-        """The autopilot's own words about what it has just refused; in the link's thread."""
+        """The autopilot's texts about its latest refusal; in the link's thread."""
         now = time.monotonic()
         said = self._telemetry.texts.recent(now, REASONS)
         if self._connection is not None and not said:
@@ -312,7 +312,7 @@ class MavlinkVehicle:
                 self._change(FlightMode.RETURN)
 
     def land(self) -> None:
-        """Land here; does nothing on the ground. Raises VehicleError when somebody else flies.
+        """Land here; does nothing on the ground. Raises VehicleError while another pilot flies.
 
         A take-off that has not come to its end is taken back: until its motors surely stand, the
         mode is LANDING.
@@ -367,12 +367,12 @@ class MavlinkVehicle:
 
     @property
     def connected(self) -> bool:
-        """Whether there is a connected vehicle."""
+        """Whether a vehicle is connected."""
         return self._connection is not None
 
     @property
     def telemetry(self) -> Telemetry:
-        """The newest of everything that the vehicle has said, in its own frames."""
+        """The newest messages of the vehicle, in its own frames."""
         return self._telemetry
 
     @property
@@ -382,7 +382,7 @@ class MavlinkVehicle:
         return Parameters(connection.link, connection.autopilot)
 
     def _take(self, message: Message, now: float) -> None:
-        """The vehicle has said something; in the link's thread."""
+        """Process a message of the vehicle; in the link's thread."""
         kind = message.get_type()
         with self._lock:
             if self._commander is None:
@@ -401,7 +401,7 @@ class MavlinkVehicle:
                 self._moved(kind, now)
 
     def _restarted(self) -> None:
-        """The autopilot has started anew; its first words may already be known."""
+        """Handle a restart of the autopilot; its first messages may have been processed."""
         self._touchdown.restart(self._telemetry.heard_at)
         flew = self._touchdown.falling or bool(self._touchdown.fault)
         self._report.restarted = f"autopilot: it started anew{' in flight' if flew else ''}"

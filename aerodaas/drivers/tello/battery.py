@@ -10,14 +10,14 @@ from aerodaas.types.data import Battery
 __all__ = ["BatteryGauge"]
 
 _WINDOW = 9
-"""Packets, 0.9 s: a reading must hold for half of it before anybody acts on it."""
+"""Packets, 0.9 s: a reading must hold for half of it before it counts."""
 
 
 class BatteryGauge:
     """The median of the newest percentages."""
 
     def __init__(self) -> None:
-        """Know nothing yet."""
+        """Start without a reading."""
         self._percent: deque[int] = deque(maxlen=_WINDOW)
 
     def take(self, percent: int) -> None:

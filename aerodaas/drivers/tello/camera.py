@@ -37,15 +37,15 @@ _BUFFER = 1 << 20
 _LISTEN = 0.2
 """Seconds between looks at whether to stop."""
 _QUIET = 3.0
-"""Seconds without video after which people should know."""
+"""Seconds without video after which an alert is due."""
 
 
 @dataclass(slots=True)
 class VideoCounts:
-    """What became of the stream."""
+    """Counters of the video stream."""
 
     frames: int = 0
-    """Pictures decoded."""
+    """Images decoded."""
     overtaken: int = 0
     """Pictures that a newer one replaced before anybody asked: no loss, the camera is asked at
     its own rate."""
@@ -86,7 +86,7 @@ class TelloCamera:
 
     @property
     def model(self) -> CameraModel | None:
-        """Calibration for the size of the newest picture; None before the first."""
+        """Calibration for the size of the newest image; None before the first."""
         return self._model
 
     @property
@@ -117,7 +117,7 @@ class TelloCamera:
         self._thread.start()
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the newest picture, stamped `stamp` less its age; None if there is no new one."""
+        """Return the newest image, stamped `stamp` less its age; None without a new one."""
         del pose
         with self._lock:
             newest, self._newest = self._newest, None

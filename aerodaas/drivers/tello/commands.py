@@ -1,4 +1,4 @@
-"""What is said to a Tello, and what its answers mean (SDK 2.0 and 3.0 user guides).
+"""Commands of a Tello, and the meaning of its replies (SDK 2.0 and 3.0 user guides).
 
 No relative move (`forward 50`, `go …`) is among the commands: its reply may be lost although the
 move was made, so that it can be neither repeated nor left. All motion goes by `rc`, whose newest
@@ -47,7 +47,7 @@ class Command:
     """More than one only where doing it twice comes to the same as doing it once."""
 
     def accepts(self, reply: str) -> bool:
-        """Tell whether `reply` can be an answer to this: numbers answer questions only."""
+        """Whether `reply` can be an answer to this: numbers answer questions only."""
         if reply.startswith("unknown command"):
             return True
         if self.text.endswith("?"):
@@ -56,14 +56,14 @@ class Command:
 
     @staticmethod
     def succeeded(reply: str) -> bool:
-        """Tell whether `reply` says that it was done."""
+        """Whether `reply` reports success."""
         return _OK.fullmatch(reply) is not None
 
 
 ENTER = Command("command", timeout=0.5, tries=3)
 """Enter SDK mode; until then a Tello neither listens nor sends."""
 VERSION = Command("sdk?", timeout=1.0, tries=2)
-"""Ask for the SDK's version: 20 or 30; SDK 1.3 does not know the question."""
+"""Ask for the SDK's version: 20 or 30; SDK 1.3 does not answer it."""
 STREAM_ON = Command("streamon", timeout=2.0, tries=3)
 TAKE_OFF = Command("takeoff", timeout=20.0)
 """Rise to about a metre. The reply comes when it hovers; users wait up to 20 s."""
@@ -107,7 +107,7 @@ STILL = Sticks()
 
 @dataclass(frozen=True, slots=True)
 class StickScale:
-    """What 100 % of each stick does, taken as proportional in between."""
+    """The motion at 100 % of each stick, taken as proportional in between."""
 
     speed: float
     """m/s horizontally."""
@@ -117,7 +117,7 @@ class StickScale:
     """rad/s."""
 
     def sticks(self, motion: BodyMotion) -> Sticks:
-        """Sticks that fly `motion`; what is more than 100 % is cut to it."""
+        """Sticks that fly `motion`, cut to 100 %."""
         ahead, left, up = motion.velocity
         return Sticks(
             _percent(-left / self.speed),

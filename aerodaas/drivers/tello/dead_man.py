@@ -21,7 +21,7 @@ __all__ = ["DeadMan"]
 
 _STILL, _MOVING, _GOODBYE = b"s", b"m", b"q"
 _PATIENCE = 1.0
-"""Seconds of silence that a moving Tello is left alone; the driver speaks 20 times a second."""
+"""Longest silence in seconds before a moving Tello is stopped; the driver sends at 20 Hz."""
 _REPEATS, _PAUSE = 3, 0.1
 
 
@@ -29,7 +29,7 @@ class DeadMan:
     """The driver's end of the pipe."""
 
     def __init__(self, link: socket.socket, peer: tuple[str, int]) -> None:
-        """Start the process; it may speak to `peer` through the socket `link`."""
+        """Start the process; it may send to `peer` through the socket `link`."""
         command = [sys.executable, "-I", "-S", __file__, str(link.fileno()), peer[0], str(peer[1])]
         # A session of its own, so that Ctrl-C in the terminal does not end the guard first.
         self._process = subprocess.Popen(  # noqa: S603 - our own file
@@ -44,13 +44,13 @@ class DeadMan:
         os.set_blocking(self._pipe.fileno(), False)
 
     def note(self, *, moving: bool) -> None:
-        """Say that the sticks were set."""
+        """Report that the sticks were set."""
         # A guard that has died must not end the flight that it guards.
         with contextlib.suppress(OSError):
             self._pipe.write(_MOVING if moving else _STILL)
 
     def close(self) -> None:
-        """Say goodbye: nothing will be sent any more."""
+        """End the watch: the driver will send nothing any more."""
         with contextlib.suppress(OSError):
             self._pipe.write(_GOODBYE)
             self._pipe.close()

@@ -1,4 +1,4 @@
-"""The first words with a Tello, and what is wrong when there is no answer."""
+"""Handshake with a Tello, and the diagnosis when it does not answer."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _REFUSALS = 2
 
 
 def meaning(reply: str) -> str:
-    """What a refusal means, where its words are known from other people's Tellos."""
+    """Meaning of a refusal whose text is known from reports of other users' Tellos."""
     for words, text in _MEANINGS.items():
         if words in reply.lower():
             return text
@@ -103,7 +103,7 @@ def _explain_silence(link: TelloLink, name: str, settings: TelloSettings) -> str
 
 
 def explain_no_states(link: TelloLink, name: str, settings: TelloSettings) -> str:
-    """Why there is no state packet although the Tello answers to commands."""
+    """Why no state packet comes although the Tello answers to commands."""
     port, counts = settings.state_port, link.counts
     if counts.malformed:
         return (

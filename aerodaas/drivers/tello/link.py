@@ -1,4 +1,4 @@
-"""The link: one thread that owns the sockets to one Tello and speaks on nobody's behalf."""
+"""The link: one thread that owns the sockets to one Tello and sends only what it is given."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ _log = logging.getLogger(__name__)
 _TICK = 0.05
 """Seconds at most between two turns of the thread."""
 _STALE_STICKS = 0.3
-"""Seconds after which sticks that nobody renews are centred: six turns of the setpoint loop."""
+"""Seconds after which sticks that are not renewed are centred: six turns of the loop."""
 _CENTRINGS = 3
-"""How often they are centred, as `rc` has no reply; then there is silence."""
+"""Number of centring `rc` packets, which have no reply; then the link is silent."""
 _SETTLE = 0.1
 """Seconds between a reply and the next command: a Tello overhears commands in quick succession,
 and a duplicate of the reply must not be taken for the next one's."""
@@ -38,7 +38,7 @@ _SETTLE_LATE = 0.5
 
 @dataclass(slots=True)
 class LinkCounts:
-    """What happened on the wire."""
+    """Counters of the wire."""
 
     states: int = 0
     malformed: int = 0
@@ -54,7 +54,7 @@ class LinkCounts:
 
 
 Done = Callable[[str | None], None]
-"""Told the reply to a command, or None if none came, in the link's thread."""
+"""Called with the reply to a command, or None without one, in the link's thread."""
 
 
 @dataclass(slots=True)
@@ -142,14 +142,14 @@ class TelloLink:
         self._ring()
 
     def steer(self, sticks: Sticks) -> None:
-        """Set the sticks, until the next call or until nobody renews them."""
+        """Set the sticks, until the next call or until they are not renewed in time."""
         with self._lock:
             self._sticks = sticks
             self._steered_at = time.monotonic()
         self._ring()
 
     def release(self) -> None:
-        """Send no more `rc`: somebody else flies (take-off, landing)."""
+        """Send no more `rc`: the Tello itself flies (take-off, landing)."""
         with self._lock:
             self._sticks = None
             self.flown = STILL

@@ -1,4 +1,4 @@
-"""What a Tello is doing: judged by its state packets, as replies get lost and say little."""
+"""Flight phase of a Tello, by its state packets, as replies get lost and carry little."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ _CALM = 0.1
 _FALLING = 2.0
 """m/s downwards that no Tello descends at by itself."""
 _LOOKED_AT = 4.0
-"""Seconds before it counts as standing in which a fall would show: its motors' clock tells late."""
+"""Seconds before it counts as standing, in which a fall would show: its motors' clock lags."""
 _NO_LIFT = 12.0
 """Seconds after a take-off's request within which it must have lifted."""
 
 
 class FlightPhase:
-    """The mode of one Tello, moved by requests and by what its packets show."""
+    """The mode of one Tello, moved by requests and by its packets."""
 
     def __init__(self) -> None:
         """Stand on the ground."""
@@ -63,7 +63,7 @@ class FlightPhase:
 
     @property
     def outcome(self) -> str:
-        """What became of a flight that nobody ended, in words."""
+        """Description of a flight's end without a command."""
         fell = self.ended is FlightEnd.FELL
         return "its motors have stopped in flight" if fell else "it has landed by itself"
 

@@ -20,7 +20,7 @@ from aerodaas.types.geometry import Vector, body_to_enu, wrap_angle
 __all__ = ["DeadReckoning"]
 
 _VELOCITY_STEP = 0.1
-"""m/s. The figures may be rounded or cut off: nobody says, so that a full step is allowed."""
+"""Step of the reported speed in m/s. Rounding is not documented, so a full step is allowed."""
 _HEIGHT_STEP = 0.1
 """Metres; likewise."""
 _YAW_STEP = math.radians(1.0)
@@ -34,7 +34,7 @@ _WALK = 2.0 * (_VELOCITY_STEP / math.sqrt(12.0)) ** 2
 """m^2 of variance gained per second: the rounding error of a velocity, uniform over a step, that
 stays the same for about a second."""
 _SCALE_ERROR = 0.05
-"""Share of the way flown: how well optical flow knows its height above the ground (assumed)."""
+"""Error as a share of the distance flown, by optical flow's error in height (assumed)."""
 _BLIND = 0.5
 """m/s by which the uncertainty grows while no packets come."""
 _PACKET_PERIOD = 0.1
@@ -71,7 +71,7 @@ class DeadReckoning:
 
     @property
     def odometry(self) -> Odometry:
-        """The newest estimate; its `position_sigma` says how far off it may be."""
+        """The newest estimate; its `position_sigma` is the possible error."""
         return Odometry(
             self._position.copy(),
             self._velocity.copy(),
@@ -110,7 +110,7 @@ class DeadReckoning:
             self._blind_for += elapsed
 
     def correct(self, state: TelloState, now: float, *, standing: bool) -> None:
-        """Cut the estimate of `now` to what a packet that has just come allows.
+        """Limit the estimate of `now` to the range that a new packet allows.
 
         While it is `standing` on the ground nothing moves, and heights count from there.
         """

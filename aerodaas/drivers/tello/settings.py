@@ -1,4 +1,4 @@
-"""What an environment file says of a Tello and of its camera."""
+"""Settings of a Tello and of its camera in an environment file."""
 
 from __future__ import annotations
 

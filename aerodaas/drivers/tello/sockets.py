@@ -1,4 +1,4 @@
-"""The UDP sockets of one Tello on this host, opened with errors that say what to do."""
+"""The UDP sockets of one Tello on this host, opened with errors that give a remedy."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _explain(error: OSError, address: str, port: int, interface: str) -> str:
 
 
 def datagrams(source: socket.socket) -> list[tuple[bytes, str, int]]:
-    """What has arrived: content, sender's address, sender's port; never blocks."""
+    """Received datagrams: content, sender's address, sender's port; never blocks."""
     arrived = []
     for _ in range(_AT_ONCE):
         try:

@@ -29,7 +29,7 @@ _RANGES = {
     "baro": (-1_000.0, 10_000.0),
     "time": (0.0, 1e6),
 }
-"""The fields that we need, and what is believable of each, in the SDK's units."""
+"""The needed fields, and the plausible range of each, in the SDK's units."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class TelloState:
     height: float
     """Metres above the place of take-off, in steps of 0.1 m."""
     ground_distance: float
-    """Metres to whatever is below, by time of flight: 0.1 on the ground, 65.53 out of range."""
+    """Metres to the surface below, by time of flight: 0.1 on the ground, 65.53 out of range."""
     barometer: float
     """Metres above the sea by air pressure: its changes mean something, its value little."""
     battery: int

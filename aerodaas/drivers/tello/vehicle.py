@@ -55,7 +55,7 @@ _DESCENDING = 0.1
 _DOWN = 0.2
 """Metres above the ground at which it stands, or is about to."""
 _HOT = 85.0
-"""Degrees Celsius inside at which people should know; it switches itself off a little above."""
+"""Degrees Celsius inside that raise an alert; it switches itself off a little above."""
 _BRAKING = 1.0
 """m/s^2 that its own braking is counted on for when flying to a place (assumed)."""
 _REACTION = 0.3
@@ -66,7 +66,7 @@ _FACING = math.radians(2.0)
 _CLIMBED = 0.15
 """Metres from the height of a take-off that count as there."""
 _CLIMB_MARGIN = 3.0
-"""Seconds more than the way takes at most that a take-off's climb may take."""
+"""Seconds that a take-off's climb may take beyond the longest expected."""
 
 
 class TelloVehicle:
@@ -117,7 +117,7 @@ class TelloVehicle:
 
     @property
     def capabilities(self) -> Capabilities:
-        """What this driver offers; a Tello has no return mode and no global position."""
+        """Capabilities of this driver; a Tello has no return mode and no global position."""
         return Capabilities(
             "tello",
             global_position=False,
@@ -157,7 +157,7 @@ class TelloVehicle:
         time.sleep(0.02)
 
     def close(self) -> None:
-        """Let go, which takes a moment; a Tello in the air is told to land."""
+        """Disconnect, which takes a moment; a Tello in the air is commanded to land."""
         link, self._link = self._link, None
         if link is not None:
             link.close(LAND if self._phase.airborne else None)
@@ -378,7 +378,7 @@ class TelloVehicle:
         return np.array([across[0], across[1], up])
 
     def _predict(self, now: float) -> None:
-        """Carry the estimate on, as long as packets say that there is something to carry on."""
+        """Advance the estimate, as long as packets arrive."""
         if self._link is not None and now - self._heard_at <= _LOST_AFTER:
             self._reckoning.predict(now, self._scale.motion(self._link.flown))
 

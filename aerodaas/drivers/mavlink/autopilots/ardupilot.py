@@ -50,7 +50,7 @@ _KNOWN = {
     _LAND: FlightMode.LAND,
 }
 _TALK = 35.0
-"""Seconds: it repeats what it objects to every 30 s."""
+"""Seconds: longer than the 30 s between its repeated objections."""
 
 
 class ArduPilot(Autopilot):
@@ -95,11 +95,11 @@ class ArduPilot(Autopilot):
     )
 
     def mode(self, custom_mode: int) -> FlightMode:
-        """What a HEARTBEAT's mode comes to."""
+        """The flight mode of a HEARTBEAT."""
         return _KNOWN.get(custom_mode, FlightMode.OTHER)
 
     def mode_name(self, custom_mode: int) -> str:
-        """What people call it."""
+        """The mode's usual name."""
         return _NAMES.get(custom_mode, f"mode {custom_mode}")
 
     def ask_mode(self, mode: FlightMode) -> PendingCommand:
@@ -119,7 +119,7 @@ class ArduPilot(Autopilot):
         return self.ask_mode(FlightMode.GUIDED), self.arm(), climb
 
     def ready(self, telemetry: Telemetry) -> bool | None:
-        """It says that it has the check, and whether it passes."""
+        """Whether it has the arming check, and whether that passes."""
         sensors, check = telemetry.sensors, mavlink.MAV_SYS_STATUS_PREARM_CHECK
         if sensors is None or not sensors.present & check:
             return None

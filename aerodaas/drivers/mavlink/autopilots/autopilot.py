@@ -27,14 +27,14 @@ class Failsafe:
     unsafe: frozenset[float]
     """Values that leave it unprotected."""
     safe: float
-    """What we would set."""
+    """The value that we would set."""
     why: str
     role: Literal["any", "ground_station"] = "any"
     """It matters only if we are the ground station."""
 
 
 class Autopilot(ABC):
-    """One family. It holds no state: what the vehicle says is in the `Telemetry`."""
+    """One family of autopilots. It holds no state: the vehicle's is in the `Telemetry`."""
 
     name: ClassVar[str]
     family: ClassVar[int]
@@ -45,9 +45,9 @@ class Autopilot(ABC):
     """Whether it holds before it has reached the height of a take-off."""
     failsafes: ClassVar[tuple[Failsafe, ...]]
     alone: ClassVar[str]
-    """What it does once our process is gone."""
+    """Its behaviour once our process is gone."""
     orphaned: ClassVar[str] = ""
-    """What it does if a companion's process dies, where no parameter makes that safe."""
+    """Its behaviour if a companion's process dies, where no parameter makes that safe."""
     rates: ClassVar[dict[int, float]] = {
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20.0,
         mavlink.MAVLINK_MSG_ID_ATTITUDE: 20.0,
@@ -64,11 +64,11 @@ class Autopilot(ABC):
 
     @abstractmethod
     def mode(self, custom_mode: int) -> FlightMode:
-        """What a HEARTBEAT's mode comes to."""
+        """The flight mode of a HEARTBEAT."""
 
     @abstractmethod
     def mode_name(self, custom_mode: int) -> str:
-        """What people call it."""
+        """The mode's usual name."""
 
     @abstractmethod
     def ask_mode(self, mode: FlightMode) -> PendingCommand:
@@ -80,11 +80,11 @@ class Autopilot(ABC):
 
     @abstractmethod
     def ready(self, telemetry: Telemetry) -> bool | None:
-        """Whether its own checks would let it arm; None where it does not say."""
+        """Whether its arming checks pass; None where it does not report them."""
 
     @abstractmethod
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
-        """Why it would not arm, in its own words as far as it gives any."""
+        """Why it would not arm, in its own texts as far as it sends any."""
 
     @abstractmethod
     def encode(self, value: float, kind: int) -> float:
@@ -112,7 +112,7 @@ class Autopilot(ABC):
 
     @staticmethod
     def check() -> PendingCommand:
-        """Have it say what it objects to."""
+        """Request a report of its arming checks."""
         values = (0.0,) * 7
         return PendingCommand(mavlink.MAV_CMD_RUN_PREARM_CHECKS, values, "run the arming checks")
 

@@ -101,12 +101,12 @@ class PX4(Autopilot):
     )
 
     def mode(self, custom_mode: int) -> FlightMode:
-        """What a HEARTBEAT's mode comes to."""
+        """The flight mode of a HEARTBEAT."""
         main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
         return _KNOWN.get((main, sub if main == _AUTO else 0), FlightMode.OTHER)
 
     def mode_name(self, custom_mode: int) -> str:
-        """What people call it."""
+        """The mode's usual name."""
         main, sub = custom_mode >> 16 & 0xFF, custom_mode >> 24 & 0xFF
         names, number = (_SUB, sub) if main == _AUTO else (_MAIN, main)
         return names.get(number, f"mode {main}/{sub}")
@@ -135,7 +135,7 @@ class PX4(Autopilot):
         return bool(telemetry.sensors.health & mavlink.MAV_SYS_STATUS_PREARM_CHECK)
 
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
-        """What its latest report of the arming checks complained about."""
+        """Complaints of its latest report of the arming checks."""
         del now
         if telemetry.altitude is None:
             return ["PX4 does not know its altitude above the sea yet"]

@@ -34,7 +34,7 @@ class _Refusal(NamedTuple):
 
 
 class Climb:
-    """The orders of one take-off; `failed` is told why it came to nothing, at most once."""
+    """Commands of one take-off; `failed` gets the reason of a failure, at most once."""
 
     def __init__(
         self,

@@ -31,7 +31,7 @@ class Departure:
         words: Callable[[], list[str]],
         land: Callable[[], None],
     ) -> None:
-        """`flies` tells whether it has left the ground; `land` lands what does.
+        """`flies` says whether it has left the ground; `land` lands a flying vehicle.
 
         `words` are the autopilot's own about why it refuses.
         """
@@ -80,7 +80,7 @@ class Departure:
         )
 
     def call_off(self, now: float) -> None:
-        """Take the take-off back: what has not begun must not begin, what flies is landed."""
+        """Withdraw the take-off: cancel it before it begins; land a flying vehicle."""
         climb, self._climb = self._climb, None
         if climb is None:
             return
@@ -89,7 +89,7 @@ class Departure:
             self.withdraw(now)
 
     def withdraw(self, now: float) -> None:
-        """Stop motors that turn, or may yet start, on the ground; land what flies after all."""
+        """Stop motors that turn, or may yet start, on the ground; land a flying vehicle."""
         self._phase.ask(FlightMode.LAND, now, meanwhile=_TAKING_OFF)
         if not self._flies():
             # In the mode of a take-off, an order to arm that comes late would have it fly.
@@ -104,7 +104,7 @@ class Departure:
             self._climb.fail("the autopilot started anew")
 
     def let_go(self) -> None:
-        """Somebody else flies: order nothing any more."""
+        """Stop all commands, as another pilot flies."""
         if self._climb is not None:
             self._climb.cancel()
         self._climb = self._withdrawal = None

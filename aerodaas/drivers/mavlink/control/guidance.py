@@ -28,7 +28,7 @@ _REACTION = 1.2
 """Seconds from a target's velocity to the vehicle's: PX4's simulated quadrotor takes 0.5 to 1,
 and what it says of itself is a little old."""
 _BRAKING = 1.5
-"""m/s² that a vehicle is counted on to brake with, half of what it could."""
+"""Assumed braking of a vehicle in m/s², half of its capability."""
 _LEASH = 1.0
 """Seconds of flight that the target may be ahead of the vehicle, and a metre beside that."""
 _LONGEST = 0.2

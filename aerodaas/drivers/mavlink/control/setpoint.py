@@ -1,4 +1,4 @@
-"""Setpoints as packets: SET_POSITION_TARGET_LOCAL_NED in the frame that both autopilots know."""
+"""Setpoints as packets: SET_POSITION_TARGET_LOCAL_NED in the frame common to both autopilots."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["position_message", "velocity_message"]
 
 _NO_ACCELERATION = 0b0000_0001_1100_0000
 _PLACE_VELOCITY_YAW = _NO_ACCELERATION | 0b1000_0000_0000
-"""Bits of what is to be ignored: acceleration and yaw rate."""
+"""Bits of the ignored fields: acceleration and yaw rate."""
 _VELOCITY_YAW_RATE = _NO_ACCELERATION | 0b0100_0000_0111
 """The same: acceleration, place and yaw."""
 _MASK32 = 0xFFFFFFFF

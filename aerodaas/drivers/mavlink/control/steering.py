@@ -1,4 +1,4 @@
-"""The stream of setpoints: clipped to what the vehicle may do, and seen to be followed."""
+"""The stream of setpoints: clipped to the vehicle's limits, and checked to be followed."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ class Steering:
         change: Callable[[FlightMode], None],
         now: float,
     ) -> None:
-        """Have the autopilot follow, once it has heard setpoints for `stream_before` seconds."""
+        """Switch to the guided mode, after a stream of setpoints for `stream_before` seconds."""
         if phase.wish is FlightMode.GUIDED and phase.seen:
             return
         if now - self._stream_since < stream_before:

@@ -11,7 +11,7 @@ __all__ = ["Watchdog"]
 _SILENT = 1.0
 """Seconds without a turn of the loop, which turns 20 times a second."""
 _GONE = 20.0
-"""Seconds after which nobody is expected to come back."""
+"""Seconds after which the loop is taken for dead."""
 
 
 class Watchdog:
@@ -32,9 +32,9 @@ class Watchdog:
             self._fed_at = time.monotonic()
 
     def healthy(self, now: float) -> bool:
-        """Tell whether the loop turns."""
+        """Whether the loop turns."""
         return now - self._fed_at < _SILENT
 
     def gone(self, now: float) -> bool:
-        """Tell whether the loop has been still for so long that it will not come back."""
+        """Whether the loop has been still for so long that it is taken for dead."""
         return now - self._fed_at > _GONE

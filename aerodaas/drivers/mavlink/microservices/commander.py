@@ -15,7 +15,7 @@ __all__ = ["CommandResult", "Commander", "PendingCommand", "always"]
 _TIMEOUT = 1.0
 """Seconds to wait for an acknowledgement."""
 _PROGRESS = 5.0
-"""The same after the word that it is being worked on."""
+"""The same after an acknowledgement IN_PROGRESS."""
 _TRIES = 6
 _LATER = 1.0
 """Seconds after which an order is tried again that was rejected for now, such as one to arm while
@@ -39,7 +39,7 @@ class PendingCommand:
     values: tuple[float, ...]
     """Parameters 1 to 7."""
     what: str
-    """For people: what it does."""
+    """Description of the command, for messages."""
     frame: int | None = None
     mode: FlightMode | None = None
     """The mode that it asks for, if it asks for one."""
@@ -49,11 +49,11 @@ class PendingCommand:
 
 @dataclass(frozen=True)
 class CommandResult:
-    """What became of an order."""
+    """Outcome of a command."""
 
     accepted: bool
     text: str = ""
-    """Why not, in a few words."""
+    """Reason of a refusal, in a few words."""
     replaced: bool = False
     """A newer order of the same number has taken its place: neither done nor refused."""
     tries: int = 1
@@ -61,7 +61,7 @@ class CommandResult:
 
 
 def always() -> bool:
-    """An order that may be repeated whatever has happened meanwhile."""
+    """A command that may be repeated at any time."""
     return True
 
 
@@ -73,7 +73,7 @@ class _Pending:
     tries: int = 0
     deadline: float = 0.0
     answer: str = "no answer"
-    """What to say if it is given up."""
+    """Text for the case that it is given up."""
 
 
 class Commander:
@@ -82,7 +82,7 @@ class Commander:
     def __init__(self, send: Callable[[Any], None], target: tuple[int, int], ours: int) -> None:
         """Send by `send` to `target` (system, component); `ours` is our own system id."""
         self.stray = 0
-        """Acknowledgements that came late, twice, or to somebody else."""
+        """Acknowledgements that were late, repeated, or for another sender."""
         self._send = send
         self._target = target
         self._ours = ours
@@ -97,7 +97,7 @@ class Commander:
         still: Callable[[], bool] = always,
         now: float,
     ) -> None:
-        """Give an order; `done` is told its outcome, in the link's thread.
+        """Send a command; `done` gets its outcome, in the link's thread.
 
         It is repeated while it is not answered or rejected for now, and only while `still` says
         that it needs doing: what the vehicle shows to be done is done, acknowledged or not. A
@@ -113,12 +113,12 @@ class Commander:
             )
 
     def withdraw(self, number: int) -> None:
-        """Repeat the order of this `number` no more; its `done` is told nothing."""
+        """Withdraw the command of this `number`; its `done` is not called."""
         with self._lock:
             self._pending.pop(number, None)
 
     def under_way(self, number: int) -> PendingCommand | None:
-        """The order of this `number` that is still to be answered; None if there is none."""
+        """The unanswered command of this `number`; None without one."""
         with self._lock:
             pending = self._pending.get(number)
             return None if pending is None else pending.order
@@ -150,7 +150,7 @@ class Commander:
             pending.done(CommandResult(accepted=False, text=word, tries=pending.tries))
 
     def turn(self, now: float) -> None:
-        """Repeat what has not been acknowledged, or give it up; end what shows to be done."""
+        """Repeat or give up unacknowledged commands; end those that telemetry shows to be done."""
         ended: list[tuple[_Pending, CommandResult]] = []
         with self._lock:
             for number, pending in list(self._pending.items()):

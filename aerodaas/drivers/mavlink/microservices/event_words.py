@@ -1,4 +1,4 @@
-"""PX4's events in plain words: by the event's own name, without the component's in front."""
+"""PX4's events as plain text, by the event's own name without its component's."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""PX4's events: what it says instead of STATUSTEXT.
+"""PX4's events, which it sends instead of STATUSTEXT.
 
 An event's number is a hash of its name (`events::ID` of PX4: 24 bits of 32-bit FNV-1a below the
 component's number). The full texts lie in a file on the autopilot whose version they belong to;
@@ -43,7 +43,7 @@ _HARMLESS = 5
 
 
 class EventText(NamedTuple):
-    """What an event says, and its severity as in STATUSTEXT."""
+    """Text of an event, and its severity as in STATUSTEXT."""
 
     text: str
     severity: int
@@ -54,7 +54,7 @@ class EventReader:
 
     def __init__(self) -> None:
         self.objections: tuple[str, ...] = ()
-        """What the latest whole report of the arming checks complains about."""
+        """Complaints of the latest complete report of the arming checks."""
         self._report: list[str] | None = None
         self._latest: int | None = None
 
@@ -64,7 +64,7 @@ class EventReader:
         return tuple(text for text in self.objections if text not in _OF_THE_MODE)
 
     def take(self, number: int, log_levels: int, sequence: int) -> EventText | None:
-        """Take one event; None for one that is a repetition or nobody needs to know."""
+        """Decode one event; None for a repetition and for one of no interest."""
         if sequence == self._latest:
             return None
         self._latest = sequence

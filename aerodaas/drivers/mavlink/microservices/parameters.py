@@ -35,7 +35,7 @@ class Parameters:
         self._autopilot = autopilot
 
     def get(self, name: str) -> float | None:
-        """The value of `name`; None if the vehicle knows none of that name, or does not answer."""
+        """The value of `name`; None if the vehicle has no such parameter, or does not answer."""
         found = self._read(name)
         return None if found is None else found.value
 
@@ -113,7 +113,7 @@ class UnsafeParameter:
 def unsafe_parameters(
     parameters: Parameters, autopilot: Autopilot, settings: MavlinkSettings
 ) -> list[UnsafeParameter]:
-    """What the vehicle's parameters leave unprotected; takes a moment for each."""
+    """Failsafes that the vehicle's parameters leave off; takes a moment for each."""
     found = []
     for failsafe in autopilot.failsafes:
         if failsafe.role not in {"any", settings.role}:

@@ -32,7 +32,7 @@ _RESULTS = {
 }
 
 Progress = Callable[[int, int], None]
-"""Told how many items of how many are through."""
+"""Called with the number of transferred items and of all."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +57,7 @@ def upload(
     kind: int = mavlink.MAV_MISSION_TYPE_MISSION,
     progress: Progress = _ignore,
 ) -> None:
-    """Put `items` in the place of what the vehicle holds; raises VehicleError that says why not.
+    """Replace the vehicle's plan by `items`; raises VehicleError with the reason of a failure.
 
     Waits for the vehicle; not for use in the link's thread.
     """
@@ -96,7 +96,7 @@ def download(
     kind: int = mavlink.MAV_MISSION_TYPE_MISSION,
     progress: Progress = _ignore,
 ) -> list[MissionItem]:
-    """What the vehicle holds; raises VehicleError. Waits; not for use in the link's thread."""
+    """The vehicle's plan; raises VehicleError. Waits; not for use in the link's thread."""
     target = _target(link)
     with link.listen("MISSION_COUNT", "MISSION_ITEM_INT") as inbox:
         ask: Any = mavlink.MAVLink_mission_request_list_message(*target, kind)

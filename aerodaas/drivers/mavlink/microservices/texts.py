@@ -1,4 +1,4 @@
-"""What the autopilot has said lately: STATUSTEXT, put together from its pieces."""
+"""Recent texts of the autopilot: STATUSTEXT, put together from its pieces."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""What is known of a vehicle: telemetry, frames of reference, health, flight phase, touchdown."""
+"""The state of a vehicle: telemetry, frames of reference, health, flight phase, touchdown."""

@@ -28,7 +28,7 @@ _AGREED = 1.5
 _SAME = 3.0
 """Metres within which a frame found again is the one from before."""
 _TOLD = 10.0
-"""Seconds for which a jump is told after it has been mended."""
+"""Seconds for which a corrected jump is reported."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,7 +46,7 @@ class Alignment:
         self.frame: LocalFrame | None = frame
         """None while no position can be believed."""
         self.fault = ""
-        """What to tell people of it."""
+        """Report of it for the operator."""
         self._telemetry = telemetry
         self._pinned = frame
         self.origin = global_origin(telemetry, frame)

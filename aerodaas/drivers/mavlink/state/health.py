@@ -1,4 +1,4 @@
-"""What is wrong with the vehicle, by its name: GPS, estimator, battery, vibration, sensors."""
+"""Faults of the vehicle by name: GPS, estimator, battery, vibration, sensors."""
 
 from __future__ import annotations
 
@@ -10,19 +10,19 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 __all__ = ["Health"]
 
 _STANDS = 1.0
-"""Seconds for which something must be wrong before it is told: estimators change their minds."""
+"""Seconds for which a fault must last before it is reported: estimators recover."""
 _SILENT = 4.0
-"""Seconds in which others spoke and the GPS, which speaks twice a second, did not."""
+"""Seconds without the GPS' messages, sent twice a second, while other messages came."""
 _GAP = 1.0
-"""Seconds between two messages that count at most: the rest is the link's silence, nobody's own."""
+"""Greatest counted time between two messages: a longer gap is the link's."""
 _FIX = 3
 """GPS fix types from this one on are positions in space."""
 _UNSURE = (100, 50, 20, 10, 5)
-"""Metres; said in steps, so that what grows slowly is not told anew with each metre."""
+"""Step in metres in which a slowly growing fault is reported anew."""
 _DOES_NOT_FIT = 0.8
 """Variance, of 1, from which ArduPilot mistrusts a sensor (its FS_EKF_THRESH)."""
 _SHAKES = (60, 30)
-"""m/s² of vibration that are too much, and that people should know of."""
+"""Excessive vibration in m/s², and the level worth a report."""
 _CLIPS = 10
 """Samples beyond an accelerometer's range from one message to the next."""
 
@@ -83,7 +83,7 @@ class Health:
         self._gps_silence = 0.0
         self._clipped: int | None = None
         self._charges_told = False
-        """The batteries speak for themselves."""
+        """Batteries are reported by their own messages."""
         self._takers = {
             "GPS_RAW_INT": self._gps,
             "ESTIMATOR_STATUS": self._estimator,
@@ -94,7 +94,7 @@ class Health:
         }
 
     def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Take note of a message, of whatever kind."""
+        """Process a message of any kind."""
         if self._heard_at is not None:
             self._gps_silence += min(now - self._heard_at, _GAP)
         self._heard_at = now
@@ -103,14 +103,14 @@ class Health:
             taker(message, now)
 
     def faults(self, now: float) -> list[str]:
-        """What is wrong at `now`, one sentence each, its name first."""
+        """Faults at `now`, one sentence each, the name first."""
         told = [one.text for one in self._complaints.values() if now - one.since >= _STANDS]
         if math.isfinite(self._fixed_at) and self._gps_silence > _SILENT:
             told.insert(0, "GPS: it has fallen silent")
         return list(dict.fromkeys(told))
 
     def lost(self, now: float) -> bool:
-        """Whether the estimator itself says that it does not know where it is."""
+        """Whether the estimator itself reports a lost position."""
         complaint = self._complaints.get("lost")
         return complaint is not None and now - complaint.since >= _STANDS
 
@@ -120,7 +120,7 @@ class Health:
         return not any(name in self._complaints for name in ("fix", "unsure", "lost", "glitch"))
 
     def _note(self, name: str, text: str, now: float) -> None:
-        """Complain of `name`, or no more if there is no text."""
+        """Set the complaint of `name`, or clear it without a text."""
         if not text:
             self._complaints.pop(name, None)
             return

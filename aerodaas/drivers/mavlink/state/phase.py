@@ -1,4 +1,4 @@
-"""What the vehicle is doing: by its HEARTBEAT, held against what it was asked to do.
+"""Flight phase of the vehicle: its HEARTBEAT compared with the requested action.
 
 A mode that nobody asked for is a pilot's, a ground station's, or the autopilot's own protection:
 from then on until it is disarmed nothing is sent that steers.
@@ -18,7 +18,7 @@ _LAG = 2.5
 
 
 class FlightMode(enum.Enum):
-    """What the modes of both autopilots come to."""
+    """Common flight modes of both autopilots."""
 
     GUIDED = "guided"
     TAKE_OFF = "take off"
@@ -54,20 +54,20 @@ class FlightPhase:
     def __init__(self) -> None:
         self.armed = False
         self.shown = FlightMode.OTHER
-        """What the latest HEARTBEAT said."""
+        """The mode of the latest HEARTBEAT."""
         self.wish: FlightMode | None = None
-        """What it was asked for last, until it is disarmed."""
+        """The last requested action, until it is disarmed."""
         self.seen = False
         """Whether it has been seen doing that."""
         self.taken: VehicleMode | None = None
-        """MANUAL or FAILSAFE once somebody else flies."""
+        """MANUAL or FAILSAFE once another pilot or the autopilot itself flies."""
         self._before: frozenset[FlightMode] = frozenset()
         """Modes that HEARTBEATs may go on to show for a moment after the wish."""
         self._asked_at = -math.inf
 
     @property
     def mode(self) -> VehicleMode:
-        """The mode by the vehicle's own word."""
+        """The mode as the vehicle reports it."""
         if not self.armed:
             return VehicleMode.GROUNDED
         return self.taken or _SHOWN[self.shown]

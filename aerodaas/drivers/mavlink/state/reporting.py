@@ -1,4 +1,4 @@
-"""What the mission is told of one vehicle, put together from all that the vehicle has said."""
+"""The state that the mission gets of one vehicle, combined from all its messages."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from aerodaas.types.vehicle import VehicleMode, VehicleState
 __all__ = ["REASONS", "VehicleReport"]
 
 REASONS = 12.0
-"""Seconds that the autopilot's words may be old to count as the reason of what it does."""
+"""Greatest age in seconds of an autopilot's text that explains its behaviour."""
 _LOST_AFTER = 1.5
-"""Seconds without any word, of a vehicle that speaks 40 times a second."""
+"""Seconds of silence of a vehicle that sends 40 messages a second, after which it is lost."""
 _FINDING = 1.0
-"""Seconds that a vehicle which is heard again has to say where it is."""
+"""Seconds for a first position after the link is back."""
 _GRAVE = 3
 """Severity of an error; smaller is graver."""
 
 
 class VehicleReport:
-    """The state of one vehicle by its own words; seconds are monotonic."""
+    """The state of one vehicle from its messages; seconds are monotonic."""
 
     def __init__(self, telemetry: Telemetry, phase: FlightPhase, touchdown: Touchdown) -> None:
         self.departure: Departure | None = None
@@ -89,7 +89,7 @@ class VehicleReport:
 
     @property
     def mode(self) -> VehicleMode:
-        """What it is doing, by its HEARTBEATs and by what became of our orders."""
+        """Its flight mode, by its HEARTBEATs and the outcome of our commands."""
         if self._touchdown.falling:
             return VehicleMode.FAILSAFE
         if self._phase.taken is None and self.departure is not None:
@@ -100,7 +100,7 @@ class VehicleReport:
         return self._phase.mode
 
     def lost(self, now: float) -> bool:
-        """Whether it has said nothing new for too long, or not yet where it is since then."""
+        """Whether it has sent nothing new for too long, or no position since then."""
         telemetry = self._telemetry
         back = telemetry.armed and now - telemetry.back_at < _FINDING
         return self._silence(now) > _LOST_AFTER or (back and not telemetry.knows_place(now))

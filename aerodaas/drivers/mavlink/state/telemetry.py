@@ -1,4 +1,4 @@
-"""The newest of everything that the vehicle has said."""
+"""The newest message of each kind of a vehicle."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Telemetry:
         self.sensors: Sensors | None = None
         """Bits of SYS_STATUS; None before it has come."""
         self.health = Health()
-        """What is wrong, by its name."""
+        """Faults by name."""
         self.boot_time = math.nan
         """Seconds of the autopilot's own clock since it started."""
         self.clock = math.nan
@@ -113,11 +113,11 @@ class Telemetry:
             taker(message, now)
 
     def silence(self, now: float) -> float:
-        """Seconds since it last said something new; stamps that stand still are nothing new."""
+        """Seconds since its last new data; timestamps that stand still are no new data."""
         return now - min(self.heard_at, self.ticked_at)
 
     def knows_place(self, now: float) -> bool:
-        """Tell whether it has said lately where it is and how it stands, and believes it itself."""
+        """Whether position and attitude are recent, and valid by its own estimate."""
         fresh = now - self.position_at < _FRESH and now - self.attitude_at < _FRESH
         return fresh and not self.health.lost(now)
 
@@ -215,7 +215,7 @@ class Telemetry:
         return True
 
     def _restarted(self) -> None:
-        """The autopilot has started anew: what it said before is of another life."""
+        """Forget messages from before a restart of the autopilot."""
         self.reboots += 1
         # Its first HEARTBEAT comes a second after its first other words, and no motor turns.
         self.armed = False

@@ -25,16 +25,16 @@ _STILL = 0.5
 _NEAR = 1.0
 """Metres above the place of arming at which a return may have ended."""
 _FRESH = 1.0
-"""Seconds for which a position says something of the present."""
+"""Seconds for which a position counts as present."""
 _LATE = 2.5
-"""Seconds by which the HEARTBEAT that tells of motors may come late: one of them may be lost."""
+"""Seconds by which a HEARTBEAT with the motors' state may be late, as one may be lost."""
 _SAID = 1.8
 """Seconds of its own word for it to stand though its estimate moves: who is stopped in the air says
 so too, but is heard to be disarmed within a second."""
 _FALLS = 2.0
-"""m/s downwards at which it does not stand, whatever it says."""
+"""m/s downwards at which it does not stand, even if it reports so."""
 _FALLEN = 10.0
-"""Seconds after which whatever fell lies."""
+"""Seconds after which a fallen vehicle lies still."""
 
 
 class Touchdown:
@@ -42,7 +42,7 @@ class Touchdown:
 
     def __init__(self) -> None:
         self.fault = ""
-        """What to tell of the latest flight's end, until motors start again."""
+        """The reported end of the latest flight, until motors start again."""
         self.falling = False
         """Motors stopped in the air, and it does not lie yet."""
         self.ended: FlightEnd | None = None
@@ -58,7 +58,7 @@ class Touchdown:
         self._still_since = math.inf
         self._moved_at = self._back_at = self._fell_at = -math.inf
         self._unheard_at = -math.inf
-        """When it was found disarmed, after a time in which nobody heard it."""
+        """Time at which it was found disarmed, after a silence of the link."""
         self._rise = 0.0
         self._stopped_at = -math.inf
         self._blind = False
@@ -78,7 +78,7 @@ class Touchdown:
         self.flew |= self._armed is True and up - self._ground > _LIFTED
 
     def report(self, now: float, *, on_ground: bool | None) -> None:
-        """Take note of the autopilot's own word about where it is; None: it does not say."""
+        """Process the autopilot's own landed state; None: it sends none."""
         self._on_ground = on_ground
         self._on_ground_since = min(self._on_ground_since, now) if on_ground else math.inf
         self.flew |= self._armed is True and on_ground is False

@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 __all__ = ["EventMessage", "mavlink"]
 
 mavlink: Any = importlib.import_module("pymavlink.dialects.v20.ardupilotmega")
-"""What both autopilots speak: the common messages and ArduPilot's own. It has no types."""
+"""Dialect of both autopilots: the common messages and ArduPilot's own. It has no types."""
 
 
 class EventMessage(mavlink.MAVLink_message):  # type: ignore[misc]
-    """EVENT, with which PX4 says what STATUSTEXT says elsewhere (common.xml, message 410)."""
+    """EVENT, PX4's counterpart of STATUSTEXT (common.xml, message 410)."""
 
     id = 410
     msgname = "EVENT"

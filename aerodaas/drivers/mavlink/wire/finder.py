@@ -1,4 +1,4 @@
-"""Finding the vehicle among all that speak on a link, and saying why there is none."""
+"""Finding the vehicle among all senders on a link, with the reason if there is none."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Finder:
         self.found: FoundVehicle | None = None
 
     def take(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Take a HEARTBEAT of anybody."""
+        """Process a HEARTBEAT of any sender."""
         system, component = message.get_srcSystem(), message.get_srcComponent()
         objection, family = self._judge(message, system)
         if family is not None and not objection:

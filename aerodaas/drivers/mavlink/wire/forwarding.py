@@ -20,11 +20,11 @@ class Forwarder:
         return self._wire.fileno()
 
     def send(self, content: bytes) -> None:
-        """Pass on what the vehicle said."""
+        """Forward a packet of the vehicle."""
         self._wire.send(content, (self._peer,))
 
     def receive(self) -> list[bytes]:
-        """What the other program says to the vehicle; never blocks."""
+        """Packets of the other program for the vehicle; never blocks."""
         arrived = self._wire.receive()
         if arrived:
             self._peer = arrived[-1][1]

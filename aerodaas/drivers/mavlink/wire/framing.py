@@ -21,7 +21,7 @@ _LARGEST = 4096
 
 
 def signed(frame: bytes | bytearray) -> bool:
-    """Tell whether a whole packet carries a signature."""
+    """Whether a whole packet carries a signature."""
     return frame[0] == _V2 and bool(frame[2] & _SIGNED)
 
 

@@ -52,7 +52,7 @@ _WANTED = frozenset(
 
 @dataclass(slots=True)
 class LinkCounts:
-    """What happened on the wire."""
+    """Counters of the wire."""
 
     received: int = 0
     """Packets of the vehicle that were of use."""
@@ -64,7 +64,7 @@ class LinkCounts:
 
 
 class MavlinkLink:
-    """Hears one vehicle, and sends; `send` may be called from any thread.
+    """Receives from one vehicle, and sends; `send` may be called from any thread.
 
     `on_message` and `on_turn` are called in the link's thread, the latter 20 times a second, and
     `healthy` before each heartbeat: what does not know how the system fares must not say that it
@@ -165,7 +165,7 @@ class MavlinkLink:
             self.turn(time.monotonic())
 
     def turn(self, now: float) -> None:
-        """Hear what has come, and do what is due at `now`; called by the link's thread."""
+        """Process received packets, and do the work due at `now`; called by the link's thread."""
         self._hear(now)
         if self._forwarder is not None:
             for packet in self._forwarder.receive():

@@ -1,4 +1,4 @@
-"""MAVLink 2 signing: the key, and what is let through. The key is shown nowhere."""
+"""MAVLink 2 signing: the key, which is never shown, and the accepted packets."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _key(content: bytes, place: str) -> bytes:
 
 
 def sign_with(mav: Any, key: bytes) -> None:  # noqa: ANN401 - pymavlink has no types
-    """Have `mav` sign what it sends, and refuse what is not signed."""
+    """Have `mav` sign its packets, and refuse unsigned ones."""
     signing = mav.signing
     signing.secret_key = key
     signing.sign_outgoing = True

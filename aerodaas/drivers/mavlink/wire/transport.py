@@ -16,7 +16,7 @@ from aerodaas.types.errors import ConfigError, VehicleError
 __all__ = ["Peer", "Transport", "open_transport"]
 
 Peer = tuple[str, int] | None
-"""Who sent something; None where a wire has one other end only."""
+"""Address of a sender; None where a wire has one other end only."""
 
 _LARGEST = 65535
 _AT_ONCE = 256
@@ -33,11 +33,11 @@ class Transport(Protocol):
         ...
 
     def receive(self) -> list[tuple[bytes, Peer]]:
-        """What has arrived; never blocks."""
+        """Received bytes by sender; never blocks."""
         ...
 
     def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
-        """Send to `peers`, where the wire has several other ends; loses what cannot be sent."""
+        """Send to `peers`, where the wire has several other ends; drops unsendable packets."""
         ...
 
     def close(self) -> None:
