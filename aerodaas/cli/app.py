@@ -178,7 +178,7 @@ def run_typer(typer_app: typer.Typer, name: str | None = None) -> None:
 
 
 def _application_line(error: Exception) -> str:
-    """The application's own last line on the way to an error, as `file:line: code`, or empty."""
+    """The application's own last line in an error's traceback, as `file:line: code`, or empty."""
     application = current_options.get().application
     if application is None:
         return ""

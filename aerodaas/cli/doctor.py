@@ -1,4 +1,4 @@
-"""What this machine can do, and what to mend: `aerodaas doctor`."""
+"""Examination of this machine, with remedies: `aerodaas doctor`."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def _machine() -> Iterator[Finding]:
 
 
 def _punctuality() -> Iterator[Finding]:
-    """What a drone's actor is granted here, found by a thread that asks for it and ends."""
+    """Priorities granted to a drone's actor, found by a thread that asks for them and ends."""
     nice = priority.niceness()
     remedy = "" if nice <= 0 else "start Ray and aerodaas without `nice`, RAY_worker_niceness=0"
     yield Finding("niceness", str(nice), nice <= 0, remedy)

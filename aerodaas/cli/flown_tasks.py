@@ -69,13 +69,13 @@ class FlownTask:
 
 @dataclass(frozen=True)
 class Flown:
-    """What a recording says of the tasks that its analytics scheduler decided on."""
+    """A recording's tasks, as its analytics scheduler decided on them."""
 
     name: str
     tasks: list[FlownTask]
     """In order of arrival."""
     models: dict[str, Profile]
-    """As the environment tells of them."""
+    """Their profiles in the environment."""
     resources: Resources
 
     @classmethod

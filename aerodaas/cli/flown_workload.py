@@ -32,7 +32,7 @@ def flown_workload(flown: Flown) -> Workload:
 
 
 def flown_trace(flown: Flown, tasks: list[Task]) -> Trace:
-    """What happened in flight, as the lab would tell it of a scheduler.
+    """A flight's trace, in the form of the lab's.
 
     `tasks` are those of `flown_workload`. So one and the same code judges flight and lab.
     """
@@ -48,7 +48,7 @@ def flown_trace(flown: Flown, tasks: list[Task]) -> Trace:
 
 
 class _Observed:
-    """Execution times in one place: what each model takes, and how that changed in the flight."""
+    """Execution times in one place: those of each model, and their change in the flight."""
 
     def __init__(self, flown: Flown, place: TaskPlace) -> None:
         seen = [
@@ -68,7 +68,7 @@ class _Observed:
         self._beyond = [took - self._typical[model] for _, model, took in seen]
 
     def estimate(self, task: FlownTask) -> int | None:
-        """What the task would have taken at about its arrival; None if nothing ran here."""
+        """Execution time of the task at about its arrival; None if nothing ran here."""
         if not self._stamps:
             return None
         right = bisect_left(self._stamps, task.arrival)

@@ -228,7 +228,7 @@ def _spread(
 def _loads(
     names: str, flown: Path | None, duration: float | None
 ) -> tuple[list[Workload], Resources, Score | None]:
-    """The workloads, what there is to run them, and how a recorded flight itself did."""
+    """The workloads, their resources, and the score of a recorded flight itself."""
     if flown is None:
         wanted = SIX if names == "six" else names.split(",")
         return [_workload(name.strip(), duration) for name in wanted], Resources(), None

@@ -1,4 +1,4 @@
-"""One way of checking what people write in files, and of wording what is wrong with it."""
+"""Validation of settings from files, and the wording of its errors."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def checked(model: type[M], content: object, place: str, hint: str = "") -> M:
 
 
 def explained(error: ValidationError, model: type[BaseModel], content: object) -> str:
-    """What is wrong, setting by setting, each with its value and what would be right."""
+    """The errors, setting by setting, each with its value and the allowed ones."""
     problems = [one for one in error.errors() if not _is_other_choice(one)] or error.errors()
     return "; ".join(_problem(one, model, content) for one in problems)
 
 
 def near(name: str, known: Iterable[str]) -> str:
-    """What may have been meant by `name`, as a remedy to put behind an error."""
+    """Suggestion of similar names for `name`, to put behind an error."""
     choices = sorted(known)
     close = difflib.get_close_matches(name, choices, n=1, cutoff=0.6)
     meant = f"; did you mean {close[0]}?" if close else ""
@@ -44,7 +44,7 @@ def near(name: str, known: Iterable[str]) -> str:
 
 
 def _is_other_choice(problem: ErrorDetails) -> bool:
-    """What pydantic says of a word that might have stood where there is more than a word."""
+    """Pydantic's error types for a scalar where an object is needed."""
     return problem["type"] == "literal_error" and not isinstance(problem["input"], str)
 
 
@@ -68,7 +68,7 @@ def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> 
 
 
 def _whose(content: object, place: Sequence[int | str]) -> str:
-    """The ids on the way to `place`, for a number in a list says little: ` (of drone, cam)`."""
+    """The ids along `place`, as a number in a list says little: ` (of drone, cam)`."""
     found = []
     for part in place:
         try:

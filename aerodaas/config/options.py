@@ -1,4 +1,4 @@
-"""How a run was asked for: what `aerodaas run` lays over an application's own words."""
+"""Options of `aerodaas run`, which override the application's."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["RunOptions", "current_options"]
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of one run; None leaves a thing as the application or its environment file says."""
+    """Options of one run; None keeps the setting of the application or its environment file."""
 
     environment: Path | None = None
     """Environment file instead of the application's own."""

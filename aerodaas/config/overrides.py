@@ -84,7 +84,7 @@ def _find(content: dict[str, Any], owner: str) -> dict[str, Any]:
 
 
 def _places(content: dict[str, Any]) -> dict[str, dict[str, Any]]:
-    """What has an id, by names that no two share."""
+    """The objects with an id, by unique names."""
     compute = [] if content["compute"] == "auto" else content["compute"]
     sections = {"robots": content["robots"], "sensors": content["sensors"], "compute": compute}
     places = {

@@ -75,7 +75,7 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
 
 
 def plugin_names(kind: PluginKind) -> list[str]:
-    """Names that `load_plugin` knows, sorted."""
+    """Names that `load_plugin` resolves, sorted."""
     found = {point.name for point in entry_points(group=f"aerodaas.{kind}")}
     return sorted(found | set(_BUILT_IN[kind]))
 
@@ -86,7 +86,7 @@ def require_plugin(kind: PluginKind, name: str) -> None:
 
 
 def is_built_in(kind: PluginKind, name: str) -> bool:
-    """Tell whether the project itself brings what is called `name`."""
+    """Whether `name` is one of the project's own plug-ins."""
     return name in _BUILT_IN[kind]
 
 

@@ -94,12 +94,12 @@ class Node:
     item: type
     """Type of the items in its stream."""
     work: Any
-    """What the actor runs: a sensor's configuration or an analysis."""
+    """The actor's work: a sensor's configuration or an analysis."""
     robot: str | None = None
     inputs: list[str] = field(default_factory=list)
     compute: str | None = None
     runtime_env: RuntimeEnvConfig | None = None
-    """What it has for itself, if the application says so."""
+    """Its own packages, if the application names any."""
     triggers: list[Trigger] = field(default_factory=list)
     dormant: bool = False
     """Runs only once triggered."""
@@ -130,7 +130,7 @@ class Graph:
         self.on_launch: list[Callable[[], None]] = []
         """Called once the streams are live."""
         self.on_growth: Callable[[], None] | None = None
-        """Has the runtime start what was added; set by it while a mission runs."""
+        """Starts additions in flight; set by the runtime while a mission runs."""
 
     def add(self, node: Node) -> Node:
         """Add a node, giving it a fresh id where its own is taken by another."""

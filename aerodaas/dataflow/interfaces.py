@@ -117,7 +117,7 @@ class IAnalyse(IDeployable, Generic[O_co]):
         target: IAnalyse[Any] | Callable[[], None],
         when: Callable[[Any], bool] | None = None,
     ) -> Self:
-        """Wake another analysis, or do something to a robot, `when` a result says so."""
+        """Wake another analysis, or command a robot, `when` a result says so."""
 
 
 class IMonitoringAnalytics(IAnalyse[O_co]):

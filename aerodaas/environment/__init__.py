@@ -1,1 +1,1 @@
-"""What an application starts from: the environment, its robots, and the run that flies them."""
+"""The application's entry: the environment, its robots, and the run that flies them."""

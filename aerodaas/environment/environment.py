@@ -177,7 +177,7 @@ class Environment(PaperNames, IEnvironment):
             self.command(robot, End())
 
     def wait(self) -> None:
-        """Return when the mission has ended; raises what it ended with."""
+        """Return when the mission has ended; raises the error that it ended with."""
         if self.run is not None:
             self.run.wait()
 
@@ -201,7 +201,7 @@ class Environment(PaperNames, IEnvironment):
         self._dispatch_with = load_scheduler(scheduler)
 
     def compute(self) -> list[ComputeConfig]:
-        """The compute resources; asks the cluster where the file says "auto"."""
+        """The compute resources; those of the cluster where the file says "auto"."""
         if self._compute is None:
             if self.config.compute == "auto":
                 from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
@@ -232,7 +232,7 @@ class Environment(PaperNames, IEnvironment):
         return self._dispatch_with
 
     def navigation_waiting(self) -> list[NavigationEntry]:
-        """What a scheduler was given before the mission."""
+        """Navigation given to a scheduler before the mission."""
         return [] if self._trajectory is None else list(self._trajectory.entries)
 
     def navigation_added(self, entry: NavigationEntry) -> bool:
@@ -286,7 +286,7 @@ class Environment(PaperNames, IEnvironment):
             )
 
     def command(self, robot: str, command: Command) -> None:
-        """Tell a flying robot something; raises MissionError if it does not fly or refuses."""
+        """Send a flying robot a command; raises MissionError if it does not fly or refuses."""
         if self.run is None or robot not in {one.robot for one in self.graph.navigation}:
             raise MissionError(f"{robot} is not flying: call start_mission(wait=False) first")
         answer = self.run.command(robot, command)
@@ -333,7 +333,7 @@ class Environment(PaperNames, IEnvironment):
         self._flown = len(self.graph.navigation)
 
     def _place_entries(self) -> None:
-        """Hand what was added to the scheduler to the robot that it is meant for.
+        """Assign the scheduler's navigation to the robots that it is meant for.
 
         Raises GraphError where several fly and nothing says for which.
         """
@@ -427,7 +427,7 @@ class Robot(PaperNames, IRobot):
         self._environment.command(self.robot_id, Resume())
 
     def wait(self) -> None:
-        """Return when the mission has ended; raises what it ended with."""
+        """Return when the mission has ended; raises the error that it ended with."""
         self._environment.launch().wait()
 
     def on_start(self, hook: Callable[[], None]) -> Callable[[], None]:

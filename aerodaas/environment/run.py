@@ -137,7 +137,7 @@ class Run:
         atexit.register(self.abandon)
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Tell a robot's mission something; raises MissionError once the run is over."""
+        """Send a robot's mission a command; raises MissionError once the run is over."""
         if self._flight is None or self._finished.is_set():
             raise MissionError(f"{robot} is no longer flying")
         return self._flight.command(robot, command)
@@ -148,7 +148,7 @@ class Run:
         return self._over
 
     def grow(self) -> None:
-        """Start what the application has added to the graph since; raises why that cannot be."""
+        """Start the graph's additions; raises the reason if that is impossible."""
         from aerodaas.actors.run.plan import (  # noqa: PLC0415 - ray only where it is needed
             make_plan,
         )
@@ -186,7 +186,7 @@ class Run:
         return self.state
 
     def _keep_alive(self) -> None:
-        """Tell the drones that the application lives, whatever it is busy with."""
+        """Keep the drones informed that the application lives, even while it is busy."""
         while not self._finished.wait(_BEAT_SECONDS):
             # Whoever waits for the run meets the same error and deals with it.
             with contextlib.suppress(AeroDaaSError):
@@ -198,7 +198,7 @@ class Run:
         return self._flight.reports()
 
     def wait(self) -> None:
-        """Watch until every mission has ended; raises what they ended with.
+        """Watch until every mission has ended; raises the error that one ended with.
 
         Ctrl-C lands the drones first; after a second one they land without us.
         """
@@ -245,7 +245,7 @@ class Run:
         return plan
 
     def _application(self, *others: object) -> Application:
-        """What the application defines by now, that of `others` included.
+        """Definitions of the application by now, those of `others` included.
 
         Raises GraphError, by name, for what cannot be sent.
         """
@@ -285,7 +285,7 @@ class Run:
                     node.work = node.work.with_model(self.options.model)
 
     def _take_tasks(self) -> None:
-        """Add what the application says of its analyses to what the environment file does."""
+        """Merge the application's task profiles into those of the environment file."""
         schedulers = self.config.schedulers
         own = {
             node.id: task

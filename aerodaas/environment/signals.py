@@ -1,4 +1,4 @@
-"""A run that is told to end lands first: SIGTERM and SIGHUP are met as Ctrl-C is."""
+"""Termination of a run, which lands first: SIGTERM and SIGHUP are handled as Ctrl-C is."""
 
 from __future__ import annotations
 

@@ -74,7 +74,7 @@ class Leg:
         return LegPhase.STALLED if stalled else LegPhase.UNDER_WAY
 
     def setpoint(self, place: Vector, position: Vector, cruise_speed: float) -> PositionSetpoint:
-        """Fly on to `place`, the waypoint or a corner on the way there, as the waypoint says."""
+        """Fly on to `place`, the waypoint or a corner before it, at the waypoint's speed."""
         waypoint = self.stop.waypoint
         return setpoint_towards(place, position, waypoint.yaw, waypoint.speed or cruise_speed)
 

@@ -1,4 +1,4 @@
-"""What a run shows on the terminal: getting ready, the live view, and where the results lie."""
+"""Terminal output of a run: its start, the live view, and the places of the results."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _ALERTS_SHOWN = 4
 
 
 class StartupView:
-    """Says what a run is waiting for until it flies."""
+    """Shows the progress of a run's start."""
 
     def __init__(self, options: RunOptions) -> None:
         self._console = Console(highlight=False)
@@ -178,7 +178,7 @@ def _commands(state: FlightState) -> list[StreamSnapshot]:
 
 
 def show_speed(options: RunOptions, mission: float, wall: float, start: float) -> None:
-    """Say how long a mission of `mission` seconds took on the wall, and its start before that."""
+    """Print the wall time of a mission of `mission` seconds, and of its start before that."""
     if options.view and wall > 0:
         factor = f"{mission / wall:.1f} times as fast as the clock"
         line = f"flew {mission:.1f} s in {wall:.1f} s, {factor}; ready after {start:.1f} s"
@@ -186,14 +186,14 @@ def show_speed(options: RunOptions, mission: float, wall: float, start: float) -
 
 
 def show_left(recording: Path | None) -> None:
-    """Say what becomes of drones that still fly when the application ends."""
+    """Print the fate of drones that still fly when the application ends."""
     where = f"; its recording: {_shown(recording)}" if recording else ""
     line = f"a drone is still flying: it comes down by itself, and its processes end then{where}"
     Console(highlight=False, soft_wrap=True, stderr=True).print(line, markup=False)
 
 
 def show_headless(head: str, recording: Path | None) -> None:
-    """Say how a run ended whose cluster has lost its head, at the address `head`."""
+    """Print the end of a run whose cluster has lost its head, at the address `head`."""
     where = f"; its recording: {_shown(recording)}" if recording else ""
     line = (
         f"the cluster's head at {head} is out of reach: what runs here for this flight ends by "
@@ -203,7 +203,7 @@ def show_headless(head: str, recording: Path | None) -> None:
 
 
 def show_results(options: RunOptions, recording: Path | None) -> None:
-    """Write plots and summary of a closed recording, and say where everything lies."""
+    """Write plots and summary of a closed recording, and print the places of all files."""
     if recording is None:
         return
     from aerodaas.recording.report.report import (  # noqa: PLC0415 - matplotlib is slow to load

@@ -56,7 +56,7 @@ class MissionView:
         error: BaseException | None,
         traceback: TracebackType | None,
     ) -> None:
-        """Leave the last picture on the terminal."""
+        """Leave the last view on the terminal."""
         if self._live is not None:
             if self._last is not None:
                 self._live.update(self.render(self._last), refresh=True)
@@ -82,7 +82,7 @@ class MissionView:
                 self._print(snapshot)
 
     def render(self, snapshot: Snapshot) -> Panel:
-        """The picture of a snapshot, at least 72 columns wide."""
+        """The view of a snapshot, at least 72 columns wide."""
         ascii_only = not self._console.encoding.lower().startswith("utf")
         parts = [
             robot_panel(robot, self._paths.get(robot.name, ()), ascii_only=ascii_only)

@@ -1,4 +1,4 @@
-"""The parts of the terminal view, each a function from what is known to something rich draws."""
+"""The parts of the terminal view, each a function from data to a renderable of rich's."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def place_text(vehicle: VehicleState) -> str:
 
 
 def waypoints_text(mission: MissionStatus) -> tuple[float, str]:
-    """Share of the waypoints visited, 0 to 1, and the same in words."""
+    """Share of the waypoints visited, 0 to 1, and the same as text."""
     visited, known = mission.waypoint_counts
     return mission.progress, f"{visited} of {known} waypoints" if known else "no waypoints"
 

@@ -1,4 +1,4 @@
-"""What the terminal view shows: the mission at one moment."""
+"""Data of the terminal view: the mission at one moment."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["RobotSnapshot", "Snapshot", "StreamSnapshot"]
 
 @dataclass(frozen=True, slots=True)
 class RobotSnapshot:
-    """One robot; None where nothing has been heard of it yet."""
+    """One robot; None before its first report."""
 
     name: str
     mission: MissionStatus | None = None

@@ -1,1 +1,1 @@
-"""What an application's or a plug-in's author tests with."""
+"""Tools for the tests of an application's or a plug-in's author."""

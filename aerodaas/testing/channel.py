@@ -12,7 +12,7 @@ __all__ = ["Channel", "Impairment"]
 
 @dataclass(frozen=True)
 class Impairment:
-    """What a radio link does to packets: shares of 0 to 1, seconds."""
+    """Impairments of a radio link's packets: shares of 0 to 1, seconds."""
 
     loss: float = 0.0
     duplicates: float = 0.0
@@ -45,7 +45,7 @@ class Channel:
         self.lost = 0
 
     def send(self, content: bytes, peer: tuple[str, int], now: float) -> None:
-        """Take a packet at `now` seconds; what has no delay is delivered at once."""
+        """Take a packet at `now` seconds; one without delay is delivered at once."""
         bad, draw = self.impairment, self._random.random
         if draw() < bad.loss:
             self.lost += 1
@@ -63,7 +63,7 @@ class Channel:
             heapq.heappush(self._waiting, (due, self._count, content, peer))
 
     def turn(self, now: float) -> None:
-        """Deliver what is due at `now` seconds."""
+        """Deliver the packets due at `now` seconds."""
         while self._waiting and self._waiting[0][0] <= now:
             _, _, content, peer = heapq.heappop(self._waiting)
             self._deliver(content, peer)

@@ -1,4 +1,4 @@
-"""What emulated vehicles share: a flight by the embedded simulator, and a thread on a socket."""
+"""Base of emulated vehicles: a flight in the embedded simulator, and a thread on a socket."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class EmulatedFlight:
 
     @property
     def mode(self) -> VehicleMode:
-        """What the autopilot is doing."""
+        """The autopilot's flight mode."""
         return self._autopilot.mode
 
     @property
@@ -68,7 +68,7 @@ class EmulatedVehicle(ABC, Generic[FlightT]):
     """A vehicle on loopback in real time, from `start` (or `with`) to `stop`."""
 
     kind: ClassVar[str]
-    """What its thread is called."""
+    """Name of its thread."""
 
     def __init__(self, opened: socket.socket, flight: FlightT) -> None:
         """Listen at `opened`, which becomes its own."""
@@ -88,7 +88,7 @@ class EmulatedVehicle(ABC, Generic[FlightT]):
 
     @property
     def mode(self) -> VehicleMode:
-        """What it is doing."""
+        """Its flight mode."""
         with self._lock:
             return self._flight.mode
 
@@ -122,7 +122,7 @@ class EmulatedVehicle(ABC, Generic[FlightT]):
         """Listen, fly and talk until `_stopping` is set."""
 
     def _release(self) -> None:
-        """Let go of what there is besides the socket, once the thread has ended."""
+        """Release everything besides the socket, once the thread has ended."""
 
 
 def watch(vehicle: EmulatedVehicle[FlightT]) -> None:

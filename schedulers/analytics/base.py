@@ -73,7 +73,7 @@ class QoeGoal:
 
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """What is known of a model before it runs. Raises SchedulerError where it makes no sense."""
+    """The scheduler's knowledge of a model. Raises SchedulerError for senseless values."""
 
     model: str
     benefit: float
@@ -180,10 +180,10 @@ class Result:
 
 @dataclass(frozen=True, slots=True)
 class Resources:
-    """What a scheduler may use: one serial edge executor and a cloud of many slots."""
+    """Resources of a scheduler: one serial edge executor and a cloud of many slots."""
 
     cloud_slots: int = 32
-    """Executions that may be in the cloud at once; 0 where there is no cloud."""
+    """Executions that may be in the cloud at once; 0 without a cloud."""
     cloud_timeout: int = 10 * NANOSECONDS
     """After which an execution in the cloud counts as lost and frees its slot."""
 
@@ -256,7 +256,7 @@ class AnalyticsScheduler:
         raise NotImplementedError
 
     def executor_idle(self, now: int) -> Iterable[Decision]:  # noqa: ARG002 - for overriding
-        """Choose what the idle edge executor runs next, if anything.
+        """Choose the next task of the idle edge executor, if any.
 
         Called after each event that leaves the executor idle while undecided tasks exist, and
         again for as long as the answer drops or sends tasks without starting one.

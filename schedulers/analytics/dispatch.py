@@ -1,4 +1,4 @@
-"""What stands between a scheduler and its executors, the same in the lab and live."""
+"""The layer between a scheduler and its executors, the same in the lab and live."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ class Host(Protocol):
 
 
 class Dispatch:
-    """Tells a scheduler the events, checks its decisions and carries them out on a host.
+    """Gives a scheduler its events, checks its decisions and carries them out on a host.
 
     Raises SchedulerError, before anything was done about it, for a decision that cannot be
     carried out: about a task that is not undecided, a second task for a busy executor, a cloud
@@ -76,7 +76,7 @@ class Dispatch:
         self._cloud_queue: deque[SendToCloud] = deque()
         self._cloud_started: dict[int, int] = {}
         self._ended: deque[Result] = deque()
-        """Ends that the scheduler has not been told of yet."""
+        """Ends not yet passed on to the scheduler."""
         self._has_cloud = resources.cloud_slots > 0
         self._host = host
 
@@ -90,7 +90,7 @@ class Dispatch:
         self.ask(self.scheduler.start, self.resources, now)
 
     def ask(self, event: Callable[..., Any], *args: Any) -> Any:  # noqa: ANN401
-        """Tell the scheduler; a host that does not trust it overrides this."""
+        """Call the scheduler; a host that does not trust it overrides this."""
         return event(*args)
 
     def arrived(self, task: Task, now: int) -> None:
@@ -126,7 +126,7 @@ class Dispatch:
             self._offer_edge(now)
 
     def change_resources(self, resources: Resources, now: int) -> None:
-        """The cloud is gone, which gives up what waits for it, or back."""
+        """Change the resources: the cloud is gone, which gives up its queue, or back."""
         self.resources = resources
         while self._cloud_queue and not resources.cloud_slots:
             self._give_up(self._cloud_queue.popleft().task, now)
@@ -135,7 +135,7 @@ class Dispatch:
             self._offer_edge(now)
 
     def replace(self, scheduler: AnalyticsScheduler, now: int) -> None:
-        """Go on with another scheduler, which is told of the undecided tasks as new ones."""
+        """Go on with another scheduler, which gets the undecided tasks as new ones."""
         self.scheduler = scheduler
         self._ended.clear()
         self.start(now)
@@ -202,7 +202,7 @@ class Dispatch:
         self._host.run_edge(task, now)
 
     def _divert(self, task: Task, now: int) -> None:
-        """What was to run on an executor that is down goes to the cloud, if it pays and fits."""
+        """Send the tasks of an executor that is down to the cloud, if they pay and fit."""
         profile = task.profile
         latest = task.deadline - profile.cloud_time
         if self.resources.cloud_slots and profile.cloud_gain > 0 and now <= latest:
@@ -240,7 +240,7 @@ class Dispatch:
                 self._give_up(waiting.task, now)
 
     def _give_up(self, task: Task, now: int) -> None:
-        """End a task that the scheduler believes to have started; it is told as soon as may be."""
+        """End a task that the scheduler takes for started; the scheduler learns it at once."""
         result = Result(task, TaskOutcome.DROPPED, TaskPlace.NOWHERE, now, now)
         self._host.closed(result)
         self._ended.append(result)

@@ -209,7 +209,7 @@ class Margin(AnalyticsScheduler):
         return ()
 
     def resources_changed(self, resources: Resources, now: int) -> Iterable[Decision]:
-        """Plan for a cloud that is gone, or back: then what is known of it is no longer true."""
+        """Plan for a cloud that is gone, or back: earlier estimates of it are void."""
         self.cloud.resources = resources
         self.cloud.silent_since = None
         self._stale = True
@@ -252,7 +252,7 @@ class Margin(AnalyticsScheduler):
         return int(task.deadline - belief.mean + belief.sigma)
 
     def _fill_slots(self, now: int) -> Iterable[Decision]:
-        """Give the slots that have become free to those who waited, the dearest models first."""
+        """Give free slots to waiting tasks, the most valuable models first."""
         for name in sorted(self._hopeful, key=self._slot_worth, reverse=True):
             model, queue = self._models[name], self._hopeful[name]
             while queue and not self.cloud.crowded:
@@ -336,7 +336,7 @@ class Margin(AnalyticsScheduler):
         return Lane(belief, jobs)
 
     def _price(self, now: int) -> float:
-        """Value of edge time, per nanosecond: what the best mix of models would earn on it.
+        """Value of edge time, per nanosecond: the gain of the best mix of models on it.
 
         Prices the cloud's slots on the way, from the same loads.
         """

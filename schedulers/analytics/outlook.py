@@ -1,4 +1,4 @@
-"""What the cloud is worth at this moment: chance of being in time, waiting, silence, probes."""
+"""The cloud's present value: chance of being in time, waiting, silence, probes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _UNANSWERED = (TaskOutcome.FAILED, TaskOutcome.TIMEOUT)
 
 
 class CloudOutlook:
-    """Knows how long the cloud takes, how full it is, and whether it answers at all."""
+    """Estimates the cloud's execution times, its load, and whether it answers at all."""
 
     def __init__(self) -> None:
         self.resources = Resources()

@@ -24,7 +24,7 @@ class Job:
     deadline: float
     benefit: float
     loss: float
-    """What running it costs: its own cost, and what it would be worth elsewhere."""
+    """Cost of running it: its own cost, and its value elsewhere."""
 
 
 @dataclass(slots=True)

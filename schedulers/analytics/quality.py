@@ -1,4 +1,4 @@
-"""What one more task in time is worth to a model's window of quality of experience."""
+"""Value of one more task in time to a model's window of quality of experience."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ _Floats = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class _Jobs:
-    """What the edge may choose from; ticks of the grid."""
+    """Candidates of the edge; ticks of the grid."""
 
     first: _Integers
     """Earliest start."""

@@ -1,4 +1,4 @@
-"""What a run is judged by: completion, utility, quality of experience, use, cost."""
+"""Metrics of a run: completion, utility, quality of experience, use, cost."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ Curve = tuple[tuple[int, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class Network:
-    """What the way to the cloud does to a task's nominal time there.
+    """Effect of the link to the cloud on a task's nominal time there.
 
     `latency` is in nanoseconds, linear between its points. `bandwidth` is in bytes per second, a
     step function: the time to send `upload` bytes from the start on replaces that at `nominal`
@@ -69,13 +69,13 @@ class Network:
         return int(_linear(self.latency, stamp)) if self.latency else 0
 
     def bandwidth_at(self, stamp: int) -> float | None:
-        """Bytes per second at `stamp`, nanoseconds; None where nothing is said of it."""
+        """Bytes per second at `stamp`, nanoseconds; None if not given."""
         if not self.bandwidth:
             return None
         return self.bandwidth[max(bisect_right(self.bandwidth, (stamp, float("inf"))) - 1, 0)][1]
 
     def out_at(self, stamp: int) -> bool:
-        """Tell whether there is no way to the cloud at `stamp`, nanoseconds."""
+        """Whether there is no link to the cloud at `stamp`, nanoseconds."""
         return any(begin <= stamp < end for begin, end in self.outages)
 
     def cloud_time(self, nominal: int, start: int) -> int | None:
@@ -92,7 +92,7 @@ class Network:
         return taken
 
     def earliest_end(self, nominal: int, start: int) -> int | None:
-        """Earliest end of an execution begun at `start` or later; None if there is none."""
+        """Earliest end of an execution begun at `start` or later; None without one."""
         ends = [
             begin + taken
             for begin in (start, *(end for _, end in self.outages if end > start))

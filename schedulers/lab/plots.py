@@ -23,7 +23,7 @@ from aerodaas.types.clock import NANOSECONDS
 __all__ = ["plot_bars", "plot_observations", "plot_timeline"]
 
 PALETTE = ("#0072B2", "#E69F00", "#009E73", "#CC79A7", "#56B4E9", "#D55E00", "#F0E442", "#000000")
-"""Okabe and Ito (2008): told apart with every kind of colour vision."""
+"""Okabe and Ito (2008): distinguishable with every kind of colour vision."""
 _STYLE: dict[str, Any] = {
     "figure.dpi": 120,
     "font.size": 9,
@@ -81,7 +81,7 @@ def plot_bars(result: LabResult, path: Path) -> None:
 
 
 def plot_timeline(trace: Trace, path: Path, title: str, begin: float, end: float) -> None:
-    """What ran where on one edge between two times in seconds, by model; misses are hatched."""
+    """Executions on one edge between two times in seconds, by model; misses are hatched."""
     shown = [r for r in trace.results if r.finished / 1e9 >= begin and r.started / 1e9 <= end]
     models = sorted({result.task.profile.model for result in trace.results})
     colours = dict(zip(models, PALETTE, strict=False))

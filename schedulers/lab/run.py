@@ -42,7 +42,7 @@ class LabResult:
     bounds: list[float] | None
 
     def figures(self, scheduler: str) -> dict[str, Mean]:
-        """What is shown of a scheduler: means over the seeds with confidence intervals.
+        """Figures of a scheduler: means over the seeds with confidence intervals.
 
         Rates are per second of the workload and summed over its edges; shares are 0 to 1.
         """

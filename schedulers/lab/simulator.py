@@ -28,7 +28,7 @@ _EVERY = 50 * MILLISECOND
 
 @dataclass(slots=True)
 class SchedulerObservation:
-    """What a scheduler let see of itself at one moment."""
+    """Internal figures of a scheduler at one moment."""
 
     at: int
     figures: dict[str, float]
@@ -36,7 +36,7 @@ class SchedulerObservation:
 
 @dataclass(slots=True)
 class Trace:
-    """What happened on one edge."""
+    """Events of one edge."""
 
     results: list[Result] = field(default_factory=list)
     reasons: Counter[str] = field(default_factory=Counter)
@@ -51,7 +51,7 @@ class Trace:
 
 
 class _SimulatedHost:
-    """Executors that take as long as the sample path says."""
+    """Executors with the execution times of the sample path."""
 
     def __init__(self, path: SamplePath, resources: Resources, *, record: bool) -> None:
         self.trace = Trace()
@@ -95,7 +95,7 @@ def simulate(
     *,
     record: bool = False,
 ) -> Trace:
-    """Run a copy of `scheduler` over the path and return what happened.
+    """Run a copy of `scheduler` over the path and return its trace.
 
     At one moment, ends of executions come first, then timers, then arrivals. `record` keeps
     every decision and looks at the scheduler every 50 ms. Raises SchedulerError for a decision

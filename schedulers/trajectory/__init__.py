@@ -1,1 +1,1 @@
-"""Trajectory schedulers: who is visited next."""
+"""Trajectory schedulers: the order in which waypoints are visited."""

@@ -30,7 +30,7 @@ __all__ = ["NavigationEntry", "NavigationSink", "PlanningContext", "TrajectorySc
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class PlanningContext:
-    """What a trajectory scheduler may know when it plans."""
+    """Input of a trajectory scheduler beside the waypoints."""
 
     now: float
     """Seconds of mission time."""
@@ -45,7 +45,7 @@ class PlanningContext:
     ordered: tuple[tuple[str, ...], ...] = ()
     """Ids that must be visited in this order, for each ordered group of two or more."""
     energy: EnergyModel | None = None
-    """Charge that flying takes; None where nobody knows."""
+    """Charge that flying takes; None if unknown."""
     reserve: float = 0.0
     """Charge that must be left on arrival at home."""
 

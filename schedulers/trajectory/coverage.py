@@ -33,7 +33,7 @@ _TURN = 3.0
 
 @dataclass(frozen=True)
 class Coverage:
-    """The way over an area."""
+    """A path that covers an area."""
 
     waypoints: tuple[Waypoint, ...]
     """Local ENU, in order."""
@@ -66,7 +66,7 @@ def cover(
     angle: float | None = None,
     speed: float | None = None,
 ) -> Coverage:
-    """Plan the way over the area inside `outline` (ENU metres) at `height` metres.
+    """Plan a path over the area inside `outline` (ENU metres) at `height` metres.
 
     `width` is that of the camera's footprint across the sweep; neighbouring strips share
     `overlap` (0 to 1) of it. `holes` need not be seen but may be flown over; `no_fly` zones are
@@ -189,7 +189,7 @@ def _join(
 
 
 def _append(way: list[Place], flyable: BaseGeometry, target: Place) -> bool:
-    """Go on to `target`, or to the flyable place nearest to it; False where there is no way."""
+    """Go on to `target`, or to the flyable place nearest to it; False without a path."""
     if not shapely.covers(flyable, shapely.Point(target)):
         nearest = shapely.shortest_line(flyable, shapely.Point(target))
         x, y = shapely.get_coordinates(nearest)[0]

@@ -49,7 +49,7 @@ class DeadlineScheduler(TrajectoryScheduler):
 
     @staticmethod
     def _insert(stop: int, order: list[int], travel: TravelCosts) -> None:
-        """Put `stop` where the way grows least without making a punctual stop late."""
+        """Insert `stop` where the path grows least without making a punctual stop late."""
         start, home = len(travel.hover), len(travel.hover) + 1
         way = np.array([start, *order, home])
         distance = travel.distance

@@ -23,7 +23,7 @@ from aerodaas.types.waypoints import Waypoint
 __all__ = ["share_out"]
 
 _HALVINGS = 5
-"""Steps of the search for the earliest end, each of which halves what is uncertain of it."""
+"""Steps of the search for the earliest end, each of which halves the uncertain interval."""
 
 
 def share_out(

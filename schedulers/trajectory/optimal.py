@@ -65,7 +65,7 @@ class OptimalScheduler(TrajectoryScheduler):
         self._seed = seed
 
     def plan(self, pending: Sequence[Waypoint], situation: PlanningContext) -> Sequence[Waypoint]:
-        """Order `pending`; what cannot be served is left out."""
+        """Order `pending`; unreachable waypoints are left out."""
         if not pending:
             return []
         travel = TravelCosts.of(pending, situation)

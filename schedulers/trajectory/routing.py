@@ -1,4 +1,4 @@
-"""Routing problems for PyVRP: waypoints, drones, what legs cost and what may be left out."""
+"""Routing problems for PyVRP: waypoints, drones, costs of legs, and optional waypoints."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _UNBOUNDED = int(np.iinfo(np.int64).max)
 
 @dataclass(frozen=True)
 class DroneRoute:
-    """One drone: where it starts and ends, what its legs cost, and what it may spend."""
+    """One drone: its start and end, the costs of its legs, and its budget."""
 
     start: int
     """Row of the matrices."""
     end: int
     costs: Matrix
-    """What is minimised, (M, M)."""
+    """The minimised cost, (M, M)."""
     durations: Matrix
     """Seconds, (M, M)."""
     budget: float = np.inf

@@ -1,4 +1,4 @@
-"""What it costs to get from place to place: distances, times and charge between waypoints."""
+"""Costs of travel between waypoints: distances, times and charge."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class TravelCosts:
         return times
 
     def is_punctual(self, order: Sequence[int]) -> bool:
-        """Tell whether `order` reaches every waypoint by its deadline."""
+        """Whether `order` reaches every waypoint by its deadline."""
         slack = 1e-9
         return all(
             arrival <= self.deadline[stop] + slack

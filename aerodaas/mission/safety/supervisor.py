@@ -144,7 +144,7 @@ class Supervisor:
         return Fault(FailsafeAction.RETURN, "link_lost", f"{what} for {duration:.0f} s")
 
     def _position(self, state: VehicleState, now: int) -> Fault | None:
-        """Judge by the time in touch alone: what is not heard of may know its position."""
+        """Judge by the time in touch alone: a silent vehicle may know its position."""
         if self._is_lost(state, now):
             return None
         if has_position(state):

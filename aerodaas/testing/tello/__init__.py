@@ -1,4 +1,4 @@
-"""An emulated Tello that speaks the SDK on loopback, flies and films."""
+"""An emulated Tello with the SDK's protocol on loopback, flight dynamics and video."""
 
 from aerodaas.testing.channel import Impairment
 from aerodaas.testing.tello.emulator import EmulatedTello

@@ -38,7 +38,7 @@ def main(
         list[int] | None, typer.Option(help="Further ports on loopback that get the video.")
     ] = None,
 ) -> None:
-    """Emulate a Tello until Ctrl-C; the first line says where it listens."""
+    """Emulate a Tello until Ctrl-C; the first line gives its addresses."""
     link = Impairment(loss=loss, delay=delay)
     options = TelloOptions(
         address,

@@ -54,7 +54,7 @@ class EmulatedTello(EmulatedVehicle[TelloFlight]):
         self._states = Channel(self.options.states, f"{seed}/states", self._transmit)
         self._client: tuple[str, int] | None = None
         self._awaiting: tuple[str, int] | None = None
-        """Who gets `ok` once the motion under way is done."""
+        """The client that gets `ok` once the motion under way is done."""
         self._idle_since = time.monotonic()
         self._video: VideoStream | None = None
 
@@ -139,7 +139,7 @@ class EmulatedTello(EmulatedVehicle[TelloFlight]):
             self._awaiting = None
 
     def _conclude(self, now: float) -> None:
-        """Reply to a motion that is done; land when nobody has spoken for long."""
+        """Reply to a finished motion; land after a long silence of the client."""
         with self._lock:
             settled, flying, mode = self._flight.settled, self._flight.flying, self._flight.mode
         if self._awaiting is not None:

@@ -25,7 +25,7 @@ _SPEED = 8.0
 """m/s by the data sheet; the sticks ask for less."""
 _ACCELERATION = 3.0
 _LEAST_TOF, _TOF_RANGE, _OUT_OF_RANGE = 10, 850, 6553
-"""Centimetres of the time-of-flight sensor: on the ground, at most, and what it says beyond."""
+"""Centimetres of the time-of-flight sensor: on the ground, at most, and its value beyond."""
 _SEA_LEVEL = 100.0
 """Metres that the barometer reads on the ground."""
 _THERE, _FACING = 0.1, math.radians(3.0)
@@ -35,7 +35,7 @@ class TelloFlight(EmulatedFlight):
     """Body, autopilot, battery and state string; time moves in `advance`."""
 
     def __init__(self, options: TelloOptions) -> None:
-        """Stand where `options` say."""
+        """Stand at the place of `options`."""
         # 80 g with propellers of 3 inches, one cell of 1.1 Ah: 13 minutes by the data sheet.
         airframe = Airframe(
             mass=0.08,

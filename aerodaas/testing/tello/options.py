@@ -1,4 +1,4 @@
-"""What an emulated Tello is like, and how bad its Wi-Fi is."""
+"""Options of an emulated Tello and of its Wi-Fi's impairments."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class TelloOptions:
     port: int = 0
     """For commands; 0 for any free one."""
     sdk: Literal[20, 30] = 30
-    """SDK 2.0 does not know `port`."""
+    """SDK 2.0 has no command `port`."""
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where it stands, ENU metres."""
     start_yaw: float = 0.0
@@ -62,7 +62,7 @@ class TelloOptions:
     gust: float = 0.0
     seed: int = 0
     commands: Impairment = field(default_factory=Impairment)
-    """On the way to the Tello."""
+    """Impairments towards the Tello."""
     replies: Impairment = field(default_factory=Impairment)
     states: Impairment = field(default_factory=Impairment)
     video_link: Impairment = field(default_factory=Impairment)

@@ -1,4 +1,4 @@
-"""What the emulated Tello films: the simulated world, or a pattern that tells its own time."""
+"""Images of the emulated Tello: the simulated world, or a pattern with its own time."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["PictureSource", "picture_source"]
 
 Image: TypeAlias = NDArray[np.uint8]
 PictureSource: TypeAlias = Callable[[float, Odometry], Image]
-"""The picture at a time in seconds from a pose: height x width x 3, BGR."""
+"""The image at a time in seconds from a pose: height x width x 3, BGR."""
 
 
 @contextlib.contextmanager
@@ -58,7 +58,7 @@ def picture_source(video: VideoOptions) -> Iterator[PictureSource]:
 
 
 def _clock(video: VideoOptions) -> PictureSource:
-    """A textured picture that drifts, with the host's milliseconds in its top rows."""
+    """A textured image that drifts, with the host's milliseconds in its top rows."""
     noise = np.random.default_rng(0).integers(
         0, 256, (video.height // 8, video.width // 8, 3), np.uint8
     )

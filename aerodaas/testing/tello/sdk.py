@@ -45,7 +45,7 @@ NOT_FLYING = "error Motor stop"
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a command comes to."""
+    """The effect of a command."""
 
     reply: str | None = None
     """At once; None for `rc`, or where the reply comes when the motion is done."""
@@ -59,7 +59,7 @@ class TelloSdk:
     def __init__(self, options: TelloOptions, flight: TelloFlight) -> None:
         """Fly `flight`."""
         self.entered = False
-        """True once `command` was said; before, nothing else is understood."""
+        """True after `command`; before, no other command is accepted."""
         self.streaming = False
         self.ports = (8890, 11111)
         """For state and video."""

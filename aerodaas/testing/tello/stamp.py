@@ -1,4 +1,4 @@
-"""A time written into a picture so that it survives encoding, to tell how old pictures are.
+"""A time written into an image so that it survives encoding, to measure an image's age.
 
 It needs numpy alone, so that clients of other libraries can load this file by its path.
 """
@@ -19,7 +19,7 @@ _MIDDLE = 128
 
 
 def write_stamp(image: NDArray[np.uint8], milliseconds: int) -> None:
-    """Write a time as black and white squares along the top of a picture."""
+    """Write a time as black and white squares along the top of an image."""
     stamp = milliseconds % _STAMPS
     word = stamp << _CHECK | _checksum(stamp)
     for bit in range(_BITS + _CHECK):
@@ -30,7 +30,7 @@ def write_stamp(image: NDArray[np.uint8], milliseconds: int) -> None:
 
 
 def read_age(image: NDArray[np.uint8], milliseconds: int) -> float | None:
-    """Milliseconds from the time in a picture until now; None if it cannot be read."""
+    """Milliseconds from the time in an image until now; None if it cannot be read."""
     word = 0
     for bit in range(_BITS + _CHECK):
         row, column = divmod(bit, image.shape[1] // _CELL)

@@ -1,4 +1,4 @@
-"""The emulated Tello's camera: pictures, real H.264, packets of 1460 bytes."""
+"""The emulated Tello's camera: images, real H.264, packets of 1460 bytes."""
 
 from __future__ import annotations
 

@@ -40,7 +40,7 @@ class Dedas(Sjf):
     def to_cloud(
         self, task: Task, now: int, reason: str = "no room on the edge"
     ) -> Iterable[Decision]:
-        """The cloud if the task fits in its slack there, whatever it costs, else drop."""
+        """The cloud if the task fits in its slack there, at any cost, else drop."""
         if not self.resources.cloud_slots or now + self.cloud_time(task) > task.deadline:
             return [self.drop(task, now, "no time left for the cloud")]
         return [self.send(task, reason)]

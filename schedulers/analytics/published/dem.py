@@ -11,7 +11,7 @@ __all__ = ["Dem"]
 
 
 class Dem(EdgeCloudEdf):
-    """Inserts a newcomer if what it gains exceeds what its victims lose by leaving the edge.
+    """Inserts a newcomer if its gain exceeds its victims' loss by leaving the edge.
 
     Victims are the tasks behind the newcomer's slot that would miss their deadline once it is
     inserted. `published=True` never looks at the first task behind the slot and orders by the

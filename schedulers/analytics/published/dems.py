@@ -61,7 +61,7 @@ class Dems(Dem):
         return decisions
 
     def executor_idle(self, now: int) -> Iterable[Decision]:
-        """Steal what fits before the queue, else run its head."""
+        """Steal a task that fits before the queue, else run the queue's head."""
         stolen = self._steal(now)
         if stolen is None:
             return super().executor_idle(now)

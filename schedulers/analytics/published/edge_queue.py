@@ -1,4 +1,4 @@
-"""What the published schedulers share: an ordered queue before the serial edge executor."""
+"""Base of the published schedulers: an ordered queue before the serial edge executor."""
 
 from __future__ import annotations
 

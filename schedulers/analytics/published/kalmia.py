@@ -14,7 +14,7 @@ EXTENSION = 0.1
 
 
 class Kalmia(Fifo):
-    """FIFO on the edge if the newcomer makes it, else the cloud if it fits, whatever it costs.
+    """FIFO on the edge if the newcomer makes it, else the cloud if it fits, at any cost.
 
     A model that is not urgent is tried once more with its deadline extended by 10 %; urgent ones
     are dropped. The lab judges by the original deadline, so an extension pays only where times

@@ -54,7 +54,7 @@ ACTIVE: tuple[str, ...] = tuple(PUBLISHED)
 
 
 def told_profile(model: str, tasks: Mapping[str, TaskConfig]) -> Profile:
-    """What the environment file's `schedulers.tasks` tell of an analysis.
+    """Profile of an analysis from the environment file's `schedulers.tasks`.
 
     `model` is the analysis' stream; the file may leave the robot's name out. Raises
     SchedulerError for figures that no scheduler could work with.
