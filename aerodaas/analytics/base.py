@@ -35,7 +35,7 @@ from aerodaas.analytics.single_item import process_item
 from aerodaas.config.model import RuntimeEnvConfig, TaskConfig, as_runtime_env
 from aerodaas.dataflow.containers import AeroData
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node, Trigger, refusal
-from aerodaas.dataflow.interfaces import IAnalyse, ICompute, INavigableAnalyse
+from aerodaas.dataflow.interfaces import IAeroData, IAnalyse, ICompute, INavigableAnalyse
 from aerodaas.dataflow.names import PaperNames, snake_case
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.mission.commands import TRIGGERED
@@ -178,7 +178,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     def analyse(self, data: AeroStreamData[Any]) -> AeroStreamData[O_co]: ...
     @overload
     def analyse(self, data: AeroData[Any]) -> AeroData[O_co | None]: ...
-    def analyse(self, data: object) -> AeroStreamData[O_co] | AeroData[O_co | None]:
+    def analyse(self, data: IAeroData[Any]) -> AeroStreamData[O_co] | AeroData[O_co | None]:
         """Analyse a stream, or a single item at once.
 
         Called again with a stream, the same analysis reads that one, too. While a mission flies,
@@ -330,6 +330,13 @@ class NavigableAnalytics(Analytics[AeroNavigation], INavigableAnalyse):
 
     produces: ClassVar[type] = AeroNavigation
 
-    def generate_navigation(self, data: AeroStreamData[Any]) -> AeroStreamData[AeroNavigation]:
-        """Turn analytics' results into navigation; the same as `analyse`."""
+    def generate_navigation(self, data: IAeroData[Any]) -> AeroStreamData[AeroNavigation]:
+        """Turn a stream of results into a stream of navigation; the same as `analyse`.
+
+        Raises:
+            GraphError: If `data` is no stream, or carries another type.
+        """
+        if not isinstance(data, AeroStreamData):
+            name = type(self).__name__
+            raise GraphError(f"{name}.generate_navigation takes a stream, not a single item")
         return self.analyse(data)

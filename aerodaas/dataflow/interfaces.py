@@ -104,7 +104,7 @@ class IAnalyse(IDeployable, Generic[O_co]):
     @overload
     def analyse(self, data: AeroData[Any]) -> AeroData[O_co | None]: ...
     @abstractmethod
-    def analyse(self, data: Any) -> Any:
+    def analyse(self, data: IAeroData[Any]) -> IAeroData[Any]:
         """Analyse a stream, whose results are a stream of their own; or one item, at once."""
 
     @abstractmethod
@@ -154,7 +154,7 @@ class INavigableAnalyse(IAnalyse["AeroNavigation"]):
     """An analysis whose results are navigation."""
 
     @abstractmethod
-    def generate_navigation(self, data: AeroStreamData[Any]) -> AeroStreamData[AeroNavigation]:
+    def generate_navigation(self, data: IAeroData[Any]) -> AeroStreamData[AeroNavigation]:
         """Turn analytics' results into navigation; the same as `analyse`, as the table names it."""
 
 
