@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from aerodaas.config.extras import require_extra
 from aerodaas.schedulers.analytics.base import MILLISECOND, AnalyticsScheduler, Resources
 from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
 from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
@@ -30,7 +31,6 @@ from aerodaas.schedulers.lab.run import Spread
 from aerodaas.schedulers.lab.workload import SIX
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import AeroDaaSError
-from aerodaas.types.extras import require_extra
 
 __all__ = ["app", "result_table"]
 

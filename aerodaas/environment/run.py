@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerodaas.actors.run.checks import check_served
+from aerodaas.config.extras import require_extra
 from aerodaas.config.model import EnvironmentConfig, TaskConfig
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.environment.signals import TerminatedError, raise_on_termination
@@ -25,7 +26,6 @@ from aerodaas.types.errors import (
     MissionError,
     RecordingError,
 )
-from aerodaas.types.extras import require_extra
 from aerodaas.types.identifiers import told
 from aerodaas.types.status import MissionState
 

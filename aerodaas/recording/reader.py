@@ -16,10 +16,10 @@ from mcap.records import Attachment, Channel, Message
 from mcap_protobuf.decoder import DecoderFactory
 from typing_extensions import Self
 
+from aerodaas.config.extras import require_extra
 from aerodaas.recording.index import BROKEN, Block, FileIndex, load, read_index
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import RecordingError
-from aerodaas.types.extras import require_extra
 
 __all__ = ["Record", "Recording", "Topic"]
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.config.extras import has_extra
 from aerodaas.schedulers.trajectory.travel import Matrix
 from aerodaas.types.errors import SchedulerError
-from aerodaas.types.extras import has_extra
 
 __all__ = ["DroneRoute", "RoutingProblem", "require_solver", "solve_routes"]
 

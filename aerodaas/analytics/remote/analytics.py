@@ -14,10 +14,10 @@ from pydantic import ValidationError
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
 from aerodaas.analytics.remote.guard import Guard, is_loopback
+from aerodaas.config.extras import require_extra
 from aerodaas.config.model import RemoteConfig
 from aerodaas.types.data import Frame
 from aerodaas.types.errors import ConfigError, SourceError
-from aerodaas.types.extras import require_extra
 
 if TYPE_CHECKING:
     import uvicorn

@@ -8,8 +8,8 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 from urllib.parse import urlsplit
 
+from aerodaas.config.extras import require_extra
 from aerodaas.types.errors import ConfigError, MissionError, SourceError
-from aerodaas.types.extras import require_extra
 
 __all__ = ["RemoteClient"]
 

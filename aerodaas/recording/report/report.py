@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 
+from aerodaas.config.extras import has_extra
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.moments import MomentPicture, key_moments, picture_moments
@@ -16,7 +17,6 @@ from aerodaas.recording.report.plot import Plot
 from aerodaas.recording.report.sheet import contact_sheet
 from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.types.errors import RecordingError
-from aerodaas.types.extras import has_extra
 
 __all__ = ["Report", "ReportFiles", "read_report", "write_report"]
 

@@ -7,9 +7,9 @@ import sys
 import pytest
 
 from aerodaas.analytics import RemoteAnalytics
+from aerodaas.config.extras import has_extra, require_extra
 from aerodaas.schedulers.trajectory.routing import require_solver
 from aerodaas.types.errors import ConfigError, SchedulerError
-from aerodaas.types.extras import has_extra, require_extra
 
 
 @pytest.mark.parametrize(
