@@ -1,1 +1,1 @@
-"""A flight's pictures, one module each; no picture is read by colour alone."""
+"""Plots of a flight, one module each; no plot relies on colour alone."""
