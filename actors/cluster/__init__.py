@@ -1,1 +1,1 @@
-"""Ray itself: a local one, a cluster to join, what ends them, and what watches over them."""
+"""Ray clusters: starting a local one, joining a remote one, shutdown and monitoring."""
