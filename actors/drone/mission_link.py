@@ -1,4 +1,4 @@
-"""The way from an analysis to the mission and back: numbered requests, replies, status."""
+"""Link between an analysis and the mission: numbered requests, replies, status."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ _REPLIES_WAITING = 64
 
 
 class StreamLink:
-    """A `MissionLink` over the streams of one analysis; its worker passes on what arrives."""
+    """A `MissionLink` over the streams of one analysis, fed with messages by its worker."""
 
     def __init__(self, actor: StreamActor, node: str, robot: str) -> None:
-        """Speak for the analysis `node` to the mission of `robot`."""
+        """Link the analysis `node` to the mission of `robot`."""
         self.depths = {status_stream(robot): 1, reply_stream(node): _REPLIES_WAITING}
-        """What the worker must read."""
+        """Streams that the worker must read, and their queue depths."""
         self._actor = actor
         self._node = node
-        # An actor that was restarted must not take replies to its predecessor for its own.
+        # A restarted actor must not accept replies to its predecessor as its own.
         self._numbers = itertools.count(secrets.randbits(48))
         self._waiting: dict[int, Future[Answer]] = {}
         self._lock = threading.Lock()
@@ -44,7 +44,7 @@ class StreamLink:
         self._requests = self._actor.publisher(request_stream(self._node))
 
     def note(self, message: Message[Any]) -> None:
-        """Take what the worker has received."""
+        """Handle a message that the worker has received."""
         item = message.item
         if isinstance(item, MissionStatus):
             self._status = item
@@ -57,15 +57,15 @@ class StreamLink:
                 waiting.set_result(item.answer)
 
     def status(self) -> MissionStatus | None:
-        """The newest word of the mission."""
+        """The newest status of the mission; None before the first."""
         return self._status
 
     def vehicle(self) -> VehicleState | None:
-        """The newest state of the vehicle."""
+        """The newest state of the vehicle; None before the first."""
         return self._vehicle
 
     def command(self, command: Command) -> Future[Answer]:
-        """Send a request; the worker completes the future."""
+        """Send a command as a request; the worker completes the future."""
         future: Future[Answer] = Future()
         status = self._status
         if status is not None and status.state in TERMINAL:
@@ -85,5 +85,5 @@ class StreamLink:
         return self.command(StreamItem(self._node, navigation, index=index, replaces=False))
 
     def alert(self, alert: Alert) -> None:
-        """Tell the people who watch."""
+        """Publish an alert."""
         self._actor.alert(alert.kind, alert.text, **alert.values)
