@@ -310,7 +310,10 @@ class StreamActor:
             self._newest_alerts.append(alert)
 
     def follow(self, stamp: int) -> None:
-        """In lockstep, advance the mission clock to `stamp`, the time of a received message."""
+        """In lockstep, advance the mission clock to `stamp`, the time of a received message.
+
+        Not for the drone's actor, which conducts mission time.
+        """
         with self._alerting:
             if isinstance(self.clock, LockstepClock) and stamp > self.clock.now():
                 self.clock.advance_to(stamp)

@@ -105,8 +105,9 @@ class RemoteExecutor:
     ) -> None:
         """Send frames through `frame_uplink`, which all executors of a node share.
 
-        `timeout_ns` is mission time and limits an execution. `wake` is called, in another thread,
-        when an answer has arrived. `speed` are mission seconds per wall second.
+        A restarted executor is prepared again. `timeout_ns` is mission time and limits an
+        execution. `wake` is called, in another thread, when an answer has arrived. `speed` are
+        mission seconds per wall second.
         """
         self._second = speed * NANOSECONDS
         self.gone = False

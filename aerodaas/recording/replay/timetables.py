@@ -42,9 +42,16 @@ class _Reading:
 
 
 def read_timetables(path: str | Path) -> dict[str, tuple[int, ...]]:
-    """Sorted timestamps (mission time, nanoseconds) of each source's measurements, by stream.
+    """Read the measurement times of each source.
 
-    Raises RecordingError if the recording cannot be read.
+    Args:
+        path: The MCAP file.
+
+    Returns:
+        Sorted timestamps (mission time, nanoseconds) by stream.
+
+    Raises:
+        RecordingError: If the recording cannot be read.
     """
     with Recording.open(path) as recording:
         found = _Reading()

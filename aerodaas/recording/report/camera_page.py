@@ -106,7 +106,7 @@ class CameraPage:
                 self._states[source.partition("/")[0]] = text
 
     def picture(self, source: str) -> NDArray[np.uint8] | None:
-        """Return a camera's newest image with detection results, drawn in, or else its newest.
+        """Return a camera's newest analysed image, detections drawn in, or else its newest image.
 
         Args:
             source: Stream of the camera.

@@ -45,10 +45,17 @@ class MomentPicture:
 
 
 def key_moments(flight: RecordedFlight, most: int = _MOST) -> list[Moment]:
-    """Choose at most `most` frames, in order of time.
+    """Choose the key moments of a flight.
 
     The first and the most confident detections have priority, then alerts, then changes of the
     mission state; remaining frames are spread evenly over the flight.
+
+    Args:
+        flight: The flight.
+        most: Most frames to choose; default 12.
+
+    Returns:
+        The moments, in order of time.
     """
     chosen: dict[tuple[str, int], Moment] = {}
     for stamp, source, reason in _candidates(flight, most):
@@ -62,7 +69,15 @@ def key_moments(flight: RecordedFlight, most: int = _MOST) -> list[Moment]:
 
 
 def picture_moments(recording: Recording, moments: list[Moment]) -> list[MomentPicture]:
-    """Read the frames of `moments` and draw their detections; moments without one are left out."""
+    """Read the frames of key moments and draw their detections.
+
+    Args:
+        recording: The open recording.
+        moments: Moments of this recording, as from `key_moments`.
+
+    Returns:
+        The images, in the order of recording; moments without an image are left out.
+    """
     wanted = {(moment.source, moment.stamp): moment for moment in moments}
     stamps = {moment.stamp for moment in moments}
     found = detections_by_frame(recording)

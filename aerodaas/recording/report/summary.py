@@ -74,7 +74,7 @@ class FlightSummary:
     detections: dict[str, int] = field(default_factory=dict)
     """Number of detections over all frames, by label."""
     decisions: dict[str, int] = field(default_factory=dict)
-    """Number of scheduler decisions by action."""
+    """Number of scheduler decisions and outcomes by action."""
     reasons: dict[str, int] = field(default_factory=dict)
     """Number of scheduler decisions and outcomes by `action: reason`."""
     utility: dict[str, float] = field(default_factory=dict)
