@@ -1,1 +1,1 @@
-"""The actors: the only code of the project that imports ray."""
+"""Ray actors of a run; the only package of the project that imports ray."""

@@ -1,7 +1,7 @@
-"""The analytics' actor: runs one or several analyses, each in a thread of its own.
+"""Analytics actor: runs one or several analyses, each in a thread of its own.
 
-Light analyses share an actor, for an actor costs 70 MB; one that is `isolated`, such as a
-neural network, has its own.
+Light analyses share an actor, because an actor costs 70 MB; an `isolated` one, such as a neural
+network, has its own.
 """
 
 from __future__ import annotations
@@ -33,60 +33,60 @@ __all__ = ["AnalyticsActor", "NodeSpec", "TriggerSpec", "Wake"]
 _WAKE_DEPTH = 8
 _LOOK_INTERVAL = 1.0
 _PARTING = 3.0
-"""Wall seconds that an analysis has to finish its item once the run is over."""
+"""Wall seconds that an analysis has to finish its item after the end of the run."""
 _HUNG = 5.0
-"""Wall seconds on one item after which an alert is published; a first inference is slow."""
+"""Wall seconds on one item before an alert; a first inference may take several."""
 
 
 @dataclass(frozen=True)
 class Wake:
-    """Message that wakes a dormant analysis."""
+    """Command to a dormant analysis to process items from now on."""
 
 
 @dataclass(frozen=True)
 class NodeSpec:
-    """One analysis as its actor gets it."""
+    """Specification of one analysis for its actor."""
 
     stream: str
     work: Analytics[Any]
     inputs: dict[str, int]
-    """Streams that it reads, and how many messages of each may wait."""
+    """Input streams and their queue depths."""
     robot: str
-    """The robot that its data belongs to, or that it commands."""
+    """Robot that its data belongs to, or that it commands."""
     state: str
-    """Stream of the states of the vehicle that its data belongs to."""
+    """Stream of the vehicle states of that robot."""
     external: bool
     dormant: bool
     triggers: tuple[TriggerSpec, ...]
     acknowledges: bool
-    """True in lockstep for an analysis whose results have no reader."""
+    """True in lockstep for an analysis whose results have no readers."""
     kind: ComputeKind
-    """Where its actor stands."""
+    """Kind of compute node on which its actor runs."""
     answers_always: bool
-    """True under a dispatcher, which waits for an answer to each task."""
+    """True if a dispatcher waits for an answer to each task."""
     wakes: tuple[str, ...]
-    """Streams on which a dormant analysis is woken."""
+    """Streams of the wake commands for a dormant analysis."""
     frames: tuple[str, ...] = ()
-    """Streams of the frames that its tasks name."""
+    """Streams of the frames that its tasks refer to."""
 
 
 class AnalyticsActor(StreamActor):
-    """Runs the analyses that `prepare` is given."""
+    """Actor that runs the analyses passed to `prepare`."""
 
     def __init__(self, session: Session, name: str) -> None:
-        """Belong to `session` as `name`."""
+        """Create the actor `name` of `session`."""
         super().__init__(session, name, {})
         self._workers: list[_Worker] = []
         self._threads: list[threading.Thread] = []
 
     def prepare(self, *nodes: NodeSpec) -> ActorInfo:
-        """Open the analyses `nodes`; raises the errors of their `open`."""
+        """Open the analyses `nodes`; raises the exceptions of their `open`."""
         # Not in the constructor: Ray would keep the models in its object store for restarts.
         self._workers = [_Worker(self, node) for node in nodes]
         return super().prepare()
 
     def join(self, *nodes: NodeSpec) -> ActorInfo:
-        """Run further analyses in flight; raises the errors of their `open`, and runs none then."""
+        """Run further analyses in flight; none of them if the `open` of one raises."""
         fresh = [_Worker(self, node) for node in nodes]
         before = set(self.publishers)
         try:
@@ -104,7 +104,7 @@ class AnalyticsActor(StreamActor):
         return self.info()
 
     def acknowledge(self, streams: dict[str, bool]) -> None:
-        """In lockstep, whether the analyses of these streams are the last of their path by now."""
+        """In lockstep, set whether the analyses of these streams acknowledge their items."""
         for worker in self._workers:
             if worker.node.stream in streams:
                 worker.acknowledge(wanted=streams[worker.node.stream])
@@ -135,24 +135,24 @@ class AnalyticsActor(StreamActor):
             worker.close()
 
     def deliver(self, stream: str, data: bytes) -> None:
-        """Take a message from another node for every analysis that reads it."""
+        """Deliver a message from another node to every analysis that reads it."""
         for worker in self._workers:
             if stream in worker.subscriber.received:
                 worker.subscriber.deliver(stream, data)
 
     def stop(self) -> Any:  # noqa: ANN401 - the base's report
-        """Finish the items under way, close everything, and return the last report."""
+        """Finish current items, close everything, and return the final report."""
         self._stopping.set()
         for worker in self._workers:
             worker.wake()
         return super().stop()
 
     def reads(self) -> list[str]:
-        """Streams that this actor's analyses read."""
+        """Names of the streams that this actor's analyses read."""
         return sorted({stream for worker in self._workers for stream in worker.depths})
 
     def counts(self) -> dict[str, StreamCount]:
-        """Counts of each analysis' received and dropped inputs, as `stream>analysis`."""
+        """Messages received and dropped by each analysis, by `stream>analysis`."""
         return {
             f"{stream}>{worker.node.stream}": StreamCount(
                 worker.subscriber.received[stream], worker.subscriber.dropped[stream]
@@ -171,13 +171,13 @@ class AnalyticsActor(StreamActor):
 
 
 class _Worker:
-    """One analysis: takes the newest item, works, publishes; is its own `Context`."""
+    """Loop of one analysis: receives, processes, publishes; serves as its `Context`."""
 
     def __init__(self, actor: AnalyticsActor, node: NodeSpec) -> None:
         self.node = node
         states = MESSAGE_DEPTH if actor.session.lockstep else 1
-        # States come last: each is published before what is measured in it, so that whoever
-        # has an item in hand finds its state, too.
+        # States come last: each is published before the measurements made in it, so that the
+        # state of a received item is available, too.
         self.depths = {
             **dict.fromkeys(node.frames, FRAME_DEPTH),
             **node.inputs,
@@ -196,7 +196,7 @@ class _Worker:
         self._hung_since: float | None = None
         self._actor = actor
         self._woken: int | None = None if node.dormant else -1
-        """Stamp of the measurement that woke it; None while it sleeps."""
+        """Timestamp of the measurement that woke it; None while dormant."""
         self._states: deque[tuple[int, VehicleState]] = deque(maxlen=states)
         self._now = 0
         self._frames = RecentFrames(node.frames)
@@ -216,7 +216,7 @@ class _Worker:
         self.opened = True
 
     def acknowledge(self, *, wanted: bool) -> None:
-        """Start or stop acknowledging processed items."""
+        """Start or stop to acknowledge processed items."""
         stream = f"{ACKS}/{self.node.stream}"
         known = self._actor.publishers.get(stream)
         self._acks = (known or self._actor.publisher(stream)) if wanted else None
@@ -247,7 +247,7 @@ class _Worker:
                 self._work(message)
                 continue
             if self._frames.find(message.item) is None:
-                # Published before the task was, it may have arrived since the last look.
+                # Published before the task, the frame may have arrived since the last receive.
                 waiting.extend(self._receive(0.0))
             frame = self._frames.find(message.item)
             if frame is not None:
@@ -257,7 +257,7 @@ class _Worker:
                 self._results.derive(missing, message, host_time_ns(), message.stamp)
 
     def _run_external(self) -> None:
-        """In lockstep an external source ticks with the drone's states."""
+        """In lockstep, measure at the timestamps of the drone's states."""
         for message in self._receive(0.5):
             due = self._actor.session.is_due(self.node.stream, self._rate, message.stamp)
             if message.stream == self.node.state and due:
@@ -286,10 +286,10 @@ class _Worker:
             self._acknowledge(self._results.measure(item, header, captured))
 
     def _receive(self, timeout: float) -> list[Message[Any]]:
-        """Return the messages that have arrived, and store states and wake-ups among them."""
+        """Store and return the messages that have arrived."""
         messages = self.subscriber.receive(timeout)
         if messages and self._actor.session.lockstep:
-            # A state is published before what was measured in it, but may arrive in between.
+            # A state is published before the measurements made in it, but may arrive in between.
             messages += self.subscriber.receive(0.0)
         for message in messages:
             self._actor.follow(message.stamp)
@@ -304,7 +304,7 @@ class _Worker:
         return messages
 
     def _awake(self, stamp: int) -> bool:
-        """Tell whether to work on what was measured at `stamp`: later than what woke us."""
+        """Return whether a measurement at `stamp` is later than the wake command's."""
         return self._woken is not None and stamp > self._woken
 
     def _work(self, message: Message[Any]) -> None:
@@ -315,7 +315,7 @@ class _Worker:
             result = self._process(message.item, message.header.stamp)
         if result is not None:
             self._triggers.fire(result, message, self._stamp(message), self._complain)
-        # An answer without a result tells the recording that this item was worked on, and when.
+        # An answer without a result records that this item was processed, and when.
         if awake or self._actor.session.lockstep or self.node.answers_always:
             self._results.derive(result, message, received, self._stamp(message))
         self._acknowledge(message)
@@ -348,7 +348,7 @@ class _Worker:
             self._acks.derive(done, message, host_time_ns(), message.stamp)
 
     def look_after(self) -> None:
-        """Publish an alert, once, about an item that takes too long."""
+        """Raise an alert, once per item, if processing takes too long."""
         since = self._at_work_since
         if since is None or since == self._hung_since or time.perf_counter() - since < _HUNG:
             return
@@ -374,11 +374,11 @@ class _Worker:
         return self._now
 
     def vehicle(self) -> VehicleState | None:
-        """The newest state; in lockstep at the item's own time, however far we have flown since."""
+        """The newest vehicle state; in lockstep the newest at the item's own time."""
         lockstep = self._actor.session.lockstep
         states = reversed(self._states)
         return next((s for at, s in states if at <= self._now or not lockstep), None)
 
     def alert(self, alert: Alert) -> None:
-        # In lockstep only the messages know the time, not the actor's clock.
+        # In lockstep only the messages carry the right time, not the actor's clock.
         self._actor.tell(alert.kind, alert.text, alert.header.stamp, alert.values)

@@ -1,8 +1,8 @@
-"""The base of all actors: a life in four steps, a subscriber, publishers, and a report.
+"""Base class of all actors: life cycle, subscriber, publishers, alerts and report.
 
-The driver's process creates all actors at once, then calls on each `prepare` (open models and
-cameras, join the streams), `start` (run in a thread of the actor's own), any number of `report`,
-and `stop`. An actor that Ray has restarted begins again with `prepare`.
+The application's process creates all actors at once, then calls on each `prepare` (open models
+and cameras, join the streams), `start` (run in a thread of the actor's own), any number of
+`report`, and `stop`. An actor restarted by Ray begins again with `prepare`.
 """
 
 from __future__ import annotations
@@ -40,15 +40,15 @@ __all__ = [
 
 _ALERTS_KEPT = 50
 _REPEATED = 5 * NANOSECONDS
-"""Mission time within which an alert with the same text is the same alert."""
+"""Mission time within which an alert with the same text is suppressed, nanoseconds."""
 _LISTENING = 5.0
-"""Wall seconds that an actor's own thread may take to turn to further streams."""
+"""Wall seconds that an actor's own thread may take to subscribe to further streams."""
 Phase = Literal["new", "ready", "running", "done", "failed"]
 
 
 @dataclass(frozen=True)
 class ActorInfo:
-    """Where an actor lives."""
+    """Node, process and streams of an actor."""
 
     node_id: str
     pid: int
@@ -56,12 +56,12 @@ class ActorInfo:
     publishes: tuple[str, ...]
     reads: tuple[str, ...]
     clock: int
-    """Reading of the machine's clock when the actor was ready, host time in nanoseconds."""
+    """Host time of its machine when it was ready, nanoseconds."""
 
 
 @dataclass(frozen=True)
 class StreamCount:
-    """Counts of one stream that an actor reads."""
+    """Messages of one stream received and dropped by an actor."""
 
     received: int
     dropped: int
@@ -69,45 +69,45 @@ class StreamCount:
 
 @dataclass(frozen=True)
 class SentCount:
-    """Counts of one stream that an actor publishes."""
+    """Messages published by an actor on one stream, and their latency."""
 
     count: int
     median_ms: float | None
-    """From capture to publishing, of the newest messages; None before the first."""
+    """Latency from capture to publishing of the newest messages; None before the first."""
     p99_ms: float | None
 
 
 @dataclass(frozen=True)
 class ActorReport:
-    """How an actor fares."""
+    """Status of an actor: phase, counters, vitals, alerts and problems."""
 
     phase: Phase
     error: AeroDaaSError | None = None
     streams: dict[str, StreamCount] = field(default_factory=dict)
     sent: dict[str, SentCount] = field(default_factory=dict)
     vitals: Vitals | None = None
-    """Resources used by the actor's process; None before the first measurement."""
+    """Vitals of its process; None before its first report."""
     alerts: tuple[Alert, ...] = ()
     """The newest alerts, oldest first."""
     problems: tuple[str, ...] = ()
-    """Items that could not be sent or read, with the reason."""
+    """Descriptions of items that could not be sent or read."""
     values: dict[str, Any] = field(default_factory=dict)
-    """Figures of the actor's own."""
+    """Figures specific to the kind of actor."""
 
 
 def failure_line(error: BaseException) -> str:
-    """The text of an exception, with the file and line that raised it."""
+    """One line with an exception's type, message, file and line."""
     frames = traceback.extract_tb(error.__traceback__)
     place = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""  # noqa: PTH119
     try:
         said = str(error)
-    except Exception:  # noqa: BLE001 - an application's class, whose text may fail, too
+    except Exception:  # noqa: BLE001 - a plug-in's class, whose `__str__` may raise
         said = "it cannot say why"
     return f"{type(error).__name__}: {said}{place}"
 
 
 class _AlertHandler(logging.Handler):
-    """Handler that publishes warnings of the project's own modules as alerts."""
+    """Publishes the warnings of the project's own modules as alerts."""
 
     def __init__(self, actor: StreamActor) -> None:
         super().__init__(logging.WARNING)
@@ -121,10 +121,10 @@ class StreamActor:
     """Base of the actors; subclasses implement `_open`, `_run` and `_close`."""
 
     niceness = 10
-    """Of its process; the drone's actor alone is not nice."""
+    """Niceness of its process; only the drone's actor has the normal one."""
 
     def __init__(self, session: Session, name: str, reads: dict[str, int]) -> None:
-        """Belong to `session` as `name`, reading the streams `reads` with these depths."""
+        """Create the actor `name` of `session`; `reads` are queue depths by stream read."""
         self.session = session
         self.name = name
         self.clock = session.clock()
@@ -135,16 +135,16 @@ class StreamActor:
         self._stopping = threading.Event()
         self._thread: threading.Thread | None = None
         self._told: dict[tuple[str, str], int] = {}
-        """Mission time of the newest alerts, by kind and text."""
+        """Mission time of each of the newest alerts, by kind and text."""
         self._newest_alerts: deque[Alert] = deque(maxlen=_ALERTS_KEPT)
-        # Reentrant: an alert may be found to be unsendable while it is sent.
+        # Reentrant: sending an alert may raise another one, if it turns out unsendable.
         self._alerting = threading.RLock()
         self._problems: list[str] = []
         self.subscriber: Subscriber | None = None
         self.publishers: dict[str, Publisher] = {}
 
     def prepare(self) -> ActorInfo:
-        """Open streams and devices; raises the project's errors."""
+        """Open streams, models and cameras; raises AeroDaaSError if one cannot be opened."""
         be_nice(self.niceness)
         logging.captureWarnings(capture=True)
         logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
@@ -155,7 +155,7 @@ class StreamActor:
         return self.info()
 
     def info(self) -> ActorInfo:
-        """The actor's node and process, and the streams that it reads and publishes."""
+        """Node, process and current streams of the actor."""
         return ActorInfo(
             ray.get_runtime_context().get_node_id(),
             os.getpid(),
@@ -166,7 +166,10 @@ class StreamActor:
         )
 
     def listen(self, depths: dict[str, int]) -> ActorInfo:
-        """Read further streams from now on, with these depths; returns once it does."""
+        """Subscribe to further streams, given with queue depths; returns once subscribed.
+
+        Raises MissionError if the actor's thread is busy for too long.
+        """
         if self.subscriber is not None:
             subscribed = self.subscriber.add(depths)
             self._reads.update(depths)
@@ -175,18 +178,18 @@ class StreamActor:
         return self.info()
 
     def learn(self, application: Application) -> None:
-        """Take over classes that the application has defined since the session was made."""
-        del application  # to arrive is enough
+        """Receive the definitions that the application has added since the session was made."""
+        del application  # unpickling it is enough
 
     def connect(self, readers: dict[str, list[Any]]) -> None:
-        """Learn which actors on other nodes read this actor's streams."""
-        # In lockstep nothing may be dropped; the barrier keeps the number under way small.
+        """Set the actors on other nodes that read this actor's streams."""
+        # In lockstep nothing may be dropped; the barrier keeps the number in transit small.
         window = MAX_DEPTH if self.session.lockstep else UNDER_WAY
         for stream, actors in readers.items():
             self.publishers[stream].remote = [RemoteReader(actor, window) for actor in actors]
 
     def start(self, origin_ns: int) -> None:
-        """Run in a thread; mission time is zero at host time `origin_ns`."""
+        """Start the actor's thread; mission time is zero at host time `origin_ns`."""
         self.session = self.session.starting_at(origin_ns)
         self.clock = self.session.clock()
         self._phase = "running"
@@ -195,27 +198,27 @@ class StreamActor:
         self._started.set()
 
     def await_start(self) -> None:
-        """Return once the actor runs; for a lifeline."""
+        """Return once the actor runs; awaited by the liveness monitor."""
         self._started.wait()
 
     def await_stop(self) -> None:
-        """Return when the actor is stopped; for a lifeline."""
+        """Return when the actor is stopped; awaited by the liveness monitor."""
         self._stopping.wait()
 
     def deliver(self, stream: str, data: bytes) -> None:
-        """Take a message from another node."""
+        """Deliver a message from another node."""
         if self.subscriber is not None:
             self.subscriber.deliver(stream, data)
 
     def hand_out(self, stream: str, seq: int) -> list[bytes]:
-        """Messages of a published `stream` from number `seq` on, of the newest few, encoded.
+        """Encoded newest messages of a published `stream`, from number `seq` on.
 
         For an application on another node, or without shared memory.
         """
         return self.publishers[stream].since(seq) if stream in self.publishers else []
 
     def report(self) -> ActorReport:
-        """How the actor fares."""
+        """Current status of the actor."""
         return ActorReport(
             phase=self._phase,
             error=self._error,
@@ -228,9 +231,9 @@ class StreamActor:
         )
 
     def stop(self) -> ActorReport:
-        """Finish the work under way, close everything, and return the last report.
+        """Finish current work, close everything, and return the final report.
 
-        The process ends soon afterwards, at the latest by itself.
+        The process ends soon afterwards, at the latest by its own timer.
         """
         exit_soon()
         self._stopping.set()
@@ -247,10 +250,10 @@ class StreamActor:
         return report
 
     def meet(self) -> None:
-        """Let its caller learn where it lives."""
+        """Do nothing: the call makes Ray resolve the actor's address for the caller."""
 
     def leave(self) -> None:
-        """End the process; `stop` came first."""
+        """End the process; called after `stop`."""
         leave()
 
     @property
@@ -276,20 +279,20 @@ class StreamActor:
         return Subscriber(self.scope, name, depths, unreadable)
 
     def _problem(self, kind: str, text: str) -> None:
-        """Publish a problem with an item once; the report repeats it at the end of the run."""
+        """Raise an alert, once, for an item that cannot be sent or read; reported at the end."""
         with self._alerting:
             if text not in self._problems and len(self._problems) < _ALERTS_KEPT:
                 self._problems.append(text)
                 self.alert(kind, text)
 
     def alert(self, kind: str, text: str, **values: Any) -> None:  # noqa: ANN401
-        """Publish an alert at the present mission time; callable from any thread."""
+        """Publish an alert at the current mission time; thread-safe."""
         self.tell(kind, text, self.clock.now(), values)
 
     def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
-        """Publish an alert about mission time `stamp`; callable from any thread.
+        """Publish an alert at mission time `stamp`; thread-safe.
 
-        What was told in the same words within the last seconds is not told again.
+        An alert with the same text within the last seconds is suppressed.
         """
         with self._alerting:
             before = self._told.get((kind, text))
@@ -307,17 +310,20 @@ class StreamActor:
             self._newest_alerts.append(alert)
 
     def follow(self, stamp: int) -> None:
-        """In lockstep, advance this actor's mission time to a message's; not in the conductor."""
+        """In lockstep, advance the mission clock to `stamp`, the time of a received message.
+
+        Not for the drone's actor, which conducts mission time.
+        """
         with self._alerting:
             if isinstance(self.clock, LockstepClock) and stamp > self.clock.now():
                 self.clock.advance_to(stamp)
 
     def reads(self) -> list[str]:
-        """Streams that this actor reads."""
+        """Names of the streams that this actor reads."""
         return list(self._reads)
 
     def counts(self) -> dict[str, StreamCount]:
-        """Received and dropped messages, by stream."""
+        """Messages received and dropped, by stream."""
         if self.subscriber is None:
             return {}
         return {
@@ -326,12 +332,12 @@ class StreamActor:
         }
 
     def sent(self) -> dict[str, SentCount]:
-        """Published messages, by stream."""
+        """Messages published, by stream."""
         return {stream: _sent(publisher) for stream, publisher in self.publishers.items()}
 
     @property
     def stopping(self) -> bool:
-        """True once `stop` was called."""
+        """True after `stop` was called."""
         return self._stopping.is_set()
 
     def _guard(self) -> None:
@@ -339,7 +345,7 @@ class StreamActor:
             self._run()
         except AeroDaaSError as error:
             self._fail(error)
-        except Exception as error:  # noqa: BLE001 - any error of a plug-in ends here
+        except Exception as error:  # noqa: BLE001 - a plug-in may raise any exception
             self._fail(AeroDaaSError(f"{self.name}: {failure_line(error)}"))
         else:
             self._phase = "done"
@@ -355,10 +361,10 @@ class StreamActor:
 
     @abstractmethod
     def _run(self) -> None:
-        """Work until `stopping`."""
+        """Run until `stopping`."""
 
     def _close(self) -> None:
-        """Release what `_open` took."""
+        """Release the resources of `_open`."""
 
     def _values(self) -> dict[str, Any]:
         return {}

@@ -1,9 +1,9 @@
-"""Processes with packages of their own: an analysis' `runtime_env` as Ray's options.
+"""Isolated processes with packages of their own: an analysis' `runtime_env` as Ray options.
 
-Packages are laid over the node's own by `uv run --with`, which keeps them in a cache and leaves
-the node's own environment alone; Ray starts the process through it (`py_executable`). Everything
-is installed on every node that the analysis may run on before the mission starts, for in flight
-there may be no network, and an error then would come too late.
+`uv run --with` overlays the packages on the node's own from a cache, without changing the node's
+environment; Ray starts the process through it (`py_executable`). Everything is installed before
+the mission starts, on every node that the analysis may run on, because in flight there may be no
+network and an error would come too late.
 """
 
 from __future__ import annotations
@@ -32,17 +32,17 @@ _INSTALL_TIMEOUT = 600.0
 
 @dataclass(frozen=True)
 class _Installed:
-    """A node's answer."""
+    """Answer of a node: the command, or the problem."""
 
     command: tuple[str, ...] = ()
-    """Starts a Python that has the packages."""
+    """Command line of a Python that has the packages."""
     problem: str = ""
 
 
 def isolation_options(env: RuntimeEnvConfig | None, place: Placement, name: str) -> dict[str, Any]:
-    """Ray's options for the process of the analysis `name`, once everything is in its place.
+    """Install the environment of the analysis `name` and return Ray's options for its process.
 
-    Raises ConfigError, with the node's own words, where a node cannot provide it.
+    Raises ConfigError, with the node's message, if a node cannot provide the environment.
     """
     if env is None:
         return {}
@@ -70,7 +70,7 @@ def _ask_all(
     question: Any,  # noqa: ANN401
     about: Iterable[str],
 ) -> list[tuple[str, ...]]:
-    """Put a question to every node where the analysis may run; raises ConfigError."""
+    """Run `question` on every node where the analysis may run; raises ConfigError."""
     ask: Any = ray.remote(question)
     answers = {}
     for node in nodes_at(place):
@@ -92,7 +92,7 @@ def _ask_all(
 
 
 def _install(packages: list[str]) -> _Installed:
-    """Install on this node, and try."""
+    """Install the packages on this node and start Python with them once."""
     if importlib.util.find_spec("uv") is None:
         return _Installed(problem='uv is missing; there, `pip install "aerodaas[isolation]"`')
     from uv import find_uv_bin  # noqa: PLC0415 - an extra

@@ -1,7 +1,7 @@
-"""Priority of a process that must be punctual: niceness, real time scheduling, locked memory.
+"""Scheduling of time-critical processes: niceness, real-time priority, locked memory.
 
-Linux knows niceness by thread, so that a process which Ray started niced is raised thread by
-thread. Elsewhere nothing is granted, and nothing is asked for.
+Linux sets niceness per thread, so a process that Ray started with a higher niceness is changed
+thread by thread. Other systems grant no real-time priority and need no change.
 """
 
 from __future__ import annotations
@@ -29,37 +29,38 @@ __all__ = [
 ]
 
 SWITCH = "AERODAAS_PRIORITY"
-"""Environment variable; `off` leaves scheduling as it is, for machines that plan it themselves."""
+"""Environment variable; `off` leaves scheduling unchanged, for machines that manage it."""
 _REAL_TIME_PRIORITY = 1
-"""Of 1 to 99: above all ordinary work, below everything else that has a reason."""
+"""Priority, 1 to 99: above all ordinary threads, below all other real-time ones."""
 _SWITCH_INTERVAL = 0.001
-"""Seconds after which a thread of the interpreter gives way to the loop; Python's own: 5 ms."""
+"""Seconds after which the interpreter switches threads, for the loop; Python's default: 5 ms."""
 _CURRENT, _ON_FAULT = 1, 4
-"""Flags of `mlockall`: present mappings, and of these only touched pages."""
+"""Flags of `mlockall`: lock the pages mapped already, and only once they are touched."""
 _YOUNG_EVERY = 20
 _ALL_EVERY = 600
-"""Turns of a loop between two collections of new, and of all, garbage."""
+"""Loop cycles between two garbage collections of all generations; `_YOUNG_EVERY`: of the
+youngest."""
 
 
 def wanted() -> bool:
-    """Whether scheduling is to be changed at all."""
+    """Whether scheduling may be changed (`SWITCH` is not `off`)."""
     return os.environ.get(SWITCH, "") != "off"
 
 
 def niceness() -> int:
-    """The niceness of this thread."""
+    """Niceness of this thread."""
     return os.getpriority(os.PRIO_PROCESS, 0)
 
 
 def raise_niceness() -> int:
-    """Set all threads of this process to normal niceness; returns this thread's niceness."""
+    """Lower all threads of this process to niceness 0; returns this thread's resulting one."""
     if wanted():
         _set_all(lambda now: min(now, 0))
     return niceness()
 
 
 def be_nice(level: int) -> None:
-    """Let all threads of this process give way to those below niceness `level`."""
+    """Raise the niceness of all threads of this process to at least `level`."""
     if wanted():
         _set_all(lambda now: max(now, level))
 
@@ -78,7 +79,7 @@ def _threads() -> list[int]:
 
 
 def real_time() -> str:
-    """Schedule this thread before all ordinary ones; returns why not, or nothing."""
+    """Give this thread real-time priority; returns the reason of a refusal, or ""."""
     if not hasattr(os, "sched_setscheduler"):
         return f"{sys.platform} has no real-time scheduling of threads"
     policy = os.SCHED_RR | getattr(os, "SCHED_RESET_ON_FORK", 0)
@@ -91,16 +92,16 @@ def real_time() -> str:
 
 
 def ordinary() -> None:
-    """Schedule this thread as any other again."""
+    """Return this thread to ordinary scheduling."""
     if hasattr(os, "sched_setscheduler"):
         with contextlib.suppress(OSError):
             os.sched_setscheduler(threading.get_native_id(), os.SCHED_OTHER, os.sched_param(0))
 
 
 def lock_memory() -> str:
-    """Lock this process' touched memory; returns the reason of a failure, or nothing.
+    """Lock this process's mapped memory once touched; returns the reason of a refusal, or "".
 
-    What it maps later is not locked, so that it does not grow by what it never uses.
+    Later mappings are not locked, so that unused ones take no memory.
     """
     try:
         library = ctypes.CDLL(None, use_errno=True)
@@ -111,7 +112,7 @@ def lock_memory() -> str:
 
 
 def lockable_memory() -> str:
-    """Why this process would not be granted locked memory, or nothing."""
+    """Reason why locked memory would not be granted to this process, or ""."""
     try:
         limit = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0]
     except (AttributeError, OSError):
@@ -122,14 +123,14 @@ def lockable_memory() -> str:
 
 
 class Slack:
-    """Collects garbage between the turns of a loop, where there is time, and never in one."""
+    """Garbage collection in a loop's slack, between two cycles and never within one."""
 
     def __init__(self) -> None:
-        """Nothing has been collected yet."""
+        """Start counting cycles at zero."""
         self._turns = 0
 
     def use(self) -> None:
-        """A turn is over, and the next one is not due yet."""
+        """Collect garbage if due; to be called after a cycle, before the next one is due."""
         self._turns += 1
         if self._turns % _ALL_EVERY == 0:
             gc.collect()
@@ -139,9 +140,9 @@ class Slack:
 
 @contextlib.contextmanager
 def punctual() -> Iterator[tuple[str, ...]]:
-    """Run the loop inside as punctually as this machine grants; yields the refused means.
+    """Run the enclosed loop with real-time priority and locked memory; yields the refusals.
 
-    Garbage is collected only when asked for (`Slack`), and what is there already never again.
+    Garbage is collected only explicitly (`Slack`), and existing objects never.
     """
     if not wanted():
         yield ()

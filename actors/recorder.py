@@ -1,4 +1,4 @@
-"""The recorder's actor: writes every stream of the run to an MCAP file."""
+"""Recorder actor: writes every stream of the run to an MCAP file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["RecorderActor"]
 
 
 class RecorderActor(StreamActor):
-    """Reads all `streams` and writes them; on a full disk it stops writing, not the flight."""
+    """Actor that records `streams`; a full disk ends the recording, not the flight."""
 
     def __init__(
         self,
@@ -37,12 +37,11 @@ class RecorderActor(StreamActor):
         live: str | None = None,
         page: str | None = None,
     ) -> None:
-        """Write the recording at `path`, and serve it at `live` (`host:port`) meanwhile.
+        """Create the actor, which writes to `path`.
 
-        At `page`, likewise, the cameras are shown to browsers.
-
-        So many messages of each of the `streams` may wait; more are dropped and counted, for the
-        flight never waits.
+        `live` and `page` are the addresses (`host:port`) of the live view and the camera page.
+        `streams` are queue depths by stream; further messages are dropped and counted, because
+        the flight never waits.
         """
         super().__init__(session, "recorder", streams)
         self._path = path
@@ -54,7 +53,7 @@ class RecorderActor(StreamActor):
         self._readings = 0
 
     def _open(self) -> None:
-        # The application's process knows this class, and does without the writers.
+        # The application's process imports this module, but does not need the writers.
         from aerodaas.recording.live import LiveServer  # noqa: PLC0415
         from aerodaas.recording.recorder import FlightRecorder  # noqa: PLC0415
 
@@ -62,7 +61,7 @@ class RecorderActor(StreamActor):
         home = environment.home
         name = self._provenance.name
         self._live = LiveServer(self._address, name) if self._address else None
-        # One that was restarted leaves what its predecessor wrote alone, and writes a second part.
+        # A restarted actor keeps its predecessor's file and writes a second part.
         self._path = _unwritten(self._path)
         self._page = _camera_page(self._page_address)
         self._recorder = FlightRecorder(
@@ -76,7 +75,7 @@ class RecorderActor(StreamActor):
         self._acks = self.publisher(f"{ACKS}/recorder") if self.session.lockstep else None
 
     def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
-        """Publish an alert and record it at once, as the recorder does not read its own alerts."""
+        """Publish an alert and record it directly: the recorder does not read its own alerts."""
         super().tell(kind, text, stamp, values)
         if self._phase == "new":
             return
@@ -86,7 +85,7 @@ class RecorderActor(StreamActor):
         self._write(Message(stream, count, stamp, alert.header, host_time_ns(), (), alert))
 
     def vitals(self, readings: dict[str, Vitals]) -> None:
-        """Record the resources used by the run's processes, by `actor@machine`."""
+        """Record the vitals of the run's processes, by `actor@machine`."""
         stamp = self.clock.now()
         self._readings += 1
         for source, reading in readings.items():
@@ -96,7 +95,7 @@ class RecorderActor(StreamActor):
             self._write(message)
 
     def _run(self) -> None:
-        assert self.subscriber is not None  # noqa: S101 - prepare came first
+        assert self.subscriber is not None  # noqa: S101 - set by prepare
         while True:
             messages = deque(self.subscriber.receive(0.2))
             if self.stopping and not messages:
@@ -104,7 +103,7 @@ class RecorderActor(StreamActor):
             done = tuple((one.header.source, one.header.stamp) for one in messages)
             last = replace(messages[-1], item=None) if messages else None
             while messages:
-                # None is held on to longer than it takes to write it: frames are large.
+                # Each message is released as soon as it is written: frames are large.
                 self._take(messages.popleft())
             self._note_drops()
             if self._acks is not None and last is not None:
@@ -126,8 +125,8 @@ class RecorderActor(StreamActor):
             self.alert("recording_stopped", self._failure)
 
     def _note_drops(self) -> None:
-        """Record losses before the recorder as they happen, as the run may be killed."""
-        assert self.subscriber is not None  # noqa: S101 - prepare came first
+        """Record dropped messages immediately, because the run may be killed."""
+        assert self.subscriber is not None  # noqa: S101 - set by prepare
         for stream, dropped in self.subscriber.dropped.items():
             if dropped > self._lost[stream]:
                 self._recorder.drops(stream, dropped - self._lost[stream])
@@ -145,7 +144,7 @@ class RecorderActor(StreamActor):
 
 
 def _unwritten(path: Path) -> Path:
-    """`path`, or the first of `flight.2.mcap`, `flight.3.mcap`, ... that is not there yet."""
+    """`path`, or the first of `flight.2.mcap`, `flight.3.mcap`, ... that does not exist."""
     parts = itertools.count(2)
     part = path
     while part.exists():
@@ -156,7 +155,7 @@ def _unwritten(path: Path) -> Path:
 def _camera_page(address: str | None) -> CameraPage | None:
     if address is None:
         return None
-    # The web server takes its time to load, and memory, which only who watches should pay.
+    # Imported only if used: the web server costs start-up time and memory.
     from aerodaas.recording.report.camera_page import CameraPage  # noqa: PLC0415
 
     return CameraPage(address)

@@ -1,4 +1,4 @@
-"""The sensor's actor: a camera becomes a stream of frames."""
+"""Sensor actor: publishes a camera's images as a stream of frames."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ __all__ = ["SensorActor"]
 
 
 class SensorActor(StreamActor):
-    """Asks a camera for its newest image at the sensor's rate and publishes it as a Frame."""
+    """Actor that publishes a camera's newest image as a Frame at the sensor's rate."""
 
     niceness = 5
 
     def __init__(self, session: Session, stream: str, sensor: SensorConfig, state: str) -> None:
-        """Publish `stream` from `sensor`, placed by the vehicle states of the stream `state`."""
+        """Publish `stream` from `sensor`, with odometry from the vehicle states of `state`."""
         depth = MESSAGE_DEPTH if session.lockstep else 1
         super().__init__(session, f"sensor/{stream}", {state: depth})
         self._stream = stream
@@ -35,12 +35,12 @@ class SensorActor(StreamActor):
         self._vehicle: VehicleState | None = None
 
     def prepare(self, ends: bool = False) -> ActorInfo:  # noqa: FBT001, FBT002 - Ray's
-        """Open the camera; with `ends`, the mission ends with its last image."""
+        """Open the camera; with `ends`, the mission ends when it has no more images."""
         self._ends = ends
         return super().prepare()
 
     def end_mission_when_finished(self, ends: bool) -> None:  # noqa: FBT001
-        """From now on, `ends` as `prepare` takes it."""
+        """Change `ends`, as in `prepare`."""
         self._ends = ends
 
     def _open(self) -> None:
@@ -52,7 +52,7 @@ class SensorActor(StreamActor):
         self._commands = self.publisher(end_stream(self._stream))
 
     def _run(self) -> None:
-        assert self.subscriber is not None  # noqa: S101 - prepare came first
+        assert self.subscriber is not None  # noqa: S101 - set by prepare
         if self.session.lockstep:
             while not self.stopping:
                 for message in self.subscriber.receive(0.5):
@@ -70,7 +70,7 @@ class SensorActor(StreamActor):
             due = next_due(self._sensor.rate, now)
 
     def counts(self) -> dict[str, StreamCount]:
-        """Nothing: of the vehicle's states only the newest matters here, by intention."""
+        """Empty: only the newest vehicle state is used, so dropped ones are intended."""
         return {}
 
     def _take(self, message: Message[Any]) -> None:
@@ -82,13 +82,13 @@ class SensorActor(StreamActor):
         vehicle = self._vehicle
         picture = self._camera.capture(stamp, vehicle.truth if vehicle else None)
         taken = host_time_ns()
-        # Before the frame: in lockstep time may go on as soon as the frame has been worked through.
+        # Before the frame: in lockstep time may advance as soon as the frame is processed.
         if self._camera.finished and self._ends and not self._ended:
             self._ended = True
             header = Header(0, stamp, self._stream)
             self._commands.measure(End(f"{self._stream} has no more pictures"), header, taken)
         if picture is not None:
-            # A live camera hands out a picture that is some milliseconds old already.
+            # An image of a live camera is already some milliseconds old.
             age = 0 if lockstep else max(0, stamp - picture.stamp)
             header = Header(self._frames.sent, picture.stamp, self._stream)
             frame = self._frame(header, picture)

@@ -1,4 +1,4 @@
-"""Data of one run that all its actors share."""
+"""Session of a run: the data that each of its actors receives."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ __all__ = [
 ]
 
 FRAME_DEPTH = 8
-"""Frames that may wait for a reader that wants them all; each is megabytes of shared memory."""
+"""Queue depth of frames for a reader of all of them; each is megabytes of shared memory."""
 MESSAGE_DEPTH = 32
-"""Other messages that may wait for a reader that wants them all."""
+"""Queue depth of other messages for a reader of all of them."""
 NEVER = 2**63 - 1
-"""A stamp that does not come."""
+"""A timestamp that is never reached."""
 CONTROL_RATE = 20.0
-"""Turns of the setpoint loop in a second: ten times the least rate of PX4's offboard mode."""
+"""Setpoint loop cycles per second: ten times the rate that PX4 requires in offboard mode."""
 CONTROL_PERIOD_NS = int(NANOSECONDS / CONTROL_RATE)
 
 
@@ -44,14 +44,14 @@ class Session:
     origin_ns: int = field(default_factory=host_time_ns)
     """Host time at which mission time is zero."""
     timetables: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
-    """Stamps in nanoseconds, in order, at which sources are due that go by no rate."""
+    """Sorted timestamps in nanoseconds at which sources without a rate are due."""
     application: Application = field(default_factory=Application)
-    """Definitions of the application's own files."""
+    """Definitions from the application's own files."""
 
     def next_due(self, source: str, rate: float, after: int) -> int:
-        """The first stamp later than `after` at which `source`, of `rate` Hz, is due.
+        """First timestamp later than `after` at which `source`, of `rate` Hz, is due.
 
-        NEVER once its timetable, if it has one, is over.
+        NEVER after the end of its timetable, if it has one.
         """
         stamps = self.timetables.get(source)
         if stamps is None:
@@ -60,7 +60,7 @@ class Session:
         return stamps[place] if place < len(stamps) else NEVER
 
     def is_due(self, source: str, rate: float, stamp: int) -> bool:
-        """Whether `source`, of `rate` Hz, is due at `stamp`."""
+        """Return whether `source`, of `rate` Hz, is due at `stamp`."""
         return self.next_due(source, rate, stamp - 1) == stamp
 
     def scope(self, node_id: str) -> str:
@@ -68,27 +68,27 @@ class Session:
         return f"{self.id}/{node_id[:12]}"
 
     def starting_at(self, origin_ns: int) -> Session:
-        """The same run with mission time zero at this host time."""
+        """Copy of the session with mission time zero at this host time."""
         return replace(self, origin_ns=origin_ns)
 
     @property
     def lockstep(self) -> bool:
-        """True if mission time waits until all actors have worked through it."""
+        """True if mission time advances only when all actors have processed its data."""
         return self.speed is None
 
     def clock(self) -> Clock:
-        """The mission clock of a process of this run."""
+        """New mission clock for a process of this run."""
         if self.speed is None:
             return LockstepClock()
         return ScaledClock(self.speed, self.origin_ns)
 
     def host_seconds(self, mission_ns: int) -> float:
-        """How long this stretch of mission time takes on the wall."""
+        """Wall seconds that `mission_ns` nanoseconds of mission time take."""
         return mission_ns / NANOSECONDS / (self.speed or 1.0)
 
 
 def next_due(rate: float, after: int) -> int:
-    """The first stamp later than `after` at which something with `rate` Hz is due."""
+    """First timestamp later than `after` at which a source of `rate` Hz is due."""
     index = int(after * rate / NANOSECONDS) + 1
     while _stamp(rate, index - 1) > after:
         index -= 1

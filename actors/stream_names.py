@@ -1,4 +1,4 @@
-"""Names of the streams of the project's own, apart from all that an application can name."""
+"""Names of the project's internal streams, distinct from all names in applications."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 ACKS = f"{INTERNAL}acks"
-"""Prefix of the acknowledgement streams of analyses whose results have no reader."""
+"""Prefix of the streams on which the last readers of a path acknowledge processed items."""
 DECISIONS = f"{INTERNAL}decisions"
 """Stream of the analytics scheduler's decisions and their outcomes."""
 
@@ -37,37 +37,37 @@ def status_stream(robot: str) -> str:
 
 
 def request_stream(node: str) -> str:
-    """Name of the stream of an analysis' commands to the mission."""
+    """Name of the stream of an analysis' requests to the mission."""
     return internal(node, "requests")
 
 
 def reply_stream(node: str) -> str:
-    """Name of the stream of the mission's answers to an analysis."""
+    """Name of the stream of the mission's replies to an analysis."""
     return internal(node, "replies")
 
 
 def setpoint_stream(robot: str) -> str:
-    """Name of the stream of a robot's setpoint records."""
+    """Name of the stream of a robot's requested and sent setpoints."""
     return internal(robot, "setpoints")
 
 
 def end_stream(camera: str) -> str:
-    """Name of the stream on which a camera announces its end."""
+    """Name of the stream on which a camera reports that it has no more images."""
     return internal(camera, "commands")
 
 
 def trigger_stream(target: str, source: str) -> str:
-    """Name of the stream of commands and wake-ups from the analysis `source`."""
+    """Name of the stream of trigger commands from `source` to a robot or analysis."""
     return f"{internal(target, 'commands')}/{source}"
 
 
 def task_stream(node: str) -> str:
-    """Name of the stream on which the edge executor of an analysis gets its tasks."""
+    """Name of the stream of tasks for the edge executor of an analysis."""
     return internal(node, "tasks")
 
 
 def done_stream(node: str) -> str:
-    """Name of the stream on which the edge executor of an analysis answers."""
+    """Name of the stream of answers of an analysis' edge executor."""
     return internal(node, "done")
 
 
@@ -77,5 +77,5 @@ def alert_stream(actor: str) -> str:
 
 
 def vitals_stream(actor: str) -> str:
-    """Name of the stream of an actor's process figures."""
+    """Name of the stream of the vitals of an actor's process."""
     return f"{INTERNAL}vitals/{actor}"

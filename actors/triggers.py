@@ -1,4 +1,4 @@
-"""Triggers: the wake-ups and commands that a result causes."""
+"""Triggers: commands to robots or analyses, published when a result meets a condition."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["TriggerSpec", "Triggers"]
 
 @dataclass(frozen=True)
 class TriggerSpec:
-    """Publishes `command` on `stream` when a result satisfies `when`."""
+    """A command to publish on `stream` when a result satisfies `when` (None: always)."""
 
     stream: str
     command: Any
@@ -23,10 +23,10 @@ class TriggerSpec:
 
 
 class Triggers:
-    """The triggers of one analysis, in the process that publishes its results."""
+    """Triggers of one analysis, in the process that publishes its results."""
 
     def __init__(self, specs: Iterable[TriggerSpec], publisher: Callable[[str], Publisher]) -> None:
-        """Open the streams of `specs` by `publisher`."""
+        """Open the streams of `specs` with `publisher`."""
         self._specs = tuple(specs)
         self._publishers = {one.stream: publisher(one.stream) for one in self._specs}
 
@@ -37,7 +37,7 @@ class Triggers:
         stamp: int,
         complain: Callable[[Exception], None],
     ) -> None:
-        """Publish the commands that a result made of `origin` triggers; errors are complaints."""
+        """Publish the commands for a `result` of `origin`; `complain` gets errors of conditions."""
         for one in self._specs:
             try:
                 wanted = one.when is None or one.when(result)

@@ -1,1 +1,1 @@
-"""Ray itself: a local one, a cluster to join, their ends, and the watch over their actors."""
+"""Ray clusters: starting a local one, joining a remote one, shutdown and monitoring."""

@@ -1,4 +1,4 @@
-"""`aerodaas cluster check`: the resources of a cluster, and what to mend before a flight."""
+"""`aerodaas cluster check`: a cluster's resources and links, and problems with remedies."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from aerodaas.types.finding import Finding
 __all__ = ["check_cluster"]
 
 _PATIENCE = 60.0
-"""Seconds that a node may take to start a probe; a first import takes some."""
+"""Seconds that a node may take to start a probe; a first import takes several."""
 _CLOCKS_APART = 0.1
-"""Offset of clocks, in seconds, beyond which latencies between nodes are meaningless."""
+"""Seconds of clock offset beyond which latencies across nodes are meaningless."""
 _SLOW_RTT = 0.25
 _SLOW_BITS = 5e6
 _KINDS = ("edge", "cloud")
@@ -29,7 +29,7 @@ _KINDS = ("edge", "cloud")
 def check_cluster(address: str) -> Iterator[Finding]:
     """Join the cluster at `address` and yield the findings.
 
-    Raises AeroDaaSError or ConfigError where it cannot be joined at all.
+    Raises AeroDaaSError or ConfigError if it cannot be joined.
     """
     cluster.connect(address)
     try:

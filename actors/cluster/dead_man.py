@@ -1,7 +1,7 @@
-"""Self-termination of a process that no other process can end any more.
+"""Self-termination of actor processes that were told to stop.
 
-An actor is ended through the head of its cluster. Where that is lost, a process that was told to
-stop would stay for ever, so it ends itself.
+An actor is ended through the head of its cluster. Without a reachable head, a stopped process
+would remain for ever, so it ends itself.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ import ray.actor
 __all__ = ["LAST_SECONDS", "exit_soon", "leave"]
 
 LAST_SECONDS = 30.0
-"""Wall seconds from being told to stop until the process ends: longer than a head needs to end it,
-and than what is under way takes to finish."""
+"""Wall seconds from the stop command until the process ends: longer than a head needs to end it,
+and than current work takes to finish."""
 
 
 def exit_soon(seconds: float = LAST_SECONDS) -> None:
-    """End this process in so many seconds, if it is an actor's."""
+    """End this process after `seconds`, if it is an actor's."""
     if ray.is_initialized() and ray.get_runtime_context().get_actor_id():
         timer = threading.Timer(seconds, os._exit, (0,))
         timer.daemon = True
@@ -28,9 +28,9 @@ def exit_soon(seconds: float = LAST_SECONDS) -> None:
 
 
 def leave() -> None:
-    """End this actor, whose call it must be, in Ray's own way: then it is not restarted.
+    """End this actor through Ray, so that it is not restarted; to be called in an actor's method.
 
-    That may take its head to be reached, so the process ends soon in any case.
+    This may need the cluster's head, so the process also ends by its own timer.
     """
     exit_soon()
     ray.actor.exit_actor()

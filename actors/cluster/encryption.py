@@ -1,4 +1,4 @@
-"""Whether both ends mean to encrypt, asked before Ray tries: over a mistake it takes minutes."""
+"""Check of matching TLS settings before Ray connects, which fails only after minutes."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _ADVICE = "clusters/certificates.sh makes certificates, docs/cluster.md says whe
 
 
 def require_same_encryption(address: str, listener: tuple[str, int]) -> None:
-    """Require that the cluster at `address`, host and port `listener`, speaks TLS if we do.
+    """Check that both or neither of the cluster at `address` and this process use TLS.
 
-    Raises AeroDaaSError if only one does, or one does not trust the other; ConfigError for files
-    of ours that cannot be used.
+    `listener` is the cluster's host and port. Raises AeroDaaSError if only one uses TLS or does
+    not trust the other; ConfigError if this process's certificate files cannot be used.
     """
     if os.environ.get("RAY_USE_TLS", "0").lower() in {"1", "true"}:
         _shake_hands(address, listener, _our_context())
@@ -52,7 +52,7 @@ def _shake_hands(address: str, listener: tuple[str, int], context: ssl.SSLContex
             socket.create_connection(listener, timeout=_SECONDS) as link,
             context.wrap_socket(link, server_hostname=listener[0]) as secured,
         ):
-            # Since TLS 1.3 the other end judges our certificate only after the handshake.
+            # Since TLS 1.3 the peer verifies our certificate only after the handshake.
             if not secured.recv(1):
                 raise ConnectionAbortedError("it hung up")
     except ssl.SSLCertVerificationError as error:
@@ -76,7 +76,7 @@ def _shake_hands(address: str, listener: tuple[str, int], context: ssl.SSLContex
 def _speaks_tls(listener: tuple[str, int]) -> bool:
     context = ssl.create_default_context()
     context.check_hostname = False
-    context.verify_mode = ssl.CERT_NONE  # nothing is said to it
+    context.verify_mode = ssl.CERT_NONE  # no data is sent
     context.set_alpn_protocols(["h2"])
     try:
         with (

@@ -1,7 +1,7 @@
-"""Handshake with a cluster's head: its version and token, before Ray tries to join it.
+"""Handshake with a cluster's head before Ray joins it: reachability, token and versions.
 
-Ray answers a wrong token after half a minute of repeated log lines, and other versions of itself
-with a traceback; its head tells both at once to who asks.
+Ray reports a wrong token only after half a minute of repeated log lines, and other versions of
+itself with a traceback; a query of its head reports both at once.
 """
 
 from __future__ import annotations
@@ -32,11 +32,10 @@ _TOKEN_ADVICE = (
 
 
 def greet(address: str) -> None:
-    """Make sure that a cluster listens at `address`, takes our token and runs our versions.
+    """Check that a cluster at `address` is reachable, accepts our token and runs our versions.
 
-    And that either both ends speak TLS, and trust each other, or neither does.
-
-    Raises AeroDaaSError that says what to mend.
+    Also checks that both ends use TLS and trust each other, or neither does. Raises
+    AeroDaaSError with the remedy.
     """
     listener = listener_of(address)
     if listener is None:
@@ -56,13 +55,13 @@ def greet(address: str) -> None:
 
 
 def listener_of(address: str) -> tuple[str, int] | None:
-    """Host and port of a cluster's address; None for "auto" and other forms of Ray's."""
+    """Host and port of a cluster's address; None for "auto" and other forms specific to Ray."""
     host, _, port = address.removeprefix("ray://").rpartition(":")
     return (host.strip("[]"), int(port)) if host and port.isdigit() else None
 
 
 def take_up_token() -> None:
-    """Ray uses the user's token for a cluster that it starts, but not for one that it joins."""
+    """Enable the user's token for joining; Ray does so only for a cluster that it starts."""
     try:
         from ray._private.authentication import (  # noqa: PLC0415 - since Ray 2.59
             authentication_token_setup as tokens,
@@ -76,7 +75,7 @@ def take_up_token() -> None:
 
 
 def _metadata(address: str) -> dict[str, Any]:
-    """The head's metadata."""
+    """Cluster metadata from the head; raises AeroDaaSError if refused or not a Ray head."""
     try:
         with hushed():
             client = GcsClient(address=address)
@@ -94,7 +93,10 @@ def _metadata(address: str) -> dict[str, Any]:
 
 
 def _compare(address: str, head: dict[str, Any]) -> None:
-    """Ray's wire protocol changes with each release, Python's pickles with each minor one."""
+    """Raise AeroDaaSError if the head's Ray release or Python minor version differs from ours.
+
+    Ray's wire protocol changes with each release, Python's pickles with each minor one.
+    """
     ours = {"ray_version": ray.__version__, "python_version": platform.python_version()}
     names = {"ray_version": "Ray", "python_version": "Python"}
     for key, mine in ours.items():
@@ -126,7 +128,7 @@ def _level(logger: logging.Logger, level: int) -> Iterator[None]:
 
 @contextlib.contextmanager
 def hushed() -> Iterator[None]:
-    """Silence Ray's C++ part, which prints errors that are raised a moment later."""
+    """Discard standard error: Ray's C++ part prints errors there that it also raises."""
     kept = os.dup(2)
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)

@@ -1,4 +1,4 @@
-"""Whether the head of the cluster answers: Ray itself waits for it in silence."""
+"""Watchdog of the cluster's head, for whose return Ray waits without a message."""
 
 from __future__ import annotations
 
@@ -14,22 +14,22 @@ __all__ = ["HeadWatch"]
 
 _EVERY = 2.0
 _PATIENCE = 3.0
-"""Seconds that a connection may take."""
+"""Timeout of a connection in seconds."""
 _LOST_AFTER = 10.0
-"""Seconds without an answer after which an alert is published."""
+"""Seconds without an answer before the alert."""
 
 
 class HeadWatch:
-    """Connects to the head every few seconds, in a thread of its own."""
+    """Watchdog that connects to the head every few seconds, in a thread of its own."""
 
     def __init__(self, address: str, tell: Callable[[str, str], None]) -> None:
-        """Watch the head at `address`, `host:port`.
+        """Start to watch the head at `address`, `host:port`.
 
-        `tell` is called in the thread, with the kind of an alert and its text.
+        `tell` is called in the thread with the kind and the text of an alert.
         """
         self.address = address
         self.lost = False
-        """Whether it has not answered for some time."""
+        """True while the head is considered lost."""
         self._tell = tell
         self._ended = threading.Event()
         if (listener := listener_of(address)) is not None:
@@ -37,7 +37,7 @@ class HeadWatch:
             watching.start()
 
     def end(self) -> None:
-        """Watch no longer."""
+        """Stop watching."""
         self._ended.set()
 
     def _watch(self, listener: tuple[str, int]) -> None:

@@ -1,4 +1,4 @@
-"""Liveness of actors: their deaths and restarts, as soon as Ray notices them."""
+"""Liveness monitor: reports actors that die or restart as soon as Ray detects it."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from ray.exceptions import ActorUnavailableError, RayError
 __all__ = ["ASKED_AGAIN", "LIFE", "LIFELINES", "Life", "LivenessMonitor"]
 
 LIFE = "life"
-"""Concurrency group of an actor in which the calls of its lifelines wait."""
+"""Concurrency group of an actor for the waiting calls of its liveness monitors."""
 LIFELINES = 2
-"""Most lifelines of one actor: its run's and, for an executor, the dispatcher's."""
+"""Most liveness monitors of one actor: its run's and, for an executor, the dispatcher's."""
 Life = Literal["serving", "restarting", "gone"]
 ASKED_AGAIN = 0.1
-"""Seconds before Ray is asked again for an actor that is not there; its own retries take one."""
+"""Seconds before an unavailable actor is called again; Ray's own retries take a second."""
 
 
 class LivenessMonitor:
-    """Watches actors by one call that waits in each for as long as it lives."""
+    """Liveness monitor with one pending call in each actor, whose end reports a change."""
 
     def __init__(self, actors: Mapping[str, Any], tell: Callable[[str, Life], None]) -> None:
-        """Watch Ray actor handles by name; `tell` is called, from any thread, with each change.
+        """Monitor Ray actor handles by name; `tell` receives name and change, in any thread.
 
         An actor has the methods `await_start` and `await_stop` and the concurrency group LIFE.
         """
@@ -40,7 +40,7 @@ class LivenessMonitor:
             self._ask(actor, "await_start")
 
     def end(self) -> None:
-        """Watch no longer."""
+        """Stop monitoring."""
         self._ended = True
 
     def _ask(self, actor: Any, what: Literal["await_start", "await_stop"]) -> None:  # noqa: ANN401

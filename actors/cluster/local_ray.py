@@ -1,7 +1,8 @@
-"""The local Ray of an application: started for it alone, and by no means ended with it.
+"""Local Ray of an application, which outlives it until the last drone has landed.
 
-A process of its own keeps it (`ray_process.py`). When the application has gone, for whatever
-reason, that waits until no drone flies any more, then ends exactly the processes that it started.
+A supervisor process keeps it (`ray_process.py`). After the end of the application, for any
+reason, the supervisor waits until no drone flies, then ends exactly the processes that it
+started.
 """
 
 from __future__ import annotations
@@ -21,10 +22,10 @@ from aerodaas.types.errors import AeroDaaSError
 __all__ = ["LocalRay"]
 
 _STORE_BYTES = 128 * 2**20
-"""Object store; streams travel in shared memory of their own."""
+"""Bytes of Ray's object store; streams use shared memory of their own."""
 _ADDRESS = "127.0.0.2"
-"""Of the loopback interface, so that a Wi-Fi that goes away takes no connection with it. Ray
-replaces 127.0.0.1 by an address of the machine's network."""
+"""Loopback address, so that a lost Wi-Fi breaks no connection. Ray replaces 127.0.0.1 by an
+address of the machine's network."""
 _START_SECONDS = 400.0
 _END_SECONDS = 20.0
 _KEEPER = Path(__file__).with_name("ray_process.py")
@@ -36,12 +37,12 @@ _OPTIONS = (
 
 
 class LocalRay:
-    """Begins to start when made; `address` waits until it is there."""
+    """Local Ray that starts in the background; `address` waits until it is ready."""
 
     node_address = _ADDRESS
 
     def __init__(self, variables: Mapping[str, str]) -> None:
-        """Start it with these environment variables on top of ours; returns at once."""
+        """Start Ray with `variables` as defaults of the environment; returns at once."""
         make_token()
         command = [sys.executable, "-I", "-S", str(_KEEPER), str(os.getpid()), *_OPTIONS]
         self._process = subprocess.Popen(  # noqa: S603 - our own file
@@ -59,7 +60,7 @@ class LocalRay:
 
     @property
     def address(self) -> str:
-        """Host and port of its head, once it is there; AeroDaaSError if it does not start."""
+        """Host and port of its head; waits for it. Raises AeroDaaSError if it does not start."""
         if not self._address:
             told = self._next(_START_SECONDS)
             if "address" not in told:
@@ -69,7 +70,7 @@ class LocalRay:
         return self._address
 
     def end(self) -> None:
-        """Release the supervisor; returns after its end, or at once while a drone still lands."""
+        """Release Ray; returns when it has ended, or early while a drone has yet to land."""
         assert self._process.stdin is not None  # noqa: S101 - asked for
         self._process.stdin.close()
         if "flying" not in self._next(_END_SECONDS):
@@ -82,7 +83,7 @@ class LocalRay:
         self._lines.put("{}")
 
     def _next(self, timeout: float) -> dict[str, object]:
-        """The supervisor's next line; empty if it has ended or is silent for too long."""
+        """The supervisor's next message; empty if it has ended, `flying` after the timeout."""
         try:
             return dict(json.loads(self._lines.get(timeout=timeout)))
         except Empty:
@@ -100,13 +101,13 @@ def _failure(reason: str) -> str:
 
 
 def make_token() -> None:
-    """See to it that this user has a token, so that no one else can use a Ray of ours."""
+    """Create the user's Ray token if missing, so that other users cannot use the local Ray."""
     named = {"RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"}
     path = Path.home() / ".ray" / "auth_token"
     if named & set(os.environ) or path.exists():
         return
     path.parent.mkdir(exist_ok=True)
-    # Made beside and moved, for two applications may start at the same time.
+    # Written to a file of its own and linked: two applications may start at the same time.
     own = path.with_name(f"auth_token.{os.getpid()}")
     with os.fdopen(os.open(own, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
         file.write(secrets.token_hex(32))

@@ -1,8 +1,8 @@
-"""The orphan reaper: ends the actors of a run whose application has died, once the drones are down.
+"""Orphan reaper: ends the actors of a run whose application has died, after the drones' landing.
 
-The actors of a run are detached from the application, so that one that is killed does not take
-the drone's actor with it. The drone's actor brings the drone home by itself; the orphan reaper
-sees to it that nothing is left running afterwards.
+The actors of a run are detached from the application, so that the drone's actor survives a
+killed application. The drone's actor brings the drone home by itself; the orphan reaper ends
+all remaining actors afterwards.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from aerodaas.actors.run.shutdown import end_actors, may_fly
 __all__ = ["OrphanReaper"]
 
 _LAUNCH = 200.0
-"""Wall seconds that an application has from its start to its first call."""
+"""Wall seconds that an application has to start its run, before its first heartbeat."""
 _SILENCE = 5.0
-"""Wall seconds without a call of the application after which it is taken for dead."""
+"""Wall seconds without a heartbeat after which the application is considered dead."""
 _LOOK_INTERVAL = 1.0
 
 
 class OrphanReaper:
-    """Watches one run, from its making on: a call might be lost with the application."""
+    """Watchdog of one run, active once constructed: a start call could be lost."""
 
     def __init__(
         self,
@@ -41,10 +41,10 @@ class OrphanReaper:
         groups: Sequence[Sequence[Any]],
         helpers: Sequence[Any],
     ) -> None:
-        """Wait until `application` is gone and none of the `drones` flies; then end everything.
+        """Wait until `application` has ended and none of the `drones` flies; then end all actors.
 
-        `groups` are stopped in turn, the `helpers` killed. In lockstep, where nothing falls down,
-        the drones are not waited for.
+        `groups` are stopped in turn, the `helpers` killed. In lockstep, where drones are
+        simulated, it does not wait for them.
         """
         self._ended: tuple[Sequence[Sequence[Any]], Sequence[Any]] = (), ()
         self._ending = False
@@ -57,25 +57,25 @@ class OrphanReaper:
         threading.Thread(target=self._watch, name="orphan_reaper", daemon=True).start()
 
     def meet(self) -> None:
-        """Let its caller learn where it lives."""
+        """Do nothing: the call makes Ray resolve the actor's address for the caller."""
 
     def leave(self) -> None:
         """End the process: the application has ended the run itself."""
         leave()
 
     def heard(self) -> None:
-        """Note that the application is alive."""
+        """Record a heartbeat of the application."""
         self._silent_from = time.monotonic() + _SILENCE
 
     def ending(self) -> bool:
-        """Whether it ends the run, or has."""
+        """Whether it is ending the run, or has ended it."""
         return self._ending
 
     def look_after(self, groups: Sequence[Sequence[Any]], helpers: Sequence[Any]) -> None:
-        """End these, instead, once it is time to: actors have come in flight."""
+        """Replace the actors to be ended, after actors were added in flight."""
         self._ended = groups, helpers
         for actor in (*itertools.chain(*groups), *helpers):
-            # Where an actor lives is asked of the cluster's head, once, and that may be lost.
+            # An actor's address is resolved once, by the cluster's head, which may be lost later.
             actor.meet.remote()
 
     def _watch(self) -> None:
@@ -87,7 +87,7 @@ class OrphanReaper:
         self._lock.release()
         exit_soon()
         with contextlib.suppress(RayError):
-            # In Ray's own way, or it would tell the terminal of a worker that died.
+            # Through Ray, or it would print a message about a dead worker to the terminal.
             ray.kill(self._itself)
 
     def _gone(self) -> bool:
@@ -95,5 +95,5 @@ class OrphanReaper:
             return time.monotonic() > self._silent_from
         if self._application.ended():
             return True
-        # Suspended in real time, it has lost its drones all the same; in lockstep they wait.
+        # A suspended application has lost its drones in real time; in lockstep they wait.
         return not self._application.lockstep and time.monotonic() > self._silent_from

@@ -1,4 +1,4 @@
-"""Probe of a cluster's node: its own properties, and its link to another node."""
+"""Probe actor of a cluster node: its versions and resources, and its link to another node."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TRANSFERS = 3
 
 @dataclass(frozen=True)
 class NodeFacts:
-    """One node's versions and means."""
+    """Versions and resources of one node."""
 
     host: str
     python: str
@@ -31,30 +31,30 @@ class NodeFacts:
     aerodaas: str
     cores: int
     memory: int
-    """Bytes."""
+    """Memory in bytes."""
 
 
 @dataclass(frozen=True)
 class LinkMeasurement:
-    """From one node to another and back."""
+    """Measurement of the link from one node to another."""
 
     rtt: float
-    """Median seconds of a call and its answer, Ray's own share included."""
+    """Median round trip of a call in seconds, Ray's overhead included."""
     offset: float
-    """Seconds that the other clock is ahead."""
+    """Seconds by which the other clock is ahead."""
     uncertainty: float
-    """Seconds by which the offset may be wrong: half the shortest round trip."""
+    """Error bound of the offset in seconds: half the shortest round trip."""
     up: float
-    """Bits per second there."""
+    """Bits per second to the other node."""
     down: float
-    """Bits per second back."""
+    """Bits per second from the other node."""
 
 
 class Probe:
-    """An actor on each node."""
+    """Probe actor, one per node."""
 
     def facts(self) -> NodeFacts:
-        """Of this node."""
+        """Versions and resources of this node."""
         from importlib.metadata import PackageNotFoundError, version  # noqa: PLC0415 - only here
 
         import psutil  # noqa: PLC0415 - only here
@@ -70,15 +70,15 @@ class Probe:
         )
 
     def now(self) -> int:
-        """The clock of this node, nanoseconds since the epoch."""
+        """Host time of this node, nanoseconds since the epoch."""
         return host_time_ns()
 
     def take(self, data: bytes) -> int:
-        """Take a transfer."""
+        """Receive a transfer and return its size."""
         return len(data)
 
     def give(self, size: int) -> bytes:
-        """Send so many bytes that no link can compress."""
+        """Return `size` random bytes, which no link can compress."""
         return os.urandom(size)
 
     def measure(self, other: Any) -> LinkMeasurement:  # noqa: ANN401 - an actor's handle
@@ -106,10 +106,10 @@ class Probe:
 
 
 def clock_offset(readings: list[tuple[int, int, int]]) -> tuple[float, float]:
-    """Seconds that the other clock is ahead, and by how much that may be wrong.
+    """Seconds by which the other clock is ahead, and the error bound.
 
-    `readings` are (sent, the other's time, received) in nanoseconds. Of all round trips the
-    shortest says most, as in NTP (RFC 5905, section 10).
+    `readings` are (sent, the other's time, received) in nanoseconds. The shortest round trip is
+    the most accurate, as in NTP (RFC 5905, section 10).
     """
     sent, theirs, received = min(readings, key=lambda reading: reading[2] - reading[0])
     return (theirs - (sent + received) / 2) / 1e9, (received - sent) / 2e9

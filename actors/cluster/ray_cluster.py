@@ -1,4 +1,4 @@
-"""Ray itself: start one of our own here, or join a cluster, and find places for actors."""
+"""Connection to Ray: starting a local one, joining a cluster, and placing actors on nodes."""
 
 from __future__ import annotations
 
@@ -36,27 +36,27 @@ __all__ = [
 
 _KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
 _SHARE = 0.001
-"""Share of a node's `edge` or `cloud` resource that an actor takes: placement, no amount."""
+"""Amount of a node's `edge` or `cloud` resource per actor, for placement only."""
 _NAMESPACE = "aerodaas"
-"""Ray's, for the names of actors that outlive their application."""
+"""Ray namespace for the names of actors that outlive their application."""
 
 _PRINTS = "print_to_stdstream"
 
 _local: LocalRay | None = None
-"""The Ray that this process has had started."""
+"""Local Ray started by this process, if any."""
 
 
 @dataclass(frozen=True)
 class Placement:
-    """Where an actor belongs."""
+    """Kind of node, or the node, on which to place an actor."""
 
     kind: Literal["edge", "cloud"] = "edge"
     node: str | None = None
-    """IP address of one node, where several are of the kind."""
+    """Address, name or id of one node, if the kind alone is ambiguous."""
 
 
 def begin(address: str | None) -> None:
-    """Have a Ray of our own begin to start, where `connect` will need one; returns at once."""
+    """Start a local Ray in the background if `connect` will need one; returns at once."""
     global _local  # noqa: PLW0603 - one Ray for each process
     if ray.is_initialized() or address or os.environ.get("RAY_ADDRESS") or _local is not None:
         return
@@ -65,7 +65,7 @@ def begin(address: str | None) -> None:
 
 
 def connect(address: str | None) -> None:
-    """Start a Ray of our own on this machine, or join the cluster at `address` (or `RAY_ADDRESS`).
+    """Start a local Ray on this machine, or join the cluster at `address` (or `RAY_ADDRESS`).
 
     Raises AeroDaaSError if the cluster cannot be reached or Ray does not start, ConfigError if the
     cluster offers no edge node.
@@ -86,7 +86,7 @@ def connect(address: str | None) -> None:
 
 
 def join(address: str) -> None:
-    """Join the cluster at `address`, without a check of its resources; raises AeroDaaSError."""
+    """Join the cluster at `address`, without a check of its nodes; raises AeroDaaSError."""
     if ray.is_initialized():
         return
     _set_variables()
@@ -95,10 +95,10 @@ def join(address: str) -> None:
 
 
 def _set_variables() -> None:
-    """Before Ray's C++ part is used for the first time: it reads them once."""
+    """Set Ray's environment variables; before the first use of its C++ part, which reads them."""
     for name, value in VARIABLES.items():
         os.environ.setdefault(name, value)
-    # The first error is told; Ray would print the tracebacks of those that followed.
+    # The first error is reported; Ray would print the tracebacks of subsequent ones.
     os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
 
 
@@ -114,9 +114,9 @@ def _init(address: str, **more: Any) -> None:  # noqa: ANN401 - as Ray takes the
 
 
 def _silence_nodes() -> None:
-    """Silence Ray's printing of its nodes' reports of dead processes; the run names them.
+    """Stop Ray from printing its nodes' messages about dead processes.
 
-    `log_to_driver` does not cover it, nor does anything else that Ray lets one choose.
+    The run reports these by name. Neither `log_to_driver` nor another option of Ray covers it.
     """
     worker = importlib.import_module("ray._private.worker")
     if hasattr(worker, _PRINTS):
@@ -125,7 +125,7 @@ def _silence_nodes() -> None:
 
 @contextlib.contextmanager
 def _fatal_only() -> Iterator[None]:
-    """Silence Ray's C++ part, which reads this once and prints errors that are raised, too."""
+    """Stop Ray's C++ part, which reads the variable once, from printing errors; we report them."""
     name = "RAY_BACKEND_LOG_LEVEL"
     if name in os.environ:
         yield
@@ -154,12 +154,12 @@ def _require_edge(address: str) -> None:
 
 
 def is_local() -> bool:
-    """Whether the connected Ray was started for this process alone."""
+    """Return whether the connected Ray was started for this process alone."""
     return _local is not None
 
 
 def disconnect() -> None:
-    """Leave Ray; one of our own ends, at once or once the last drone has landed."""
+    """Leave Ray; a local one ends at once or after the last drone has landed."""
     global _local  # noqa: PLW0603 - one Ray for each process
     ray.shutdown()
     if _local is not None:
@@ -169,7 +169,7 @@ def disconnect() -> None:
 
 
 def discover() -> list[ComputeConfig]:
-    """The compute resources that the connected cluster offers: one for each kind of node."""
+    """Compute resources of the connected cluster: one for each kind of node."""
     found: dict[str, ComputeConfig] = {}
     for node in ray.nodes():
         for kind in _KINDS:
@@ -179,9 +179,9 @@ def discover() -> list[ComputeConfig]:
 
 
 def nodes_at(place: Placement) -> list[dict[str, Any]]:
-    """The living nodes that `place` may mean, as Ray describes them.
+    """Live nodes that match `place`, as described by Ray.
 
-    Raises ConfigError if there are none, or if Ray does not know the named one as this kind.
+    Raises ConfigError if there are none, or if the named one is not of this kind.
     """
     alive = [node for node in ray.nodes() if node["Alive"]]
     kind = [node for node in alive if place.kind in node["Resources"]]
@@ -205,7 +205,7 @@ def nodes_at(place: Placement) -> list[dict[str, Any]]:
 
 
 def _names(node: dict[str, Any]) -> set[str]:
-    """How an environment file may call a node: by address, name, host name or id."""
+    """Names of a node in environment files: address, name, host name and id."""
     keys = ("NodeManagerAddress", "NodeName", "NodeManagerHostname", "NodeID")
     return {node[key] for key in keys if key in node}
 
@@ -217,9 +217,10 @@ def _label(node: dict[str, Any]) -> str:
 
 
 def home_edge() -> str:
-    """Id of the edge node beside the drones where the environment file names none.
+    """Id of the edge node for the drones if the environment file names none.
 
-    This process' own node if it is one, else the first. Raises ConfigError if there is none.
+    This process' own node if it is an edge node, else the first one. Raises ConfigError if there
+    is none.
     """
     offered = sorted(node["NodeID"] for node in nodes_at(Placement()))
     here: str = ray.get_runtime_context().get_node_id()
@@ -241,16 +242,16 @@ def options_for(place: Placement, *, restarts: int) -> dict[str, Any]:
         address = nodes[0]["NodeManagerAddress"]
         neighbours = [n for n in ray.nodes() if n["Alive"] and n["NodeManagerAddress"] == address]
         if len(neighbours) == 1:
-            # By its address, so that a node that was restarted is known again.
+            # By its address, so that a restarted node matches again.
             options["resources"][f"node:{address}"] = _SHARE
         else:
             options["scheduling_strategy"] = pinned(nodes[0]["NodeID"])
     elif place.kind == "edge":
-        # All that is beside the drones is beside each other, however many edges there are.
+        # All edge actors of a run share one node, even if there are several edge nodes.
         options["scheduling_strategy"] = pinned(home_edge())
     return options
 
 
 def pinned(node_id: str) -> NodeAffinitySchedulingStrategy:
-    """Ray's strategy of running on this node or nowhere."""
+    """Ray scheduling strategy that requires this node."""
     return NodeAffinitySchedulingStrategy(node_id, soft=False)

@@ -1,4 +1,4 @@
-"""Many independent simulations over a Ray cluster, for the lab."""
+"""Parallel map of independent simulations over a Ray cluster, for scheduler experiments."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from aerodaas.schedulers.analytics.registry import load_scheduler
 __all__ = ["shipped", "spread_over"]
 
 _WAITING_PER_CORE = 4
-"""Parts handed to the cluster ahead of the answers, so that no core waits for us."""
+"""Parts submitted ahead of the answers, per core, so that no core waits."""
 
 
 def spread_over(address: str) -> Callable[[Callable[[Any], Any], Iterable[Any]], Iterator[Any]]:
-    """Something like `map` over the cores of the Ray cluster at `address`, in order.
+    """Return an ordered `map` over the cores of the Ray cluster at `address`.
 
-    A part whose node dies is worked out again elsewhere. The project must be installed on every
-    node. Raises AeroDaaSError if the cluster cannot be reached.
+    A part whose node dies is computed again on another one. The project must be installed on
+    every node. Raises AeroDaaSError if the cluster cannot be reached.
     """
     cluster.join(address)
 
@@ -44,7 +44,7 @@ def spread_over(address: str) -> Callable[[Callable[[Any], Any], Iterable[Any]],
 
 
 def shipped(wanted: str) -> str | type[AnalyticsScheduler]:
-    """A scheduler as another machine can load it: a class from a file travels with its code."""
+    """A scheduler as another machine can load it: a class from a file is pickled by value."""
     if ".py:" not in wanted:
         return wanted
     found = type(load_scheduler(wanted))

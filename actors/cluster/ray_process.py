@@ -1,11 +1,11 @@
-"""Supervisor process of a local Ray: starts it, ends it after its last user, and tidies up.
+"""Supervisor process of a local Ray: starts it, ends it when unused, and cleans up.
 
 It is run as a script, needs the standard library only (10 MB), and is in a session of its own, so
-that neither Ctrl-C nor a `kill -9` of the application ends it or its Ray. The Ray is ended once
-the application has gone and no run is under way: each run holds a lock (`run_lock.py`) for as long
-as its drones may fly and its actors have work. On standard output it tells the application, one
-line of JSON each, `{"address": ...}` or `{"error": ...}`, and `{"flying": true}` where it has to
-stay after the application has said goodbye by closing its standard input.
+that neither Ctrl-C nor a `kill -9` of the application ends it or its Ray. Ray is ended once the
+application has ended and no run is active: each run holds a lock (`run_lock.py`) for as long as
+its drones may fly and its actors have work. On standard output it sends the application one line
+of JSON per message: `{"address": ...}` or `{"error": ...}`, and `{"flying": true}` if it has to
+stay after the application has closed its standard input.
 """
 
 from __future__ import annotations
@@ -28,38 +28,38 @@ from pathlib import Path
 __all__ = ["LOCKS", "PREFIX", "VARIABLE", "main"]
 
 VARIABLE = "AERODAAS_LOCAL_RAY"
-"""Environment variable of all processes of a local Ray: its folder."""
+"""Environment variable of all processes of a local Ray, set to its folder."""
 PREFIX = "aerodaas-ray-"
 LOCKS = "runs"
-"""Folder of the locks of runs that are under way."""
+"""Folder of the locks of active runs."""
 _RAYS_OWN = "ray"
-"""Below our own folder, for Ray opens its own to all users of the machine."""
+"""Ray's folder, below our own because Ray opens it to all users of the machine."""
 _OWN_LOCK = "supervisor.lock"
 _TRIES = 2
 _TOO_SLOW = "timed out during startup"
-"""Ray gives its node half a minute to start, which a busy machine may not have to give."""
+"""Text of Ray's error when its node does not start within half a minute, on a busy machine."""
 _START_SECONDS = 180.0
 _GRACE_SECONDS = 3.0
-"""Seconds for actors that are ending and hold their locks a moment longer."""
+"""Wait for actors that were told to end and still hold their locks."""
 _DYING_SECONDS = 10.0
 _LOOK_SECONDS = 0.2
 _LONGEST = 40
-"""Characters of a temporary folder; a socket's path below it may have 107 in all."""
+"""Most characters of a temporary folder; a socket's path below it may have 107."""
 _UNWANTED = ("_private/monitor.py", "v2/monitor.py", "dashboard/dashboard.py", "util.client.server")
-"""Autoscaler, web pages and proxy for remote drivers, 200 MB that one machine has no use for."""
+"""Processes useless on one machine (200 MB): autoscaler, web pages, proxy for remote drivers."""
 _SUBREAPER = 36
 _RAY = (
-    # What comes with its command line, but not with starting: a second of imports.
+    # Skips a second of imports that only other subcommands need.
     "import sys; sys.modules['ray.serve.scripts'] = None; "
     "from ray.scripts.scripts import main; main()"
 )
 
 
 def main(application: int, words: list[str]) -> None:
-    """Keep a Ray started by `ray start` with arguments `words` for the process `application`."""
+    """Run Ray, started by `ray start` with the arguments `words`, for process `application`."""
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    # Orphans of this Ray's processes become children of this one.
+    # Orphans of this Ray's processes become children of this process.
     ctypes.CDLL(None).prctl(_SUBREAPER, 1, 0, 0, 0)
     client = _Client(application)
     base = Path(tempfile.gettempdir())
@@ -70,7 +70,7 @@ def main(application: int, words: list[str]) -> None:
         (folder / LOCKS).mkdir()
         with (folder / LOCKS / _OWN_LOCK).open("w") as own:
             fcntl.lockf(own, fcntl.LOCK_EX)
-            # It gets its name only now, so that no application finds it without an owner.
+            # Renamed only when locked, so that no other supervisor finds it without an owner.
             Path(own.name).rename(folder / _OWN_LOCK)
             _keep(client, folder, words)
     finally:
@@ -80,7 +80,7 @@ def main(application: int, words: list[str]) -> None:
 
 
 def _keep(client: _Client, folder: Path, words: list[str]) -> None:
-    """Start Ray, and return when it is to be ended."""
+    """Start Ray and return when it is to be ended."""
     address, reason = _start(client, folder, words)
     if not address:
         client.tell(error=reason)
@@ -100,36 +100,36 @@ def _keep(client: _Client, folder: Path, words: list[str]) -> None:
 
 
 class _Client:
-    """The application: its process, and the pipe to it."""
+    """The application's process and the pipe to it."""
 
     def __init__(self, pid: int) -> None:
         try:
             self._process = os.pidfd_open(pid)
         except ProcessLookupError:
-            sys.exit()  # it died before we came
+            sys.exit()  # it has already ended
         self._poll = select.poll()
         self._poll.register(self._process, select.POLLIN)
         self._poll.register(sys.stdin.fileno(), select.POLLIN | select.POLLHUP)
 
     def gone(self, timeout: float) -> bool:
-        """Whether it has died or left, waiting for that up to `timeout` seconds."""
+        """Wait up to `timeout` seconds; return whether it has ended or closed the pipe."""
         return bool(self._poll.poll(timeout * 1000.0))
 
     def tell(self, **words: object) -> None:
-        """Send a line to the application, if it still runs."""
+        """Send a message, ignored if the application has ended."""
         with contextlib.suppress(OSError):
             print(json.dumps(words), flush=True)  # noqa: T201 - this is the pipe
 
 
 def _start(client: _Client, folder: Path, words: list[str]) -> tuple[str, str]:
-    """Start Ray; returns its address, or "" and why it did not start."""
+    """Start Ray; returns its address and "", or "" and the reason of the failure."""
     environment = {**os.environ, VARIABLE: str(folder)}
     own = folder / _RAYS_OWN
     command = [sys.executable, "-c", _RAY, "start", "--temp-dir", str(own), *words]
     reason = ""
     for _ in range(_TRIES):
         with (folder / "start.log").open("w+") as log:
-            starting = subprocess.Popen(  # noqa: S603 - our own words
+            starting = subprocess.Popen(  # noqa: S603 - fixed arguments
                 command, env=environment, stdin=subprocess.DEVNULL, stdout=log, stderr=log
             )
             until = time.monotonic() + _START_SECONDS
@@ -167,7 +167,7 @@ def _held(path: Path) -> bool:
 
 
 def _end_all(matches: Callable[[str], bool] = lambda _: True) -> None:
-    """Kill all descendants whose command line `matches`, and wait for their end."""
+    """Kill all descendants whose command line `matches` and wait for their end."""
     until = time.monotonic() + _DYING_SECONDS
     while left := [pid for pid in _descendants() if matches(_command(pid))]:
         for pid in left:
@@ -186,7 +186,7 @@ def _reap() -> None:
 
 
 def _descendants() -> list[int]:
-    """All processes below this one, but for those that have ended."""
+    """All descendants of this process that have not ended."""
     parents = dict(_processes())
     ours = {os.getpid()}
     while more := {pid for pid, parent in parents.items() if parent in ours} - ours:
@@ -195,7 +195,7 @@ def _descendants() -> list[int]:
 
 
 def _processes() -> Iterator[tuple[int, int]]:
-    """Number and parent of each process of this machine that has not ended."""
+    """Id and parent id of each process of this machine that has not ended."""
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit():
             with contextlib.suppress(OSError):
@@ -211,7 +211,7 @@ def _command(pid: int) -> str:
 
 
 def _prune(base: Path) -> None:
-    """Remove the remains of supervisors that were killed, unless a drone still flies there."""
+    """Remove processes and folders of killed supervisors, unless a drone still flies."""
     for folder in base.glob(f"{PREFIX}*"):
         if _orphaned(folder):
             for pid, _ in list(_processes()):
@@ -225,7 +225,7 @@ def _orphaned(folder: Path) -> bool:
     with contextlib.suppress(OSError):
         own = folder / _OWN_LOCK
         return own.exists() and not _held(own) and not _under_way(folder)
-    return False  # of another user
+    return False  # another user's
 
 
 def _belongs(pid: int, folder: Path) -> bool:
@@ -237,10 +237,10 @@ def _belongs(pid: int, folder: Path) -> bool:
 
 
 def _free_streams() -> None:
-    """Have iceoryx2 remove the shared memory of the dead, as it does for each new node."""
+    """Make iceoryx2 remove the shared memory of dead processes, as it does for each new node."""
     code = "import iceoryx2 as i; i.NodeBuilder.new().create(i.ServiceType.Ipc)"
     with contextlib.suppress(OSError, subprocess.TimeoutExpired):
-        subprocess.run(  # noqa: S603 - our own words
+        subprocess.run(  # noqa: S603 - fixed arguments
             [sys.executable, "-c", code],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,

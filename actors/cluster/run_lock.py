@@ -1,4 +1,4 @@
-"""A lock that keeps the local Ray of this process up until the process lets go of it or ends."""
+"""Lock that keeps this process's local Ray running until it is released or the process ends."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ __all__ = ["RunLock"]
 
 
 class RunLock:
-    """Lock held from construction on; does nothing on a cluster, which no run here may end.
+    """Lock of an active run, held once constructed; without effect on a remote cluster.
 
-    It is a POSIX record lock, which a process' children do not inherit.
+    It is a POSIX record lock, which child processes do not inherit.
     """
 
     def __init__(self) -> None:
@@ -26,7 +26,7 @@ class RunLock:
             fcntl.lockf(self._file, fcntl.LOCK_EX)
 
     def release(self) -> None:
-        """Let go."""
+        """Release the lock."""
         if self._path is not None:
             self._path.unlink(missing_ok=True)
             self._file.close()

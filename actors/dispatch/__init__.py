@@ -1,1 +1,1 @@
-"""The dispatcher's actor, which runs an analytics scheduler, and the executors."""
+"""Dispatcher actor, which runs an analytics scheduler, and the executors."""

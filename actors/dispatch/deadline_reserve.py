@@ -1,4 +1,4 @@
-"""Overhead of the live system per execution: the round trip to an executor, and late timers."""
+"""Reserve for the live system's overhead: round trips to an executor, and late timers."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ __all__ = ["DeadlineReserve"]
 
 _KEPT = 200
 _ENOUGH = 20
-"""Samples needed before a measurement counts."""
+"""Samples before the measurements are used."""
 _AT_FIRST = 5 * MILLISECOND
 _QUANTILE = 0.95
 _LARGEST_SHARE = 0.1
-"""Of a task's deadline that may be held in reserve."""
+"""Largest fraction of a task's deadline held in reserve."""
 
 
 class DeadlineReserve:
-    """Measures overheads outside the scheduler's model; the same reserve for each scheduler.
+    """Measured overhead, by which the deadlines given to every scheduler are shortened.
 
-    A table of execution times and a simulator know nothing of messages and thread switches. A
-    scheduler that defers to the last moment would miss by them, so each task's deadline is moved
-    forward by a high quantile of what they took of late; results are judged by the true one.
+    Tables of execution times and simulators do not include messages and thread switches. A
+    scheduler that defers to the last moment would miss deadlines by them, so each task's deadline
+    is moved forward by a high quantile of the recent overhead; results are judged by the true
+    deadline.
     """
 
     def __init__(self) -> None:
@@ -33,18 +34,18 @@ class DeadlineReserve:
         self._news = 0
 
     def travelled(self, answer: Message[object], taken: int) -> None:
-        """Record an execution on the edge of duration `taken`; its executor's span is the work."""
+        """Add an execution on the edge of `taken` ns; the answer's last span is the work."""
         work = answer.spans[-1].published - answer.spans[-1].received
         self._ways.append(max(0, taken - work))
         self._refresh()
 
     def delayed(self, late: int) -> None:
-        """A timer came `late`."""
+        """Add a timer that was `late` nanoseconds late."""
         self._delays.append(max(0, late))
         self._refresh()
 
     def reserve(self, deadline: int) -> int:
-        """Time to subtract from a relative deadline, nanoseconds."""
+        """Nanoseconds to subtract from a relative deadline."""
         return min(self._reserve, int(_LARGEST_SHARE * deadline))
 
     def _refresh(self) -> None:

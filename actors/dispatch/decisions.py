@@ -1,4 +1,4 @@
-"""The dispatcher's record of its scheduler: each decision with its reason, and the sums."""
+"""Published decisions of the dispatcher's scheduler with their reasons, and totals."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ __all__ = ["Counts", "DecisionLog"]
 
 
 class DecisionLog:
-    """Publishes each task's decisions and outcome."""
+    """Publisher of each task's decisions and outcome."""
 
     def __init__(self, publisher: Publisher, many: set[str]) -> None:
-        """Publish on `publisher`; `many` are the analyses that watch several cameras."""
+        """Publish on `publisher`; `many` are the analyses of several cameras."""
         self._publisher = publisher
         self._many = many
 
     def label(self, task: Task) -> str:
-        """The analysis and the frame; also the camera, where the analysis watches several."""
+        """Name of a task: the analysis, the camera if it has several, and the frame."""
         model = task.profile.model
         source = f"{task.source}:" if model in self._many else ""
         return f"{model}#{source}{task.segment}"
@@ -39,10 +39,10 @@ class DecisionLog:
         now: int,
         totals: Mapping[str, float] | None = None,
     ) -> None:
-        """Publish one decision or one end; `totals` are further figures."""
+        """Publish one decision or outcome; `totals` are further figures."""
         slack = task.deadline + task.reserve - now
         waited = (now - task.arrival) / 1e6
-        # The tasks of a frame arrive at one moment; their numbers tell the order.
+        # The tasks of a frame arrive at the same time; their numbers give the order.
         values = {"slack_ms": slack / 1e6, "waited_ms": waited, "number": float(task.id)}
         if action in {"edge", "cloud"}:
             values["edge_ms"] = task.profile.edge_time / MILLISECOND
@@ -56,10 +56,10 @@ class DecisionLog:
 
 
 class Counts:
-    """Metrics of a run, as in the lab."""
+    """Counts of tasks and outcomes and the utility of a run, as in the simulator."""
 
     def __init__(self) -> None:
-        """Nothing has happened yet."""
+        """Start with all counts at zero."""
         self.retried = 0
         self._tasks = 0
         self._outcomes: Counter[str] = Counter()
@@ -72,7 +72,7 @@ class Counts:
         self._windows.arrived(task)
 
     def ended(self, result: Result) -> None:
-        """Count its end."""
+        """Count a task's outcome and utility."""
         self._outcomes[result.outcome.value] += 1
         self._utility += result.utility
         if result.outcome is TaskOutcome.DONE:
@@ -80,11 +80,11 @@ class Counts:
 
     @property
     def totals(self) -> dict[str, float]:
-        """Utility so far."""
+        """Utility so far: QoS and QoE."""
         return {"qos_total": self._utility, "qoe_total": self._windows.utility}
 
     def values(self) -> dict[str, Any]:
-        """Everything, for the report."""
+        """All counts, for the report."""
         return {
             "tasks": self._tasks,
             "outcomes": dict(self._outcomes),

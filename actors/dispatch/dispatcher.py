@@ -1,13 +1,13 @@
-"""The dispatcher's actor: an analytics scheduler decides live where each task runs, and when.
+"""Dispatcher actor: an analytics scheduler decides live where and when each analysis runs.
 
-The scheduler is the very class that the lab studies, driven through the same `Dispatch`. Each
+The scheduler is the same class as in the simulator, driven through the same `Dispatch`. Each
 frame becomes a task for each managed analysis. The edge executor is serial, as in the model that
-the schedulers were made for: whichever analysis it is, one runs at a time. The dispatcher alone
-publishes the analyses' results, so that a result that comes too late goes nowhere.
+the schedulers were designed for: one analysis runs at a time. Only the dispatcher publishes the
+analyses' results, so that a late result is discarded.
 
-An executor that dies is restarted (by Ray), and its task is tried once more if the deadline
-allows. A cloud that is gone has no slots until it answers again. A scheduler that raises, talks
-nonsense or is slow is replaced by edge-first EDF.
+An executor that dies is restarted by Ray, and its task is retried once if the deadline allows. A
+cloud that is gone has no slots until it answers again. A scheduler that raises, returns invalid
+decisions or is slow is replaced by edge-first EDF.
 """
 
 from __future__ import annotations
@@ -53,33 +53,33 @@ from aerodaas.types.status import Message
 __all__ = ["DispatcherActor", "Managed"]
 
 _LAST_ANSWERS = 2.0
-"""Seconds given to the cloud at the end of a run."""
+"""Seconds to wait for the cloud's answers at the end of a run."""
 _COMPLAINTS_KEPT = 16
 _EDGE_PATIENCE = 4
-"""An execution on the edge that takes so many times its expected time has failed."""
+"""An execution on the edge that takes this many times its expected time has failed."""
 _LEAST_PATIENCE = NANOSECONDS
-"""... but not before this: a first inference may take some."""
+"""... but not before this: a first inference may take several."""
 _FORGOTTEN = NANOSECONDS
-"""A task still undecided so long after its deadline, the edge being idle, has been forgotten."""
+"""Nanoseconds after its deadline at which a task, undecided with an idle edge, is an error."""
 
 
 @dataclass(frozen=True)
 class Managed:
-    """One analysis under the dispatcher."""
+    """One analysis managed by the dispatcher."""
 
     stream: str
     inputs: tuple[str, ...]
     profile: Profile
-    """Its model's name is the stream."""
+    """Times, deadline and utility; its model's name is the stream."""
     acknowledges: bool = False
-    """True in lockstep for an analysis whose results have no reader."""
+    """True in lockstep for an analysis whose results have no readers."""
     open_times: frozenset[str] = frozenset()
-    """Times of the profile that the user left to be measured."""
+    """Times of the profile that are to be measured, because the user gave none."""
     triggers: tuple[TriggerSpec, ...] = ()
 
 
 class DispatcherActor(StreamActor):
-    """Drives `scheduler` over the executors of the `managed` analyses."""
+    """Actor that runs `scheduler` for the executors of the `managed` analyses."""
 
     niceness = 5
 
@@ -90,10 +90,10 @@ class DispatcherActor(StreamActor):
         managed: tuple[Managed, ...],
         resources: Resources,
     ) -> None:
-        """Belong to `session`; without a cloud, `resources` has no slots there."""
+        """Create the actor of `session`; without a cloud, `resources` has no cloud slots."""
         inputs = dict.fromkeys((s for one in managed for s in one.inputs), FRAME_DEPTH)
         answers = dict.fromkeys((done_stream(one.stream) for one in managed), MESSAGE_DEPTH)
-        # Of what comes together, ends are told before arrivals, as in the lab.
+        # Of simultaneous messages, ends precede arrivals, as in the simulator.
         super().__init__(session, "dispatcher", {**answers, **inputs})
         self._managed = managed
         self._by_done = {done_stream(one.stream): one for one in managed}
@@ -105,9 +105,9 @@ class DispatcherActor(StreamActor):
         self._frames: dict[int, Message[Any]] = {}
         self._references = FrameReferences()
         self._held: deque[Message[Any]] = deque()
-        """Lockstep: frames that wait until every task about those before them has ended."""
+        """Lockstep: frames that wait until every task of earlier ones has ended."""
         self._carried = 0
-        """Tasks on the edge whose frame was published again, for its executor had it no more."""
+        """Tasks on the edge whose frame was sent again, because its executor no longer had it."""
         self._results: dict[int, Message[Any]] = {}
         self._timers: list[int] = []
         self._edge_since = 0
@@ -115,26 +115,26 @@ class DispatcherActor(StreamActor):
         self._estimates = Estimates(session.speed or 1.0, scheduler.learns)
         self._now = 0
         self._figures: dict[int, dict[str, float]] = {}
-        """Figures of executions in the cloud, by task."""
+        """Durations and sizes of an execution in the cloud, by task."""
         self._why: dict[int, str] = {}
-        """Why an execution failed, by task."""
+        """Reason of a failed execution, by task."""
         self._lost: set[int] = set()
-        """Tasks whose executor died under them."""
+        """Tasks whose executor died during the execution."""
         self._second: set[int] = set()
-        """Tasks that are tried for the second time."""
+        """Tasks in their second try."""
         self._again: deque[Task] = deque()
-        """Tasks to be tried once more at once, ..."""
+        """Tasks to be retried at once, ..."""
         self._orphans: dict[str, list[Task]] = {}
         """... and those that wait for their executor, by model."""
         self._gone: set[str] = set()
         """Models whose executor on the edge will not come back."""
         self._complaints: deque[str] = deque(maxlen=_COMPLAINTS_KEPT)
-        """Failures in the cloud that were published as alerts."""
+        """Failures in the cloud that have raised an alert."""
         self._counts = Counts()
         self._cloud: ExecutorPool | None = None
         self._liveness_monitor: LivenessMonitor | None = None
         self._lives: deque[tuple[str, Life]] = deque()
-        """Changes of executors on the edge, from other threads."""
+        """Liveness changes of executors on the edge, from other threads."""
 
     def prepare(
         self,
@@ -175,7 +175,7 @@ class DispatcherActor(StreamActor):
         }
 
     def _run(self) -> None:
-        assert self.subscriber is not None  # noqa: S101 - prepare came first
+        assert self.subscriber is not None  # noqa: S101 - set by prepare
         self._guarded("start", self._time())
         while not self.stopping:
             for message in self.subscriber.receive(self._patience()):
@@ -188,7 +188,7 @@ class DispatcherActor(StreamActor):
             else:
                 self._catch_up()
 
-    # What happens.
+    # Events.
 
     def _take(self, message: Message[Any]) -> None:
         managed = self._by_done.get(message.stream)
@@ -247,7 +247,7 @@ class DispatcherActor(StreamActor):
         self._guarded("finished", task, now)
 
     def _executor_is(self, model: str, life: Life, now: int) -> None:
-        """Take note that an executor on the edge died, is back, or will not come back."""
+        """Handle an executor on the edge that died, is back, or will not come back."""
         down = self._dispatch.down
         if life == "serving":
             if model in down:
@@ -268,7 +268,7 @@ class DispatcherActor(StreamActor):
             self._lose(running, "its executor on the edge died", now)
 
     def _catch_up(self) -> None:
-        """Real time: timers that are due, answers from the cloud, executions that hang."""
+        """Real time: handle due timers, answers from the cloud, and hanging executions."""
         self._wake_scheduler()
         now = self._time()
         if self._cloud is not None:
@@ -283,19 +283,19 @@ class DispatcherActor(StreamActor):
             self._require_decisions(now)
 
     def _wake_scheduler(self) -> None:
-        """Real time: fire the timers that are due, before any later event."""
+        """Real time: deliver due timers to the scheduler before later events."""
         while not self.session.lockstep and self._timers and self._timers[0] <= self._time():
             self._way.delayed(self._now - heapq.heappop(self._timers))
             self._guarded("timer", self._now)
 
     def _patience_with(self, profile: Profile) -> int:
-        """How long an execution on the edge may take, nanoseconds."""
+        """Timeout of an execution on the edge, nanoseconds."""
         return max(_EDGE_PATIENCE * profile.edge_time, _LEAST_PATIENCE)
 
     def _hear_from(self, cloud: ExecutorPool, now: int) -> None:
         answers = list(cloud.answers(now))
         cloud.probe(now)
-        # First of all, so that nothing is tried again in a cloud that is gone.
+        # First, so that no task is retried in a cloud that is gone.
         slots, before = cloud.slots, self._dispatch.resources.cloud_slots
         if slots != before:
             if not slots:
@@ -336,10 +336,10 @@ class DispatcherActor(StreamActor):
         self._replace(f"left {self._log.label(oldest)} undecided beyond its deadline", now)
 
     def _settle(self) -> None:
-        """Lockstep: let each frame arrive once every task about those before it has ended.
+        """Lockstep: deliver each frame once every task of earlier ones has ended.
 
-        What a host takes for an execution, or how far a camera is ahead of it, must not count.
-        Meanwhile the scheduler's own time runs on from timer to timer.
+        Neither the host's execution times nor a camera's lead may affect the result. Meanwhile
+        the scheduler's own time advances from timer to timer.
         """
         while self._dispatch.running is None:
             if not self._dispatch.undecided:
@@ -355,7 +355,7 @@ class DispatcherActor(StreamActor):
                 return
 
     def _guarded(self, event: str, *args: Any) -> None:  # noqa: ANN401
-        """Call the scheduler; one that raises, returns invalid decisions or is slow is replaced."""
+        """Pass an event to the scheduler; replace one that raises, misbehaves or is slow."""
         now = next(arg for arg in reversed(args) if isinstance(arg, int))
         try:
             getattr(self._dispatch, event)(*args)
@@ -380,7 +380,7 @@ class DispatcherActor(StreamActor):
         self._guarded("finished", task, now, TaskOutcome.FAILED)
 
     def _retried(self, task: Task, now: int) -> bool:
-        """Keep a lost task for a second try, if its deadline allows one."""
+        """Keep a lost task for a second try and return True, if its deadline allows one."""
         profile, resources = task.profile, self._dispatch.resources
         room = task.deadline - now
         if task.id in self._second:
@@ -396,7 +396,7 @@ class DispatcherActor(StreamActor):
         return False
 
     def _try_again(self, now: int) -> None:
-        """Hand lost tasks to the scheduler once more, as new ones with the deadline they had."""
+        """Pass lost tasks to the scheduler again, as new ones with their old deadline."""
         while self._again:
             lost = self._again.popleft()
             why = self._why.pop(lost.id, "")
@@ -410,10 +410,10 @@ class DispatcherActor(StreamActor):
             self._log.note(task, "retry", why, now)
             self._guarded("arrived", task, now)
 
-    # The host of `Dispatch`.
+    # Host interface of `Dispatch`.
 
     def run_edge(self, task: Task, now: int) -> None:
-        """Give a task to its analysis' executor on the edge."""
+        """Send a task to its analysis' executor on the edge."""
         self._edge_since = now
         self._send_task(task, self._references.item(self._frames[task.id]))
 
@@ -429,7 +429,7 @@ class DispatcherActor(StreamActor):
             self._cloud.send(task, self._frames[task.id], now, left)
 
     def wake_at(self, at: int) -> None:
-        """Remember a time at which the scheduler wants to be woken."""
+        """Store a time at which the scheduler is to be woken."""
         heapq.heappush(self._timers, at)
 
     def decided(self, decision: Decision, now: int) -> None:
@@ -445,7 +445,7 @@ class DispatcherActor(StreamActor):
             self._log.note(task, action, decision.reason, now)
 
     def closed(self, result: Result) -> None:
-        """Publish a task's result, if it came in time."""
+        """Publish a task's result if in time, or retry a lost task."""
         lost = result.task.id in self._lost
         self._lost.discard(result.task.id)
         if not (lost and self._retried(result.task, result.finished)):

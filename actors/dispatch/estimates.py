@@ -1,4 +1,4 @@
-"""The profile that a scheduler gets of each analysis: the user's figures, or measured ones."""
+"""Profiles of the analyses for a scheduler: the user's times, or else measured ones."""
 
 from __future__ import annotations
 
@@ -11,16 +11,17 @@ from aerodaas.types.clock import NANOSECONDS
 __all__ = ["Estimates"]
 
 _WORTH_TELLING = 0.05
-"""Relative difference between the given and the measured time that is reported."""
+"""Relative difference of a measured time from which the profile is updated."""
 
 
 class Estimates:
-    """Profiles with measured times where the user gave none."""
+    """Profiles whose times follow the measurements if the user gave none."""
 
     def __init__(self, speed: float, learnt: frozenset[str]) -> None:
-        """Mission time runs at `speed`; the scheduler learns the times named in `learnt` itself.
+        """Create the estimates for mission seconds per wall second `speed`.
 
-        A time that both would correct would be corrected twice.
+        The times named in `learnt` are left to the scheduler, which learns them itself: otherwise
+        they would be corrected twice.
         """
         self.edge = ExecutionEstimates()
         self._second = speed * NANOSECONDS
@@ -34,11 +35,11 @@ class Estimates:
         cloud: float | None,
         link: float = 0.0,
     ) -> Profile:
-        """The profile for a new task of an analysis.
+        """Profile for a new task of an analysis.
 
-        `told` is what the environment file says, `open_times` which of its times are to be
-        measured, `cloud` the host seconds that the cloud is expected to take, if known, `link`
-        those that a frame sent now spends on its way alone: no time told can be less than that.
+        `told` is the environment file's profile, `open_times` are those of its times to be
+        measured, `cloud` is the expected time of the cloud in host seconds, if known, and `link`
+        that of the transfer alone of a frame sent now: a lower bound of the cloud time.
         """
         profile = self._told.setdefault(told.model, told)
         wanted = open_times - self._learnt
@@ -57,5 +58,5 @@ class Estimates:
         return profile
 
     def _time(self, seconds: float | None) -> int | None:
-        """Mission time that so many host seconds take."""
+        """Mission nanoseconds of a duration in host seconds; at least a millisecond."""
         return None if seconds is None else max(MILLISECOND, round(seconds * self._second))

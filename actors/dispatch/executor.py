@@ -1,6 +1,6 @@
-"""The cloud's executor: runs analyses on frames, several at once.
+"""Cloud executor: runs analyses on frames, several at once.
 
-A frame travels in the first call that is about it; the calls that follow name it.
+A frame is sent in the first call for it; subsequent calls refer to it.
 """
 
 from __future__ import annotations
@@ -28,37 +28,37 @@ from aerodaas.types.vehicle import VehicleState
 __all__ = ["FRAMES_KEPT", "CloudExecutor", "Executed", "MissingFrameError", "UnpreparedError"]
 
 _NICENESS = 10
-"""Niceness of its process, so that on one machine the setpoint loop comes first."""
+"""Niceness of its process: on a shared machine, the drone's actor has precedence."""
 FRAMES_KEPT = 8
-"""Frames that can be named; the oldest gives way to the next."""
+"""Frames kept for references; the oldest is replaced by the next."""
 _UNPACKING = 2.0
-"""Seconds that the thread with the call that carries a frame may take to unpack it."""
+"""Seconds to wait for another call's thread to unpack its frame."""
 
 
 class UnpreparedError(AeroDaaSError):
-    """An executor that Ray has restarted holds no analyses yet."""
+    """A call to an executor without analyses, because Ray has restarted it."""
 
 
 class MissingFrameError(AeroDaaSError):
-    """An executor does not hold the frame that a call names."""
+    """A call that refers to a frame that the executor does not have."""
 
 
 class Executed(NamedTuple):
-    """The answer of an execution."""
+    """Result of an execution."""
 
     message: bytes
-    """The encoded message with the result; its last span is the executor's."""
+    """The encoded message with the result; its last span is the time on the executor."""
     decoding: float
-    """Seconds of it that went into decompressing the frame; 0 where the frame was named."""
+    """Seconds of it spent on decompressing the frame; 0 if the call referred to the frame."""
 
 
 class CloudExecutor:
-    """Holds the analyses of `prepare`; Ray runs several `execute` at once, up to its slots."""
+    """Actor that executes the analyses of `prepare`; Ray limits the concurrent `execute`."""
 
     def __init__(self, application: Application | None = None) -> None:
-        """Hold nothing yet: the analyses would be kept for restarts.
+        """Create it without analyses, which Ray would store for restarts.
 
-        What the `application` defines is known from here on, and after a restart.
+        Unpickling `application` makes its definitions available, also after a restart.
         """
         del application
         self._analyses: dict[str, Analytics[Any]] = {}
@@ -76,11 +76,11 @@ class CloudExecutor:
         self._analyses = analyses
 
     def ready(self) -> bool:
-        """Whether it is prepared; one that Ray has restarted is not."""
+        """Whether it is prepared; False after a restart by Ray."""
         return bool(self._analyses)
 
     def meet(self) -> None:
-        """Let its caller learn where it lives."""
+        """Do nothing: the call makes Ray resolve the actor's address for the caller."""
 
     def leave(self) -> None:
         """End the process."""
@@ -93,10 +93,10 @@ class CloudExecutor:
     def execute(
         self, analysis: str, frame: tuple[str, int], data: bytes, budget: float | None = None
     ) -> Executed:
-        """Analyse a frame within `budget` seconds, if the analysis can hurry.
+        """Analyse a frame; `budget` are the seconds left, for analyses that adapt to it.
 
-        `frame` is the stream and number of its message; `data` the encoded message, or nothing
-        where an earlier call carried it. Raises MissingFrameError if none did.
+        `frame` is the stream and number of its message; `data` the encoded message, or empty if
+        an earlier call carried it. Raises MissingFrameError if none did.
         """
         if not self._analyses:
             raise UnpreparedError("the executor in the cloud was restarted")
@@ -113,7 +113,7 @@ class CloudExecutor:
         return Executed(encode_message(replace(message, spans=spans, item=result)), decoding)
 
     def _unpack(self, frame: tuple[str, int], data: bytes) -> tuple[Message[Any], float]:
-        """The message with its image decompressed, and the seconds of decompressing."""
+        """The message with its image decompressed, and the seconds of decompression."""
         message, decoding = decode_message(memoryview(data)), 0.0
         if isinstance(message.item, CodedFrame):
             began = time.perf_counter()
@@ -127,7 +127,7 @@ class CloudExecutor:
         return message, decoding
 
     def _named(self, frame: tuple[str, int]) -> Message[Any]:
-        # The call that carries it came first, but another thread may still be at it.
+        # The call that carries it came first, but another thread may still be unpacking it.
         with self._unpacked:
             if not self._unpacked.wait_for(lambda: frame in self._frames, _UNPACKING):
                 raise MissingFrameError("the executor in the cloud lacks the frame")
@@ -135,7 +135,7 @@ class CloudExecutor:
 
 
 class _Context:
-    """Context of an analysis in the cloud: the time of its item; it cannot alert."""
+    """Context of an analysis in the cloud: time and time left; no vehicle and no alerts."""
 
     kind: ComputeKind = "cloud"
 

@@ -1,4 +1,4 @@
-"""All executors of the cloud: which one takes a task, and its expected duration."""
+"""Pool of the cloud's executors: selects an executor for a task and estimates its time."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from aerodaas.types.status import Message
 __all__ = ["ExecutorPool"]
 
 _UNKNOWN = 0.3
-"""Seconds expected of an executor that has not executed an analysis yet."""
+"""Expected seconds on an executor that has not executed an analysis yet."""
 
 
 _TOO_LATE = "its frame would have been there too late"
 
 
 class ExecutorPool:
-    """The executors in the cloud. A task goes to the one that is expected to answer first."""
+    """Executors in the cloud; a task goes to the one that is expected to answer first."""
 
     def __init__(
         self,
@@ -30,7 +30,7 @@ class ExecutorPool:
         wake: Callable[[], None],
         speed: float = 1.0,
     ) -> None:
-        """Use `executors`; `timeout_ns`, `wake` and `speed` as of `RemoteExecutor`."""
+        """Use `executors`; `timeout_ns`, `wake` and `speed` as in `RemoteExecutor`."""
         # Processes of one node share its link, and frames are coded once for all of them.
         frame_uplinks = {one.site: FrameUplink(one.compression) for one in executors}
         self._clouds = [
@@ -43,23 +43,23 @@ class ExecutorPool:
 
     @property
     def slots(self) -> int:
-        """Executions that may be under way at once on the executors that are not gone."""
+        """Most concurrent executions on the executors that are not gone."""
         present = {cloud.executor.site for cloud in self._clouds if not cloud.gone}
         return sum(self._slots[site] for site in present)
 
     def expected(self, model: str) -> float | None:
-        """Seconds expected from sending a task to its result; None before the first result."""
+        """Expected seconds from sending a task to its result; None while unknown."""
         known = [cloud.expected(model) for cloud in self._able(model)]
         return min((seconds for seconds in known if seconds is not None), default=None)
 
     def on_the_way(self, model: str) -> float:
-        """Seconds of the link alone for a frame sent now, its queue included."""
+        """Seconds of transfer of a frame sent now, queueing included, without execution."""
         return min((cloud.frame_uplink.expected for cloud in self._able(model)), default=0.0)
 
     def send(self, task: Task, message: Message[Any], now: int, budget: float) -> None:
-        """Start an execution whose result is of use for `budget` seconds of the host.
+        """Start an execution whose result is useful for `budget` seconds of the host.
 
-        A frame that must come too late is not sent.
+        A frame that would arrive too late is not sent.
         """
         model = task.profile.model
         able = self._able(model)
@@ -68,30 +68,30 @@ class ExecutorPool:
             return
         best = min(able, key=lambda cloud: self._delay(cloud, model))
         if best.frame_uplink.expected > budget:
-            # It would keep the link from those that come after it.
+            # It would delay the subsequent frames on the link.
             self._homeless.append(RemoteResult(task, timed_out=True, error=_TOO_LATE))
         else:
             best.send(task, message, now, budget)
 
     def answers(self, now: int) -> Iterator[RemoteResult]:
-        """Yield the executions that were answered, timed out, or could not be sent."""
+        """Yield the results of executions that returned, timed out, or could not be sent."""
         while self._homeless:
             yield self._homeless.popleft()
         for cloud in self._clouds:
             yield from cloud.answers(now)
 
     def probe(self, now: int) -> None:
-        """Look after links, and executors that are gone."""
+        """Measure idle links, and probe executors that are gone."""
         for cloud in self._clouds:
             cloud.probe(now)
 
     def finish(self, timeout: float) -> None:
-        """Wait up to `timeout` seconds for the executions under way."""
+        """Wait up to `timeout` seconds for the current executions."""
         for cloud in self._clouds:
             cloud.finish(timeout)
 
     def values(self) -> dict[str, Any]:
-        """Estimates of each site: milliseconds, Mbit/s, frames by coding."""
+        """Figures of each site: milliseconds, Mbit/s, frames by coding."""
         return {
             site: {
                 "latency_ms": frame_uplink.link.latency * 1e3,

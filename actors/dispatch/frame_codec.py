@@ -1,7 +1,7 @@
-"""How a frame travels to another node: as it is, as JPEG or as PNG, whichever arrives first.
+"""Coding of frames for another node: raw, JPEG or PNG, the one with the least total time.
 
-Nothing is assumed: what a coding takes and saves is measured on the very pictures, what a byte
-costs on the link is measured, too (`_costs`), and the sum decides.
+Sizes and coding times are measured on the actual images, the time per byte on the link
+(`costs.py`); the sum decides.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ CODINGS: dict[str, tuple[Coding, ...]] = {
     "lossless": ("raw", "png"),
     "none": ("raw",),
 }
-"""Codings that a setting of `ComputeConfig.compression` allows; of equals the first is taken."""
+"""Codings allowed by each `ComputeConfig.compression`; the first of equals is taken."""
 _WRITING: dict[Coding, tuple[str, list[int]]] = {
     "jpeg": (".jpg", [cv2.IMWRITE_JPEG_QUALITY, 90]),
-    # Of PNG's settings the quickest: of 640 x 360 pixels it leaves half in 12 ms of one core.
+    # PNG's fastest settings: they halve 640 x 360 pixels in 12 ms on one core.
     "png": (
         ".png",
         [
@@ -41,49 +41,49 @@ _WRITING: dict[Coding, tuple[str, list[int]]] = {
     ),
 }
 _REMEASURED = 64
-"""After so many frames, a coding that was not chosen is measured again."""
+"""Frames after which another coding is measured again."""
 _WEIGHT = 0.3
-"""Of the newest measurement in a running average."""
+"""Weight of the newest measurement in a running average."""
 
 
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class CodedFrame:
-    """A frame whose image is compressed."""
+    """A frame with a compressed image."""
 
     header: Header
     data: NDArray[np.uint8]
-    """The file's bytes."""
+    """Bytes of the JPEG or PNG file."""
     coding: Coding
     camera: CameraModel | None
     odometry: Odometry | None
     depth: NDArray[np.uint8] | None = None
-    """The bytes of a PNG file, where the camera measured depth."""
+    """Bytes of the PNG file of the depth; None without depth."""
 
 
 @dataclass(frozen=True)
 class CodingCost:
-    """The cost of a coding for an image."""
+    """Size and times of an image with a coding."""
 
     size: float
-    """Bytes that travel."""
+    """Bytes sent."""
     encode: float
-    """Seconds."""
+    """Seconds of encoding."""
     decode: float
-    """Seconds, at the other end."""
+    """Seconds of decoding, at the other end."""
 
     @property
     def seconds(self) -> float:
-        """Seconds of work at both ends."""
+        """Seconds of encoding and decoding."""
         return self.encode + self.decode
 
 
 def fastest(
     costs: Mapping[Coding, CodingCost], link: Callable[[float], float]
 ) -> tuple[Coding, float]:
-    """The coding with which an image arrives first, and the seconds until then.
+    """Coding with the least total time, and this time in seconds.
 
-    `link` gives the seconds that a number of bytes is on its way.
+    `link` returns the transfer time in seconds of a number of bytes.
     """
     totals: dict[Coding, float] = {
         coding: cost.seconds + link(cost.size) for coding, cost in costs.items()
@@ -93,7 +93,7 @@ def fastest(
 
 
 def decoded(item: Frame | CodedFrame) -> Frame:
-    """The decoded frame; raises SourceError for data that is no image."""
+    """Decoded frame, exact except for JPEG; raises SourceError for damaged data."""
     if isinstance(item, Frame):
         return item
     image = cv2.imdecode(item.data, cv2.IMREAD_COLOR)
@@ -105,14 +105,14 @@ def decoded(item: Frame | CodedFrame) -> Frame:
 
 
 class Coder:
-    """Measures the cost of each coding for each camera's images. One thread at a time."""
+    """Encoder with the measured costs of each coding for each camera. Not thread-safe."""
 
     def __init__(self) -> None:
         self._known: dict[tuple[str, tuple[int, ...]], dict[Coding, CodingCost]] = {}
         self._count = 0
 
     def costs(self, frame: Frame, allowed: tuple[Coding, ...]) -> dict[Coding, CodingCost]:
-        """The cost of each allowed coding for images like this one, measured at the first one."""
+        """Costs of each allowed coding for images like this one, measured on the first."""
         known = self._known.setdefault((frame.header.source, frame.image.shape), {})
         for coding in allowed:
             if coding not in known:
@@ -123,7 +123,7 @@ class Coder:
         return {coding: known[coding] for coding in allowed}
 
     def encode(self, frame: Frame, coding: Coding) -> Frame | CodedFrame:
-        """Code a frame, and learn from it."""
+        """Encode a frame and update the costs."""
         if coding == "raw":
             self._learn(frame, coding, CodingCost(frame.nbytes, 0.0, 0.0))
             return frame
@@ -131,13 +131,13 @@ class Coder:
         data = _written(frame.image, coding)
         depth = None if frame.depth is None else _written(frame.depth, "png")
         took = time.perf_counter() - began
-        # Until the other end has told, decoding is taken to last as long as encoding.
+        # Until decoding is measured, it is assumed to take as long as encoding.
         size = data.nbytes + (0 if depth is None else depth.nbytes)
         self._learn(frame, coding, CodingCost(size, took, took))
         return CodedFrame(frame.header, data, coding, frame.camera, frame.odometry, depth)
 
     def took_to_decode(self, frame: Frame, coding: Coding, seconds: float) -> None:
-        """Record the seconds of decoding at the other end."""
+        """Update the cost of decoding at the other end."""
         known = self._known.get((frame.header.source, frame.image.shape), {})
         if coding in known:
             old = known[coding]

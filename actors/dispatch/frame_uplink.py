@@ -1,4 +1,4 @@
-"""Uplink of frames to one node: each crosses the link once, coded as is faster, and is timed."""
+"""Uplink of frames to one node: each frame is sent once, in the fastest coding, and timed."""
 
 from __future__ import annotations
 
@@ -20,17 +20,17 @@ __all__ = ["FrameTransfer", "FrameUplink"]
 
 _KEPT = 8
 _PING_EVERY = 2.0
-"""Seconds between two probes of a link without other traffic."""
+"""Seconds between two pings of the link."""
 _LARGE_EVERY = 5.0
-"""Seconds without a frame after which a ping carries `_LARGE`, to see the bandwidth, too."""
+"""Seconds without a frame after which a ping carries `_LARGE` bytes, to measure the bandwidth."""
 _LARGE = 65536
 _PATIENCE = 60.0
-"""Seconds after which a ping has got lost."""
+"""Seconds after which a ping is considered lost."""
 
 
 @dataclass
 class FrameTransfer:
-    """A frame on its way to a node."""
+    """An encoded frame for a node."""
 
     name: tuple[str, int]
     """Stream and number of the message."""
@@ -39,45 +39,45 @@ class FrameTransfer:
     frame: Frame | None
     coding: Coding
     original: int
-    """Bytes of the message before coding."""
+    """Bytes before coding."""
     expected: float
-    """Seconds of coding and way that were expected."""
+    """Expected seconds of coding and transfer."""
 
 
 class FrameUplink:
-    """State of the uplink to one node. `later` runs calls in the packing thread."""
+    """Link to one node: estimates, coding of frames, and pings, in a packing thread."""
 
     def __init__(self, compression: str) -> None:
-        """`compression` is that of `ComputeConfig`."""
+        """Create the uplink; `compression` is that of `ComputeConfig`."""
         self.link = LinkEstimate()
         self.uplink = Uplink(self.link)
         self.chosen: dict[str, int] = {}
         """Frames coded, by coding."""
         self.bytes = 0
-        """Sent in frames."""
+        """Bytes of frames sent."""
         self._allowed = CODINGS[compression]
         self._coder = Coder()
         self._transfers: OrderedDict[tuple[str, int], FrameTransfer] = OrderedDict()
         self._packer = ThreadPoolExecutor(1, "packer")
         self._coding_seconds = self._size = 0.0
-        """Of the newest transfer."""
+        """Coding time and size of the newest transfer."""
         self._announced: dict[tuple[str, int], None] = {}
-        """Messages that are to be packed."""
+        """Messages that wait to be packed."""
         self._pinged = self._transferred = float("-inf")
         self._pinging: Future[Any] | None = None
 
     def later(self, work: Callable[[], None]) -> None:
-        """Do `work` in the packing thread, after earlier requests."""
+        """Queue `work` for the packing thread."""
         self._packer.submit(work)
 
     def announce(self, message: Message[Any]) -> None:
-        """Announce a message that will be packed, so that it counts in the link's queue."""
+        """Count a message that will be packed as queued on the link."""
         name = (message.stream, message.seq)
         if name not in self._transfers:
             self._announced[name] = None
 
     def pack(self, message: Message[Any]) -> FrameTransfer:
-        """The transfer for a message; made at the first call. In the packing thread only."""
+        """Transfer of a message, created at the first call. In the packing thread only."""
         key = (message.stream, message.seq)
         self._announced.pop(key, None)
         transfer = self._transfers.get(key)
@@ -90,9 +90,10 @@ class FrameUplink:
     def arrived(
         self, transfer: FrameTransfer, way: tuple[str, int], at: float, decoding: float
     ) -> None:
-        """Learn from the call that carried a frame and that was answered, but for work, at `at`.
+        """Update the estimates from the call that carried a frame.
 
-        `way` is its name on the uplink; `decoding` the seconds of decompressing.
+        `at` is the time of its answer less the execution, `way` its name on the uplink,
+        `decoding` the seconds of decompression.
         """
         self._transferred = time.monotonic()
         self.uplink.arrive(way, at)
@@ -102,15 +103,15 @@ class FrameUplink:
 
     @property
     def expected(self) -> float:
-        """Seconds of coding and way that a frame like the last one may be expected to take.
+        """Expected seconds of coding and transfer for a frame like the last one.
 
-        What is under way, or waits to be packed, goes before it.
+        Current transfers and messages that wait to be packed precede it.
         """
         size = self._size * (1 + len(self._announced))
         return max(self._coding_seconds + self.uplink.seconds(size), self.link.latency)
 
     def ping(self, executor: Any) -> None:  # noqa: ANN401 - a Ray handle
-        """Look at the link, if it is time to."""
+        """Measure the link with a ping, if one is due."""
         now = time.monotonic()
         answered = self._pinging is None or self._pinging.done()
         if now - self._pinged < (_PING_EVERY if answered else _PATIENCE):
@@ -122,7 +123,7 @@ class FrameUplink:
         self.later(lambda: self._ping(executor, _LARGE if large else 0))
 
     def look_again(self) -> None:
-        """Have the next ping go at once, and see the bandwidth: the link may be another one now."""
+        """Make the next ping due now and large: the link may have changed."""
         self._pinged = self._transferred = float("-inf")
 
     def close(self) -> None:
@@ -139,7 +140,7 @@ class FrameUplink:
         def answered(future: Future[int]) -> None:
             if future.exception() is None:
                 if size:
-                    # Nothing else was on the link, so this says more than all that came before.
+                    # The link was idle, so this sample is better than all earlier ones.
                     self.link.forget()
                 self.link.observe(size, time.perf_counter() - began)
 

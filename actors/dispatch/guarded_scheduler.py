@@ -1,4 +1,4 @@
-"""Guard around a scheduler in flight: its calls run in a thread, are timed and cut off."""
+"""Guarded calls of a plug-in scheduler: in a thread of its own, timed and with a timeout."""
 
 from __future__ import annotations
 
@@ -17,25 +17,25 @@ __all__ = ["GuardedDispatch"]
 _SLOW = 0.05
 """Seconds on one event above which an answer is slow, ..."""
 _SLOW_IN_A_ROW = 5
-"""... and slow answers in a row that are too many: a single one may be the machine's fault."""
+"""... and slow answers in a row that are an error: a single one may be the machine's fault."""
 _LIMIT = 2.0
-"""Longest wait for the scheduler's answer to one event, seconds."""
+"""Timeout in seconds of one event."""
 _PATIENT_LIMIT = 10.0
-"""The same for `start`, which may load something and delays no task."""
+"""The same for `start`, which may load data, and for lockstep."""
 
 _Answer = tuple[Any, BaseException | None, float]
 
 
 class GuardedDispatch(Dispatch):
-    """Asks the scheduler in a thread of its own; raises SchedulerError if it is slow or hangs."""
+    """Dispatch that calls its scheduler in a thread; raises SchedulerError if slow or hanging."""
 
     hurried = True
-    """False where mission time waits: then an answer is never slow, and repeats stay equal."""
+    """False if mission time waits: then an answer is never slow, and runs are repeatable."""
     _thinker: _Thinker | None = None
     _slow = 0
 
     def ask(self, event: Callable[..., Any], *args: Any) -> Any:  # noqa: ANN401
-        """Ask, and wait for no longer than the limit."""
+        """Call the scheduler's `event` and return its answer, within the timeout."""
         if self._thinker is None:
             self._thinker = _Thinker()
         patient = not self.hurried or event.__name__ == "start"
@@ -60,14 +60,14 @@ class GuardedDispatch(Dispatch):
         return answer
 
     def close(self) -> None:
-        """End the thread."""
+        """End the scheduler's thread."""
         if self._thinker is not None:
             self._thinker.end()
             self._thinker = None
 
 
 class _Thinker:
-    """A thread that answers one question at a time."""
+    """Thread that makes one call at a time."""
 
     def __init__(self) -> None:
         self._questions: queue.SimpleQueue[tuple[Callable[..., Any], tuple[Any, ...]] | None]
@@ -85,7 +85,7 @@ class _Thinker:
         self._questions.put(None)
 
     def abandon(self) -> None:
-        """Leave the thread to itself, and stop it if it is busy in Python."""
+        """Abandon the thread, and stop it if it is busy in Python code."""
         self.end()
         ident = ctypes.c_ulong(self._thread.ident or 0)
         ctypes.pythonapi.PyThreadState_SetAsyncExc(ident, ctypes.py_object(SystemExit))
@@ -96,7 +96,7 @@ class _Thinker:
             began = time.perf_counter()
             try:
                 answer = event(*args)
-                # A generator thinks while it is read.
+                # A generator computes while it is read.
                 answer = (
                     answer if answer is None or isinstance(answer, (list, tuple)) else list(answer)
                 )

@@ -1,4 +1,4 @@
-"""Where in the cloud each managed analysis may run, and at what price."""
+"""Cloud resources of the managed analyses: where each may run, and at what cost."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ __all__ = ["CloudProcess", "allowed", "cloud_processes", "priced", "short_name"]
 
 @dataclass(frozen=True)
 class CloudProcess:
-    """One executor in the cloud: a process on a node, or before an endpoint."""
+    """One executor in the cloud: a process on a node, or a client of an endpoint."""
 
     site: str
     """Id of the compute resource."""
     place: Placement
     slots: int
     works: dict[str, Analytics[Any]]
-    """The analyses that it can run, by stream."""
+    """Analyses that it can run, by stream."""
     compression: str
     runtime_env: RuntimeEnvConfig | None
 
 
 def short_name(node: Node) -> str:
-    """An analysis' name without its robot's."""
+    """Name of an analysis without its robot's."""
     return node.id.rpartition("/")[2]
 
 
 def allowed(node: Node, compute: Mapping[str, ComputeConfig]) -> list[ComputeConfig]:
-    """The resources in the cloud that a scheduler may send a managed analysis to.
+    """Cloud resources that a scheduler may send a managed analysis to.
 
-    The one that it is deployed on; or else, deployed on an edge, every cloud node, and every
-    endpoint that has a model for it.
+    The one that it is deployed on; if deployed on an edge, every cloud node, and every endpoint
+    that has a model for it.
     """
     own = compute[node.compute] if node.compute is not None else None
     if own is not None and own.kind != "edge":
@@ -57,9 +57,9 @@ def cloud_processes(
     compute: Mapping[str, ComputeConfig],
     envs: Mapping[str, RuntimeEnvConfig | None],
 ) -> tuple[CloudProcess, ...]:
-    """The executors for the managed analyses `nodes`, whose environments are `envs`, by id.
+    """Executors for the managed analyses `nodes`, whose environments are `envs`, by id.
 
-    Raises GraphError where an endpoint cannot do what an analysis does.
+    Raises GraphError if an endpoint cannot perform an analysis.
     """
     found = []
     for resource in compute.values():
@@ -82,7 +82,7 @@ def cloud_processes(
 
 
 def priced(profile: Profile, resources: Sequence[ComputeConfig]) -> Profile:
-    """The profile at the cloud's price: the highest of `resources`; without any, too high."""
+    """Profile with the highest cost of `resources`; without any, the benefit, so no gain."""
     costs = [
         profile.cloud_cost
         if resource.endpoint is None or resource.endpoint.cost is None
@@ -102,7 +102,7 @@ def _work(node: Node, resource: ComputeConfig) -> Analytics[Any]:
 def _by_environment(
     nodes: Sequence[Node], envs: Mapping[str, RuntimeEnvConfig | None]
 ) -> list[set[str]]:
-    """Analyses that can share a process: those without an environment of their own."""
+    """Ids of analyses by process: those without an environment of their own share one."""
     plain = {node.id for node in nodes if envs[node.id] is None}
     own = [{node.id} for node in nodes if envs[node.id] is not None]
     return [plain, *own] if plain else own

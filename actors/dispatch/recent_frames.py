@@ -1,4 +1,4 @@
-"""Frames by name: a task names its frame, and an executor on the edge has read it already."""
+"""References to frames in tasks, for executors on the edge that have received the frames."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["FrameReference", "FrameReferences", "MissingFrame", "RecentFrames"]
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class FrameReference:
-    """A frame that its reader is expected to hold: stream and number of its message."""
+    """Reference to a frame that its reader should hold: stream and number of its message."""
 
     stream: str
     seq: int
@@ -27,24 +27,24 @@ class FrameReference:
 @fast_pickle
 @dataclass(frozen=True, slots=True)
 class MissingFrame:
-    """An executor's answer to a task whose frame it does not hold."""
+    """Answer of an executor to a task whose frame it does not hold."""
 
     reference: FrameReference
 
 
 class FrameReferences:
-    """The sender's side: decides which frames a task may name."""
+    """Sender's side: decides whether a task refers to its frame or carries it."""
 
     def __init__(self) -> None:
         """Start without frames."""
         self._newest: dict[str, int] = {}
 
     def note(self, message: Message[Any]) -> None:
-        """A message of a stream has arrived."""
+        """Store the number of a stream's newest message."""
         self._newest[message.stream] = message.seq
 
     def item(self, message: Message[Any]) -> object:
-        """Content of a task about `message`: its name, or the frame once no reader keeps it."""
+        """Item of a task about `message`: a reference, or the frame if no reader keeps it."""
         newest = self._newest.get(message.stream, message.seq)
         if isinstance(message.item, Frame) and 0 <= newest - message.seq < FRAME_DEPTH:
             return FrameReference(message.stream, message.seq)
@@ -52,7 +52,7 @@ class FrameReferences:
 
 
 class RecentFrames:
-    """The reader's side: the newest frames of some streams, by number."""
+    """Reader's side: buffer of the newest frames of some streams."""
 
     def __init__(self, streams: Iterable[str]) -> None:
         """Keep the newest `FRAME_DEPTH` messages of each of `streams`."""
@@ -64,6 +64,6 @@ class RecentFrames:
             self._kept[message.stream].append(message)
 
     def find(self, reference: FrameReference) -> Message[Any] | None:
-        """The message of this name; None if it is not kept (any more)."""
+        """Message of a reference; None if it is not (or no longer) kept."""
         kept = self._kept.get(reference.stream, ())
         return next((one for one in kept if one.seq == reference.seq), None)

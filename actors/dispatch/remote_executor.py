@@ -1,7 +1,7 @@
-"""The dispatcher's link to one executor of the cloud: its executions and its liveness.
+"""Dispatcher's client of one cloud executor: its executions, timeouts and liveness.
 
-The executor is gone when its process or node is, or when an execution has timed out and nothing
-sent later was answered. From then on it is probed, a few bytes a second, until it answers.
+The executor counts as gone when its process or node is, or when an execution has timed out and
+no later one was answered. It is then probed, with a few bytes per second, until it answers.
 """
 
 from __future__ import annotations
@@ -33,23 +33,23 @@ __all__ = ["Executor", "RemoteExecutor", "RemoteResult"]
 
 _PROBE_EVERY = NANOSECONDS
 _PATIENCE = 4
-"""An execution that takes so many times its expected duration is lost, ..."""
+"""An execution that takes this many times its expected time is lost, ..."""
 _LEAST_PATIENCE = NANOSECONDS
 """... but not before this."""
 _SETTLING = NANOSECONDS
-"""Mission time that an executor which is back is given for answers that are overdue."""
+"""Mission time for overdue answers of an executor that is back, nanoseconds."""
 
 
 @dataclass(frozen=True)
 class Executor:
-    """One process of a compute resource in the cloud, or before an endpoint."""
+    """One executor process of a cloud resource or an endpoint."""
 
     site: str
     """Id of the compute resource."""
     handle: Any
-    """Ray's."""
+    """Ray actor handle."""
     works: list[Any]
-    """A Ray reference to the analyses that it is prepared with, in a list so that it stays one."""
+    """Ray reference to its analyses, in a list so that Ray does not resolve it."""
     models: frozenset[str]
     """Streams of these analyses."""
     slots: int
@@ -58,18 +58,18 @@ class Executor:
 
 @dataclass(frozen=True)
 class RemoteResult:
-    """The outcome of an execution in the cloud."""
+    """Outcome of an execution in the cloud."""
 
     task: Task
     message: Message[Any] | None = None
-    """The result."""
+    """Message with the result; None without one."""
     timed_out: bool = False
     lost: bool = False
-    """Its executor is gone, or lacks the frame; `error` says which."""
+    """Whether its executor is gone or lacks the frame; `error` has the reason."""
     error: str = ""
-    """The error that the analysis raised."""
+    """Exception of the analysis, or the reason of the failure."""
     way: str = ""
-    """Where the frame went, and how."""
+    """Coding and destination of the frame."""
     figures: dict[str, float] | None = None
     """Durations in milliseconds and sizes in kilobytes."""
 
@@ -78,22 +78,22 @@ class RemoteResult:
 class _Sent:
     task: Task
     at: int
-    """Mission time."""
+    """Mission time of sending."""
     until: int
-    """Mission time after which it is lost."""
+    """Mission time after which it has timed out."""
     future: Future[Executed] | None = None
     transfer: FrameTransfer | None = None
     carries: bool = True
-    """The frame travels in this call; else it is named."""
+    """Whether the call carries the frame; else it refers to it."""
     way: tuple[str, int] = ("", 0)
-    """Its frame's name on the uplink, where it carries it."""
+    """Name of its transfer on the uplink, if it carries the frame."""
     began: float = 0.0
     ended: float = 0.0
     problem: str = ""
 
 
 class RemoteExecutor:
-    """Executions on one executor."""
+    """Client of one cloud executor."""
 
     def __init__(
         self,
@@ -103,10 +103,11 @@ class RemoteExecutor:
         wake: Callable[[], None],
         speed: float = 1.0,
     ) -> None:
-        """Send frames as `frame_uplink`, which all executors of a node share.
+        """Send frames through `frame_uplink`, which all executors of a node share.
 
-        An executor that was restarted is given its analyses anew. `wake` is called, from another
-        thread, when an answer is there. Mission time runs at `speed`.
+        A restarted executor is prepared again. `timeout_ns` is mission time and limits an
+        execution. `wake` is called, in another thread, when an answer has arrived. `speed` are
+        mission seconds per wall second.
         """
         self._second = speed * NANOSECONDS
         self.gone = False
@@ -117,28 +118,28 @@ class RemoteExecutor:
         self._wake = wake
         self._started: dict[int, _Sent] = {}
         self._overdue: dict[int, _Sent] = {}
-        """Executions given up whose frames may still cross the link."""
+        """Timed out, but their frames may still be on the link."""
         self._answered: deque[_Sent] = deque()
         self._answered_since = -1
-        """When the newest execution that was answered had been sent."""
+        """Mission time at which the newest answered execution was sent."""
         self._probe: Future[bool] | None = None
         self._preparing: Future[None] | None = None
         self._carried: deque[tuple[str, int]] = deque(maxlen=FRAMES_KEPT)
-        """Frames that the executor holds."""
+        """Frames that the executor has."""
         self._probed = 0
 
     @property
     def load(self) -> float:
-        """Executions under way by slot."""
+        """Current executions per slot."""
         return len(self._started) / self.executor.slots
 
     def expected(self, model: str) -> float | None:
-        """Seconds that a task may be expected to take; None before the first one was executed."""
+        """Expected seconds of a task; None before the first execution."""
         work = self.executions.seconds(model)
         return None if work is None else self.frame_uplink.expected + work
 
     def send(self, task: Task, message: Message[Any], now: int, budget: float) -> None:
-        """Start an execution whose result is of use for `budget` seconds of the host."""
+        """Start an execution whose result is useful for `budget` seconds of the host."""
         patience = self._patience(task)
         sent = self._started[task.id] = _Sent(task, now, now + patience)
         self.frame_uplink.announce(message)
@@ -146,9 +147,9 @@ class RemoteExecutor:
         self.frame_uplink.later(partial(self._carry, sent, message, until))
 
     def answers(self, now: int) -> Iterator[RemoteResult]:
-        """Yield the executions that were answered or timed out.
+        """Yield the results of executions that returned or timed out.
 
-        What comes after its time-out tells of the link only.
+        An answer after the timeout only updates the estimates of the link.
         """
         while self._answered:
             sent = self._answered.popleft()
@@ -174,10 +175,10 @@ class RemoteExecutor:
                 )
 
     def _patience(self, task: Task) -> int:
-        """How long an execution may take, nanoseconds of mission time.
+        """Timeout of an execution, nanoseconds of mission time.
 
-        A few times of what is expected once anything is known, for a process that is frozen says
-        nothing; while nothing is known, as long as the resources allow.
+        A multiple of the expected time, to detect a frozen process; without an estimate, the
+        resources' timeout.
         """
         expected = self.expected(task.profile.model)
         if expected is None:
@@ -186,7 +187,7 @@ class RemoteExecutor:
         return min(self._timeout, max(_LEAST_PATIENCE, _PATIENCE * usual))
 
     def probe(self, now: int) -> None:
-        """Look at the link; and whether an executor that was gone is back, for a few bytes."""
+        """Measure the link, or probe with a few bytes whether a gone executor is back."""
         if self._probe is not None and self._probe.done():
             probe, self._probe = self._probe, None
             if probe.exception() is None and probe.result():
@@ -207,19 +208,19 @@ class RemoteExecutor:
             self._probe = future
 
     def _hear_late(self, sent: _Sent) -> None:
-        """Learn from an answer after its time-out: the estimates were too low."""
+        """Update the estimates from an answer after its timeout: the old ones were wrong."""
         if sent.future is not None and sent.future.exception() is None:
             self.frame_uplink.link.forget()
             self._answer(sent)
 
     def _forget_overdue(self) -> None:
-        """Forget overdue executions: an answer to a later one shows that the link is empty."""
+        """Remove overdue executions, because later ones have been answered."""
         for sent in self._overdue.values():
             self.frame_uplink.uplink.lose(sent.way)
         self._overdue.clear()
 
     def finish(self, timeout: float) -> None:
-        """Wait up to `timeout` seconds for executions under way, so that the executor may end."""
+        """Wait up to `timeout` seconds for current executions, before the executor is ended."""
         futures = [sent.future for sent in self._started.values() if sent.future is not None]
         if futures and not self.gone:
             wait(futures, timeout)
@@ -231,9 +232,9 @@ class RemoteExecutor:
             self._preparing = self.executor.handle.prepare.remote(works).future()
 
     def _carry(self, sent: _Sent, message: Message[Any], until: float) -> None:
-        """In the packing thread: code the frame, and start the execution.
+        """In the packing thread: encode the frame and start the execution.
 
-        Calls arrive in the order in which they are made, so that a frame may be named at once.
+        Calls arrive in the order in which they are made, so the next one may refer to the frame.
         """
         try:
             transfer = sent.transfer = self.frame_uplink.pack(message)
@@ -253,7 +254,7 @@ class RemoteExecutor:
             reference = execute.remote(sent.task.profile.model, transfer.name, data, left)
             future = sent.future = reference.future()
             future.add_done_callback(lambda _: self._came_back(sent))
-        except Exception as error:  # noqa: BLE001 - any error is reported as the execution's
+        except Exception as error:  # noqa: BLE001 - any failure must be reported
             sent.problem = f"{type(error).__name__}: {error}"
             self._came_back(sent)
 
@@ -285,7 +286,7 @@ class RemoteExecutor:
             return RemoteResult(sent.task, error=f"cannot be read: {error}", way=self.executor.site)
 
     def _learned(self, sent: _Sent, executed: Executed) -> RemoteResult:
-        """Update the estimates of the link, the coding and the work from an execution."""
+        """Update the estimates of link, coding and execution, and return the result."""
         message: Message[Any] = decode_message(memoryview(executed.message))
         transfer, span = sent.transfer, message.spans[-1]
         assert transfer is not None  # noqa: S101 - it was sent

@@ -1,1 +1,1 @@
-"""The drone's actor: vehicle, mission and setpoint loop; and its trajectory scheduler's."""
+"""Drone actor (vehicle, mission, setpoint loop) and the trajectory scheduler's actor."""

@@ -1,8 +1,8 @@
-"""The drone's actor: the 20 Hz setpoint loop beside the vehicle, independent of other actors.
+"""Drone actor: the 20 Hz setpoint loop on the vehicle's edge, independent of all other actors.
 
 In real time each robot has an actor of its own. In lockstep one actor flies all the simulated
-robots of a run and conducts mission time: it moves to the next due moment, publishes what is
-measured there, and goes on once every actor whose work can reach a drone is done.
+robots of a run and conducts mission time: it advances to the next due time, publishes the
+measurements, and continues once all analyses that can affect a drone have processed them.
 """
 
 from __future__ import annotations
@@ -49,31 +49,31 @@ from aerodaas.types.vehicle import VehicleState
 __all__ = ["COMMANDS", "DroneActor", "LockstepSchedule"]
 
 _APPLICATION_TIMEOUT = 5.0
-"""Seconds without a call of the application's process after which the drone comes home."""
+"""Seconds without a heartbeat of the application's process after which the drone returns home."""
 _ANSWER_TIMEOUT = 4.0
-"""Wall seconds within which the loop must have come to a command; less than its sender waits."""
+"""Wall seconds within which the loop must execute a command; less than the sender's timeout."""
 COMMANDS = "commands"
-"""Concurrency group of an actor in which commands wait for the loop, and nothing else with them."""
+"""Concurrency group of an actor for commands only, which wait for the loop."""
 
 
 @dataclass(frozen=True)
 class LockstepSchedule:
-    """The lockstep run as its conductor needs it."""
+    """Sources and acknowledgements of a lockstep run, for the actor that conducts its time."""
 
     rates: dict[str, float] = field(default_factory=dict)
-    """Sources that others publish (cameras, external analyses), and their rates in Hz."""
+    """Rates in Hz of the sources of other actors (cameras, external analyses)."""
     acknowledgements: dict[str, int] = field(default_factory=dict)
-    """How many acknowledgements one measurement of each source leads to."""
+    """Number of acknowledgements of one measurement, by source."""
     windows: dict[str, int] = field(default_factory=dict)
-    """How many measurements of each source may be under way while time goes on."""
+    """Most unprocessed measurements while time advances, by source."""
     readers: tuple[str, ...] = ()
     """Streams of acknowledgements."""
     patience: float = 20.0
-    """Wall seconds to wait for an acknowledgement before its reader is given up."""
+    """Timeout of an acknowledgement in wall seconds."""
 
 
 class DroneActor(StreamActor):
-    """Flies `robots`."""
+    """Actor that flies `robots`."""
 
     niceness = 0
 
@@ -85,9 +85,9 @@ class DroneActor(StreamActor):
         conduct: LockstepSchedule,
         neighbours: tuple[str, ...] = (),
     ) -> None:
-        """Belong to `session` as `name`; `conduct` matters in lockstep only.
+        """Create the actor `name` of `session`; `conduct` is used in lockstep only.
 
-        `neighbours` are the robots that other actors fly, to be kept away from.
+        `neighbours` are the robots of other actors, from which to keep separation.
         """
         depths = dict.fromkeys(_streams(robots, conduct), MESSAGE_DEPTH)
         depths.update(dict.fromkeys((state_stream(other) for other in neighbours), 1))
@@ -99,14 +99,14 @@ class DroneActor(StreamActor):
         self._specs = robots
         self._controllers: dict[str, VehicleController] = {}
         self._reports: dict[str, RobotReport] = {}
-        """How each robot fares: replaced by the loop, never changed."""
+        """Newest report of each robot: replaced by the loop, never mutated."""
         self._calls = LoopCalls(self._wake, self._publish_reports)
         self._publisher = BackgroundPublisher(self._unpublished)
         self._gate = GrowthGate(self._calls.serve)
         self._due: dict[str, int] = {}
         self._late = 0
         self._refused: tuple[str, ...] = ()
-        """Priorities that this machine does not grant the loop."""
+        """Reasons why this machine refuses real-time priority or locked memory."""
         self._heard = time.monotonic()
         self._orphaned = False
 
@@ -128,7 +128,7 @@ class DroneActor(StreamActor):
     def command(self, robot: str, command: Command) -> Answer:
         """Execute a command of the application's process on one robot's mission.
 
-        Raises MissionError if the loop does not come to it.
+        Raises MissionError if the loop does not execute it in time.
         """
         controller = self._controllers[robot]
         try:
@@ -140,27 +140,27 @@ class DroneActor(StreamActor):
             return Answer(accepted=False, text=f"{over}: {state}")
 
     def hold(self, timeout: float) -> bool:
-        """In lockstep, have mission time stand still; False if it does not in `timeout` seconds."""
+        """In lockstep, hold mission time; returns False if not held within `timeout` seconds."""
         return self._gate.hold(timeout)
 
     def release(self) -> None:
-        """Let mission time go on."""
+        """Let mission time advance again."""
         self._gate.release()
 
     def grow(
         self, robots: tuple[RobotSpec, ...], conduct: LockstepSchedule, timeout: float
     ) -> ActorInfo:
-        """Fly by the streams that `robots` have by now; returns once the loop does.
+        """Subscribe to the streams added to `robots`; returns once the loop uses them.
 
-        Raises MissionError if the loop turns no more.
+        Raises MissionError if the loop has ended or does not answer.
         """
         self._calls.ask(lambda: self._grow(robots, conduct), timeout)
         return self.info()
 
     def use_scheduler(self, scheduler: TrajectoryScheduler, timeout: float) -> None:
-        """Have all robots plan by `scheduler` from now on.
+        """Use the trajectory scheduler `scheduler` for all robots from now on.
 
-        Raises MissionError if the loop turns no more.
+        Raises MissionError if the loop has ended or does not answer.
         """
         for controller in self._controllers.values():
             # In this thread: a planner's process takes seconds to start.
@@ -168,7 +168,7 @@ class DroneActor(StreamActor):
             self._calls.ask(partial(controller.use_planner, planner), timeout)
 
     def _grow(self, robots: tuple[RobotSpec, ...], conduct: LockstepSchedule) -> None:
-        assert self.subscriber is not None  # noqa: S101 - prepare came first
+        assert self.subscriber is not None  # noqa: S101 - set by prepare
         for spec in robots:
             controller = self._controllers[spec.robot.id]
             replies = [reply_stream(node) for node in spec.requesters]
@@ -186,19 +186,19 @@ class DroneActor(StreamActor):
                 self._due.setdefault(source, self._next_due(source, self.clock.now()))
 
     def note(self, kind: str, text: str) -> None:
-        """Record a finding of the application as an alert."""
+        """Publish an alert of the application's process, so that it is recorded."""
         self.alert(kind, text)
 
     def wait_no_longer(self) -> None:
-        """In lockstep, stop waiting for readers that died or are new."""
+        """In lockstep, stop waiting for current acknowledgements, as a reader died or is new."""
         if self.session.lockstep:
             with contextlib.suppress(LoopOverError):
                 self._calls.ask(self._barrier.forget, _ANSWER_TIMEOUT)
 
     def robots(self, newest: int = 200) -> dict[str, RobotReport]:
-        """How each robot fared at its last turn, with the `newest` latencies.
+        """Report of each robot's last loop cycle, with the `newest` latencies.
 
-        Also the sign that the application's process is alive.
+        The call is also the heartbeat of the application's process.
         """
         self._heard = time.monotonic()
         controllers = self._controllers
@@ -208,7 +208,7 @@ class DroneActor(StreamActor):
         }
 
     def _publish_reports(self) -> None:
-        """Replace the reports that others read; in the loop's thread only."""
+        """Replace the robots' reports; in the loop's thread only."""
         self._reports = {
             name: RobotReport(controller.status, controller.state, (), self._late)
             for name, controller in self._controllers.items()
@@ -238,7 +238,7 @@ class DroneActor(StreamActor):
             lock.release()
 
     def _run_real_time(self) -> None:
-        assert self.subscriber is not None  # noqa: S101 - prepare came first
+        assert self.subscriber is not None  # noqa: S101 - set by prepare
         due, slack = self.clock.now(), Slack()
         while not self._over():
             wait = self.session.host_seconds(max(0, due - self.clock.now()))
@@ -287,7 +287,7 @@ class DroneActor(StreamActor):
         return self.session.next_due(source, self._conduct.rates[source], after)
 
     def _measure(self, now: int) -> None:
-        """Publish the measurements that are due, and expect their acknowledgements."""
+        """Publish the vehicles' measurements, and expect those of the sources that are due."""
         counts = self._conduct.acknowledgements
         for source, stamp in self._due.items():
             if stamp == now:
@@ -298,7 +298,7 @@ class DroneActor(StreamActor):
                 self._barrier.expect(stream, stamp, counts.get(stream, 0))
 
     def _await(self, *, drain: bool) -> None:
-        assert self.subscriber is not None  # noqa: S101 - prepare came first
+        assert self.subscriber is not None  # noqa: S101 - set by prepare
         given_up = time.monotonic() + self._conduct.patience
         arrived: list[Message[Any]] = []
         while not self.stopping:
@@ -318,7 +318,7 @@ class DroneActor(StreamActor):
                 self.alert("reader_lost", f"nobody answers for {sources}; flying on without")
                 self._barrier.forget()
         now = self.clock.now()
-        # Arrival depends on the host's scheduler; the order in which they count must not.
+        # The order of arrival depends on the host's scheduler; that of processing must not.
         for message in sorted(arrived, key=_order):
             self._take(message, now)
 
@@ -392,7 +392,7 @@ def _streams(robots: tuple[RobotSpec, ...], conduct: LockstepSchedule) -> list[s
 
 
 def _order(message: Message[Any]) -> tuple[bool, str, int]:
-    """Order of messages: results of a camera's last frame come before its end."""
+    """Sort key of messages: results of a camera's last image before the camera's end command."""
     return message.stream.endswith(end_stream("")), message.stream, message.seq
 
 

@@ -1,4 +1,4 @@
-"""Publishing beside a loop: another thread encodes and sends."""
+"""Background publisher of a loop: another thread encodes and sends its messages."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ __all__ = ["BackgroundPublisher"]
 
 _log = logging.getLogger(__name__)
 _MOST_WAITING = 512
-"""Messages, some seconds' worth, beyond which the newest are dropped: a loop never waits."""
+"""Queue length (some seconds' messages) at which new ones are dropped: a loop never waits."""
 _CLOSING = 2.0
-"""Seconds for waiting work at the end."""
+"""Seconds to finish the queue at the end."""
 
 
 class BackgroundPublisher:
-    """Does one thread's work, in order, in another one; at once before `start`."""
+    """Queue of work for a thread of its own, done in order; before `start` done at once."""
 
     def __init__(self, on_drop: Callable[[int], None] = lambda _: None) -> None:
-        """Publish in the caller's own thread, as lockstep needs it.
+        """Publish in the caller's own thread until `start`, as lockstep requires.
 
-        `on_drop` is called in the thread that publishes, once it has caught up with what was
-        dropped, with the number of messages dropped since the last time.
+        `on_drop` is called in the publishing thread, once its queue is empty after drops, with
+        the number of messages dropped since the last call.
         """
         self.dropped = 0
-        """Messages that gave way because too many waited."""
+        """Number of messages dropped because the queue was full."""
         self._on_drop = on_drop
         self._told = 0
         self._waiting: queue.SimpleQueue[Callable[[], object] | None] = queue.SimpleQueue()
@@ -39,7 +39,7 @@ class BackgroundPublisher:
         self._thread.start()
 
     def do(self, work: Callable[[], object]) -> None:
-        """Do `work` in the background; its errors there become warnings."""
+        """Queue `work`; exceptions in the publishing thread become warnings."""
         if self._thread is None:
             work()
         elif self._waiting.qsize() < _MOST_WAITING:
@@ -48,7 +48,7 @@ class BackgroundPublisher:
             self.dropped += 1
 
     def close(self) -> None:
-        """Finish the waiting work; later work is done at once again."""
+        """Finish the queue; later work is done at once in the caller's thread."""
         thread, self._thread = self._thread, None
         if thread is not None:
             self._waiting.put(None)
@@ -65,5 +65,5 @@ class BackgroundPublisher:
 def _tried(work: Callable[[], object]) -> None:
     try:
         work()
-    except Exception as error:  # noqa: BLE001 - one message's failure, not the others'
+    except Exception as error:  # noqa: BLE001 - a failed message must not affect the others
         _log.warning("a message was not published: %s: %s", type(error).__name__, error)

@@ -1,6 +1,6 @@
-"""Calls that other threads make and a loop carries out in its own thread, between its turns.
+"""Calls from other threads that a loop executes in its own thread, between its cycles.
 
-State that only the loop's thread touches needs no lock.
+The loop's data thus needs no lock: only its own thread accesses it.
 """
 
 from __future__ import annotations
@@ -20,19 +20,19 @@ T = TypeVar("T")
 
 
 class LoopOverError(MissionError):
-    """A call came when its loop no longer turned."""
+    """A call came after the end of its loop."""
 
 
 class LoopCalls:
-    """A queue of calls, carried out in the order in which they came."""
+    """Queue of calls, executed in the order of arrival."""
 
     def __init__(self, wake: Callable[[], None], publish: Callable[[], None] | None = None) -> None:
         """Start empty.
 
         Args:
-            wake: Lets the loop, which may be asleep, come to `serve` at once; called in any thread.
-            publish: Lets others read what the calls have changed; called in the loop's thread
-                before any of them is answered, so that a caller reads the effect of its own call.
+            wake: Wakes the loop, which may be asleep, for `serve`; called in any thread.
+            publish: Publishes the changes of the calls; called in the loop's thread before any
+                of them is answered, so that a caller reads the effect of its own call.
         """
         self._wake = wake
         self._publish = publish
@@ -40,10 +40,10 @@ class LoopCalls:
         self._over = ""
 
     def ask(self, call: Callable[[], T], timeout: float) -> T:
-        """Have the loop make `call` and return its result; raises the call's errors.
+        """Execute `call` in the loop and return its result; raises the exceptions of the call.
 
-        Raises LoopOverError if the loop is over, and MissionError if it does not come to the call
-        within `timeout` wall seconds; then it is not made later, either.
+        Raises LoopOverError if the loop is over, and MissionError if it does not answer within
+        `timeout` wall seconds; a call that has not started by then is withdrawn.
         """
         answer: Future[T] = Future()
         self._calls.put((call, answer))
@@ -61,7 +61,7 @@ class LoopCalls:
         raise MissionError(f"the drone's loop did not answer within {timeout:g} s: {said}")
 
     def serve(self) -> int:
-        """Make the calls that wait, in the loop's thread; returns how many there were."""
+        """Execute the queued calls, in the loop's thread; returns their number."""
         answers: list[Callable[[], None]] = []
         while (taken := self._next()) is not None:
             call, answer = taken
@@ -69,7 +69,7 @@ class LoopCalls:
                 continue
             try:
                 answers.append(partial(answer.set_result, call()))
-            except Exception as error:  # noqa: BLE001 - the caller's failure, never the loop's
+            except Exception as error:  # noqa: BLE001 - raised to the caller, not in the loop
                 answers.append(partial(answer.set_exception, error))
         if answers and self._publish is not None:
             self._publish()
@@ -78,7 +78,7 @@ class LoopCalls:
         return len(answers)
 
     def close(self, why: str) -> None:
-        """End the loop for the reason `why`: waiting and later callers get LoopOverError."""
+        """End the loop for the reason `why`: queued and later calls raise LoopOverError."""
         self._over = why
         self._refuse()
 

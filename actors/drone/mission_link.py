@@ -24,15 +24,15 @@ _REPLIES_WAITING = 64
 
 
 class StreamLink:
-    """A `MissionLink` over the streams of one analysis, fed by the analysis' worker."""
+    """A `MissionLink` over the streams of one analysis, fed with messages by its worker."""
 
     def __init__(self, actor: StreamActor, node: str, robot: str) -> None:
         """Link the analysis `node` to the mission of `robot`."""
         self.depths = {status_stream(robot): 1, reply_stream(node): _REPLIES_WAITING}
-        """Depths of the streams that the worker must read."""
+        """Streams that the worker must read, and their queue depths."""
         self._actor = actor
         self._node = node
-        # An actor that was restarted must not take replies to its predecessor for its own.
+        # A restarted actor must not accept replies to its predecessor as its own.
         self._numbers = itertools.count(secrets.randbits(48))
         self._waiting: dict[int, Future[Answer]] = {}
         self._lock = threading.Lock()
@@ -44,7 +44,7 @@ class StreamLink:
         self._requests = self._actor.publisher(request_stream(self._node))
 
     def note(self, message: Message[Any]) -> None:
-        """Process a message that the worker has received."""
+        """Handle a message that the worker has received."""
         item = message.item
         if isinstance(item, MissionStatus):
             self._status = item
@@ -57,15 +57,15 @@ class StreamLink:
                 waiting.set_result(item.answer)
 
     def status(self) -> MissionStatus | None:
-        """The mission's newest status."""
+        """The newest status of the mission; None before the first."""
         return self._status
 
     def vehicle(self) -> VehicleState | None:
-        """The newest state of the vehicle."""
+        """The newest state of the vehicle; None before the first."""
         return self._vehicle
 
     def command(self, command: Command) -> Future[Answer]:
-        """Send a request; the worker completes the future."""
+        """Send a command as a request; the worker completes the future."""
         future: Future[Answer] = Future()
         status = self._status
         if status is not None and status.state in TERMINAL:

@@ -1,4 +1,4 @@
-"""The trajectory scheduler's actor: plans beside the drone's, which a long plan must not delay."""
+"""Trajectory scheduler's actor: plans in a process of its own, not to delay the drone's actor."""
 
 from __future__ import annotations
 
@@ -19,19 +19,19 @@ __all__ = ["PlannerExecutor"]
 T = TypeVar("T")
 
 _NICENESS = 10
-"""Of its process: a plan may take longer, the setpoint loop beside it must not."""
+"""Niceness of its process: a plan may take longer, but must not delay the setpoint loop."""
 
 
 class _PlannerActor:
-    """Runs functions; holds no state, so that a restart loses nothing."""
+    """Actor that calls functions; stateless, so that a restart loses nothing."""
 
     def __init__(self, application: Application | None) -> None:
-        """Load the application's definitions, after a restart, too."""
+        """Unpickle the application's definitions, also after a restart."""
         del application
 
     @ray.method(max_task_retries=-1)
     def load(self, *_: object) -> None:
-        """Load the classes of the arguments; tried again whenever the process dies meanwhile."""
+        """Unpickle the arguments, which imports their modules; retried after each restart."""
         be_nice(_NICENESS)
 
     def call(self, function: Callable[..., T], *args: Any, **kwargs: Any) -> T:  # noqa: ANN401
@@ -39,14 +39,14 @@ class _PlannerActor:
 
 
 class PlannerExecutor(Executor):
-    """Runs one call after another in an actor on this node, started anew where one hangs."""
+    """Executor of one call after another in an actor on this node, restarted if a call hangs."""
 
     def __init__(
         self, patience: float, *used: object, application: Application | None = None
     ) -> None:
-        """Give each call `patience` wall seconds; returns when the actor is there.
+        """Start the actor and wait for it; each call has a timeout of `patience` wall seconds.
 
-        The modules of what is `used` later are loaded at once, for it takes seconds.
+        The modules of the objects `used` later are imported now, because it takes seconds.
         """
         here = ray.get_runtime_context().get_node_id()
         remote: Any = ray.remote(_PlannerActor)
@@ -64,16 +64,16 @@ class PlannerExecutor(Executor):
         return self._caller.submit(self._call, function, args, kwargs)
 
     def shutdown(self, wait: bool = True, *, cancel_futures: bool = False) -> None:  # noqa: FBT001, FBT002 - the base's
-        """End the actor, and the calls that wait for it."""
+        """End the actor and cancel the waiting calls."""
         del wait, cancel_futures
-        # First what waits, or the next of it would begin as soon as the actor is dead.
+        # The waiting calls first, or the next one would start as soon as the actor is dead.
         self._caller.shutdown(wait=False, cancel_futures=True)
         with contextlib.suppress(Exception):
             ray.kill(self._actor)
 
     def _call(self, function: Callable[..., T], args: tuple[Any, ...], kwargs: dict[str, Any]) -> T:
         try:
-            # An actor that is starting anew is waited for: patience counts from when it is there.
+            # Wait for a restarting actor: the timeout counts from when it is ready.
             ray.get(self._actor.load.remote())
             done = self._actor.call.remote(function, *args, **kwargs)
             result: T = ray.get(done, timeout=self._patience)

@@ -1,4 +1,4 @@
-"""Immutable report of one robot, replaced by its actor each turn of the setpoint loop."""
+"""Report of one robot that a drone's actor makes in each loop cycle."""
 
 from __future__ import annotations
 
@@ -13,26 +13,26 @@ __all__ = ["Latencies", "RobotReport"]
 
 @dataclass(frozen=True)
 class RobotReport:
-    """One robot at one moment; made by the setpoint loop, never changed afterwards."""
+    """Status and state of one robot at one time; made by the setpoint loop, immutable."""
 
     status: MissionStatus
     state: VehicleState | None
     latencies: tuple[float, ...]
     """Milliseconds from capture to command, newest last."""
     loop_late: int
-    """Turns of the setpoint loop that came more than half a period late."""
+    """Number of setpoint loop cycles more than half a period late."""
 
 
 class Latencies:
-    """Figures that one thread appends and others read; an entry is never changed."""
+    """Append-only list of latencies, written by one thread and read by others."""
 
     def __init__(self) -> None:
         self._values = array("d")
 
     def append(self, value: float) -> None:
-        """Add the newest."""
+        """Append the newest value."""
         self._values.append(value)
 
     def newest(self, count: int) -> tuple[float, ...]:
-        """The newest `count`, newest last."""
+        """The newest `count` values, newest last."""
         return tuple(self._values[-count:]) if count > 0 else ()

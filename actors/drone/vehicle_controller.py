@@ -1,4 +1,4 @@
-"""One drone inside its actor: vehicle, mission and setpoint loop, and the streams they feed."""
+"""Controller of one drone: vehicle, mission and setpoint loop, and the streams that they feed."""
 
 from __future__ import annotations
 
@@ -55,15 +55,15 @@ from aerodaas.types.vehicle import (
 __all__ = ["RobotSpec", "VehicleController", "sensor_item"]
 
 _PLANS_PATIENCE = 4.0
-"""Times the plan's time-out, after which a scheduler that has not answered is stopped."""
+"""Multiple of the plan's timeout after which a scheduler without an answer is stopped."""
 _TURNS_FAILED = 20
-"""Turns in a row that raise, a second of them, after which the vehicle is left to itself."""
+"""Failed loop cycles in a row (one second) after which the loop gives up the vehicle."""
 _LEAST_PATIENCE = 5.0
-"""Wall seconds; enough for a restarting actor at any speed of the mission."""
+"""Least timeout in wall seconds: enough for an actor's restart at any mission speed."""
 
 
 def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus) -> object:
-    """The item of a sensor of the vehicle itself; None where the vehicle has no reading."""
+    """Reading of one of the vehicle's own sensors; None if the vehicle does not provide it."""
     readings: dict[str, object] = {
         "odometry": state.odometry,
         "gps": state.gps,
@@ -75,13 +75,13 @@ def sensor_item(sensor: SensorConfig, state: VehicleState, status: MissionStatus
 
 @dataclass(frozen=True)
 class RobotSpec:
-    """One robot as its actor gets it."""
+    """Specification of one robot for its actor."""
 
     robot: RobotConfig
     sensors: tuple[SensorConfig, ...]
-    """The vehicle's own sensors (no cameras) that have a reader."""
+    """The vehicle's own sensors (no cameras) that have readers."""
     navigation: tuple[str, ...]
-    """Streams that feed its mission."""
+    """Streams of navigation for its mission."""
     commands: tuple[str, ...]
     """Streams that carry commands from triggers and cameras."""
     requesters: tuple[str, ...]
@@ -92,30 +92,30 @@ class RobotSpec:
 
 
 class VehicleController:
-    """Flies one robot; driven by the drone's actor."""
+    """Controller of one robot, called by the drone's actor."""
 
     def __init__(self, spec: RobotSpec, session: Session, background: BackgroundPublisher) -> None:
-        """Build the vehicle and the mission; nothing is connected yet."""
+        """Create the vehicle; `open` connects it and creates the mission."""
         self._background = background
         self.spec = spec
         self.id = spec.robot.id
         self.latencies = Latencies()
-        """Milliseconds from capture to the arrival of the command made from it."""
+        """Milliseconds from capture to the arrival of the resulting navigation."""
         self._session = session
         self._told = 0
         self._turned = -1
         self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
         self._due = {sensor.id: self._next_due(sensor, -1) for sensor in spec.sensors}
         self._failures = 0
-        """Turns in a row that raised."""
+        """Loop cycles in a row that raised."""
         self._blamed: set[tuple[str, type[Exception]]] = set()
-        """Sources and kinds of the failures that were published as alerts."""
+        """Sources and kinds of failures that have already raised an alert."""
         self._alerts: list[Alert] = []
         plugin = load_plugin("drivers", spec.robot.driver)
         self.vehicle: Vehicle = plugin(spec.robot, session.environment)
 
     def open(self, publishers: dict[str, Publisher]) -> None:
-        """Connect the vehicle, build its mission; publish through `publishers`, by stream."""
+        """Connect the vehicle and create its mission; `publishers` are by stream."""
         self._publishers = publishers
         self.vehicle.connect()
         robot, environment = self.spec.robot, self._session.environment
@@ -132,12 +132,12 @@ class VehicleController:
         )
         self.loop = SetpointLoop(self.vehicle, self.mission)
         self.state: VehicleState = self.vehicle.read()
-        """The newest state that the loop or a sensor went by."""
+        """The newest state used by the loop or a sensor."""
         give(self.id, self.spec.initial, lambda command: self.handle(command, 0))
 
     def make_planner(self, scheduler: TrajectoryScheduler) -> Planner:
-        """The planner for `scheduler`; may take seconds to start."""
-        # In lockstep a plan is made on the spot, so that it does not depend on the host's speed.
+        """Create the planner for `scheduler`; may take seconds to start."""
+        # In lockstep plans are made inline, so that they do not depend on the host's speed.
         if self._session.lockstep:
             return InlinePlanner(scheduler)
         if not scheduler.isolated:
@@ -156,7 +156,7 @@ class VehicleController:
 
     @staticmethod
     def streams(spec: RobotSpec) -> list[str]:
-        """Streams that a pilot of this robot publishes for all, the replies aside."""
+        """Streams that the controller of this robot publishes, except replies."""
         own = [state_stream(spec.robot.id), status_stream(spec.robot.id)]
         return [
             *own,
@@ -165,34 +165,34 @@ class VehicleController:
         ]
 
     def start(self, clock: Clock) -> None:
-        """Start the mission, whose time is that of `clock`."""
+        """Start the mission with the time of `clock`."""
         if isinstance(self.vehicle, ClockedVehicle):
             self.vehicle.use_clock(clock)
         if not self._session.lockstep:
-            # A replay takes off where the mission was built for, which lockstep tells at 0 s.
+            # A replay needs the mission's take-off position, which lockstep publishes at 0 s.
             self._publish(state_stream(self.id), self.state, clock.now())
         self.handle(Start(), clock.now())
 
     def grow(self, spec: RobotSpec, publishers: dict[str, Publisher]) -> None:
-        """Read further streams; answer commanding analyses through `publishers`."""
+        """Accept further streams; `publishers` are for replies to further analyses."""
         self.spec = spec
         self._replies = {request_stream(node): reply_stream(node) for node in spec.requesters}
         self._publishers.update(publishers)
 
     def use_planner(self, planner: Planner) -> None:
-        """Plan with `planner` from now on, beginning with the whole queue."""
+        """Use `planner` from now on, starting with the current queue."""
         former, self._planner = self._planner, planner
         self.mission.use_planner(planner)
         if isinstance(former, BackgroundPlanner):
             former.close()
 
     def advance_to(self, stamp: int) -> None:
-        """Move a simulated vehicle's time on."""
+        """Advance a simulated vehicle's time."""
         if isinstance(self.vehicle, SteppedVehicle):
             self.vehicle.advance_to(stamp)
 
     def handle(self, command: Command, now: int) -> Answer:
-        """Pass a command on to the mission; one that raises is refused, with an alert."""
+        """Execute a command; one that raises is refused, with an alert."""
         return self._obey(command, now, f"the command {type(command).__name__}")
 
     def _obey(self, command: Command, now: int, source: str) -> Answer:
@@ -201,11 +201,11 @@ class VehicleController:
             if isinstance(answer, Answer):
                 return answer
             raise TypeError(f"{type(command).__name__} is no command")  # noqa: TRY301 - as any
-        except Exception as error:  # noqa: BLE001 - the command's failure, never the loop's
+        except Exception as error:  # noqa: BLE001 - a command's failure must not end the loop
             return self._refuse(source, error, now)
 
     def _refuse(self, source: str, error: Exception, now: int) -> Answer:
-        """Refuse a command of `source`; each kind of its errors is published as an alert once."""
+        """Refuse a command of `source` that raised; one alert per source and kind of error."""
         text = f"{source} failed: {failure_line(error)}"
         if (source, type(error)) not in self._blamed:
             self._blamed.add((source, type(error)))
@@ -216,10 +216,10 @@ class VehicleController:
         self._alerts.append(Alert(Header(len(self._alerts), now, self.id), kind, text))
 
     def take(self, message: Message[Any], now: int) -> None:
-        """Pass on a stream's item: navigation, a trigger's command, or a request."""
+        """Execute a received message: navigation, a trigger's command, or a request."""
         try:
             self._take(message, now)
-        except Exception as error:  # noqa: BLE001 - the item's failure, never the loop's
+        except Exception as error:  # noqa: BLE001 - an item's failure must not end the loop
             self._refuse(f"an item of {message.stream}", error, now)
 
     def _take(self, message: Message[Any], now: int) -> None:
@@ -238,10 +238,10 @@ class VehicleController:
             self._publish(self._replies[message.stream], reply, now)
 
     def turn(self, now: int, neighbours: Iterable[Neighbour]) -> SetpointRecord:
-        """One turn of the setpoint loop; publishes the decision.
+        """Execute one cycle of the setpoint loop and publish setpoint and status.
 
-        A turn that raises, because of an item's or a plug-in's data, empties the queue and lets
-        the drone hover; the error is raised only once a second of turns has ended so.
+        A cycle that raises, because of an application's data, empties the queue and lets the
+        drone hover; the error is raised only after a second of such cycles.
         """
         try:
             record = self.loop.turn(now, neighbours)
@@ -266,10 +266,10 @@ class VehicleController:
         return SetpointRecord(now, None, None)
 
     def observe(self, now: int) -> list[tuple[str, int]]:
-        """Publish the vehicle's state and the readings of the sensors that are due by now.
+        """Publish the vehicle's state and the readings of the sensors that are due.
 
-        Returns (stream, stamp) of each. At the time of a turn the state is the one that the turn
-        went by, so that a replay finds the mission's own input.
+        Returns (stream, stamp) of each. At the time of a loop cycle the state is the one that the
+        cycle used, so that a replay gets the mission's own input.
         """
         seen = self.loop.state if self._turned == now else None
         state = self.state = seen or self.vehicle.read()
@@ -286,18 +286,18 @@ class VehicleController:
 
     @property
     def next_reading(self) -> int:
-        """When the next sensor is due; NEVER without sensors."""
+        """Mission time at which the next sensor is due; NEVER without sensors."""
         return min(self._due.values(), default=NEVER)
 
     @property
     def over(self) -> bool:
-        """True once the mission has ended, on the ground or out of our hands, or was replayed."""
+        """True after the mission has ended, landed or aborted, or the replay has finished."""
         played = isinstance(self.vehicle, PlayedVehicle) and self.vehicle.finished
         return self.mission.finished or played
 
     @property
     def status(self) -> MissionStatus:
-        """The mission's status."""
+        """Current status of the mission."""
         return self.mission.status
 
     def new_alerts(self) -> list[Alert]:
@@ -309,7 +309,7 @@ class VehicleController:
         return alerts
 
     def abandon(self) -> None:
-        """Our own code has failed: have the vehicle land by itself."""
+        """Make the vehicle land by itself, after a failure of the actor."""
         with contextlib.suppress(AeroDaaSError):
             self.vehicle.land()
 

@@ -1,1 +1,1 @@
-"""Lockstep: the barrier and the gate at which mission time waits."""
+"""Lockstep execution: the barrier and the gate that hold mission time."""

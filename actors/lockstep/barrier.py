@@ -1,8 +1,8 @@
-"""Lockstep barrier: mission time waits until all readers have processed each measurement.
+"""Lockstep barrier: holds mission time until all actors have processed the measurements.
 
-Each measurement is known by its source and stamp. An analysis answers every item with exactly
-one message, empty if it has nothing to say, so the readers at the ends of all paths tell that
-everything between has been done; `paths` counts those ends.
+A measurement is identified by its source and timestamp. An analysis answers every item with
+exactly one message, empty without a result, so acknowledgements of the readers at the ends of
+all paths imply that all analyses between are done; `paths` counts those ends.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ __all__ = ["Barrier", "paths", "widest"]
 
 
 def paths(graph: Graph, stream: str, steering: set[str], *, recorded: bool) -> int:
-    """How many acknowledgements one message of `stream` leads to.
+    """Number of acknowledgements that one message of `stream` leads to.
 
     The recorder, the drones' actor if the stream is among the `steering` ones, and an analysis
     whose results have no reader each give one.
@@ -27,7 +27,7 @@ def paths(graph: Graph, stream: str, steering: set[str], *, recorded: bool) -> i
 
 
 def widest(graph: Graph, stream: str) -> int:
-    """How many messages at most one message of `stream` leads to on any one stream."""
+    """Most messages on any one stream that one message of `stream` leads to."""
     counts: Counter[str] = Counter()
     waiting = [stream]
     while waiting:
@@ -38,45 +38,45 @@ def widest(graph: Graph, stream: str) -> int:
 
 
 class Barrier:
-    """Counts the acknowledgements under way, by source."""
+    """Counter of unprocessed measurements by source."""
 
     def __init__(self, windows: dict[str, int]) -> None:
-        """Let `windows[source]` measurements of each source be under way while time goes on."""
+        """Allow `windows[source]` unprocessed measurements of each source as time advances."""
         self.windows = windows
         self._missing: dict[str, dict[int, int]] = defaultdict(dict)
         self._forgotten: dict[str, int] = {}
-        """The newest stamp of each source that is not waited for any more."""
+        """Newest timestamp of each source that is no longer waited for."""
 
     def expect(self, source: str, stamp: int, acknowledgements: int) -> None:
-        """A measurement is about to be worked through."""
+        """Add a measurement for which this number of acknowledgements is expected."""
         missing = self._missing[source]
         missing[stamp] = missing.get(stamp, 0) + acknowledgements
         if not missing[stamp]:
             del missing[stamp]
 
     def acknowledge(self, source: str, stamp: int) -> None:
-        """Count one reader's acknowledgement; it may come before the measurement is expected.
+        """Count one acknowledgement, which may precede the call of `expect`.
 
-        Sources without a window are not waited for.
+        Sources without a window are ignored.
         """
         if source in self.windows and stamp > self._forgotten.get(source, -1):
             self.expect(source, stamp, -1)
 
     def forget(self) -> None:
-        """Stop waiting for anything that is under way: its reader is gone."""
+        """Stop waiting for all current measurements, because a reader is gone."""
         for source, missing in self._missing.items():
             self._forgotten[source] = max([self._forgotten.get(source, -1), *missing])
         self._missing.clear()
 
     def clear(self, *, drain: bool = False) -> bool:
-        """Whether time may go on; with `drain`, whether nothing at all is under way."""
+        """Return whether time may advance; with `drain`, whether all measurements are processed."""
         return all(
             len(missing) <= (0 if drain else self.windows[source])
             for source, missing in self._missing.items()
         )
 
     def waiting_for(self) -> list[str]:
-        """Sources of which more is under way than may be."""
+        """Sources with more unprocessed measurements than their window."""
         return sorted(
             source
             for source, missing in self._missing.items()

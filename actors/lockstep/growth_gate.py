@@ -1,7 +1,8 @@
-"""Where a lockstep's time stands still, between two measurements.
+"""Gate that holds lockstep mission time between two measurements, for changes to the graph.
 
-What counts a measurement's readers must change between two measurements: the conductor first lets
-everything that is under way be done, then holds mission time until all actors know of the change.
+The number of a measurement's readers may change only between two measurements: the setpoint loop
+first lets all current ones be processed, then holds mission time until all actors have the
+change.
 """
 
 from __future__ import annotations
@@ -13,30 +14,30 @@ from collections.abc import Callable
 __all__ = ["GrowthGate"]
 
 _LONGEST_HOLD = 120.0
-"""Wall seconds after which time goes on, should the application have died meanwhile."""
+"""Wall seconds after which time advances again, in case the application has died."""
 _LOOK_INTERVAL = 0.02
 
 
 class GrowthGate:
-    """Holds mission time for other threads."""
+    """Gate by which other threads hold mission time."""
 
     def __init__(self, serve: Callable[[], object]) -> None:
-        """Let time go on; while it stands still, `serve` is called, in the loop's thread."""
+        """Create an open gate; while time is held, `serve` is called in the loop's thread."""
         self._serve = serve
         self._wanted = False
         self._still = threading.Event()
 
     def hold(self, timeout: float) -> bool:
-        """Have time stand still; False if it does not within `timeout` wall seconds."""
+        """Hold time; returns False if it is not held within `timeout` wall seconds."""
         self._wanted = True
         return self._still.wait(timeout)
 
     def release(self) -> None:
-        """Let time go on."""
+        """Let time advance again."""
         self._wanted = False
 
     def visit(self, settle: Callable[[], None]) -> None:
-        """Where time may stand still, in the loop's thread; `settle` is called before it does."""
+        """Hold time here if requested, in the loop's thread, after a call of `settle`."""
         if not self._wanted:
             return
         settle()

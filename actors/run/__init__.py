@@ -1,1 +1,1 @@
-"""One run: from an application's graph to actors, their membership, growth, and shutdown."""
+"""Runs of an application: planning of its actors, their start, growth and shutdown."""

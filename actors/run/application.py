@@ -1,8 +1,8 @@
-"""Definitions of the application's own files, for every process of its run.
+"""Definitions of the application's own files, as sent to every process of its run.
 
-The session carries it: modules as source text, and the classes of files that run as `__main__`,
-which no other process can import, as pickles. An actor gets its session before anything else, so
-that messages sent later find their classes there.
+The session carries them: modules as source text, and the classes of files that run as
+`__main__`, which other processes cannot import, as pickles. An actor gets its session first, so
+that later messages find their classes defined.
 """
 
 from __future__ import annotations
@@ -29,22 +29,22 @@ from aerodaas.types.errors import GraphError
 __all__ = ["Application", "capture", "require_sendable"]
 
 _LARGEST = 1 << 20
-"""Bytes of a class beyond which it travels only with the items that need it."""
+"""Bytes of a class beyond which it is sent only with the items that need it."""
 
 
 @dataclass(frozen=True)
 class Application:
-    """Modules and classes of an application; to unpickle it is to have them."""
+    """Modules and classes of an application; unpickling it makes them available."""
 
     sources: Mapping[str, Source] = field(default_factory=dict)
     """Modules by name."""
     definitions: Mapping[str, bytes] = field(default_factory=dict)
     """Pickled classes by `id/qualified name`."""
     plugins: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
-    """By the name of a module that is the application's own file: definitions by attribute."""
+    """Names of definitions by attribute, by module name of the application's own file."""
 
     def and_later(self, later: Application) -> Application:
-        """The definitions of both; the later one's come last."""
+        """Union of this and the `later` definitions, which have precedence."""
         plugins = {**self.plugins}
         for name, attributes in later.plugins.items():
             plugins[name] = {**plugins.get(name, {}), **attributes}
@@ -55,7 +55,7 @@ class Application:
         )
 
     def __reduce__(self) -> tuple[Any, tuple[Any, ...]]:
-        """Rebuild by loading its definitions."""
+        """Pickle it so that unpickling makes its modules and classes available."""
         return _arrived, (dict(self.sources), dict(self.definitions), dict(self.plugins))
 
 
@@ -81,9 +81,9 @@ def _defined(module: str, attributes: dict[str, str], name: str) -> Any:  # noqa
 
 
 def capture(graph: Graph, config: EnvironmentConfig, *plugins: object) -> Application:
-    """Collect the definitions of the application and its guests; in their own process.
+    """Collect the definitions of the application and its guests, in their own process.
 
-    `plugins` are instances of its classes that are not in the graph, such as schedulers.
+    `plugins` are instances of its classes outside the graph, such as schedulers.
     """
     used = [*_used(graph), *plugins]
     files = _main_files(used)
@@ -109,13 +109,13 @@ def capture(graph: Graph, config: EnvironmentConfig, *plugins: object) -> Applic
 
 
 def _define(prefix: str, found: Iterable[Any]) -> dict[str, bytes]:
-    """Pickle classes one by one, so that one that cannot be sent costs only itself."""
+    """Pickle classes one by one, leaving out those that cannot be pickled."""
     definitions: dict[str, bytes] = {}
     for one in found:
-        # A class that cannot be pickled is told of where it is used.
+        # A class that cannot be pickled is reported where it is used.
         with contextlib.suppress(Exception):
             data = _definitions.pickled_class(one)
-            # A class keeps the name by which actors that run already put it into messages.
+            # A class keeps the name that running actors already use in messages.
             name = _definitions.name_of(one) or f"{prefix}/{one.__qualname__}"
             if len(data) <= _LARGEST and name not in definitions:
                 definitions[name] = data
@@ -135,7 +135,7 @@ def _used(graph: Graph) -> list[object]:
 
 
 def _main_files(used: Iterable[object]) -> list[dict[str, Any]]:
-    """The namespaces of files that run as `__main__`: the application's and its guests'."""
+    """Namespaces of files that run as `__main__`: the application's and its guests'."""
     files: dict[int, dict[str, Any]] = {}
     main = sys.modules.get("__main__")
     if main is not None:
@@ -182,7 +182,7 @@ def _functions(namespace: dict[str, Any], wanted: set[str]) -> Iterator[Any]:
 
 
 def _mentioned(used: Iterable[object]) -> list[type]:
-    """Classes of the used objects, their bases, and the classes in brackets behind those."""
+    """Classes of the objects used, their bases, and the type arguments of these bases."""
     found: dict[type, None] = {}
     waiting: list[object] = [one if isinstance(one, type) else type(one) for one in used]
     while waiting:
@@ -207,7 +207,7 @@ def _plugin_names(config: EnvironmentConfig) -> list[str]:
 
 
 def _imports_of(namespace: dict[str, Any]) -> list[tuple[str, list[str]]]:
-    """Modules that a file that runs as `__main__` imports."""
+    """Modules that a file that runs as `__main__` imports, with its folder."""
     try:
         file = Path(namespace["__file__"]).resolve()
         text = file.read_bytes()
@@ -218,7 +218,7 @@ def _imports_of(namespace: dict[str, Any]) -> list[tuple[str, list[str]]]:
 
 
 def require_sendable(graph: Graph, *plugins: object) -> None:
-    """Raise GraphError, by name, for an object that must be sent and cannot be."""
+    """Raise GraphError, by name, for an object that must be sent but cannot be pickled."""
     for node in graph.nodes.values():
         for trigger in node.triggers:
             _require(trigger.when, f"the condition of {node.id}'s trigger")

@@ -1,4 +1,4 @@
-"""The application as its orphan reaper sees it: a process here, or one of another machine."""
+"""Identity of the application's process, for the orphan reaper."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ def _pid_namespace() -> str:
 
 @dataclass(frozen=True)
 class ApplicationProcess:
-    """Made by the application itself, and looked after by another process."""
+    """The application's process: created by the application, checked by the reaper."""
 
     lockstep: bool
-    """Its drones are simulated, and fly no faster than it can follow."""
+    """Whether the run is in lockstep: its drones are simulated and wait for it."""
     node: str = field(default_factory=lambda: ray.get_runtime_context().get_node_id())
     pid: int = field(default_factory=os.getpid)
     pids: str = field(default_factory=_pid_namespace)
-    """The namespace of its number; a container's own, or empty where there are none."""
+    """PID namespace of the process, such as a container's; empty if there are none."""
     began: float = field(default_factory=lambda: psutil.Process().create_time())
 
     @property
     def near(self) -> bool:
-        """Whether this process runs beside it, and so can see whether it lives."""
+        """Whether the calling process runs on the same node and PID namespace."""
         here: str = ray.get_runtime_context().get_node_id()
         return here == self.node and _pid_namespace() == self.pids
 
     def ended(self) -> bool:
-        """Whether it has ended, for a caller on the same machine."""
+        """Whether it has ended; valid only if `near`."""
         try:
             process = psutil.Process(self.pid)
-            # A number may be used again.
+            # A process id may be reused.
             again = process.create_time() != self.began
             return bool(again or process.status() == psutil.STATUS_ZOMBIE)
         except psutil.NoSuchProcess:

@@ -1,7 +1,7 @@
-"""Checks of an environment and a graph before anything starts, each fault with its remedy.
+"""Checks of an environment and a graph before a run; each error names its remedy.
 
-Errors that an actor would raise when it opens are raised here first, as far as possible: Ray
-takes seconds to start, and a fleet on its way to the field does not come back for a typing error.
+Errors that an actor would raise when it opens are raised here first, if possible: Ray takes
+seconds to start, and a typing error should be found before the fleet is in the field.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 __all__ = ["check_environment", "check_graph", "check_plugins", "check_served", "check_tasks"]
 
 _PLAYED = {"folder", "mcap", "recorded", "video"}
-"""Cameras that read the setting `path`."""
+"""Camera drivers that read the file or folder of the setting `path`."""
 _CAMERA = ("open", "capture", "close")
 _VEHICLE = (
     "connect", "read", "preflight", "take_off", "send", "hold", "return_home", "land", "close"
@@ -36,14 +36,14 @@ _VEHICLE = (
 _OWN_CAMERA = 'give the sensor a "driver" of its own, such as "simulated", "video" or module:Class'
 _LAST_PORT = 65535
 _NAMED = 200
-"""Files of a folder that are looked through for the one that may have been meant."""
+"""Most files of a folder that are searched for a similar name."""
 
 
 def check_environment(config: EnvironmentConfig, place: str) -> None:
-    """Raise ConfigError or UnknownIdError for names and settings of plug-ins that there are not.
+    """Raise ConfigError or UnknownIdError for unknown names and settings of plug-ins.
 
-    Nothing of an application's own is imported, for it may be the application's own file; that is
-    for `check_plugins`.
+    Plug-ins of the application are not imported, because they may be in its own file;
+    `check_plugins` checks them.
     """
     require_plugin("trajectory_schedulers", config.schedulers.trajectory)
     for robot in config.robots:
@@ -66,9 +66,9 @@ def check_plugins(
 ) -> None:
     """Raise the project's errors for drivers and cameras that could not be opened.
 
-    A plug-in of a stranger's is held to the pydantic model `settings_model` of its class, if it
-    has one; one of ours is built, which opens nothing. `here` is True where all runs on this
-    machine: then what is to be played must be on it.
+    Settings of any plug-in are validated by the pydantic model `settings_model` of its class, if
+    it has one; built-in plug-ins are also constructed, which opens nothing. `here` is True if
+    all actors run on this machine: then files to be played must exist on it.
     """
     for robot in robots:
         _require_methods("drivers", robot.driver, _VEHICLE, f"robot {robot.id}")
@@ -87,7 +87,7 @@ def check_plugins(
 
 
 def check_graph(graph: Graph, config: EnvironmentConfig, flying: Collection[str]) -> None:
-    """Raise the project's errors for a graph that could fail only once it runs.
+    """Raise the project's errors for a graph that would fail only at run time.
 
     `flying` are the robots that navigate.
     """
@@ -113,7 +113,7 @@ def check_graph(graph: Graph, config: EnvironmentConfig, flying: Collection[str]
 def _check_process(node: Node) -> None:
     process, name = node.work.process, type(node.work).__name__
     if hasattr(node.work, "postprocess"):
-        return  # an endpoint's, whose parts are called
+        return  # an endpoint's, whose parts are called instead
     if getattr(process, "__func__", None) is Analytics.process:
         raise GraphError(f"{name} ({node.id}) has no process(self, item, context), so does nothing")
     try:
@@ -125,11 +125,11 @@ def _check_process(node: Node) -> None:
 
 
 def check_tasks(graph: Graph, config: EnvironmentConfig) -> None:
-    """Raise UnknownIdError for tasks of analyses that there are not, which would have no effect.
+    """Raise UnknownIdError for tasks of unknown analyses, which would have no effect.
 
-    A file that several applications share may name the analyses that ship with the project.
+    A file shared by several applications may name the analyses that ship with the project.
     """
-    from aerodaas import analytics  # noqa: PLC0415 - loads its modules where they are asked for
+    from aerodaas import analytics  # noqa: PLC0415 - loads its modules on access
 
     shipped = {snake_case(name).removesuffix("_analytics") for name in dir(analytics)}
     told = [name for name in config.schedulers.tasks if name not in shipped]
@@ -155,7 +155,7 @@ def _require_methods(
     what = f"{place}: driver {name!r}"
     if not callable(plugin):
         raise ConfigError(f"{what} is no class but {plugin!r}{hint}")
-    # A function may make anything; what it makes is known only once it has been called.
+    # The type of a factory function's result is unknown before the call.
     missing = [one for one in methods if isinstance(plugin, type) and not hasattr(plugin, one)]
     if missing:
         kinds = kind.removesuffix("s").replace("driver", "vehicle")
@@ -175,7 +175,7 @@ def _check_path(sensor: SensorConfig) -> None:
 
 
 def check_served(option: str, address: str | None) -> None:
-    """Raise ConfigError for an address to serve at that is none; None is not asked for."""
+    """Raise ConfigError for an address of a server that is malformed; None is valid."""
     if address is None:
         return
     host, _, port = address.rpartition(":")

@@ -1,4 +1,4 @@
-"""A run as the application's process sees it: start all actors, watch them, stop them."""
+"""Control of a run by the application's process: starts, monitors and stops all actors."""
 
 from __future__ import annotations
 
@@ -48,23 +48,23 @@ __all__ = ["Flight", "FlightState"]
 
 _PREPARE_TIMEOUT = 90.0
 _GROWING = 10.0
-"""Wall seconds that an actor may take to join in, or to come to rest for it."""
+"""Timeout in wall seconds of a change in flight, and of holding mission time for it."""
 _SILENT_FOR = 30.0
-"""Seconds that a drone's actor may not answer before the run counts as failed; it flies on."""
+"""Seconds without an answer of a drone's actor after which the run has failed; it flies on."""
 _REPORT_INTERVAL = 0.5
 _RESTARTS = 3
 _LOOKS = 2
-"""Calls of an executor in the cloud that only look whether and how far away it is."""
+"""Concurrent calls of a cloud executor reserved for probes and pings."""
 
 
 @dataclass(frozen=True)
 class FlightState:
-    """All of a run at one moment."""
+    """State of a run at one time."""
 
     robots: dict[str, RobotReport]
     reports: dict[str, ActorReport]
     over: bool
-    """True once every mission has ended."""
+    """True after every mission has ended."""
 
     @property
     def alerts(self) -> list[Alert]:
@@ -74,7 +74,7 @@ class FlightState:
 
 
 class Flight:
-    """The actors of one run. Use as a context manager: leaving it stops them all."""
+    """The actors of one run; a context manager, whose exit stops them all."""
 
     def __init__(
         self,
@@ -84,13 +84,13 @@ class Flight:
         live: str | None = None,
         page: str | None = None,
     ) -> None:
-        """Create the actors of `plan`, all at once; `recording` is where the MCAP file goes.
+        """Create the actors of `plan`, all at once; `recording` is the path of the MCAP file.
 
-        With `live`, `host:port`, what is recorded is served there, too; with `page`, the cameras
-        are shown there to browsers.
+        `live` and `page` are the addresses (`host:port`) of the recorder's live view and camera
+        page; None for none.
         """
         self.plan = plan
-        # The recorder on a cluster's node does not share our working directory.
+        # The recorder on a cluster node does not share our working directory.
         self.recording = recording.absolute() if recording and plan.recorded else None
         self._drones: dict[str, str] = {}
         self._members: dict[str, Member] = {}
@@ -126,12 +126,12 @@ class Flight:
             self._appoint_reaper()
         self._origin = 0
         self._answers: dict[str, tuple[float, dict[str, RobotReport]]] = {}
-        """When each drone's actor last answered, monotonic seconds, and what."""
+        """Time (monotonic seconds) and content of each drone actor's last answer."""
         self._next_reports = 0.0
         self._stopped = False
 
     def __enter__(self) -> Self:
-        """Stop the actors when left."""
+        """Return the run, whose actors are stopped on exit."""
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -139,22 +139,22 @@ class Flight:
         self.stop()
 
     def launch(self, progress: Callable[[str], None] = lambda _: None) -> None:
-        """Open all actors and start flying; raises the errors of their `open`.
+        """Open everything and start flying; raises the errors of an actor's opening.
 
-        `progress` is told what has become ready.
+        `progress` is called with the name of each actor that is ready.
         """
         self._prepare(list(self._members.values()), progress)
         for reference in self._opening:
             ask(reference, _PREPARE_TIMEOUT)
         if self._reaper is None:
-            # Until here the local Ray would have ended with us.
+            # Before this, the local Ray would have ended with this process.
             self._appoint_reaper()
         self._origin = host_time_ns()
         self._start(list(self._members.values()))
         self._head = HeadWatch(ray.get_runtime_context().gcs_address, self._note)
 
     def _start(self, members: list[Member]) -> None:
-        # Subscribers start first, so that no message is published before its readers are there.
+        # Pure readers start first, so that no message is published without its readers.
         for member in reversed(members):
             member.handle.start.remote(self._origin)
             member.report = ActorReport("running")
@@ -162,9 +162,9 @@ class Flight:
         self._liveness_monitor.append(LivenessMonitor(mortal, self._life_of))
 
     def poll(self, newest: int = 200) -> FlightState:
-        """Poll all actors, with the `newest` latencies of each robot.
+        """State of the run, with the `newest` latencies of each robot.
 
-        Also tells the drones that the application is alive.
+        The call is also the application's heartbeat for the drones.
         """
         self._pulse.beat()
         if time.monotonic() >= self._next_reports:
@@ -180,7 +180,7 @@ class Flight:
         return FlightState(robots, self.reports(), over)
 
     def _robots_of(self, name: str, newest: int) -> dict[str, RobotReport]:
-        """A drone's report; its last one while its actor is too busy to answer."""
+        """Reports of a drone's actor; the last ones while it is too busy to answer."""
         before = self._answers.get(name)
         try:
             robots: dict[str, RobotReport] = ask(self._members[name].handle.robots.remote(newest))
@@ -194,7 +194,7 @@ class Flight:
         return robots
 
     def _drone_lost(self, member: Member) -> MissionError:
-        """Why a drone's actor has gone: an application that stood still is no proof of it."""
+        """Error for a lost drone actor, which a suspended application may have caused itself."""
         frozen = self._pulse.frozen
         if frozen and self._reaper is not None:
             try:
@@ -208,24 +208,24 @@ class Flight:
 
     @property
     def reachable(self) -> bool:
-        """False once this process has left the cluster that the actors live in."""
+        """False after this process has left the cluster of the actors."""
         return ray.is_initialized() and ray.get_runtime_context().get_job_id() == self._job
 
     def learn(self, application: Application) -> None:
-        """Send the application's newest definitions to every actor."""
+        """Send the application's current definitions to every actor."""
         application = self.plan.session.application.and_later(application)
         session = replace(self.plan.session, application=application)
         self.plan = replace(self.plan, session=session)
         for reference in [one.handle.learn.remote(application) for one in self._members.values()]:
-            # One that has died learns it when it is set up anew.
+            # An actor that has died receives it when it is set up again.
             with contextlib.suppress(AeroDaaSError):
                 ask(reference)
 
     def grow(self, plan: FlightPlan) -> None:
-        """Fly on by `plan`, the graph as it is now; returns when all that is new runs.
+        """Continue with `plan`, that of the current graph; returns when all additions run.
 
-        Raises GraphError for what cannot be changed in flight, and what a new actor could not
-        open; then everything goes on as it was.
+        Raises GraphError for a change that is impossible in flight, and the errors of a new
+        actor's opening; the run then continues unchanged.
         """
         change = growth(self.plan, plan)
         drones = [self._members[name].handle for name in sorted(self._ids())]
@@ -240,7 +240,7 @@ class Flight:
         self.plan = plan
 
     def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
-        """Have all robots plan by `scheduler` from now on."""
+        """Use the trajectory scheduler `scheduler` for all robots from now on."""
         for name in sorted(self._ids()):
             handle = self._members[name].handle
             ask(handle.use_scheduler.remote(scheduler, _GROWING), _PREPARE_TIMEOUT)
@@ -252,7 +252,7 @@ class Flight:
             self._create_cameras(change.cameras)
             self._create_analyses(change.analyses, environments)
             fresh = [member for name, member in self._members.items() if name not in known]
-            # Before they can do anything: the application may be killed at any time.
+            # Before they start: the application may be killed at any time.
             self._inform_reaper()
             self._prepare(fresh, lambda _: None)
             for name, nodes in change.joining.items():
@@ -286,17 +286,17 @@ class Flight:
 
     @property
     def flying(self) -> bool:
-        """Whether a drone may be in the air that would not be safe if its actor ended."""
+        """Whether a drone may be in the air and thus needs its actor."""
         drones = [self._members[name].handle for name in self._ids()]
         return not self.plan.session.lockstep and any(map(may_fly, drones))
 
     @property
     def headless(self) -> str:
-        """Where the head of the cluster was, if it is out of reach; else empty."""
+        """Address of the cluster's head if it is out of reach; else empty."""
         return self._head.address if self._head is not None and self._head.lost else ""
 
     def command(self, robot: str, command: Command) -> Answer:
-        """Send a command to a robot's mission."""
+        """Execute a command on a robot's mission."""
         handle = self._members[self._drones[robot]].handle
         method = handle.command.options(concurrency_group=COMMANDS)
         answer: Answer = ask(method.remote(robot, command))
@@ -307,18 +307,18 @@ class Flight:
         return {name: member.report for name, member in self._members.items()}
 
     def infos(self) -> dict[str, ActorInfo]:
-        """Where each actor lives, once launched."""
+        """Node, process and streams of each launched actor."""
         return {m.name: m.info for m in self._members.values() if m.info is not None}
 
     def publisher(self, stream: str) -> tuple[Any, str] | None:
-        """The actor that publishes `stream`, as a handle, and its node; None without one."""
+        """Actor handle and node of the publisher of `stream`; None without a publisher."""
         for name, info in self.infos().items():
             if stream in info.publishes:
                 return self._members[name].handle, info.node_id
         return None
 
     def stop(self) -> dict[str, ActorReport]:
-        """Stop all actors, the recorder last, and return their last reports."""
+        """Stop all actors, the recorder last, and return their final reports."""
         if self._stopped:
             return self.reports()
         self._watch_no_longer()
@@ -328,7 +328,7 @@ class Flight:
         return self.reports()
 
     def leave(self) -> None:
-        """Leave the drones, and all that they need, to the orphan reaper."""
+        """Leave the drones and all other actors to the orphan reaper."""
         self._watch_no_longer()
 
     def _watch_no_longer(self) -> None:
@@ -339,7 +339,7 @@ class Flight:
             self._head.end()
 
     def _in_ending_order(self) -> list[list[Any]]:
-        """All actors with streams; the recorder last, for it records the end of the others."""
+        """All actors with streams; the recorder last, because it records the end of the others."""
         recorder = [m.handle for m in self._members.values() if m.name == "recorder"]
         others = [m.handle for m in self._members.values() if m.name != "recorder"]
         return [others, recorder]
@@ -368,7 +368,7 @@ class Flight:
         options: Mapping[str, Any] | None = None,
     ) -> None:
         remote: Any = ray.remote
-        # Calls that wait, for its life to end or for its loop, must not keep others waiting.
+        # Pending calls, of the liveness monitor or for the loop, must not block others.
         groups = {LIFE: LIFELINES} if restarts else {}
         groups |= {COMMANDS: 1} if kind is DroneActor else {}
         if groups:
@@ -378,7 +378,7 @@ class Flight:
         self._members[name] = Member(name, made.remote(*args), setup, restarts)
 
     def _options(self, name: str, place: Placement, *, restarts: int) -> dict[str, Any]:
-        """Ray's options; actors outlive the application, and therefore have a name."""
+        """Ray options of an actor; a detached one, to outlive the application, needs a name."""
         outliving = {"lifetime": "detached", "name": f"{self.plan.session.id}/{name}"}
         return {**options_for(place, restarts=restarts), **outliving}
 
@@ -425,7 +425,7 @@ class Flight:
     def _create_executor(
         self, name: str, process: CloudProcess, environments: Mapping[str, Mapping[str, Any]]
     ) -> Executor:
-        # A node that comes and goes must not use restarts up: without one there is no cloud.
+        # Unlimited restarts, for an intermittent node: without an executor there is no cloud.
         options = {**self._options(name, process.place, restarts=-1), **environments[name]}
         remote: Any = ray.remote(CloudExecutor)
         concurrency = process.slots + _LOOKS
@@ -458,7 +458,7 @@ class Flight:
             ask(reference)
 
     def _connect(self, member: Member) -> Any:  # noqa: ANN401 - Ray's reference
-        """Register the readers of a publisher on other nodes, or without shared memory."""
+        """Send a publisher its readers on other nodes, or without shared memory."""
         return member.handle.connect.remote(routes(member, self._members.values()))
 
     def _gather_reports(self) -> None:
@@ -474,16 +474,16 @@ class Flight:
             except RayActorError:
                 if member.name in self._ids():
                     raise self._drone_lost(member) from None
-                # Of those with a lifeline, that tells, and sooner.
+                # Actors with restarts are covered by the liveness monitor, which is faster.
                 if not member.restarts:
                     self._lost(member)
             except RayTaskError as error:
-                # An actor that can't say how it fares is no reason to leave the drones alone.
+                # A failed report of an actor must not end the supervision of the drones.
                 reason = MissionError(f"no report from {member.name}: {error.cause}")
                 member.report = replace(member.report, error=reason)
 
     def _record_vitals(self) -> None:
-        """Have the recorder record each process' resources, as it could not ask other nodes."""
+        """Send the vitals of all processes to the recorder, which cannot query other nodes."""
         recorder = self._members.get("recorder")
         if recorder is None or recorder.report.phase != "running":
             return
@@ -496,7 +496,7 @@ class Flight:
         )
 
     def _life_of(self, name: str, life: Life) -> None:
-        """Take note, in any thread, that an actor died, serves, or will not come back."""
+        """Handle, in any thread, an actor that died, serves again, or will not come back."""
         member = self._members[name]
         if life == "serving":
             self._back(member)
@@ -529,7 +529,7 @@ class Flight:
             self._members[name].handle.note.remote(kind, text)
 
     def _revive(self, member: Member) -> None:
-        """Set an actor up anew, in a thread, as soon as Ray has restarted it."""
+        """Set an actor up again, in a thread, as soon as Ray has restarted it."""
         actor, lost_at = member.handle, member.lost_at
         while member.lost_at == lost_at and not self._stopped:
             try:
@@ -541,7 +541,7 @@ class Flight:
                     self._connect(member)
                     ray.get(actor.start.remote(self._origin))
             except ActorUnavailableError:
-                pass  # it is not there yet, or no longer
+                pass  # it has not restarted yet, or died again
             except RayTaskError as error:
                 self._note("actor_failed", f"{member.name} cannot start again: {error.cause}")
                 return
@@ -551,10 +551,10 @@ class Flight:
 
 
 def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
-    """Ray's options for the environment of each process that runs analyses.
+    """Ray options for the environment of each process that runs analyses, by name.
 
-    Before any actor is there, so that what cannot be provided leaves nothing behind. Raises
-    ConfigError for that, and for a place that no node offers.
+    Called before any actor exists, so that a failure leaves nothing behind. Raises ConfigError
+    for an environment that a node cannot provide, and for a place without a node.
     """
     processes: dict[str, AnalyticsActorPlan | CloudProcess] = {
         one.name: one for one in plan.analyses

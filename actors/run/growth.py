@@ -1,4 +1,4 @@
-"""Additions to a running plan for a graph that has grown in flight."""
+"""Additions to the running actors for a graph that has grown in flight."""
 
 from __future__ import annotations
 
@@ -15,30 +15,31 @@ __all__ = ["Growth", "growth"]
 
 @dataclass(frozen=True)
 class Growth:
-    """The difference between two plans of one run."""
+    """Difference between two plans of one run."""
 
     cameras: tuple[Cameras, ...]
-    """To be started."""
+    """Cameras to be started."""
     ending: dict[str, bool]
-    """Running cameras whose last frame ends the mission now, or no longer does, by stream."""
+    """Running cameras whose last image now ends, or no longer ends, the mission, by stream."""
     analyses: tuple[AnalyticsActorPlan, ...]
-    """Actors to be started."""
+    """Analytics actors to be started."""
     joining: dict[str, tuple[NodeSpec, ...]]
-    """Analyses that join an actor that runs already, by its name."""
+    """Analyses that join a running actor, by its name."""
     acknowledging: dict[str, dict[str, bool]]
-    """In lockstep, the running analyses that are the last of their path now, or no longer are: by
-    actor and stream."""
+    """In lockstep, running analyses that start or stop to acknowledge, because they are, or are
+    no longer, the last of their path: by actor and stream."""
     drones: tuple[tuple[RobotSpec, ...], ...]
-    """All robots as they are now, by actor."""
+    """All robots of the new plan, by actor."""
     conduct: LockstepSchedule
     recorded: dict[str, int]
-    """Further streams for the recorder, and how many messages of each may wait."""
+    """Further streams for the recorder, and their queue depths."""
 
 
 def growth(old: FlightPlan, new: FlightPlan) -> Growth:
-    """Compare the plan that flies with that of the graph as it is now.
+    """Compare the running plan with that of the current graph.
 
-    Raises GraphError for what cannot be changed in flight: which tasks the analytics scheduler has.
+    Raises GraphError for an additional task of the analytics scheduler, which is impossible in
+    flight.
     """
     _require_same_tasks(old, new)
     running = {node.stream: node for actor in old.analyses for node in actor.nodes}

@@ -1,4 +1,4 @@
-"""Streams of a flight, read in the application's own process."""
+"""Reader of a flight's streams in the application's own process."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ __all__ = ["LiveReader"]
 
 _DEPTH = 4
 _PAUSE = 0.02
-"""Seconds between two questions to a publisher."""
+"""Seconds between two requests to a publisher."""
 _ANSWER = 0.2
-"""Least seconds for a poll."""
+"""Least timeout of a request in seconds."""
 
 
 class _Source(Protocol):
     def receive(self, timeout: float) -> list[Message[Any]]:
-        """Return the messages that have arrived; wait up to `timeout` seconds for some."""
+        """Return new messages; wait up to `timeout` seconds for them."""
         ...
 
 
 class _Asking:
-    """Polls the publisher for its newest messages, as no actor can call an application."""
+    """Polls the publisher for its newest messages: actors cannot call an application."""
 
     def __init__(self, publisher: Any, stream: str) -> None:  # noqa: ANN401 - Ray's handle
         self._publisher = publisher
@@ -46,7 +46,7 @@ class _Asking:
         self._question: Any = None
 
     def receive(self, timeout: float) -> list[Message[Any]]:
-        """Return the messages that have arrived; wait up to `timeout` seconds for some."""
+        """Return new messages; wait up to `timeout` seconds for them."""
         until = time.monotonic() + timeout
         while True:
             messages = self._ask(max(_ANSWER, until - time.monotonic()))
@@ -80,7 +80,7 @@ def _decoded(data: bytes) -> Message[Any]:
 
 
 class LiveReader:
-    """Reads the items of one stream until the flight is over; keeps the newest few."""
+    """Reader of one stream's items until the flight is over; buffers the newest few."""
 
     def __init__(
         self,
@@ -92,7 +92,7 @@ class LiveReader:
     ) -> None:
         """Read `stream` of the run `session` from its `publisher`, an actor on the node `node`.
 
-        `over` tells when to stop waiting.
+        `over` returns whether the flight is over.
         """
         here = ray.get_runtime_context().get_node_id()
         self._source: _Source
@@ -107,7 +107,7 @@ class LiveReader:
         self._over = over
 
     def next(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
-        """Return the next item that is not empty.
+        """Return the next item, skipping empty messages.
 
         Raises TimeoutError after `timeout` seconds, StopIteration once the flight is over.
         """
@@ -122,7 +122,7 @@ class LiveReader:
         return self._waiting.popleft()
 
     def newest(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
-        """Return the newest item, again if there is none newer; raises as `next` before any."""
+        """Return the newest item, again if there is none newer; raises like `next` without one."""
         self._take(0.0)
         if self._newest is None:
             self.next(timeout)

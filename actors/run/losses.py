@@ -1,4 +1,4 @@
-"""Alert texts for a lost drone actor: which drone, and what its autopilot does now."""
+"""Errors for lost actors: which drone is affected, and what its autopilot does now."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from aerodaas.types.errors import MissionError
 __all__ = ["ALONE", "DeadError", "SilentError", "SuspensionMonitor", "drone_lost"]
 
 ALONE = "alone"
-"""Key of a drone's report: each vehicle's behaviour without its actor, by robot."""
+"""Key of a drone actor's report: each vehicle's behaviour without its actor, by robot."""
 _FROZEN = 5.0
-"""Seconds of silence after which the drones have taken the application for dead."""
+"""Seconds without a heartbeat after which the drones consider the application dead."""
 
 
 class SilentError(MissionError):
@@ -20,19 +20,19 @@ class SilentError(MissionError):
 
 
 class DeadError(MissionError):
-    """An actor's process has gone."""
+    """An actor's process has died."""
 
 
 class SuspensionMonitor:
-    """Detects that this process was stopped from outside for so long that its drones came home."""
+    """Detects suspensions of this process so long that its drones returned home."""
 
     def __init__(self) -> None:
         self._last = float("inf")
         self.frozen = 0.0
-        """Seconds of the last such stop; 0 without any."""
+        """Seconds of the last such suspension; 0 without any."""
 
     def beat(self) -> None:
-        """Note that this process runs."""
+        """Record that this process runs; to be called regularly."""
         now = time.monotonic()
         if now - self._last > _FROZEN:
             self.frozen = now - self._last
@@ -40,7 +40,7 @@ class SuspensionMonitor:
 
 
 def drone_lost(name: str, report: ActorReport, frozen: float) -> MissionError:
-    """The error for the drone's actor `name`, whose last report was `report`."""
+    """Error for the lost drone actor `name`; `report` is its last one, `frozen` in seconds."""
     robots = ", ".join(name.rpartition("/")[2].split("+"))
     if frozen:
         return MissionError(

@@ -1,4 +1,4 @@
-"""One actor of a run, as seen by the application's process."""
+"""Members of a run: the application's record of each actor, and calls to it."""
 
 from __future__ import annotations
 
@@ -18,30 +18,33 @@ __all__ = ["Member", "ask", "require_clock", "routes"]
 
 _ANSWER_TIMEOUT = 5.0
 _CLOCKS_APART = 1.0
-"""Seconds by which clocks may differ; missions are timed by them, and latencies measured."""
+"""Seconds by which clocks may differ; they time missions and measure latencies."""
 
 
 @dataclass
 class Member:
-    """One actor of the run."""
+    """State of one actor of the run."""
 
     name: str
     handle: Any
     setup: tuple[Any, ...]
-    """What `prepare` is given."""
+    """Arguments of `prepare`."""
     restarts: int
-    """How often Ray restarts it."""
+    """Most restarts by Ray."""
     further: dict[str, int] = field(default_factory=dict)
-    """Streams that it has come to read in flight, and how many messages of each may wait."""
+    """Streams added in flight that it reads, and their queue depths."""
     info: ActorInfo | None = None
     report: ActorReport = field(default_factory=lambda: ActorReport("new"))
     pending: ray.ObjectRef[ActorReport] | None = None
     lost_at: float | None = None
-    """Host's monotonic seconds at which it was found dead; None while it lives."""
+    """Host's monotonic seconds at which its death was detected; None while it is alive."""
 
 
 def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN401 - as it says
-    """Result of a call to an actor; raises the project's errors, SilentError after `timeout`."""
+    """Wait for the result of an actor call.
+
+    Raises the project's errors: DeadError if the actor died, SilentError after `timeout` seconds.
+    """
     try:
         return ray.get(reference, timeout=timeout)
     except RayTaskError as error:
@@ -50,7 +53,7 @@ def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN40
             raise cause from None
         raise MissionError(f"{type(cause).__name__}: {cause}") from cause
     except RayActorError as error:
-        # Ray puts the remote traceback first and what went wrong last.
+        # Ray puts the remote traceback first and the message last.
         reason = str(error).strip().splitlines()[-1]
         raise DeadError(f"an actor died: {reason}") from None
     except GetTimeoutError:
@@ -58,7 +61,7 @@ def ask(reference: Any, timeout: float = _ANSWER_TIMEOUT) -> Any:  # noqa: ANN40
 
 
 def routes(member: Member, members: Iterable[Member]) -> dict[str, list[Any]]:
-    """The readers of each stream of `member` on other nodes, or without shared memory."""
+    """Readers of each stream of `member` on other nodes, or without shared memory."""
     here = member.info
     assert here is not None  # noqa: S101 - prepared
     known = [(one.handle, one.info) for one in members if one.info is not None]
@@ -74,7 +77,10 @@ def routes(member: Member, members: Iterable[Member]) -> dict[str, list[Any]]:
 
 
 def require_clock(name: str, info: ActorInfo, began: int) -> None:
-    """A clock with an impossible reading while `prepare` was under way is wrong."""
+    """Raise MissionError if an actor's clock is not between start and end of its `prepare`.
+
+    A deviation of up to `_CLOCKS_APART` is tolerated.
+    """
     ahead = max(info.clock - host_time_ns(), 0) - max(began - info.clock, 0)
     if abs(ahead) > _CLOCKS_APART * NANOSECONDS:
         side = "ahead of" if ahead > 0 else "behind"

@@ -1,4 +1,4 @@
-"""From an application's graph to the actors that will run it."""
+"""Planning of a run: from an application's graph to its actors."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ _STATE_WINDOW = 16
 
 @dataclass(frozen=True)
 class Cameras:
-    """One camera's actor."""
+    """Plan of one camera's actor."""
 
     stream: str
     sensor: SensorConfig
@@ -70,7 +70,7 @@ class Cameras:
 
 @dataclass(frozen=True)
 class AnalyticsActorPlan:
-    """One analytics actor."""
+    """Plan of one analytics actor."""
 
     name: str
     place: Placement
@@ -80,7 +80,7 @@ class AnalyticsActorPlan:
 
 @dataclass(frozen=True)
 class DispatchPlan:
-    """The dispatcher's actor, and the executors in the cloud."""
+    """Plan of the dispatcher's actor and the executors in the cloud."""
 
     scheduler: AnalyticsScheduler
     managed: tuple[Managed, ...]
@@ -90,23 +90,23 @@ class DispatchPlan:
 
 @dataclass(frozen=True)
 class FlightPlan:
-    """All actors of a run, before they are placed."""
+    """Plan of all actors of a run."""
 
     session: Session
     drones: tuple[tuple[RobotSpec, ...], ...]
-    """One actor for each group."""
+    """Robots by drone actor."""
     edges: tuple[Placement, ...]
-    """Where the drones of each group are flown from."""
+    """Place of each drone actor."""
     cameras: tuple[Cameras, ...]
     analyses: tuple[AnalyticsActorPlan, ...]
     dispatch: DispatchPlan | None
     conduct: LockstepSchedule
     recorded: dict[str, int]
-    """Streams for the recorder and how many messages of each may wait; empty for none."""
+    """Streams for the recorder and their queue depths; empty without a recorder."""
 
 
 class _Planner:
-    """Reads one graph; each method answers one question about it."""
+    """Planner of one graph's actors."""
 
     def __init__(
         self,
@@ -128,7 +128,7 @@ class _Planner:
         self.steering = {name for edge in graph.navigation for name in _streams_of(edge)}
 
     def _add_sensors(self) -> None:
-        """Sensors that the application does not read run all the same, cameras if recorded."""
+        """Add sensors that the application does not read; cameras only if recorded."""
         for robot in self.robots:
             for sensor in robot.sensors:
                 stream = f"{robot.id}/{sensor.id}"
@@ -152,10 +152,10 @@ class _Planner:
         return state_stream(self.robot_of(node))
 
     def reaches_a_drone(self, stream: str, asked: frozenset[str] = frozenset()) -> bool:
-        """Whether the items of `stream` can change a drone's flight.
+        """Return whether items of `stream` can affect a drone.
 
         By navigation, by a trigger's command, or by waking an analysis that can; `asked` are the
-        streams that the question came through.
+        streams visited by the recursion.
         """
         if stream in self.steering:
             return True
@@ -184,7 +184,7 @@ class _Planner:
         )
 
     def is_managed(self, node: Node) -> bool:
-        """The dispatcher manages the analyses of frames that want to be scheduled."""
+        """Whether the dispatcher manages `node`: an analysis of frames that is `scheduled`."""
         if self.dispatch_with is None or not node.work.scheduled or not node.inputs:
             return False
         return all(self.graph.nodes[name].item is Frame for name in node.inputs)
@@ -196,7 +196,7 @@ class _Planner:
         nodes = self.managed()
         if self.dispatch_with is None or not nodes:
             return None
-        # In lockstep time stands still while an analysis runs, so there is nothing to offload.
+        # In lockstep time is held while an analysis runs, so offloading has no benefit.
         compute = {} if self.session.lockstep else self.compute
         envs = {node.id: self.runtime_env_of(node) for node in nodes}
         processes = cloud_processes(nodes, compute, envs)
@@ -247,7 +247,7 @@ class _Planner:
             state=self.state_of(node),
             external=node.kind == "external",
             dormant=node.dormant,
-            # The dispatcher publishes the results of those that it manages, wherever they ran.
+            # The dispatcher publishes the results of managed analyses, from edge and cloud.
             triggers=() if managed else self.triggers_of(node),
             kind=self.place_of(node).kind,
             acknowledges=self.acknowledgements(node.id) == 0 and not managed,
@@ -257,26 +257,26 @@ class _Planner:
         )
 
     def depth(self, stream: str) -> int:
-        """How many messages may wait for a reader of `stream` that wants them all."""
+        """Queue depth of `stream` for a reader of all messages."""
         node = self.graph.nodes.get(stream.removesuffix(task_stream("")))
         frames = stream.endswith(task_stream("")) or (node is not None and node.item is Frame)
         return FRAME_DEPTH if frames else MESSAGE_DEPTH
 
     def edge_of(self, robot: str | None) -> Placement:
-        """The edge beside a robot; that of all drones for analyses without a robot."""
+        """Edge of a robot; the default one for a node without a robot."""
         named = next((r.edge for r in self.robots if r.id == robot), None)
         return Placement("edge", self.compute[named].node) if named is not None else Placement()
 
     def place_of(self, node: Node) -> Placement:
         resource = self.compute[node.compute] if node.compute is not None else None
-        # Under a dispatcher, an analysis has an executor on the edge wherever it is deployed; an
-        # endpoint is called from there.
+        # A managed analysis always has an executor on the edge; an endpoint is called from the
+        # edge.
         if resource is None or resource.kind == "http" or self.is_managed(node):
             return self.edge_of(node.robot)
         return Placement(resource.kind, resource.node)
 
     def work_of(self, node: Node) -> Analytics[Any]:
-        """The analysis itself, or before the endpoint that it is deployed on."""
+        """The analysis itself, or the client of the endpoint that it is deployed on."""
         resource = self.compute[node.compute] if node.compute is not None else None
         work: Analytics[Any] = node.work
         if resource is None or resource.kind != "http" or self.is_managed(node):
@@ -284,7 +284,7 @@ class _Planner:
         return endpoint_analysis(work, short_name(node), resource, strict=False)
 
     def runtime_env_of(self, node: Node) -> RuntimeEnvConfig | None:
-        """An analysis' own packages; the environment file overrides the application."""
+        """Runtime environment of an analysis; the environment file's overrides its own."""
         return told(node.id, self.session.environment.runtime_env) or node.runtime_env
 
     def analyses_by_actor(self) -> tuple[AnalyticsActorPlan, ...]:
@@ -327,7 +327,7 @@ class _Planner:
         )
 
     def _room(self, source: str) -> int:
-        """Measurements beyond the newest whose results fit into the readers' queues."""
+        """Most measurements, beyond the newest, whose results fit into the readers' queues."""
         return max(0, MESSAGE_DEPTH // widest(self.graph, source) - 1)
 
     def conduct(
@@ -372,11 +372,11 @@ def make_plan(
     *,
     here: bool = True,
 ) -> FlightPlan:
-    """Decide which actors a graph becomes.
+    """Plan the actors of a graph.
 
-    With an analytics scheduler to `dispatch_with`, heavy analyses run when and where it says;
-    `here` is False where actors may run on other machines. Raises the project's errors for a
-    graph that cannot fly, with what is wrong and what to do about it.
+    The analytics scheduler `dispatch_with`, if any, decides when and where `scheduled` analyses
+    run; `here` is False if actors may run on other machines. Raises the project's errors, with
+    remedies, for a graph that cannot fly.
     """
     planner = _Planner(session, graph, compute, scheduler, dispatch_with)
     if not planner.robots:

@@ -1,4 +1,4 @@
-"""Shutdown of a run's actors: those that write end last, and each wait is bounded."""
+"""Shutdown of a run's actors: in groups, the recorder last, with a timeout for each."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _ANSWER_TIMEOUT = 5.0
 
 
 def may_fly(drone: Any) -> bool:  # noqa: ANN401 - an actor's handle
-    """Whether the mission of a drone's actor goes on, or may go on for all that is known."""
+    """Return whether the mission of a drone's actor is running, or its status is unknown."""
     try:
         report = cast("ActorReport", ray.get(drone.report.remote(), timeout=_ANSWER_TIMEOUT))
     except RayActorError:
@@ -31,9 +31,9 @@ def may_fly(drone: Any) -> bool:  # noqa: ANN401 - an actor's handle
 
 
 def end_actors(groups: Iterable[Sequence[Any]], helpers: Sequence[Any]) -> dict[Any, ActorReport]:
-    """Stop each group of actors in turn, then end the processes of all, the `helpers`' too.
+    """Stop each group of actors in turn, then end the processes of all, including `helpers`.
 
-    Returns the last report of each that gave one, by handle.
+    Returns the final reports by handle, of the actors that answered.
     """
     reports: dict[Any, ActorReport] = {}
     killed = list(helpers)
@@ -48,7 +48,7 @@ def end_actors(groups: Iterable[Sequence[Any]], helpers: Sequence[Any]) -> dict[
                 reports[references[reference]] = ray.get(reference)
     for actor in killed:
         with contextlib.suppress(RayError):
-            # To be killed takes the cluster's head, which may be lost.
+            # A kill needs the cluster's head, which may be lost; `leave` does not.
             actor.leave.remote()
             ray.kill(actor)
     return reports

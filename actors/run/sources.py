@@ -1,8 +1,8 @@
-"""The application's own modules as source text, and how another process imports them from it.
+"""The application's own modules as source text, and their import in other processes.
 
-Own is what was neither installed nor shipped with Python: files beside the application, packages
-there, plug-in folders. A node that lacks them imports what the application's process had; so no
-process of a run works with another version of a file.
+Own modules are neither installed nor shipped with Python: files and packages beside the
+application, plug-in folders. Other processes import the application's source text, so all
+processes of a run use the same version of a file.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ _INSTALLED = ("site-packages", "dist-packages")
 
 @dataclass(frozen=True)
 class Source:
-    """One module."""
+    """Source text of one module or package."""
 
     text: bytes
-    """As the file has it; empty for a package without a file of its own."""
+    """Content of the file; empty for a package without a file of its own."""
     file: str
-    """Where the application's process has it; other machines may not."""
+    """Path on the application's machine; other machines may lack it."""
     folders: tuple[str, ...] | None = None
-    """Of a package; None for a module."""
+    """Folders of a package; None for a module."""
 
 
 def own_sources(seeds: Iterable[tuple[str, list[str]]]) -> dict[str, Source]:
-    """The own ones of the modules `seeds`, and of all that those import, by name.
+    """Own modules among `seeds` and all their imports, by name.
 
-    A seed is a name and the folders to look for it in besides `sys.path`.
+    A seed is a module's name and the folders to search besides `sys.path`.
     """
     found: dict[str, Source] = {}
     seen: set[str] = set()
@@ -92,7 +92,7 @@ def _source(name: str, folders: list[str]) -> Source | None:
 
 
 def _found(name: str, folders: list[str]) -> ModuleSpec | None:
-    """Find a module without importing it or its packages."""
+    """Find the spec of a module without importing it or its packages."""
     parent, _, _ = name.rpartition(".")
     try:
         if not parent:
@@ -115,7 +115,7 @@ def _is_own(path: Path) -> bool:
 
 @lru_cache(maxsize=1024)
 def imported_names(text: bytes, package: str) -> tuple[str, ...]:
-    """Names that a source imports anywhere; relative ones refer to `package`."""
+    """Names that a source imports anywhere; `package` is the base of relative imports."""
     try:
         tree = ast.parse(text)
     except (SyntaxError, ValueError):
@@ -175,7 +175,7 @@ _finder = _Finder()
 
 
 def serve(sources: Mapping[str, Source]) -> None:
-    """Import the modules `sources` in this process from the given source texts, by name."""
+    """Make this process import the modules `sources`, by name, from their source text."""
     if _finder not in sys.meta_path:
         sys.meta_path.insert(0, _finder)
     _finder.sources.update(sources)

@@ -1,8 +1,8 @@
 """Streams between actors: keep-latest, counted drops, one behaviour over two transports.
 
-Between actors of one node a message travels in shared memory (`shared_memory.py`, iceoryx2); to
-another node in a Ray call or as an ObjectRef (`remote.py`). Placement decides; the other actors do
-not see which.
+Between actors of one node a message is sent in shared memory (`shared_memory.py`, iceoryx2); to
+another node in a Ray call or as an ObjectRef (`remote.py`). Placement decides, transparently to
+publishers and subscribers.
 """
 
 from aerodaas.actors.streams.codec import UnreadableError

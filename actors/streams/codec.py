@@ -1,9 +1,8 @@
-"""Messages as bytes: pickle 5 with large arrays out of band, so that a reader copies nothing.
+"""Codec of messages: pickle 5 with large arrays out of band, so that a reader copies nothing.
 
 Layout: u32 number of buffers, u32 length of the envelope's pickle, u32 length of the item's, u64
-length of each buffer, the two pickles, then each buffer, aligned to 64 bytes. Little-endian, as
-both ends run the same host. The envelope is apart so that it is readable without the item's
-classes.
+length of each buffer, the two pickles, then each buffer, aligned to 64 bytes. Little-endian. The
+envelope is separate so that it can be read even if the item cannot.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ _envelope = attrgetter(*(one.name for one in dataclasses.fields(Message) if one.
 _ALIGNMENT = 64
 _HEAD = struct.Struct("<III")
 _defined: set[str] = set()
-"""Streams whose items were found to be of classes that pickle cannot name."""
+"""Streams with items of classes that pickle cannot refer to by name."""
 
 
 class UnsendableError(AeroDaaSError):
@@ -38,7 +37,7 @@ class UnreadableError(AeroDaaSError):
     """An item cannot be rebuilt here."""
 
     def __init__(self, message: Message[Any], kind: str, reason: str) -> None:
-        """An item of the class `kind`; `message` is its envelope, empty."""
+        """Create the error for an item of class `kind`; `message` is its envelope, empty."""
         super().__init__(f"{kind} from {message.stream}: {reason}")
         self.message = message
 
@@ -51,7 +50,7 @@ class Encoded:
     """A message ready to be written into a buffer of `size` bytes."""
 
     def __init__(self, message: Message[Any]) -> None:
-        """Pickle the message, leaving the memory of its arrays where it is.
+        """Pickle the message without copying its arrays.
 
         Raises UnsendableError for an item that cannot be pickled.
         """
@@ -80,14 +79,14 @@ class Encoded:
             target[offset : offset + buffer.nbytes] = buffer
 
     def to_bytes(self) -> bytes:
-        """All of it as one bytes object."""
+        """The encoded message as one bytes object."""
         whole = bytearray(self.size)
         self.write_into(memoryview(whole))
         return bytes(whole)
 
 
 def encode(message: Message[Any]) -> bytes:
-    """The message as one bytes object."""
+    """Encode a message as one bytes object."""
     return Encoded(message).to_bytes()
 
 
@@ -124,7 +123,7 @@ def _pickled(message: Message[Any]) -> tuple[bytes, list[pickle.PickleBuffer]]:
     if message.stream not in _defined:
         try:
             return pickle.dumps(message.item, protocol=5, buffer_callback=buffers.append), buffers
-        except Exception:  # noqa: BLE001 - the other pickler names the cause
+        except Exception:  # noqa: BLE001 - the attempt below reports the reason
             buffers = []
     try:
         data = _definitions.pickled(message.item, buffers.append)

@@ -1,10 +1,10 @@
-"""Classes that no reader can import, such as those of the application's own file, by name.
+"""Definitions of classes that readers cannot import, such as those of the application's own file.
 
-Pickle names a class by its module, and the module `__main__` is another one in every process. The
-run hands all its processes the definitions of its application's classes beforehand (`define`), so
-that a message only names them. A class unknown then, such as one made in flight,
-travels with each message that needs it. Either way a process builds a class once, and
-`isinstance` holds wherever an item goes.
+Pickle refers to a class by its module, and the module `__main__` differs in every process. The
+run sends the definitions of its application's classes to all its processes beforehand
+(`define`), so that a message only refers to them by name. A class defined later, such as one
+created in flight, is sent with each message that needs it. In both cases a process builds a class
+once, and `isinstance` holds in every process.
 """
 
 from __future__ import annotations
@@ -24,36 +24,36 @@ __all__ = ["define", "name_of", "named", "pickled", "pickled_class", "register"]
 
 _lock = threading.RLock()
 _unbuilt: dict[str, bytes] = {}
-"""Definitions that were not needed yet, by name."""
+"""Pickled definitions that are not built yet, by name."""
 _built: dict[str, Any] = {}
-"""Definitions by name."""
+"""Built definitions by name."""
 _references: dict[int, tuple[Any, tuple[Any, ...]]] = {}
-"""How a class is put into a message, by its id; the class itself comes along, to keep it."""
+"""Pickle reductions by the id of their class, with the class itself, to keep it alive."""
 
 
 def define(definitions: Mapping[str, bytes]) -> None:
-    """Take definitions by name, as `pickled_class` made them; each is built when it is needed."""
+    """Store definitions by name, pickled by `pickled_class`; each is built when needed."""
     with _lock:
         new = {name: data for name, data in definitions.items() if name not in _built}
         _unbuilt.update(new)
 
 
 def register(name: str, definition: type) -> None:
-    """Call a class of this process `name`; in the process that it comes from."""
+    """Register a class of this process as `name`, in the process that defines it."""
     with _lock:
         _built[name] = definition
         _references[id(definition)] = definition, (named, (name,))
 
 
 def name_of(definition: object) -> str | None:
-    """The name of a class that was registered in this process; None for any other."""
+    """Name of a class registered in this process; None for any other."""
     with _lock:
         _, (build, arguments) = _references.get(id(definition), (None, (None, ())))
         return arguments[0] if build is named else None
 
 
 def named(name: str) -> Any:  # noqa: ANN401 - a class
-    """The definition of this name; raises ImportError, with the reason, if it cannot be built."""
+    """Definition of this name; raises ImportError if it is not defined in this run."""
     with _lock:
         if name not in _built:
             if name not in _unbuilt:
@@ -64,19 +64,19 @@ def named(name: str) -> Any:  # noqa: ANN401 - a class
 
 
 def _carried(name: str, data: bytes) -> Any:  # noqa: ANN401 - a class
-    """The definition that came with a message."""
+    """Definition sent with a message."""
     define({name: data})
     return named(name)
 
 
 def pickled_class(definition: object) -> bytes:
-    """A pickled class or function with everything that it needs; raises pickling's errors."""
+    """Pickle a class, function or object by value; raises the exceptions of pickling."""
     data: bytes = cloudpickle.dumps(definition, protocol=5)  # pyright: ignore[reportPrivateImportUsage]
     return data
 
 
 def pickled(item: object, buffers: Callable[[pickle.PickleBuffer], Any]) -> bytes:
-    """Pickle an item whose classes may be the application's; raises pickling's errors."""
+    """Pickle an item whose classes may be the application's; raises the errors of pickling."""
     file = io.BytesIO()
     pickler: Any = _Pickler
     pickler(file, protocol=5, buffer_callback=buffers).dump(item)
@@ -103,9 +103,9 @@ def _reference(definition: type) -> tuple[Any, ...]:
 
 
 def _find(definition: type) -> bool:
-    """Whether a class that came here by another path is one that the run has a name for."""
+    """Return whether a class received otherwise, such as in a Ray call, has a name in the run."""
     for name in [one for one in _unbuilt if one.partition("/")[2] == definition.__qualname__]:
-        # Cloudpickle keeps track of the classes that it has built: the same one comes back.
+        # Cloudpickle tracks the classes that it has built and returns the same one.
         if named(name) is definition:
             return True
     return id(definition) in _references

@@ -1,4 +1,4 @@
-"""Errors of pickling, in terms of the object's own attributes and items."""
+"""Diagnosis of pickling errors: the part of an object that cannot be pickled."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ __all__ = ["culprit"]
 
 _DEEPEST = 6
 _MOST = 1000
-"""Elements of one container that are looked at."""
+"""Most elements of one container that are examined."""
 
 
 def culprit(item: object, error: Exception) -> str:
-    """Name the part of `item` that cannot be sent; `error` is the error for the whole.
+    """Describe which part of `item` cannot be sent, and why; `error` is that of the whole.
 
     >>> import threading
     >>> culprit({"lock": threading.Lock()}, TypeError("cannot pickle '_thread.lock' object"))
@@ -30,7 +30,7 @@ def culprit(item: object, error: Exception) -> str:
 
 
 def _search(item: object, error: Exception, depth: int) -> tuple[str, Exception]:
-    """Path to the innermost part that fails, and its reason."""
+    """Path to the innermost part that fails, and its error."""
     if depth < _DEEPEST:
         for name, part in _parts(item):
             reason = _failure(part)
@@ -73,7 +73,7 @@ def _attributes(item: object) -> Iterator[tuple[str, object]]:
 
 
 def _state(item: object) -> object:
-    """The pickled parts of an object: its attributes, unless its class says otherwise."""
+    """Pickled state of an object: its attributes, unless its class defines another."""
     told = getattr(item, "__getstate__", None)
     if callable(told):
         with contextlib.suppress(Exception):
@@ -83,7 +83,7 @@ def _state(item: object) -> object:
 
 
 def _globals_used(of: type | Callable[..., Any]) -> Iterator[tuple[str, object]]:
-    """Global names of `__main__` that a function, or a class' methods, use: they travel along."""
+    """Globals of `__main__` used by a function or a class' methods, which are pickled with it."""
     for function in vars(of).values() if isinstance(of, type) else (of,):
         if isinstance(function, types.FunctionType) and function.__module__ == "__main__":
             for name in function.__code__.co_names:

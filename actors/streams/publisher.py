@@ -1,4 +1,4 @@
-"""The writing end of a stream."""
+"""Publisher of a stream."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ _MESSAGES_KEPT = 4
 
 
 class Publisher:
-    """Publishes one stream: in shared memory on this node, by reference to other nodes.
+    """Publisher of one stream: in shared memory on this node, by Ray calls to other nodes.
 
-    An item that cannot be sent leaves its message empty, so that readers that wait for it go on.
+    For an item that cannot be sent, an empty message is published, so that its readers continue.
     """
 
     def __init__(
@@ -32,7 +32,7 @@ class Publisher:
     ) -> None:
         """Open `stream` for writing; `scope` is the prefix of its name on this node.
 
-        `unsendable` is told of what cannot be sent, and why.
+        `unsendable` is called with a description of an item that cannot be sent.
         """
         self._unsendable = unsendable
         self.scope = scope
@@ -45,7 +45,7 @@ class Publisher:
         self._kept: deque[tuple[int, bytes]] | None = None
 
     def measure(self, item: Any, header: Header, captured: int) -> Message[Any]:  # noqa: ANN401
-        """Publish a measurement: the first message of its way. `captured` is host time in ns."""
+        """Publish a measurement, the first message of its path; `captured` is host time in ns."""
         span = TraceSpan(self.stream, captured, host_time_ns())
         return self._send(header.stamp, header, captured, (span,), item)
 
@@ -56,7 +56,7 @@ class Publisher:
         received: int,
         stamp: int,
     ) -> Message[Any]:
-        """Publish an item made from `origin`, which arrived at host time `received`."""
+        """Publish the result of `origin`, which was received at host time `received`."""
         spans = (*origin.spans, TraceSpan(self.stream, received, host_time_ns()))
         return self._send(stamp, origin.header, origin.captured, spans, item)
 
@@ -89,10 +89,10 @@ class Publisher:
         return message
 
     def since(self, seq: int) -> list[bytes]:
-        """Encoded messages from number `seq` on, of the newest few; any thread may ask.
+        """Encoded newest messages from number `seq` on; thread-safe.
 
-        They are kept from the first question on. A reader ahead of this publisher has known one
-        before it, and is given all.
+        They are kept from the first call on. A reader with a `seq` ahead of this publisher has
+        read its predecessor, and gets all of them.
         """
         if self._kept is None:
             self._kept = deque(maxlen=_MESSAGES_KEPT)
@@ -100,6 +100,6 @@ class Publisher:
         return [data for number, data in list(self._kept) if number >= first]
 
     def close(self) -> None:
-        """Leave the stream."""
+        """Close the stream."""
         if self._shared is not None:
             self._shared.close()

@@ -1,11 +1,11 @@
-"""Transport to another node: a few messages under way, the newest kept back.
+"""Transport to other nodes: a few messages in transit, and the newest one waiting.
 
-What a call carries arrives with it, up to Ray's RAY_max_direct_call_object_size; what lies in the
-object store costs its reader four or five round trips more. So a message for one reader goes in
-the call, and one for several, which may share a node and a link, lies in the store.
+An argument arrives with its call, up to Ray's RAY_max_direct_call_object_size; one in the object
+store costs its reader four or five round trips more. So a message for one reader is sent in the
+call, and one for several, which may share a node and a link, is put into the store.
 
-A link that is busy neither queues nor forgets the latest word: while deliveries are under way,
-one message waits for each reader, and a newer one takes its place.
+A busy link neither queues messages nor loses the latest one: while deliveries are in transit, one
+message waits for each reader, and a newer one replaces it.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ from aerodaas.actors.streams.codec import Encoded
 __all__ = ["RemoteReader", "send_to"]
 
 UNDER_WAY = 2
-"""Deliveries not yet acknowledged beyond which a slow link keeps the newest message only."""
+"""Unacknowledged deliveries beyond which a slow link keeps the newest message only."""
 
 
 class _Transfer:
-    """A message on its way, put into the object store once if several read it."""
+    """A message to deliver, put into the object store once if it has several readers."""
 
     def __init__(self, stream: str, data: bytes, *, shared: bool) -> None:
         self.stream = stream
@@ -33,10 +33,10 @@ class _Transfer:
         self._reference: ray.ObjectRef[bytes] | None = None
 
     def content(self) -> bytes | ray.ObjectRef[bytes]:
-        """The argument of the call: the bytes, or a reference to them."""
+        """Argument of the delivering call."""
         if not self._shared:
             return self._data
-        # Two threads may both put it, which costs a copy only.
+        # Two threads may both put it; that costs a copy only.
         if self._reference is None:
             self._reference = ray.put(self._data)
         return self._reference
@@ -48,7 +48,7 @@ class RemoteReader:
     def __init__(self, actor: Any, under_way: int = UNDER_WAY) -> None:  # noqa: ANN401
         """Deliver to `actor`, a Ray actor handle with a method `deliver(stream, data)`.
 
-        At most `under_way` deliveries are not yet acknowledged at any time.
+        At most `under_way` deliveries are unacknowledged at any time.
         """
         self._actor = actor
         self._limit = under_way
@@ -57,7 +57,7 @@ class RemoteReader:
         self._under_way = 0
         self._waiting: _Transfer | None = None
         self.skipped = 0
-        """Messages that gave way to newer ones while the link was busy."""
+        """Number of messages replaced by newer ones while the link was busy."""
 
     def send(self, transfer: _Transfer) -> None:
         """Deliver a message, now or as soon as the link is free."""
@@ -74,7 +74,7 @@ class RemoteReader:
         done.future().add_done_callback(self._delivered)
 
     def _delivered(self, _: object) -> None:
-        """A reader that has died counts as one that is done: the publisher goes on."""
+        """Send the waiting message after a delivery; a failed one counts, too."""
         with self._lock:
             transfer, self._waiting = self._waiting, None
             if transfer is None:
@@ -84,7 +84,7 @@ class RemoteReader:
 
 
 def send_to(readers: list[RemoteReader], stream: str, encoded: Encoded) -> None:
-    """Send a message to every reader; its arrays are copied, for they may change soon."""
+    """Send a message to every reader; its arrays are copied, because they may change soon."""
     transfer = _Transfer(stream, encoded.to_bytes(), shared=len(readers) > 1)
     for reader in readers:
         reader.send(transfer)

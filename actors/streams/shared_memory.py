@@ -1,8 +1,8 @@
-"""Publish-subscribe and event services of iceoryx2 for one stream; its only importer.
+"""Shared memory transport over iceoryx2: publish-subscribe and event services of one stream.
 
-Its Python API is young; the version is pinned in pyproject.toml. A publisher writes a message
-once into shared memory, a reader maps it without a copy, and a full reader loses its oldest
-message (safe overflow), never the newest.
+Only this module uses iceoryx2, whose Python API is young; the version is pinned in
+pyproject.toml. A publisher writes a message once into shared memory, a reader maps it without a
+copy, and a full reader loses its oldest message (safe overflow), never the newest.
 """
 
 from __future__ import annotations
@@ -20,27 +20,27 @@ __all__ = ["SharedPublisher", "SharedSubscriber", "SharedWaiter", "shared_memory
 
 MAX_READERS = 16
 MAX_DEPTH = 32
-"""Messages that a reader may leave waiting."""
+"""Largest queue depth of a reader."""
 MAX_BORROWED = 16
-"""Messages that a reader may hold on to while it goes on receiving."""
+"""Most messages that a reader may hold while it receives further ones."""
 _INITIAL_BYTES = 4096
 _COPIED_BYTES = 65536
-"""Messages up to this size are copied, which takes microseconds, so that no reader borrows them."""
+"""Messages up to this size are copied, in microseconds, so that readers need not borrow them."""
 
 
 @functools.cache
 def _iceoryx() -> Any:  # noqa: ANN401 - the library ships no types
-    iceoryx2: Any = importlib.import_module("iceoryx2")  # only where a stream is opened
+    iceoryx2: Any = importlib.import_module("iceoryx2")  # only if a stream is opened
     iceoryx2.set_log_level(iceoryx2.LogLevel.Fatal)
     return iceoryx2
 
 
 @functools.cache
 def shared_memory_available() -> bool:
-    """Whether this host can carry streams in shared memory."""
+    """Return whether this host supports streams in shared memory."""
     try:
         _node()
-    except Exception:  # noqa: BLE001 - with any error of the library the answer is no
+    except Exception:  # noqa: BLE001 - any exception of the library means unavailable
         return False
     return True
 
@@ -87,7 +87,7 @@ def _event(name: str, notifiers: int) -> Any:  # noqa: ANN401
 
 
 class SharedPublisher:
-    """Writes one stream into shared memory."""
+    """Publisher of one stream in shared memory."""
 
     def __init__(self, name: str) -> None:
         """Open the stream `name` for writing."""
@@ -99,11 +99,11 @@ class SharedPublisher:
             .allocation_strategy(iox.AllocationStrategy.PowerOfTwo)
             .create()
         )
-        # The library keeps slots for all that its readers may hold; memory is only touched when
-        # they are used. With fewer slots than that, a reader that falls behind aborts us.
+        # The library keeps slots for all messages that its readers may hold; memory is touched
+        # only when used. With fewer slots, a slow reader would abort this process.
         self._notifier = event.notifier_builder().create()
         self.refused = 0
-        """Messages not sent because there was no memory for them."""
+        """Number of messages not sent for lack of memory."""
 
     def send(self, encoded: Encoded) -> None:
         """Write a message and wake the readers."""
@@ -119,13 +119,13 @@ class SharedPublisher:
         self._notifier.notify()
 
     def close(self) -> None:
-        """Leave the stream."""
+        """Close the stream."""
         self._publisher.delete()
         self._notifier.delete()
 
 
 class _Loan:
-    """A message that its reader has not let go of."""
+    """A message that its reader still holds."""
 
     __slots__ = ("__weakref__", "_sample")
 
@@ -134,7 +134,7 @@ class _Loan:
 
 
 class SharedSubscriber:
-    """Reads one stream from shared memory."""
+    """Subscriber of one stream in shared memory."""
 
     def __init__(self, name: str, depth: int) -> None:
         """Open the stream `name`, keeping the newest `depth` messages."""
@@ -144,16 +144,15 @@ class SharedSubscriber:
         self._loans: weakref.WeakSet[_Loan] = weakref.WeakSet()
 
     def receive(self) -> Message[Any] | None:
-        """Return the oldest message kept, or None.
+        """Return the oldest queued message, or None.
 
-        Large arrays in it live in shared memory, unless the reader holds on to so many already
-        that only a copy lets it go on receiving. Raises UnreadableError if its item cannot be
-        rebuilt here.
+        Its large arrays are in shared memory, or copied if the reader already holds too many
+        messages to receive another. Raises UnreadableError if its item cannot be rebuilt here.
         """
         try:
             sample = self._subscriber.receive()
         except Exception:  # noqa: BLE001 - ReceiveError has no stable import path
-            # A publisher that died halfway; the living must not fall over it.
+            # A publisher died while sending; its readers must continue.
             return None
         if sample is None:
             return None
@@ -169,16 +168,16 @@ class SharedSubscriber:
         return decode(memoryview(block).cast("B"))
 
     def close(self) -> None:
-        """Leave the stream."""
+        """Close the stream."""
         self._subscriber.delete()
         self.listener.delete()
 
 
 class SharedWaiter:
-    """Sleeps until one of several streams, or another thread of this process, calls."""
+    """Waits for a message on one of several streams, or for a wake-up by another thread."""
 
     def __init__(self, name: str) -> None:
-        """Wait under the process-wide unique `name`."""
+        """Create the wait set; `name` of its event is unique in the process."""
         iox = _iceoryx()
         self._microseconds = iox.Duration.from_micros
         builder = iox.WaitSetBuilder.new().signal_handling_mode(iox.SignalHandlingMode.Disabled)
@@ -190,19 +189,19 @@ class SharedWaiter:
         self._guards = [self._set.attach_notification(self._listener)]
 
     def attach(self, subscriber: SharedSubscriber) -> None:
-        """Wake up for this stream, too."""
+        """Add a stream that ends the wait."""
         self._listeners.append(subscriber.listener)
         self._guards.append(self._set.attach_notification(subscriber.listener))
 
     def wait(self, timeout: float) -> None:
-        """Sleep up to `timeout` seconds, without holding the interpreter."""
+        """Wait up to `timeout` seconds, without holding the interpreter lock."""
         self._set.wait_and_process_with_timeout(self._microseconds(max(1, int(timeout * 1e6))))
         for listener in self._listeners:
             while listener.try_wait():
                 pass
 
     def wake(self) -> None:
-        """Wake the sleeper from another thread."""
+        """End the wait from another thread."""
         self._notifier.notify()
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""The reading end: one subscriber for all the streams that an actor reads."""
+"""Subscriber of all the streams that an actor reads."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ __all__ = ["Subscriber"]
 
 
 class Subscriber:
-    """Reads several streams from one thread; another thread may `deliver` and `wake`.
+    """Subscriber of several streams for one thread; other threads may `deliver` and `wake`.
 
-    Each stream keeps its newest `depth` messages. What was overwritten unread shows as a gap in
-    the messages' `seq` and is counted in `dropped`.
+    Each stream keeps its newest `depth` messages. Messages overwritten unread leave a gap in
+    `seq` and are counted in `dropped`.
     """
 
     def __init__(
@@ -35,10 +35,10 @@ class Subscriber:
         depths: Mapping[str, int],
         unreadable: Callable[[str], None] = warnings.warn,
     ) -> None:
-        """Read the streams named in `depths`; `scope` is the prefix of their names on this node.
+        """Subscribe to the streams of `depths`; `scope` is the prefix of their names on this node.
 
-        `name` is the reader's own, unique within the scope. A message whose item cannot be rebuilt
-        here is received empty, and `unreadable` is told what it was, and why, in any thread.
+        `name` is the reader's, unique within the scope. A message whose item cannot be rebuilt
+        here is received empty, and `unreadable` is called with the reason, in any thread.
         """
         self._unreadable = unreadable
         self.received: dict[str, int] = dict.fromkeys(depths, 0)
@@ -58,9 +58,9 @@ class Subscriber:
             self._subscribe(depths)
 
     def add(self, depths: Mapping[str, int]) -> threading.Event:
-        """Read these streams, too; any thread may ask.
+        """Request a subscription to further streams; thread-safe.
 
-        The event is set once the reading thread has subscribed: what is published later arrives.
+        The event is set once the reading thread has subscribed: later messages are received.
         """
         subscribed = threading.Event()
         self._added.put((depths, subscribed))
@@ -68,7 +68,7 @@ class Subscriber:
         return subscribed
 
     def subscribe_added(self) -> None:
-        """Subscribe to added streams; for the reading thread, whose `receive` calls it, too."""
+        """Subscribe to the added streams, in the reading thread; `receive` does it, too."""
         while not self._added.empty():
             depths, subscribed = self._added.get()
             fresh = {name: depth for name, depth in depths.items() if name not in self._delivered}
@@ -80,14 +80,14 @@ class Subscriber:
 
     @property
     def shared(self) -> bool:
-        """True where this subscriber reads shared memory."""
+        """True if this subscriber reads shared memory."""
         return self._waiter is not None
 
     def receive(self, timeout: float) -> list[Message[Any]]:
-        """Return the messages that have arrived, in order within each stream.
+        """Return new messages, in order within each stream; wait up to `timeout` seconds.
 
-        Waits up to `timeout` seconds for one; returns early, perhaps empty-handed, when woken.
-        Streams come in the order in which they were named, regardless of the order of arrival.
+        Returns early, perhaps without messages, when woken. Streams are in the order of
+        subscription, independent of the order of arrival.
         """
         self.subscribe_added()
         messages = self._collect()
@@ -97,7 +97,7 @@ class Subscriber:
         return messages
 
     def deliver(self, stream: str, data: bytes) -> None:
-        """Take a message that came from another node."""
+        """Add a message from another node."""
         try:
             message = decode(memoryview(data))
         except UnreadableError as error:
@@ -107,7 +107,7 @@ class Subscriber:
         self.wake()
 
     def wake(self) -> None:
-        """Let a waiting `receive` return."""
+        """Make a waiting `receive` return."""
         with self._called:
             self._calls += 1
             self._called.notify_all()
@@ -115,7 +115,7 @@ class Subscriber:
             self._waiter.wake()
 
     def close(self) -> None:
-        """Leave all streams."""
+        """Close all streams."""
         for subscriber in self._subscribers.values():
             subscriber.close()
         if self._waiter is not None:

@@ -1,1 +1,1 @@
-"""Recording a flight to MCAP, reading it again, and reporting on it."""
+"""Recording of flights to MCAP, reading of recordings, replay, export and reports."""

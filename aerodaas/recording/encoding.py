@@ -1,4 +1,4 @@
-"""Messages as bytes: our JSON channels, and the entries that converters yield."""
+"""Encoding of messages for a recording: topics, JSON schemas and strict JSON."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ __all__ = ["Entry", "json_bytes", "json_schema", "plain", "stream_of", "topic"]
 _DEEPEST = 12
 _LONGEST_ARRAY = 4096
 _TAKEN = frozenset({"fence", "setpoints", "state", "status"})
-"""Last parts of the topics of a robot that are the project's own."""
+"""Last parts of a robot's topics that are reserved for this project."""
 _OWN = "own."
 _LONGEST_TEXT = 1000
 _DEEPEST_OBJECT = 4
@@ -33,23 +33,23 @@ _FORBIDDEN = re.compile(r"[^A-Za-z0-9_/\-]+")
 
 
 class Entry(NamedTuple):
-    """One message for one channel, encoded."""
+    """One encoded message for one channel."""
 
     topic: str
     schema: Schema
-    """Of the channel; its encoding is `protobuf` or `jsonschema`."""
+    """Schema of the channel; its encoding is `protobuf` or `jsonschema`."""
     data: bytes
     stamp: int | None = None
-    """Mission clock of the described moment, where it isn't the message's own measurement."""
+    """Mission time of the described measurement, if it differs from the message header's."""
 
 
 @lru_cache(maxsize=4096)
 def topic(stream: str, kind: str) -> str:
-    """Topic of one kind of data of a stream: `/robot/camera/image`.
+    """Topic of one kind of data of a stream, such as `/robot/camera/image`.
 
-    Dots and blanks become `_`; a stream that is already named after the kind does not repeat it.
-    Streams of the project's own go without the sign that tells them apart (`/robot/state`), so a
-    robot's sensor or analysis of such a name is recorded as `/robot/own.state`.
+    Dots and blanks become `_`; a stream already named after the kind does not repeat it. The
+    marker of internal streams is removed (`/robot/state`), so a robot's sensor or analysis with
+    such a name is recorded as `/robot/own.state`.
     """
     plain_name = stream.replace(INTERNAL, "") if is_internal(stream) else stream
     name = "/" + _FORBIDDEN.sub("_", plain_name).strip("/")
@@ -60,13 +60,13 @@ def topic(stream: str, kind: str) -> str:
 
 
 def stream_of(name: str) -> str:
-    """The stream of a sensor or an analysis whose topic, without the kind, is `name`."""
+    """Stream of a sensor or analysis from its topic without the kind; inverse of `topic`."""
     owner, slash, last = name.strip("/").rpartition("/")
     return f"{owner}{slash}{last.removeprefix(_OWN)}"
 
 
 def json_schema(name: str, **properties: str | dict[str, Any]) -> Schema:
-    """Schema of a JSON channel; a property given by a string is of that JSON type."""
+    """Schema of a JSON channel; a property given as a string has that JSON type."""
     body = {
         "type": "object",
         "properties": {
@@ -80,19 +80,19 @@ def json_schema(name: str, **properties: str | dict[str, Any]) -> Schema:
 
 
 def json_bytes(value: dict[str, Any]) -> bytes:
-    """Encode any object as strict JSON; unknown types are converted by `plain`."""
+    """Encode a dictionary as strict JSON; values of other types are converted by `plain`."""
     try:
         return json.dumps(value, default=plain, allow_nan=False, separators=(",", ":")).encode()
     except (ValueError, TypeError, RecursionError):
-        # NaN, infinity, keys that are no strings, cycles, lone surrogates: rare, so paid for here.
+        # NaN, infinity, keys that are no strings, cycles, lone surrogates: rare, hence a slow path.
         return json.dumps(plain(value), separators=(",", ":")).encode()
 
 
 def plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - any JSON value
-    """Reduce any object to JSON's types; never raises, even if the object's methods do.
+    """Reduce any object to JSON's types; never raises, even if a method of the object does.
 
-    Numbers that are not finite become None, large arrays their shape and type, members of an
-    enumeration their name, objects with fields those fields, and others what they print as.
+    Non-finite numbers become None, large arrays their shape and type, enumeration members their
+    name, objects with fields a dictionary of these fields, and other objects their `str`.
     """
     if value is None or isinstance(value, bool | int | str):
         return value
@@ -101,7 +101,7 @@ def plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - any JSON valu
     if isinstance(value, np.integer | np.bool_):
         return value.item()
     if depth < _DEEPEST:
-        # Whatever an object of the application's raises when it is asked.
+        # An object of the application may raise any exception from its own methods.
         with suppress(Exception):
             return _plain_container(value, depth + 1)
     return f"<{type(value).__name__}>"
@@ -120,14 +120,14 @@ def _plain_container(value: object, depth: int) -> Any:  # noqa: ANN401 - any JS
     if isinstance(value, list | tuple | AbstractSet):
         return [plain(item, depth) for item in value]
     fields = {} if isinstance(value, type | Enum) else _fields(value)
-    # Objects that name each other are left to their names sooner than nested lists are.
+    # Objects that refer to each other are cut off at a smaller depth than nested lists.
     if fields and depth <= _DEEPEST_OBJECT:
         return {name: plain(item, depth) for name, item in fields.items()}
     return _words(value)
 
 
 def _fields(value: Any) -> dict[str, Any]:  # noqa: ANN401 - any object
-    """The fields that an object declares; nothing for one of Python's own."""
+    """Data fields of an object by name; empty for objects of the standard library."""
     dump = getattr(value, "model_dump", None) or getattr(value, "get_data", None)
     if callable(dump):
         data = dump()
@@ -150,6 +150,6 @@ def _words(value: object) -> str:
 
 
 def _wordless(kind: type) -> bool:
-    """Whether objects of a class print as no more than its name and an address."""
+    """Whether the class has neither `__str__` nor `__repr__` of its own."""
     words: tuple[object, object] = kind.__str__, kind.__repr__
     return words == (object.__str__, object.__repr__)

@@ -1,7 +1,7 @@
-"""Images as H.264 for Foxglove's CompressedVideo, and back.
+"""H.264 encoder and decoder for Foxglove's CompressedVideo.
 
-One frame a message, Annex B, no B-frames, parameter sets before every key frame: a reader may
-begin at any of them. PyAV is loaded only where a video is.
+One frame per message, Annex B, no B-frames, parameter sets before every key frame, so that a
+reader can start at any key frame. PyAV is imported only when video is used.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 __all__ = ["H264Decoder", "H264Encoder", "is_key_frame", "require_encoder"]
 
 KEY_FRAME_NS = NANOSECONDS
-"""Mission time between key frames: the most that seeking must decode."""
+"""Mission time between key frames, the most that a seek must decode; nanoseconds."""
 _ENCODER = "libx264"
 _UNIT = re.compile(rb"\x00\x00\x01(.)", re.DOTALL)
 _PICTURE = frozenset({1, 5})
@@ -35,7 +35,7 @@ _TICKS = 90_000
 
 
 def require_encoder() -> None:
-    """Raise RecordingError where FFmpeg was built without the encoder that recordings need."""
+    """Raise RecordingError if FFmpeg was built without the libx264 encoder."""
     import av.codec  # noqa: PLC0415 - 30 MB that other recordings do without
 
     if _ENCODER not in av.codec.codecs_available:
@@ -46,12 +46,12 @@ def require_encoder() -> None:
 
 
 class H264Encoder:
-    """Encoder of one camera's images of one size, each encoded on arrival."""
+    """H.264 encoder for one camera's images of one size, without lookahead."""
 
     def __init__(self, width: int, height: int, quality: int) -> None:
-        """Encode images of `width` x `height` at x264's constant rate factor `quality`.
+        """Encode images of `width` x `height` pixels at x264's constant rate factor `quality`.
 
-        Sizes that are odd grow by a pixel, for colours have half the resolution.
+        Odd sizes are padded by a pixel, because colours have half the resolution.
         """
         import av  # noqa: PLC0415 - as above
         from av.error import FFmpegError  # noqa: PLC0415
@@ -62,7 +62,7 @@ class H264Encoder:
         codec.width, codec.height = width + width % 2, height + height % 2
         codec.pix_fmt = "yuv420p"
         codec.time_base = Fraction(1, _TICKS)
-        # OpenCV's conversion is that of standard definition, whatever the size.
+        # OpenCV converts with the standard-definition matrix at every size.
         codec.colorspace, codec.color_range = 6, 1
         codec.max_b_frames = 0
         codec.thread_count = 1
@@ -83,10 +83,9 @@ class H264Encoder:
         self._next_key: int | None = None
 
     def encode(self, image: NDArray[np.uint8], stamp: int) -> bytes:
-        """Encode an image (BGR) taken at mission time `stamp`.
+        """Encode an image (BGR) captured at mission time `stamp`, nanoseconds.
 
-        After an error the next picture is a key frame; raises ValueError for a picture that
-        cannot be encoded.
+        Raises ValueError if the image cannot be encoded; the next one is then a key frame.
         """
         key = self._next_key is None or not self._next_key - KEY_FRAME_NS <= stamp < self._next_key
         self._next_key = stamp + KEY_FRAME_NS if key else self._next_key
@@ -109,7 +108,7 @@ class H264Encoder:
 
 
 def is_key_frame(data: bytes) -> bool:
-    """Whether decoding may begin with the frame `data` (H.264, Annex B)."""
+    """Return whether decoding can start at the frame `data` (H.264, Annex B)."""
     for unit in _UNIT.finditer(data):
         kind = unit[1][0] & 0x1F
         if kind in _PICTURE:
@@ -118,21 +117,22 @@ def is_key_frame(data: bytes) -> bool:
 
 
 class H264Decoder:
-    """Decodes any frame of a video, given those from its key frame on, each at most once in order.
+    """Decoder for any frame of a video, given the frames since its key frame.
 
-    A picture that was asked for out of order is decoded from its key frame again.
+    Frames requested in order are decoded once each; a frame requested out of order is decoded
+    from its key frame again.
     """
 
     def __init__(self) -> None:
         self._group: Sequence[bytes] | None = None
         self._done = 0
-        """Frames of the group that were decoded."""
+        """Number of frames of the group decoded so far."""
         self._picture: VideoFrame | None = None
 
     def decode(self, group: Sequence[bytes], place: int) -> NDArray[np.uint8] | None:
-        """Decode frame `place` of `group`, which begins with a key frame; BGR.
+        """Decode frame `place` of `group`, which starts with a key frame, to BGR.
 
-        Returns None for one that is broken, or rests on a broken one.
+        Returns None for a frame that is broken or depends on a broken one.
         """
         from aerodaas.cameras.h264 import FrameDecoder, WholeFrame  # noqa: PLC0415 - loads PyAV
 

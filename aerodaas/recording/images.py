@@ -1,6 +1,6 @@
 """Decoding of recorded images: Foxglove's and ROS 2's, compressed or raw, to BGR.
 
-And the depth pictures that this project records: raw, 16UC1.
+Also decodes the depth images that this project records (raw, 16UC1).
 """
 
 from __future__ import annotations
@@ -26,9 +26,9 @@ __all__ = [
 _COMPRESSED = frozenset({"foxglove.CompressedImage", "sensor_msgs/msg/CompressedImage"})
 _RAW = frozenset({"foxglove.RawImage", "sensor_msgs/msg/Image"})
 IMAGE_SCHEMAS = _COMPRESSED | _RAW
-"""Schemas whose messages `decode_image` reads."""
+"""Schemas of the messages that `decode_image` decodes."""
 VIDEO_SCHEMAS = frozenset({"foxglove.CompressedVideo", "foxglove_msgs/msg/CompressedVideo"})
-"""Schemas of messages that are decoded together with those before them."""
+"""Schemas of video messages, which are decoded together with the preceding ones."""
 
 
 class _Layout(NamedTuple):
@@ -36,9 +36,9 @@ class _Layout(NamedTuple):
 
     channels: int
     kind: str
-    """numpy's type of one channel."""
+    """numpy type code of one channel."""
     conversion: int | None
-    """OpenCV's, to BGR; None for BGR itself."""
+    """OpenCV's conversion code to BGR; None for BGR itself."""
 
 
 _LAYOUTS = {
@@ -66,7 +66,7 @@ _LAYOUTS = {
 def decode_image(schema: str, value: Any) -> NDArray[np.uint8] | None:  # noqa: ANN401 - by schema
     """Decode a message of one of `IMAGE_SCHEMAS` to height x width x 3 of BGR.
 
-    Returns None for a broken picture; raises SourceError for a pixel format that isn't known.
+    Returns None for a broken image; raises SourceError for an unknown pixel format.
     """
     data = np.frombuffer(picture_bytes(value), np.uint8)
     if schema in _COMPRESSED:
@@ -106,7 +106,7 @@ def _pixels(
     data: NDArray[np.uint8],
     layout: _Layout,
 ) -> NDArray[Any] | None:
-    """Height x width x channels, as they were written; None if bytes are missing."""
+    """Pixels as stored, height x width x channels; None if bytes are missing."""
     width, height = int(picture_field(value, "width")), int(picture_field(value, "height"))
     pixel = layout.channels * np.dtype(layout.kind).itemsize
     step = int(picture_field(value, "step")) or width * pixel
@@ -126,7 +126,7 @@ def picture_bytes(value: Any) -> bytes:  # noqa: ANN401
 
 
 def picture_field(value: Any, name: str, default: Any = None) -> Any:  # noqa: ANN401
-    """A field of a message in any of its encodings."""
+    """A field of a JSON, protobuf or ROS 2 message; `default` if it is missing."""
     if isinstance(value, dict):
         return value.get(name, default)
     return getattr(value, name, default)

@@ -1,4 +1,4 @@
-"""Where everything lies in an MCAP file, from its summary or, for a cut-off file, by scanning.
+"""Index of an MCAP file, from its summary or, for a cut-off file, from a scan.
 
 The format is https://mcap.dev/spec: records of an opcode, a length and a body, most of them
 inside compressed chunks.
@@ -35,20 +35,20 @@ BROKEN = (
     RuntimeError,
     zstandard.ZstdError,
 )
-"""Exceptions of reading damaged bytes."""
+"""Exceptions that reading damaged bytes may raise."""
 
 _MAGIC = 8
 _RECORD_HEAD = 9
 _CHECKSUM = 4
 _FOOTER_END = 8 + 8 + _CHECKSUM + _MAGIC
-"""Bytes from the footer's first figure, where the summary begins, to the end of the file."""
+"""Bytes from the footer's first field, the summary's offset, to the end of the file."""
 _LOOSE = 1 << 20
 """Bytes up to which messages outside chunks are gathered into one block."""
 
 
 @dataclass(slots=True)
 class Block:
-    """A chunk, or a run of messages that lie in no chunk."""
+    """A chunk, or a run of messages outside chunks."""
 
     offset: int
     length: int
@@ -58,31 +58,31 @@ class Block:
     end: int = 0
     """Latest log time."""
     channels: set[int] = field(default_factory=set)
-    """Ids of the channels with messages in it."""
+    """Ids of the channels with messages in the block."""
     damaged: bool = False
-    """It could not be read."""
+    """Whether reading the block has failed."""
 
 
 @dataclass(slots=True)
 class FileIndex:
-    """The contents of a file."""
+    """Index of an MCAP file: schemas, channels, blocks, metadata and attachments."""
 
     complete: bool
-    """The file was closed properly."""
+    """Whether the file was closed properly."""
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     blocks: list[Block] = field(default_factory=list)
     counts: Counter[int] = field(default_factory=Counter)
-    """Messages by channel."""
+    """Number of messages by channel id."""
     metadata: list[Metadata] = field(default_factory=list)
     attachments: dict[str, tuple[int, int]] = field(default_factory=dict)
     """Offset and length of each attachment's record, by name."""
     damaged: int = 0
-    """Chunks that could not be read."""
+    """Number of chunks that could not be read."""
 
 
 def read_index(file: BinaryIO, size: int) -> FileIndex:
-    """Index a file of `size` bytes; raises one of `BROKEN` if it isn't MCAP at all."""
+    """Index a file of `size` bytes; raises one of `BROKEN` if it is not MCAP."""
     read_magic(ReadDataStream(file))
     try:
         file.seek(0)
@@ -113,7 +113,7 @@ def load(file: BinaryIO, block: Block) -> list[McapRecord]:
 
 
 def _tells_all(summary: Summary) -> bool:
-    """Whether everything is found by a summary; its writer may leave out any part of it."""
+    """Whether a summary indexes the whole file; its writer may leave out any part of it."""
     told = summary.statistics
     return (
         told is not None
@@ -128,7 +128,7 @@ def _tells_all(summary: Summary) -> bool:
 
 
 def _intact(file: BinaryIO, size: int) -> bool:
-    """Whether the summary is as it was written; true where its writer took no checksum."""
+    """Whether the summary's checksum matches; true if its writer stored no checksum."""
     file.seek(size - _FOOTER_END)
     start, _, checksum = struct.unpack("<QQI", file.read(_FOOTER_END - _MAGIC))
     file.seek(start)
@@ -167,11 +167,11 @@ def _scan(file: BinaryIO, size: int) -> FileIndex:
         file.seek(offset)
         opcode, length = struct.unpack("<BQ", file.read(_RECORD_HEAD))
         end = offset + _RECORD_HEAD + length
-        # There is no opcode 0: a machine that lost its power leaves zeros, maybe gigabytes of them.
+        # There is no opcode 0: a machine that lost power may leave gigabytes of zeros.
         if end > size or opcode in {0, Opcode.FOOTER}:
             index.complete = opcode != 0 and end + _MAGIC == size
             break
-        # What follows the end of the data, the index, only repeats what was said.
+        # The records after the end of the data, the index, only repeat earlier ones.
         over = over or opcode == Opcode.DATA_END
         try:
             if not over:

@@ -1,4 +1,4 @@
-"""The recording's channels over Foxglove's WebSocket while the mission flies."""
+"""Live view of a recording's channels over Foxglove's WebSocket during the mission."""
 
 from __future__ import annotations
 
@@ -16,18 +16,26 @@ from aerodaas.types.errors import ConfigError
 __all__ = ["LiveServer"]
 
 _BACKLOG = 256
-"""Messages kept for a client that is slow to read; older ones are dropped for it alone."""
+"""Messages queued for a slow client; older ones are dropped for this client only."""
 
 
 class LiveServer(ServerListener):
-    """Serves entries to connected viewers; almost free without one.
+    """Foxglove WebSocket server for recorded entries; nearly free of cost without clients.
 
-    A client that comes later, or turns a channel on, gets the channel's last message at once:
-    the plan, the fence and the calibration are written only when they change.
+    A client that connects later, or subscribes to a channel, gets the channel's last message at
+    once: the plan, the geofence and the calibration are written only when they change.
     """
 
     def __init__(self, address: str, name: str = "") -> None:
-        """Listen at `address`, `host:port`; port 0 takes a free one. Raises ConfigError."""
+        """Start the server.
+
+        Args:
+            address: `host:port` to listen on; port 0 selects a free one.
+            name: Server name shown to clients; empty for `AeroDaaS`.
+
+        Raises:
+            ConfigError: If the address is malformed or cannot be listened on.
+        """
         host, _, port = address.rpartition(":")
         if not host or not port.isdigit():
             raise ConfigError(f"a live view is served at host:port, not at {address!r}")
@@ -49,19 +57,19 @@ class LiveServer(ServerListener):
                 f"cannot serve a live view at {address}: {error}; give another --live-address"
             ) from None
         self.port = self._server.port
-        """The port that is listened at."""
+        """Port that the server listens on."""
 
     def put(self, entry: Entry, log_time: int) -> None:
-        """Send an entry, logged at Unix time `log_time` in nanoseconds."""
+        """Send an entry with the log time `log_time`, Unix nanoseconds."""
         channel = self._channels.get(entry.topic) or self._register(entry)
         if entry.schema.name not in VIDEO_SCHEMAS:
-            # Of a video, nothing can be seen before the next key frame.
+            # A repeated video message cannot be decoded before the next key frame.
             with self._lock:
                 self._last[entry.topic] = (entry.data, log_time)
         channel.log(entry.data, log_time=log_time)
 
     def on_subscribe(self, client: Client, channel: ChannelView) -> None:
-        """Repeat a channel's last message for a new viewer."""
+        """Repeat a channel's last message for a new subscriber."""
         del client
         with self._lock:
             last = self._last.get(channel.topic)
@@ -71,7 +79,7 @@ class LiveServer(ServerListener):
             known.log(data, log_time=log_time)
 
     def close(self) -> None:
-        """Disconnect all viewers."""
+        """Stop the server and disconnect all clients."""
         self._server.stop()
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""The outcome of a recording."""
+"""Summary of a closed recording: messages, drops, duration and size."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["RecordingSummary"]
 
 @dataclass(frozen=True, slots=True)
 class RecordingSummary:
-    """Figures of a recording that has been closed."""
+    """Figures of a closed recording."""
 
     path: Path
     channels: Mapping[str, int]
@@ -21,17 +21,17 @@ class RecordingSummary:
     duration: float
     """Mission seconds from the first message to the last."""
     size: int
-    """Bytes of the file."""
+    """File size in bytes."""
     stopped: str = ""
-    """Why recording ended early, or empty."""
+    """Reason why recording ended early, or empty."""
 
     @property
     def messages(self) -> int:
-        """Messages written in all."""
+        """Total number of messages written."""
         return sum(self.channels.values())
 
     def __str__(self) -> str:
-        """One line for a person."""
+        """One readable line."""
         text = (
             f"{self.path}: {self.size / 1e6:.1f} MB, {self.duration:.1f} s, "
             f"{self.messages} messages on {len(self.channels)} channels"

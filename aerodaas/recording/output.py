@@ -1,4 +1,4 @@
-"""The file that a recording is written to: never overwrites, always ends at a whole record."""
+"""Output file of a recording: never overwrites a file, always ends at a whole record."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ __all__ = ["Output"]
 
 
 class Output:
-    """A new file for MCAP's writer, which hands over whole records one `write` at a time.
+    """A new file for MCAP's writer, which passes whole records to each `write`.
 
-    Unbuffered, so that what `write` has returned from survives the death of this process. A
-    write that fails half-way (disk full) is taken back, and the file stays readable.
+    Unbuffered, so that completed writes survive the death of this process. A write that fails
+    half-way (disk full) is rolled back, and the file stays readable.
     """
 
     def __init__(self, path: Path) -> None:
-        """Create `path` and its folders; RecordingError if it exists or cannot be made."""
+        """Create `path` and its folders; raises RecordingError if it exists or cannot be made."""
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             self._file = path.open("xb", buffering=0)
@@ -39,7 +39,7 @@ class Output:
         self._size = 0
 
     def write(self, data: bytes) -> int:
-        """Append all of `data` or none of it; raises OSError."""
+        """Append all of `data`; raises OSError, with nothing appended, if that fails."""
         remaining = memoryview(data)
         try:
             while remaining:
@@ -52,14 +52,14 @@ class Output:
         return len(data)
 
     def tell(self) -> int:
-        """Bytes written so far."""
+        """Number of bytes written so far."""
         return self._size
 
     def flush(self) -> None:
         """Do nothing: every write has reached the operating system when it returns."""
 
     def sync(self) -> None:
-        """Return when the operating system has put everything on the disk; raises OSError."""
+        """Wait until the operating system has written everything to disk; raises OSError."""
         os.fsync(self._file.fileno())
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Images and detections of a recording, as the types that streams carry."""
+"""Images and detections of a recording, decoded to the types of the streams."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ __all__ = [
 
 _PICTURE_SCHEMAS = IMAGE_SCHEMAS | VIDEO_SCHEMAS
 _DEPTH = "/aligned_depth"
-"""End of the topic of our frames' depth, whose frames are described beside it."""
+"""End of the topic of a frame's depth image, next to the topic of its header."""
 _AHEAD = 4
-"""Images decoded ahead."""
+"""Number of images decoded ahead of the reader."""
 
 
 @dataclass
 class _Video:
-    """A video as far as it was read: the frames since the last key frame."""
+    """Decoder of a video and its frames read since the last key frame."""
 
     decoder: H264Decoder = field(default_factory=H264Decoder)
     group: list[bytes] = field(default_factory=list)
@@ -60,7 +60,7 @@ class _Video:
 
 @dataclass(frozen=True, slots=True)
 class _VideoFrame:
-    """A frame of a video, with the data needed to decode it."""
+    """A frame of a video, with its decoder and the frames that it depends on."""
 
     decoder: H264Decoder
     group: list[bytes]
@@ -76,23 +76,30 @@ class Shot:
 
     header: Header
     odometry: Odometry | None
-    """The vehicle's at capture, where it was recorded."""
+    """Odometry of the vehicle at capture; None if not recorded."""
     record: Record
     video: _VideoFrame | None = None
     size: tuple[int, int] | None = None
-    """Width and height in pixels, where they were recorded."""
+    """Width and height in pixels; None if not recorded."""
     decoded: Callable[[], NDArray[np.uint8] | None] | None = None
-    """Returns the image where it is being decoded already."""
+    """Returns the image if it is being decoded ahead."""
     measured: Record | None = None
-    """Its depth, where the camera measured it."""
+    """Record of the depth image; None if the camera measures no depth."""
 
     @property
     def format(self) -> str:
-        """The image's encoding, such as `jpeg`; empty for raw pixels."""
+        """Encoding of the image, such as `jpeg`; empty for raw pixels."""
         return str(picture_field(self.record.value, "format", ""))
 
     def image(self) -> NDArray[np.uint8] | None:
-        """Decode the image, BGR; None if it is broken, SourceError for an unknown format."""
+        """Decode the image.
+
+        Returns:
+            Height x width x 3 of BGR; None if it is broken.
+
+        Raises:
+            SourceError: If the format is unknown.
+        """
         if self.decoded is not None:
             return self.decoded()
         if self.video is None:
@@ -108,9 +115,11 @@ class Shot:
         return image[:height, :width]
 
     def depth(self) -> NDArray[np.uint16] | None:
-        """Decode the depth: height x width of millimetres, as in a `Frame`; None without depth.
+        """Decode the depth image.
 
-        A depth that is broken, or not of the picture's size, counts as none.
+        Returns:
+            Height x width of millimetres, as in a `Frame`; None without depth, and for one that
+            is broken or not of the image's size.
         """
         found = None if self.measured is None else decode_depth(self.measured.value)
         if found is None or self.size is None or found.shape != self.size[::-1]:
@@ -119,16 +128,24 @@ class Shot:
 
 
 def picture_topics(recording: Recording) -> list[str]:
-    """Topics that hold images, in order; depth belongs to its image's topic."""
+    """Topics of a recording that hold images, sorted; topics of a frame's depth are excluded."""
     known = recording.topics
     found = (name for name, one in known.items() if one.schema in _PICTURE_SCHEMAS)
     return sorted(name for name in found if not _is_depth(name, known))
 
 
 def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterator[Shot]:
-    """Every image in the order of recording; nothing is decoded.
+    """Iterate over images in the order of recording, without decoding them.
 
-    A recording of others has no frame numbers: the message's sequence and frame id serve.
+    Recordings of other software have no frame numbers; there a header has the message's
+    sequence number and frame id.
+
+    Args:
+        recording: An open recording.
+        topics: Topics to read; None for all that hold images.
+
+    Yields:
+        Images with their headers and, if recorded, odometry and depth.
     """
     heads: dict[str, Record] = {}
     videos: dict[str, _Video] = defaultdict(_Video)
@@ -162,11 +179,11 @@ def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterat
 
 
 def decoded_ahead(found: Iterator[Shot]) -> Iterator[Shot]:
-    """The same shots, the next few of them being decoded meanwhile by threads of our own."""
+    """Iterate over `found`, with the next few images being decoded by background threads."""
     first = next(found, None)
     if first is None:
         return
-    # The frames of a video need each other, pictures do not.
+    # The frames of a video depend on each other, still images do not.
     threads = 1 if first.video is not None else 2
     waiting: deque[Shot] = deque()
     with ThreadPoolExecutor(threads, "decoder") as pool:
@@ -182,9 +199,16 @@ def frames(
     topics: Collection[str] | None = None,
     stamps: Collection[int] | None = None,
 ) -> Iterator[Frame]:
-    """Every image in the order of recording, decoded; a broken one is left out.
+    """Iterate over decoded frames in the order of recording; broken ones are left out.
 
-    With `stamps`, only pictures captured at these mission times, and no other is decoded.
+    Args:
+        recording: An open recording.
+        topics: Topics to read; None for all that hold images.
+        stamps: Mission times of capture to read, nanoseconds; only these images are decoded.
+            None for all.
+
+    Yields:
+        Frames with, if recorded, odometry and depth.
     """
     for shot in shots(recording, topics):
         if stamps is None or shot.record.captured in stamps:
@@ -194,7 +218,7 @@ def frames(
 
 
 def detections(recording: Recording) -> Iterator[tuple[str, Detections]]:
-    """Topic and detections, in the order of recording."""
+    """Iterate over topics and detections in the order of recording."""
     for record in recording.records(schemas=("aerodaas.Detections",)):
         value = record.value
         header = Header(value["id"], value["stamp"], value["source"])
@@ -203,9 +227,9 @@ def detections(recording: Recording) -> Iterator[tuple[str, Detections]]:
 
 
 def detections_by_frame(recording: Recording) -> dict[tuple[str, int], list[Detection]]:
-    """Detections of each frame, by the frame's camera and stamp.
+    """Detections of each frame, by the frame's camera and timestamp.
 
-    A tracker repeats what its detector found, and adds to it: the later word counts.
+    A tracker repeats its detector's detections with track ids added; the later message wins.
     """
     found: dict[tuple[str, int], dict[tuple[str, object], Detection]] = defaultdict(dict)
     for _, result in detections(recording):
@@ -215,7 +239,7 @@ def detections_by_frame(recording: Recording) -> dict[tuple[str, int], list[Dete
 
 
 def _heads(topic: str) -> tuple[str, str]:
-    """Topics of the metadata of an image on `topic`."""
+    """Topics that may hold the frame header of an image on `topic`."""
     stream = topic.removesuffix("/image")
     return stream, f"{stream}/frame"
 

@@ -1,4 +1,4 @@
-"""Provenance of a recording: all that is needed to fly it again."""
+"""Provenance of a recording: versions, configuration, application and seed of its run."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ class Provenance:
     started_ns: int = field(default_factory=time.time_ns)
     """Wall time (Unix, nanoseconds) at which the mission clock read zero."""
     name: str = ""
-    """The application's name, for a title."""
+    """Name of the application, for titles."""
     seed: int | None = None
     speed: str = ""
     """`--speed` as given."""
     config: str = ""
-    """The environment, JSON."""
+    """The environment configuration, JSON."""
     app: str = ""
     """File name of the application."""
     app_source: str = ""
     revision: str = ""
-    """Git commit of the application's repository, `+` appended if it had changes; or empty."""
+    """Git commit of the application's repository, with `+` if it had changes; or empty."""
     versions: Mapping[str, str] = field(default_factory=dict)
-    """Versions of Python, the platform and the packages that matter, by name."""
+    """Versions of Python, the platform and the main packages, by name."""
 
     @classmethod
     def collect(
@@ -51,9 +51,15 @@ class Provenance:
         seed: int | None = None,
         speed: str = "",
     ) -> Self:
-        """Look everything up for a run of the application in the file `app`.
+        """Collect the provenance of a run.
 
-        Passwords in URLs of the configuration are left out.
+        Passwords in URLs of the configuration are masked.
+
+        Args:
+            app: File of the application; None for none.
+            config: Environment of the run; None for none.
+            seed: Random seed; None takes the simulation's from `config`.
+            speed: `--speed` as given.
         """
         environment = config.model_dump_json(indent=2, by_alias=True) if config else ""
         return cls(
@@ -68,7 +74,7 @@ class Provenance:
         )
 
     def as_metadata(self) -> dict[str, str]:
-        """Everything that fits a table of short texts, by name."""
+        """The fields that are short texts and the versions, by name."""
         figures = {
             "epoch_ns": str(self.started_ns),
             "name": self.name,

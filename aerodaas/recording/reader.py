@@ -1,4 +1,4 @@
-"""Reading a recording, whole or cut off, ours or another's MCAP."""
+"""Reader of MCAP recordings, complete or cut off, of this project or another."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Topic:
     encoding: str
     """`json`, `protobuf`, `cdr`, …"""
     count: int
-    """Messages in the file."""
+    """Number of messages in the file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,16 +46,16 @@ class Record:
     topic: str
     schema: str
     stamp: int
-    """Mission clock when it was recorded, nanoseconds."""
+    """Mission time at which it was recorded, nanoseconds."""
     captured: int
-    """Mission clock of the described moment, nanoseconds."""
+    """Mission time of the described measurement, nanoseconds."""
     sequence: int
     value: Any
-    """A dictionary for JSON, an object with fields for protobuf and ROS 2, or else bytes."""
+    """A dictionary for JSON, an object with fields for protobuf and ROS 2, else bytes."""
 
 
 class Recording:
-    """An open MCAP file. Of a cut-off or damaged file the intact part is read, the rest counted."""
+    """An open MCAP file; the readable part of a cut-off or damaged one, the rest counted."""
 
     def __init__(self, path: Path, file: BinaryIO, index: FileIndex) -> None:
         """Wrap an open file; use `Recording.open`."""
@@ -68,7 +68,7 @@ class Recording:
         self.metadata: dict[str, dict[str, str]] = {
             record.name: record.metadata for record in index.metadata
         }
-        """Every metadata record by name; `aerodaas` holds our provenance."""
+        """Metadata records by name; `aerodaas` holds the provenance."""
         try:
             self.epoch_ns = int(self.provenance["epoch_ns"])
         except (KeyError, ValueError):
@@ -76,7 +76,17 @@ class Recording:
 
     @classmethod
     def open(cls, path: str | Path) -> Self:
-        """Open the recording `path`; raises RecordingError if it isn't one or cannot be read."""
+        """Open a recording.
+
+        Args:
+            path: The MCAP file.
+
+        Returns:
+            The recording, to be closed with `close` or a `with` block.
+
+        Raises:
+            RecordingError: If the file is no MCAP recording or cannot be read.
+        """
         path = Path(path)
         try:
             size = path.stat().st_size
@@ -102,17 +112,17 @@ class Recording:
 
     @property
     def damaged(self) -> int:
-        """Chunks that could not be read so far."""
+        """Number of chunks and messages that could not be read so far."""
         return self._index.damaged
 
     @property
     def provenance(self) -> Mapping[str, str]:
-        """Versions, seed and application, as `Provenance.as_metadata`; empty if not ours."""
+        """Versions, seed and application as in `Provenance.as_metadata`; empty if not recorded."""
         return self.metadata.get("aerodaas", {})
 
     @property
     def topics(self) -> dict[str, Topic]:
-        """The channels by topic."""
+        """Channels by topic."""
         index = self._index
         return {
             channel.topic: Topic(
@@ -126,7 +136,7 @@ class Recording:
 
     @property
     def duration(self) -> float:
-        """Seconds between the first message and the last."""
+        """Seconds from the first message to the last."""
         blocks = self._index.blocks
         if not blocks:
             return 0.0
@@ -138,7 +148,14 @@ class Recording:
         return list(self._index.attachments)
 
     def attachment(self, name: str) -> bytes:
-        """Contents of an attachment; raises RecordingError for an unknown name."""
+        """Contents of an attachment.
+
+        Args:
+            name: One of `attachments`.
+
+        Raises:
+            RecordingError: If the attachment does not exist or is damaged.
+        """
         if name not in self._index.attachments:
             known = ", ".join(self._index.attachments) or "none"
             raise RecordingError(f"{self.path} has no attachment {name!r}; it has: {known}")
@@ -157,9 +174,14 @@ class Recording:
         schemas: Collection[str] | None = None,
         topics: Collection[str] | None = None,
     ) -> Iterator[Record]:
-        """Messages of these schemas and topics (None: of all) in the order of log times.
+        """Iterate over messages in the order of log times.
 
-        A damaged chunk or message is skipped and counted in `damaged`.
+        Args:
+            schemas: Names of the schemas to read; None for all.
+            topics: Topics to read; None for all.
+
+        Yields:
+            Messages; a damaged chunk or message is skipped and counted in `damaged`.
         """
         wanted = {
             number

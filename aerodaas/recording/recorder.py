@@ -1,7 +1,7 @@
-"""The flight recorder: messages in, an MCAP file out that survives a crash.
+"""Flight recorder: writes messages to an MCAP file that survives a crash.
 
-Foxglove's SDK encodes the messages, the mcap library writes the file: the SDK's own writer has
-no publish time, and says nothing when the disk is full.
+Foxglove's SDK encodes the messages and the mcap library writes the file: the SDK's own writer
+has no publish time and does not report a full disk.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from aerodaas.types.status import Message
 __all__ = ["FLUSH_SECONDS", "FlightRecorder"]
 
 FLUSH_SECONDS = 0.5
-"""The most that a killed process loses, in seconds of the host."""
+"""Most data that a killed process loses, in seconds of host time."""
 _CHUNK = 1 << 20
 _MILLISECOND = 1_000_000
 
@@ -54,11 +54,11 @@ LATENCY = json_schema(
 
 
 class FlightRecorder:
-    """Writes messages of streams to a new MCAP file. Any thread may call it.
+    """Thread-safe recorder of messages to a new MCAP file.
 
-    Messages are logged at their mission time of publishing and published at the time of the
-    measurement, both counted from `provenance.started_ns`. Whatever was written half a second
-    ago outlives a kill of this process, and soon after a loss of power.
+    A message's log time is its mission time of publishing, its publish time that of the
+    measurement, both counted from `provenance.started_ns`. Data written more than half a second
+    ago survives a kill of this process and, soon after, a loss of power.
     """
 
     def __init__(
@@ -71,10 +71,19 @@ class FlightRecorder:
         fences: Mapping[str, GeofenceConfig] | None = None,
         live: LiveServer | None = None,
     ) -> None:
-        """Create the file `path`; `fences` are by robot; `live` gets everything, too.
+        """Create the file and start its flushing thread.
 
-        Raises RecordingError if the file exists already or cannot be written, and for video that
-        cannot be encoded here.
+        Args:
+            path: The new MCAP file; its folders are created.
+            config: Image format and quality.
+            provenance: Versions, configuration and application, written as metadata.
+            home: Origin of the local reference frame, for maps; None for none.
+            fences: Geofences by robot; None for none.
+            live: Server that receives every entry, too; None for none.
+
+        Raises:
+            RecordingError: If the file exists or cannot be written, or if `config` requires
+                H.264 and PyAV lacks the encoder.
         """
         if config.images == "h264":
             require_encoder()
@@ -103,10 +112,11 @@ class FlightRecorder:
         self._flusher.start()
 
     def write(self, message: Message[Any]) -> None:
-        """Record a message: its item by type, and its way here.
+        """Record a message: its item, converted by type, and its latency per hop.
 
-        Raises RecordingError once if recording had to stop (disk full); from then on it only
-        counts what is lost.
+        Raises:
+            RecordingError: Once, if recording had to stop (disk full); afterwards lost messages
+                are only counted.
         """
         entries = self._entries(message)
         with self._lock:
@@ -121,7 +131,7 @@ class FlightRecorder:
                 self._lose(message.stream)
 
     def drops(self, stream: str, count: int = 1) -> None:
-        """Count messages of `stream` that were dropped on their way here."""
+        """Count `count` messages of `stream` that were dropped before the recorder."""
         with self._lock:
             self._drops[stream] += count
             value = {"stream": stream, "dropped": count, "total": self._drops[stream]}
@@ -134,7 +144,7 @@ class FlightRecorder:
                 self._fail(error)
 
     def flush(self) -> None:
-        """Hand everything written so far to the operating system."""
+        """Pass everything written so far to the operating system."""
         with self._lock:
             if self._failure or self._summary is not None:
                 return
@@ -144,7 +154,7 @@ class FlightRecorder:
                 self._fail(error)
 
     def close(self) -> RecordingSummary:
-        """Finish the file and summarise it. May be called again; never raises."""
+        """Finish the file and return its summary. May be called again; never raises."""
         self._closing.set()
         self._flusher.join()
         with self._lock:
@@ -183,13 +193,14 @@ class FlightRecorder:
             try:
                 entries = list(convert(message.item, message, self._session))
             except Exception as error:  # noqa: BLE001 - an object of the application's may raise anything
-                # An item that contradicts its own type must cost neither the flight nor the rest.
+                # An item that contradicts its own type must not end the flight or the recording.
                 self.drops(message.stream)
                 text = f"cannot record a {type(message.item).__name__}: {error}"
                 entries = [
                     log_entry(self._session, message.stamp, LogLevel.Error, message.stream, text)
                 ]
-        # Of one span, only what is recorded nowhere else: that an analysis had nothing to say.
+        # A single span is recorded only for a message without an item (an analysis without
+        # a result), which is recorded nowhere else.
         if len(message.spans) > (message.item is not None):
             entries.append(_latency(message))
         return entries
@@ -261,7 +272,7 @@ class FlightRecorder:
         while not self._closing.wait(FLUSH_SECONDS):
             self.flush()
             try:
-                # Not under the lock: a slow card must not hold up `write`.
+                # Not under the lock: a slow memory card must not delay `write`.
                 self._output.sync()
             except OSError as error:
                 with self._lock:

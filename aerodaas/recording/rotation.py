@@ -1,4 +1,4 @@
-"""Quaternions (x, y, z, w), which Foxglove's schemas want and nothing else here does."""
+"""Quaternions (x, y, z, w) for Foxglove's schemas."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ Rotation: TypeAlias = tuple[float, float, float, float]
 """A unit quaternion: x, y, z, w."""
 
 OPTICAL: Rotation = (-0.5, 0.5, -0.5, 0.5)
-"""Takes optical-frame vectors (x right, y down, z forward) to an FLU frame."""
+"""Rotates optical-frame vectors (x right, y down, z forward) to an FLU frame."""
 
 
 def from_rpy(roll: float, pitch: float, yaw: float) -> Rotation:
-    """Quaternion of intrinsic z-y-x angles in radians, as `geometry.rotation_from_rpy`."""
+    """Quaternion of intrinsic z-y-x angles in radians, as in `geometry.rotation_from_rpy`."""
     cr, sr = math.cos(roll / 2), math.sin(roll / 2)
     cp, sp = math.cos(pitch / 2), math.sin(pitch / 2)
     cy, sy = math.cos(yaw / 2), math.sin(yaw / 2)
@@ -28,7 +28,7 @@ def from_rpy(roll: float, pitch: float, yaw: float) -> Rotation:
 
 
 def compose(first: Rotation, second: Rotation) -> Rotation:
-    """Hamilton's product: the rotation that applies `second`, then `first`."""
+    """Hamilton product: the rotation that applies `second`, then `first`."""
     ax, ay, az, aw = first
     bx, by, bz, bw = second
     return (

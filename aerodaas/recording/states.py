@@ -1,4 +1,4 @@
-"""Vehicle states of a recording, as the types that streams carry."""
+"""Vehicle states of a recording, decoded to the types of the streams."""
 
 from __future__ import annotations
 
@@ -16,14 +16,22 @@ __all__ = ["odometry_of", "vehicle_states"]
 
 
 def vehicle_states(recording: Recording, robot: str) -> Iterator[tuple[int, VehicleState]]:
-    """Mission time of publishing and state, in the order of recording."""
+    """Iterate over a robot's states in the order of recording.
+
+    Args:
+        recording: An open recording.
+        robot: Id of the robot.
+
+    Yields:
+        Mission time of publishing, nanoseconds, and the state.
+    """
     for record in recording.records(schemas=("aerodaas.VehicleState",)):
         if record.value["robot"] == robot:
             yield record.stamp, _state(record.value)
 
 
 def odometry_of(value: dict[str, Any] | None) -> Odometry | None:
-    """Odometry from its JSON, to the last digit; None for None."""
+    """Decode odometry from its JSON without loss of precision; None for None."""
     if value is None:
         return None
     position, velocity = (
@@ -53,5 +61,5 @@ def _state(value: dict[str, Any]) -> VehicleState:
 
 
 def _number(value: float | None) -> Any:  # noqa: ANN401 - an int stays one
-    """NaN for null: JSON has no NaN, so values that are not finite were written as null."""
+    """Restore NaN from null, as which non-finite numbers are written to JSON."""
     return math.nan if value is None else value

@@ -1,7 +1,7 @@
-"""How each type of item is written: one module for each family, registered by `convert`.
+"""Converters from each type of item to recorded entries, registered with `convert`.
 
-`convert(item, message, session)` yields the entries that `item` becomes. A plug-in whose items
-deserve better than the JSON fallback registers its own::
+`convert(item, message, session)` yields the entries of `item`. A plug-in can replace the JSON
+fallback for its own type of item::
 
     @convert.register
     def _(item: MyResult, message: Message[Any], session: Session) -> Iterator[Entry]: ...

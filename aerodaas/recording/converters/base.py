@@ -1,4 +1,4 @@
-"""Dispatch on an item's type, the state of converters, and the fallback for unknown types."""
+"""Dispatch on an item's type, shared helpers, and the fallback for unknown types."""
 
 from __future__ import annotations
 
@@ -20,24 +20,24 @@ from aerodaas.types.status import Message
 __all__ = ["MAP_FRAME", "Session", "convert", "quaternion", "vector", "xyz"]
 
 MAP_FRAME = "map"
-"""Name of the local ENU frame."""
+"""Name of the local ENU reference frame."""
 
 VALUE = json_schema("Value", stamp="integer", source="string", type="string", value={})
 
 
 @dataclass(slots=True)
 class Session:
-    """Data of the recording that converters write for."""
+    """State of a recording that its converters share."""
 
     config: RecordingConfig
     epoch_ns: int
     """Unix time at mission time zero."""
     home: GeodeticOrigin | None = None
-    """Pins the local frame on the globe, for maps."""
+    """Geodetic origin of the local reference frame, for maps."""
     last: dict[tuple[str, str], Any] = field(default_factory=dict)
-    """A converter's last output, by its name and the stream's, to write changes only."""
+    """Last value by converter and stream, so that only changes are written."""
     videos: dict[str, H264Encoder] = field(default_factory=dict)
-    """Video encoders by stream, where images are recorded as video."""
+    """Video encoders by stream, if images are recorded as video."""
 
     def time(self, stamp: int) -> Timestamp:
         """Foxglove's timestamp of a mission time."""
@@ -54,7 +54,7 @@ class Session:
 
 @singledispatch
 def convert(item: object, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Yield the entries of `item`; for an unregistered type, generic JSON."""
+    """Yield the entries of `item`; generic JSON for an unregistered type."""
     del session
     value = {
         "stamp": message.header.stamp,
@@ -66,16 +66,16 @@ def convert(item: object, message: Message[Any], session: Session) -> Iterator[E
 
 
 def xyz(vector: Vector) -> dict[str, float]:
-    """A vector for JSON."""
+    """Convert a vector for JSON."""
     return {"x": float(vector[0]), "y": float(vector[1]), "z": float(vector[2])}
 
 
 def vector(values: Vector | Sequence[float]) -> Vector3:
-    """A vector for Foxglove."""
+    """Convert a vector for Foxglove."""
     return Vector3(x=float(values[0]), y=float(values[1]), z=float(values[2]))
 
 
 def quaternion(rotation: Rotation) -> Quaternion:
-    """A rotation for Foxglove."""
+    """Convert a rotation for Foxglove."""
     x, y, z, w = rotation
     return Quaternion(x=x, y=y, z=z, w=w)

@@ -1,4 +1,4 @@
-"""Frames and detections: images, calibration, mount, boxes and keypoints."""
+"""Converters of frames and detections: images, calibration, mount, boxes and keypoints."""
 
 from __future__ import annotations
 
@@ -55,13 +55,13 @@ DETECTIONS = json_schema(
 )
 
 _VISIBLE = 0.3
-"""Keypoints of less confidence are recorded, but not drawn."""
+"""Least confidence of a drawn keypoint; others are only recorded."""
 _BLACK = Color(r=0.0, g=0.0, b=0.0, a=0.7)
 
 
 @convert.register
 def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write an image, and its camera when that has changed."""
+    """Write an image, its depth, and its camera's calibration when that has changed."""
     header, stream = item.header, message.stream
     if item.camera is not None and session.changed("camera", stream, item.camera):
         yield from _camera(item.camera, header.source, stream, header.stamp, session)
@@ -76,7 +76,7 @@ def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entr
         value["odometry"] = odometry_json(item.odometry)
     yield Entry(topic(stream, "frame"), FRAME, json_bytes(value), header.stamp)
     if item.depth is not None and session.config.images != "none":
-        # Before the picture, so that a reader has all of a frame once it has the picture.
+        # Before the image, so that a reader has the whole frame once it has the image.
         yield _depth(item.depth, header, stream, session)
     if session.config.images == "h264":
         yield _video(item, stream, session)
@@ -86,10 +86,10 @@ def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entr
 
 @convert.register
 def detections(item: Detections, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write boxes and keypoints as annotations of the image, and the same as exact JSON."""
+    """Write boxes and keypoints as annotations of the image and as exact JSON."""
     header, stream = item.header, message.stream
     annotations = ImageAnnotations(
-        # Foxglove pairs annotations with the picture of exactly this time.
+        # Foxglove pairs annotations with the image of exactly this time.
         timestamp=session.time(header.stamp),
         points=[shape for found in item.items for shape in _shapes(found)],
         texts=[_label(found) for found in item.items],

@@ -1,4 +1,4 @@
-"""Mission states, plans, navigation and scheduler decisions."""
+"""Converters of mission states, plans, navigation and scheduler decisions."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ DECISION = json_schema(
 
 @convert.register
 def mission_status(item: MissionStatus, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a status; its plan when that is a new one; a log line when the state has changed."""
+    """Write a status, a new plan, and log lines for a changed state and changed faults."""
     stream = message.stream
     robot = (message.header.source or stream).partition("/")[0]
     value = {
@@ -81,7 +81,7 @@ def mission_status(item: MissionStatus, message: Message[Any], session: Session)
 
 
 def _is_new_plan(ahead: tuple[Waypoint, ...], stream: str, session: Session) -> bool:
-    """Whether more has happened than that the first waypoints of the last plan were reached."""
+    """Whether the plan has changed other than by reaching its first waypoints."""
     last: tuple[Waypoint, ...] = session.last.get(("plan", stream), ())
     if ahead == last[len(last) - len(ahead) :]:
         return False
@@ -91,7 +91,7 @@ def _is_new_plan(ahead: tuple[Waypoint, ...], stream: str, session: Session) -> 
 
 @convert.register
 def navigation(item: AeroNavigation, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write the waypoints and commands that analytics made."""
+    """Write the waypoints and commands of a navigation result."""
     del session
     header = message.header
     value = {
@@ -107,7 +107,7 @@ def navigation(item: AeroNavigation, message: Message[Any], session: Session) ->
 
 @convert.register
 def decision(item: Decision, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a scheduler's decision with its reason."""
+    """Write a scheduler decision with its reason."""
     del session
     value = {
         "stamp": item.stamp,

@@ -1,4 +1,4 @@
-"""Alerts and log lines."""
+"""Converters of alerts and log lines."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ALERT = json_schema(
 
 
 def log_entry(session: Session, stamp: int, level: LogLevel, name: str, text: str) -> Entry:
-    """One line of the recording's log, by `name`."""
+    """One line of the recording's log, with `name` as its source."""
     line = Log(timestamp=session.time(stamp), level=level, message=text, name=name)
     return Entry("/log", LOG, line.encode(), stamp)
 
@@ -57,7 +57,7 @@ def text(item: str, message: Message[Any], session: Session) -> Iterator[Entry]:
 
 @convert.register
 def log_record(item: logging.LogRecord, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a record of Python's logging, with its level and place."""
+    """Write a record of Python's logging, with its level, file and line."""
     line = Log(
         timestamp=session.time(message.stamp),
         level=_level(item.levelno),

@@ -1,4 +1,4 @@
-"""Plans and fences for display: in the 3D scene, as poses, and on the map."""
+"""Entries of plans and geofences: in the 3D scene, as poses, and on the map."""
 
 from __future__ import annotations
 

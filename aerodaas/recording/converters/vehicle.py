@@ -1,4 +1,4 @@
-"""Vehicle states and setpoints: odometry, transform, GPS, and everything else as JSON."""
+"""Converters of vehicle states, setpoints and the odometry, GPS and battery sensors."""
 
 from __future__ import annotations
 
@@ -58,13 +58,13 @@ SETPOINT = json_schema(
 
 
 def body_frame(source: str) -> str:
-    """Name of the body frame of the robot that a source belongs to; the map for no robot."""
+    """Name of the body frame of the source's robot; the map's for a source without a robot."""
     robot, slash, _ = source.partition("/")
     return f"{robot}/base_link" if slash else MAP_FRAME
 
 
 def odometry_json(odometry: Odometry) -> dict[str, Any]:
-    """An odometry for JSON, exact to the last digit."""
+    """Convert odometry for JSON without loss of precision."""
     return {
         "position": xyz(odometry.position),
         "velocity": xyz(odometry.velocity),
@@ -144,7 +144,7 @@ def _pose(item: Odometry, frame: str, stream: str, stamp: int, session: Session)
     time = session.time(stamp)
     position = vector(item.position)
     attitude = quaternion(from_rpy(item.roll, item.pitch, item.yaw))
-    # Foxglove, as ROS, wants velocities in the body's frame.
+    # Foxglove, like ROS, expects velocities in the body frame.
     velocity = vector(enu_to_body(item.velocity, item.yaw))
     pose = FoxgloveOdometry(
         timestamp=time,

@@ -1,4 +1,4 @@
-"""Vitals of the run's processes, one channel for each."""
+"""Converter of the vitals of the run's processes, one channel per process."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ VITALS = json_schema(
 
 @convert.register
 def vitals(item: Vitals, message: Message[Any], session: Session) -> Iterator[Entry]:
-    """Write a reading, with the cores that were busy since the last one."""
+    """Write a reading, with the number of cores in use since the last one."""
     actor, _, machine = message.header.source.partition("@")
     key = ("vitals", actor)
     before: Vitals | None = session.last.get(key)
@@ -46,7 +46,7 @@ def vitals(item: Vitals, message: Message[Any], session: Session) -> Iterator[En
         "machine_memory": item.machine_memory,
         "gpus": [{"busy": gpu.busy, "memory": gpu.memory} for gpu in item.gpus],
     }
-    # An actor that was restarted begins to count anew.
+    # The counter of a restarted actor starts from zero.
     if took > 0 and used >= 0:
         value["cpu_cores"] = used / took
     yield Entry("/" + message.stream, VITALS, json_bytes(value), message.stamp)

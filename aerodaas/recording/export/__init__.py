@@ -1,1 +1,1 @@
-"""A recording as files that other programs open: tables, videos, tracks."""
+"""Export of recordings to common file formats: tables, videos, GPS tracks."""

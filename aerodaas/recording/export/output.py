@@ -1,4 +1,4 @@
-"""Where exports go: never over a file that is there already."""
+"""Output files of exports; existing files are never overwritten."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ __all__ = ["file_name", "new_file"]
 
 
 def file_name(topic: str) -> str:
-    """A file's name, without ending, for a topic: `/tello/camera/image` -> `tello-camera-image`."""
+    """File name, without suffix, for a topic: `/tello/camera/image` -> `tello-camera-image`."""
     return re.sub(r"[^A-Za-z0-9_]+", "-", topic).strip("-")
 
 
 def new_file(path: Path) -> Path:
-    """Make `path`'s folder; raises RecordingError if the file exists or the folder cannot be."""
+    """Create the folder of `path`; raises RecordingError if the file exists or this fails."""
     if path.exists():
         raise RecordingError(
             f"{path} already exists and is not overwritten; give another folder with --out"

@@ -1,4 +1,4 @@
-"""One channel as a table: CSV, or Parquet where pyarrow is installed."""
+"""Export of one channel as a table: CSV, or Parquet if pyarrow is installed."""
 
 from __future__ import annotations
 
@@ -25,9 +25,18 @@ Row = dict[str, Any]
 def table_of(recording: Recording, topic: str) -> list[Row]:
     """All messages of a channel as flat rows with the same columns.
 
-    `recorded_s` and `captured_s` are mission seconds, `sequence` is the message's number; nested
-    fields are joined by dots, lists become JSON, bytes their length. Raises RecordingError for
-    an unknown channel or one whose encoding is not known.
+    `recorded_s` and `captured_s` are mission seconds, `sequence` is the message's number; names
+    of nested fields are joined by dots, lists become JSON, bytes their length.
+
+    Args:
+        recording: An open recording.
+        topic: Topic of the channel; the leading slash may be omitted.
+
+    Returns:
+        One dictionary per message, in the order of recording; missing fields are None.
+
+    Raises:
+        RecordingError: If the channel or its encoding is unknown.
     """
     name = _known(recording, topic)
     rows = []
@@ -50,7 +59,19 @@ def table_of(recording: Recording, topic: str) -> list[Row]:
 
 
 def write_csv(recording: Recording, topic: str, folder: Path) -> Path:
-    """Write a channel as CSV into `folder`; returns the file. Raises RecordingError."""
+    """Write a channel as CSV.
+
+    Args:
+        recording: An open recording.
+        topic: Topic of the channel; the leading slash may be omitted.
+        folder: Folder of the new file, created if necessary.
+
+    Returns:
+        The file.
+
+    Raises:
+        RecordingError: As in `table_of`; also if the file exists or cannot be written.
+    """
     rows = table_of(recording, topic)
     path = new_file(folder / f"{file_name(topic)}.csv")
     try:
@@ -64,7 +85,20 @@ def write_csv(recording: Recording, topic: str, folder: Path) -> Path:
 
 
 def write_parquet(recording: Recording, topic: str, folder: Path) -> Path:
-    """Write a channel as Parquet into `folder`; returns the file. Raises RecordingError."""
+    """Write a channel as Parquet.
+
+    Args:
+        recording: An open recording.
+        topic: Topic of the channel; the leading slash may be omitted.
+        folder: Folder of the new file, created if necessary.
+
+    Returns:
+        The file.
+
+    Raises:
+        RecordingError: As in `table_of`; also if pyarrow is missing, or the file exists or
+            cannot be written.
+    """
     try:
         import pyarrow as pa  # noqa: PLC0415 - an extra
         from pyarrow import parquet  # noqa: PLC0415
@@ -80,7 +114,7 @@ def write_parquet(recording: Recording, topic: str, folder: Path) -> Path:
         try:
             columns[name] = pa.array(values)
         except (pa.ArrowInvalid, pa.ArrowTypeError):
-            # A field that holds numbers in one message and words in another.
+            # A field that holds numbers in one message and text in another.
             columns[name] = pa.array([None if value is None else str(value) for value in values])
     try:
         parquet.write_table(pa.table(columns), path)
@@ -100,7 +134,7 @@ def _known(recording: Recording, topic: str) -> str:
 
 
 def _plain(message: Message) -> dict[str, Any]:
-    """A protobuf message as a dictionary; bytes by their length, not as Base64."""
+    """A protobuf message as a dictionary; bytes as their length instead of Base64."""
     lengths = {
         field.name: f"<{len(value)} bytes>"
         for field, value in message.ListFields()

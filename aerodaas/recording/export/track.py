@@ -1,4 +1,4 @@
-"""The flight on the globe: GPX 1.1 and KML 2.2."""
+"""Export of the flight track as GPX 1.1 and KML 2.2."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ __all__ = ["write_gpx", "write_kml"]
 _GPX = "http://www.topografix.com/GPX/1/1"
 _KML = "http://www.opengis.net/kml/2.2"
 _INTERVAL = NANOSECONDS // 2
-"""Interval of points, half a second: finer than a GPS receiver's resolution."""
+"""Nanoseconds between points: half a second, finer than a receiver's accuracy."""
 
 
 class _Place(NamedTuple):
-    """A point of the track, or a waypoint by its name."""
+    """A point of the track, or a named waypoint; degrees and metres."""
 
     latitude: float
     longitude: float
@@ -35,17 +35,29 @@ class _Place(NamedTuple):
 
 
 class _Track(NamedTuple):
-    """One robot's flight."""
+    """Track points and waypoints of one robot."""
 
     points: list[_Place]
     waypoints: dict[str, _Place]
 
 
 def write_gpx(recording: Recording, folder: Path) -> Path:
-    """Write tracks and waypoints as GPX; returns the file. Raises RecordingError without places."""
+    """Write tracks and waypoints as GPX.
+
+    Args:
+        recording: An open recording.
+        folder: Folder of the new file, created if necessary.
+
+    Returns:
+        The file.
+
+    Raises:
+        RecordingError: If the recording has no geodetic position, or the file exists or cannot
+            be written.
+    """
     root = ET.Element("gpx", {"xmlns": _GPX, "version": "1.1", "creator": "AeroDaaS"})
     tracks = _tracks(recording)
-    # The schema wants all waypoints before the first track.
+    # The schema requires all waypoints before the first track.
     for track in tracks.values():
         for place in track.waypoints.values():
             _gpx_point(root, "wpt", place)
@@ -59,7 +71,19 @@ def write_gpx(recording: Recording, folder: Path) -> Path:
 
 
 def write_kml(recording: Recording, folder: Path) -> Path:
-    """Write tracks and waypoints as KML; returns the file. Raises RecordingError without places."""
+    """Write tracks and waypoints as KML.
+
+    Args:
+        recording: An open recording.
+        folder: Folder of the new file, created if necessary.
+
+    Returns:
+        The file.
+
+    Raises:
+        RecordingError: If the recording has no geodetic position, or the file exists or cannot
+            be written.
+    """
     root = ET.Element("kml", {"xmlns": _KML})
     document = ET.SubElement(root, "Document")
     ET.SubElement(document, "name").text = recording.provenance.get("name") or recording.path.stem
@@ -76,7 +100,7 @@ def write_kml(recording: Recording, folder: Path) -> Path:
 
 
 def _tracks(recording: Recording) -> dict[str, _Track]:
-    """By robot; from the vehicle's own position where it has one, else from home and odometry."""
+    """Tracks by robot: from odometry if the environment has a home, else from GPS."""
     home = _home(recording)
     tracks: dict[str, _Track] = {}
     newest: dict[str, int] = {}

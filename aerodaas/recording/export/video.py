@@ -1,4 +1,4 @@
-"""A camera's recording as MP4 (H.264), with the timestamps of its images."""
+"""Export of a camera's images as MP4 (H.264) with their capture times."""
 
 from __future__ import annotations
 
@@ -22,15 +22,23 @@ from aerodaas.types.errors import RecordingError
 __all__ = ["write_videos"]
 
 _TICKS = 90_000
-"""Units of the video's clock in a second, as in MPEG."""
+"""Units of the video's clock per second, as in MPEG."""
 _QUALITY = {"crf": "23", "preset": "veryfast"}
 
 
 def write_videos(recording: Recording, folder: Path, *, overlays: bool = True) -> list[Path]:
-    """Write an MP4 for each camera into `folder`; returns the files.
+    """Write an MP4 file for each camera.
 
-    With `overlays`, detections, the mission's time and its state are drawn in. Raises
-    RecordingError for a recording without pictures, and for a file in the way.
+    Args:
+        recording: An open recording.
+        folder: Folder of the new files, created if necessary.
+        overlays: Draw detections, the mission time and the mission state into the images.
+
+    Returns:
+        The files.
+
+    Raises:
+        RecordingError: If the recording has no images, or a file exists or cannot be created.
     """
     writers: dict[str, _Video] = {}
     found = detections_by_frame(recording) if overlays else {}
@@ -63,7 +71,7 @@ def _caption(flight: RecordedFlight, frame: Frame) -> str:
 
 
 class _Video:
-    """One MP4 file."""
+    """Writer of one MP4 file."""
 
     def __init__(self, path: Path, first: Frame) -> None:
         import av  # noqa: PLC0415 - 30 MB that reports do without
@@ -71,7 +79,7 @@ class _Video:
         self.path = path
         self._frame = av.VideoFrame
         self._container = av.open(str(path), "w", options={"movflags": "+faststart"})
-        # H.264 halves the colours' resolution, so that sizes must be even.
+        # H.264 halves the colours' resolution, hence sizes must be even.
         self._size = first.width // 2 * 2, first.height // 2 * 2
         stream = self._container.add_stream("libx264", options=_QUALITY)
         stream.width, stream.height = self._size

@@ -1,1 +1,1 @@
-"""Players of a recording: cameras, vehicles, and the timeline of a flight."""
+"""Replay of a recording: cameras, vehicles, and the timestamps of each source."""

@@ -1,4 +1,4 @@
-"""The environment in which a recording is flown again, with players for its hardware."""
+"""Environment for the replay of a recording, with its hardware played from the file."""
 
 from __future__ import annotations
 
@@ -14,13 +14,20 @@ from aerodaas.types.errors import RecordingError
 __all__ = ["replay_environment"]
 
 _FINITE = frozenset({"folder", "recorded", "video", "mcap"})
-"""Cameras that may run out of images, which ends a mission that flies by them."""
+"""Camera drivers that may run out of images, which ends a mission that depends on them."""
 
 
 def replay_environment(path: str | Path) -> EnvironmentConfig:
-    """The environment of a recording, in which vehicles and cameras are played from the file.
+    """Environment of a recording, with vehicles and cameras played from the file.
 
-    Raises RecordingError if it cannot be read, or was not made by `aerodaas run`.
+    Args:
+        path: The MCAP file.
+
+    Returns:
+        The recorded environment with replay drivers; recording is enabled without images.
+
+    Raises:
+        RecordingError: If the recording cannot be read or was not written by `aerodaas run`.
     """
     path = Path(path).resolve()
     with Recording.open(path) as recording:

@@ -1,4 +1,4 @@
-"""Cameras that play the images of an MCAP recording, ours or another's."""
+"""Cameras that play the images of an MCAP recording."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ _log = logging.getLogger(__name__)
 
 
 class McapCamera:
-    """Plays a recording's images at their recorded pace, from the first one on.
+    """Camera that plays a recording's images at their recorded rate, from the first one on.
 
-    Settings: `path` of the MCAP file, `topic` where it holds pictures of several cameras,
-    `loop`, and the lens and mount of `CameraConfig`. Reads Foxglove's CompressedImage,
-    CompressedVideo (H.264) and RawImage, and ROS 2's sensor_msgs/CompressedImage and Image.
+    Settings: `path` of the MCAP file, `topic` if it holds images of several cameras, `loop`,
+    and the lens and mount of `CameraConfig`. Reads Foxglove's CompressedImage, CompressedVideo
+    (H.264) and RawImage, and ROS 2's sensor_msgs/CompressedImage and Image.
     """
 
     settings_model = CameraConfig
@@ -50,16 +50,16 @@ class McapCamera:
 
     @property
     def finished(self) -> bool:
-        """True once the last image was given; never for a recording that loops."""
+        """True after the last image was returned; never for a recording that loops."""
         return self._next is None
 
     @property
     def skipped(self) -> int:
-        """Images that are broken, or older than the one before."""
+        """Number of images skipped because broken, or older than the preceding one."""
         return self._skipped
 
     def open(self) -> None:
-        """Open the recording; raises SourceError if it has no image that can be decoded."""
+        """Open the recording; raises SourceError if it has no images that can be decoded."""
         try:
             self._recording = Recording.open(self._path)
         except RecordingError as error:
@@ -74,7 +74,7 @@ class McapCamera:
         raise SourceError(f"none of the pictures on {self._topic} of {self._path} can be decoded")
 
     def capture(self, stamp: int, pose: Odometry | None) -> Picture | None:
-        """Return the newest image due at `stamp`; None if it was given or is broken."""
+        """Return the newest image due at `stamp`; None if already returned or broken."""
         del pose
         due: Shot | None = None
         while self._next is not None and self._due_at(self._next, stamp) <= stamp:
@@ -121,7 +121,7 @@ class McapCamera:
     def _begin_again(self, stamp: int) -> None:
         if self._settings.loop:
             self._rewind()
-            # A moment later, so that a recording of a single picture is not for ever due.
+            # A nanosecond later, so that a recording of a single image is not always due.
             self._offset = stamp + 1 - self._next.record.captured if self._next else None
 
     def _rewind(self) -> None:
@@ -147,18 +147,18 @@ class McapCamera:
 
 
 class ReplayedCamera(McapCamera):
-    """Plays a recording of this project at its own mission times, with the odometry recorded.
+    """Camera that plays a recording of this project at its recorded mission times.
 
-    With `loop`, it does not say that it has finished, as the recorded camera never did.
+    With `loop` it never reports that it has finished, as the recorded camera never did.
     """
 
     @property
     def finished(self) -> bool:
-        """True once the last image was given, also of a camera that ended in flight."""
+        """True after the last image was returned, unless the recorded camera was endless."""
         return super().finished and not self._settings.loop
 
     def _play(self, found: Iterator[Shot]) -> Iterator[Shot]:
-        # Every picture is shown, as fast as pictures can be had: decoding is what takes longest.
+        # Every image is played as fast as possible: decoding takes longest.
         return decoded_ahead(found)
 
     def _due_at(self, shot: Shot, stamp: int) -> int:
@@ -166,7 +166,7 @@ class ReplayedCamera(McapCamera):
         return shot.header.stamp
 
     def _begin_again(self, stamp: int) -> None:
-        """Mission time does not begin again."""
+        """Do nothing: mission time does not restart."""
 
     def _picture(self, picture: Picture, shot: Shot) -> Picture:
         return replace(picture, stamp=shot.header.stamp)

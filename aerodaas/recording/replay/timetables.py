@@ -1,4 +1,4 @@
-"""When each source of a recorded flight measured: the timetables of its replay."""
+"""Measurement times of each source of a recorded flight, for its replay."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["read_timetables"]
 
 
 class _Reading:
-    """Gathers stamps by stream, message by message."""
+    """Collects timestamps by stream, message by message."""
 
     def __init__(self) -> None:
         self.stamps: dict[str, set[int]] = defaultdict(set)
@@ -23,28 +23,35 @@ class _Reading:
         self.stamps[record.value["source"]].add(record.value["stamp"])
 
     def reading(self, record: Record) -> None:
-        """Of a sensor, whose stream is the topic without the kind of data."""
+        """Add a sensor's reading; its stream is the topic without the kind of data."""
         name = record.topic.strip("/")
-        # A stream that is named after the kind of its data does not repeat it.
+        # The topic of a stream that is named after its kind of data does not repeat the kind.
         for stream in (name, name.rpartition("/")[0]):
             self.stamps[stream_of(stream)].add(record.stamp)
 
     def result(self, record: Record) -> None:
-        """Of an analysis; one without inputs measures something itself."""
+        """Add an analysis's result if the analysis has no inputs and measures itself."""
         source = record.value["source"]
         if source == stream_of(record.topic.strip("/").rpartition("/")[0]):
             self.stamps[source].add(record.value["stamp"])
 
     def latency(self, record: Record) -> None:
-        """Of a message; one that has passed through one actor only is a measurement."""
+        """Add a message that passed through one actor only and is thus a measurement."""
         if len(record.value["hops"]) == 1:
             self.stamps[record.value["stream"]].add(record.captured)
 
 
 def read_timetables(path: str | Path) -> dict[str, tuple[int, ...]]:
-    """Stamps (mission clock, nanoseconds) of each source's measurements, in order, by stream.
+    """Read the measurement times of each source.
 
-    Raises RecordingError if the recording cannot be read.
+    Args:
+        path: The MCAP file.
+
+    Returns:
+        Sorted timestamps (mission time, nanoseconds) by stream.
+
+    Raises:
+        RecordingError: If the recording cannot be read.
     """
     with Recording.open(path) as recording:
         found = _Reading()
@@ -60,7 +67,7 @@ def read_timetables(path: str | Path) -> dict[str, tuple[int, ...]]:
             "aerodaas.Latency": found.latency,
         }
         for record in recording.records(schemas=readers):
-            # Another version's message: the rest is still worth keeping to.
+            # A message of another version is skipped; the other timestamps remain useful.
             with suppress(KeyError, TypeError, IndexError, AttributeError):
                 readers[record.schema](record)
     return {stream: tuple(sorted(stamps)) for stream, stamps in found.stamps.items()}

@@ -1,4 +1,4 @@
-"""A vehicle that plays the states of a recording and obeys no command."""
+"""Vehicle that plays the states of a recording and ignores commands."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _WAITING = {"idle", "preflight"}
 
 
 class ReplayedVehicle:
-    """Shows at each mission time the state recorded then; implements `vehicle.PlayedVehicle`.
+    """Vehicle whose state is that recorded at the mission time; a `vehicle.PlayedVehicle`.
 
     Settings: `path` of the recording, and `driver` and `settings` of the recorded robot, whose
-    capabilities it claims. Commands change nothing; setpoints are taken where the recorded
-    vehicle would have taken them.
+    capabilities it reports. Commands have no effect; setpoints are accepted in the modes in
+    which the recorded vehicle accepted them.
     """
 
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
@@ -45,16 +45,16 @@ class ReplayedVehicle:
 
     @property
     def capabilities(self) -> Capabilities:
-        """Capabilities of the recorded vehicle's driver."""
+        """Capabilities of the recorded vehicle's driver, except that it obeys no commands."""
         return self._capabilities
 
     @property
     def finished(self) -> bool:
-        """True once the recording has nothing more to show."""
+        """True after the last recorded state."""
         return self._next is None and self._now > self._last
 
     def connect(self, timeout: float = 10.0) -> None:  # noqa: ARG002 - a file does not make us wait
-        """Open the recording; raises RecordingError, or VehicleError if the robot isn't in it."""
+        """Open the recording; raises RecordingError, or VehicleError without the robot's states."""
         self._recording = Recording.open(self._path)
         self._ready_at = self._when_ready()
         self._states = vehicle_states(self._recording, self._id)
@@ -65,31 +65,31 @@ class ReplayedVehicle:
         self._next = next(self._states, None)
 
     def advance_to(self, stamp: int) -> None:
-        """Show the newest state recorded up to mission time `stamp`, in nanoseconds."""
+        """Advance to the newest state recorded up to mission time `stamp`, in nanoseconds."""
         self._now = stamp
         while self._next is not None and self._next[0] <= stamp:
             self._last, self._current = self._next
             self._next = next(self._states, None)
 
     def read(self) -> VehicleState:
-        """Return the state shown; raise VehicleError if not connected."""
+        """Return the current state; raise VehicleError if not connected."""
         if self._current is None:
             raise VehicleError(f"{self._id} is not connected; call connect first")
         return self._current
 
     def preflight(self) -> list[str]:
-        """Objections for as long as the recorded mission met some."""
+        """Return an objection until the recorded mission had passed its preflight checks."""
         return [] if self._now >= self._ready_at else ["the recorded vehicle was not ready yet"]
 
     def send(self, setpoint: Setpoint) -> Setpoint:
-        """Return `setpoint`; raise VehicleError where the recorded vehicle would have refused."""
+        """Return `setpoint`; raise VehicleError in modes in which the vehicle refused it."""
         mode = self.read().mode
         if mode in _ON_ITS_OWN:
             raise VehicleError(f"{self._id} takes no setpoints while {mode.value}")
         return setpoint
 
     def take_off(self, height: float) -> None:
-        """Do nothing: it takes off when it did."""
+        """Do nothing: it takes off at the recorded time."""
 
     def hold(self) -> None:
         """Do nothing."""
@@ -109,7 +109,7 @@ class ReplayedVehicle:
     def _when_ready(self) -> int:
         """Mission time at which the recorded mission stopped waiting for the vehicle.
 
-        What held it up is not among the states.
+        The states do not contain the reason for the wait.
         """
         for record in self._recording.records(schemas=("aerodaas.MissionStatus",)):
             if record.value["robot"] == self._id and record.value["state"] not in _WAITING:

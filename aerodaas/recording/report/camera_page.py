@@ -1,7 +1,7 @@
-"""A web page of the cameras' images, with boxes and the mission's state drawn in.
+"""Web page of the cameras' live images, with detections and the mission state drawn in.
 
-Each camera is a stream of JPEG pictures (`multipart/x-mixed-replace`), which every browser shows
-without a script. Pictures are encoded only while somebody looks.
+Each camera is a stream of JPEG images (`multipart/x-mixed-replace`), which every browser shows
+without a script. Images are encoded only while a viewer is connected.
 """
 
 from __future__ import annotations
@@ -30,9 +30,9 @@ from aerodaas.types.status import Message, MissionStatus
 __all__ = ["CameraPage"]
 
 _FRAMES_KEPT = 8
-"""Of each camera: boxes are drawn into the frame that they were found in, which is past by then."""
+"""Frames kept per camera: detections arrive later than the frame that they are drawn into."""
 _RATE = 10.0
-"""Images per second and viewer, at most."""
+"""Most images per second and viewer."""
 _BOUNDARY = "picture"
 _STOPPING = 5.0
 
@@ -40,16 +40,23 @@ _STOPPING = 5.0
 @dataclass
 class _Camera:
     frames: dict[int, NDArray[np.uint8]] = field(default_factory=dict)
-    """The newest ones, by stamp."""
+    """The newest images by timestamp."""
     found: dict[int, dict[str, tuple[Detection, ...]]] = field(default_factory=dict)
-    """Detections of each analysis in them, by stamp."""
+    """Detections in these images by timestamp and stream."""
 
 
 class CameraPage:
-    """Takes a run's messages and serves the page; any thread may call it."""
+    """Thread-safe web server of the camera page, fed with a run's messages."""
 
     def __init__(self, address: str) -> None:
-        """Listen at `address`, `host:port`; port 0 takes a free one. Raises ConfigError."""
+        """Start the server.
+
+        Args:
+            address: `host:port` to listen on; port 0 selects a free one.
+
+        Raises:
+            ConfigError: If the address is malformed or cannot be listened on.
+        """
         host, _, port = address.rpartition(":")
         if not host or not port.isdigit():
             raise ConfigError(f"the camera's page is served at host:port, not at {address!r}")
@@ -60,7 +67,7 @@ class CameraPage:
                 f"cannot serve the camera's page at {address}: {error}; give another --view-address"
             ) from None
         self.port: int = self._socket.getsockname()[1]
-        """The port that is listened at."""
+        """Port that the server listens on."""
         self._cameras: dict[str, _Camera] = {}
         self._states: dict[str, str] = {}
         self._lock = threading.Lock()
@@ -77,7 +84,7 @@ class CameraPage:
         self._thread.start()
 
     def put(self, message: Message[Any]) -> None:
-        """Take note of a frame, of boxes or of a mission's state; of nothing else."""
+        """Store a frame, detections or a mission status; other messages are ignored."""
         item, source = message.item, message.header.source
         with self._lock:
             if isinstance(item, Frame):
@@ -99,9 +106,13 @@ class CameraPage:
                 self._states[source.partition("/")[0]] = text
 
     def picture(self, source: str) -> NDArray[np.uint8] | None:
-        """The newest analysed image of a camera, with the detections drawn in.
+        """Return a camera's newest analysed image, detections drawn in, or else its newest image.
 
-        Where nobody does, the newest; None before the first.
+        Args:
+            source: Stream of the camera.
+
+        Returns:
+            The image, BGR; None before the first frame.
         """
         with self._lock:
             camera = self._cameras.get(source)
@@ -141,7 +152,7 @@ class CameraPage:
             f'<figure><img src="/camera/{name}" alt=""><figcaption>{name}</figcaption></figure>'
             for name in names
         )
-        # Cameras come with their first picture; the page looks again until there is one.
+        # Cameras are listed from their first image on; the page reloads until there is one.
         again = "" if names else '<meta http-equiv="refresh" content="1"><p>no picture yet</p>'
         style = "body{font:14px sans-serif;background:#111;color:#ddd}img{max-width:100%}"
         return HTMLResponse(

@@ -1,4 +1,4 @@
-"""Two flights side by side in one page."""
+"""HTML page that compares two flights side by side."""
 
 from __future__ import annotations
 
@@ -16,9 +16,18 @@ __all__ = ["comparison_page", "write_comparison"]
 
 
 def write_comparison(first: str | Path, second: str | Path, page: str | Path) -> Path:
-    """Write one HTML page that sets two recordings side by side; returns its path.
+    """Write an HTML page that compares two recordings side by side.
 
-    Raises RecordingError if a recording cannot be read, or the page cannot be written.
+    Args:
+        first: The first MCAP file, A in the page.
+        second: The second MCAP file, B in the page.
+        page: File of the page; replaced if it exists.
+
+    Returns:
+        The file of the page.
+
+    Raises:
+        RecordingError: If a recording cannot be read or the page cannot be written.
     """
     page = Path(page)
     text = comparison_page(
@@ -33,7 +42,14 @@ def write_comparison(first: str | Path, second: str | Path, page: str | Path) ->
 
 
 def comparison_page(first_name: str, first: Report, second_name: str, second: Report) -> str:
-    """The HTML page: figures with their differences, latencies, then each plot twice."""
+    """Return the HTML page: figures with their differences, latencies, then each plot twice.
+
+    Args:
+        first_name: Name of the first recording.
+        first: Report of the first recording.
+        second_name: Name of the second recording.
+        second: Report of the second recording.
+    """
     head = [
         paragraph(f"{letter}: {name} ({origin_line(report.summary)})")
         for letter, name, report in (("A", first_name, first), ("B", second_name, second))
@@ -71,7 +87,7 @@ def _latency_rows(first: Report, second: Report) -> Iterator[tuple[object, ...]]
 
 
 def _plots(first: list[Plot], second: list[Plot]) -> Iterator[str]:
-    """Each plot of A, with that of B beside it."""
+    """Yield a section for each plot of A, followed by that of B."""
     pairs: dict[str, list[Plot | None]] = {}
     for side, plots in enumerate((first, second)):
         for plot in plots:

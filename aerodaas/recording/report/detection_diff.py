@@ -1,4 +1,4 @@
-"""How alike two detectors' results are, by the boxes that overlap."""
+"""Comparison of two detectors' results by overlapping boxes."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ Box = list[float]
 
 @dataclass(frozen=True, slots=True)
 class DetectionDiff:
-    """Boxes of two results from the same frames, paired by label and overlap."""
+    """Comparison of two results for the same frames, boxes paired by label and overlap."""
 
     paired: int
     lost: int
-    """Objects that only the first result has."""
+    """Number of objects that only the first result has."""
     new: int
-    """Objects that only the second result has."""
+    """Number of objects that only the second result has."""
     median_pixels: float
     """Median over the pairs of the largest distance between edges."""
     most_pixels: float
@@ -32,7 +32,7 @@ class DetectionDiff:
     """Largest difference of a pair's scores."""
 
     def __str__(self) -> str:
-        """The difference as text."""
+        """One readable line."""
         text = f"{self.paired} objects found again, {self.lost} lost, {self.new} new"
         if not self.paired:
             return text
@@ -43,7 +43,11 @@ class DetectionDiff:
 
 
 def box_shift(results: Iterable[tuple[list[Item], list[Item]]]) -> DetectionDiff:
-    """Pair the objects of each frame's two results, each with label, score and box."""
+    """Pair the objects of each frame's two results and measure their differences.
+
+    Args:
+        results: For each frame, both results: objects with `label`, `score` and `box`.
+    """
     moves, scores = [], []
     lost = new = 0
     for first, second in results:
@@ -69,7 +73,7 @@ def box_shift(results: Iterable[tuple[list[Item], list[Item]]]) -> DetectionDiff
 
 
 def _likeness(one: Item, other: Item) -> float:
-    """Intersection over union; -1 for another label."""
+    """Intersection over union; -1 for different labels."""
     return _overlap(one["box"], other["box"]) if one["label"] == other["label"] else -1.0
 
 

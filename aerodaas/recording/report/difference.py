@@ -1,6 +1,7 @@
-"""How two recordings of the same sensors differ: detections, navigation, decisions, missions.
+"""Differences between two recordings of the same sensors.
 
-Results are paired by the measurement that they were made from, not by when they came.
+Compares detections, navigation, other results, decisions, mission states, setpoints and alerts.
+Results are paired by the measurement that they were computed from, not by their time of arrival.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from aerodaas.recording.report.detection_diff import DetectionDiff, box_shift
 __all__ = ["Difference", "StreamDifference", "difference"]
 
 _TURN = 50_000_000
-"""Nanoseconds between turns of the setpoint loop."""
+"""Nanoseconds between cycles of the setpoint loop."""
 
 Key = Hashable
 Content = Any
@@ -26,19 +27,19 @@ Content = Any
 
 @dataclass(frozen=True, slots=True)
 class StreamDifference:
-    """One stream in both recordings."""
+    """Comparison of one stream in both recordings."""
 
     what: str
-    """Stream and kind of data, for display."""
+    """Stream and kind of data, such as `scheduler decisions`."""
     same: int
     differing: int
-    """Made from the same measurement, with another content."""
+    """Number of results of the same measurement with different content."""
     only_first: int
     only_second: int
     example: str = ""
-    """The first difference, as text."""
+    """Description of the first difference; empty for none."""
     boxes: DetectionDiff | None = None
-    """How far boxes moved, of detections that differ."""
+    """Changes of the boxes, for detections that differ."""
 
     @property
     def agrees(self) -> bool:
@@ -46,7 +47,7 @@ class StreamDifference:
         return not (self.differing or self.only_first or self.only_second)
 
     def __str__(self) -> str:
-        """One line."""
+        """One readable line."""
         if self.agrees:
             return f"{self.what}: {self.same}, all the same"
         text = f"{self.what}: {self.same} the same, {self.differing} differ"
@@ -59,17 +60,17 @@ class StreamDifference:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """All streams that both or one of the recordings hold."""
+    """Comparison of all streams of two recordings."""
 
     streams: tuple[StreamDifference, ...] = field(default=())
 
     @property
     def agrees(self) -> bool:
-        """Whether every decision and every detection is the same."""
+        """Whether no stream differs."""
         return all(stream.agrees for stream in self.streams)
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, for JSON."""
+        """All fields as a dictionary, for JSON."""
         return {"agrees": self.agrees, "streams": [asdict(stream) for stream in self.streams]}
 
     def __str__(self) -> str:
@@ -79,10 +80,20 @@ class Difference:
 
 
 def difference(first: str | Path, second: str | Path) -> Difference:
-    """Compare two recordings; raises RecordingError if one cannot be read.
+    """Compare two recordings.
 
-    What was made of measurements later than the first one's last setpoint is left out: nothing
-    was decided by it any more.
+    Results of measurements later than the first recording's last setpoint are left out: they
+    affected no decision.
+
+    Args:
+        first: The first MCAP file.
+        second: The second MCAP file.
+
+    Returns:
+        The differences by stream.
+
+    Raises:
+        RecordingError: If a recording cannot be read.
     """
     end = _last_turn(first)
     one, other = _contents(first, end), _contents(second, end)
@@ -101,7 +112,7 @@ def _last_turn(path: str | Path) -> int | None:
 
 
 def _contents(path: str | Path, end: int | None) -> dict[str, dict[Key, Content]]:
-    """Compared values up to mission time `end`, by stream, and within by their pairing key."""
+    """Compared contents up to mission time `end`, by stream and pairing key."""
     found: dict[str, dict[Key, Content]] = defaultdict(dict)
     states: dict[str, list[str]] = defaultdict(list)
     with Recording.open(path) as recording:
@@ -187,7 +198,7 @@ def _mission(record: Record) -> tuple[str, Key, Content]:
 
 def _setpoint(record: Record) -> tuple[str, Key, Content]:
     value = record.value
-    # In real time the loop's turns come a few milliseconds early or late.
+    # In real time the loop's cycles are a few milliseconds early or late.
     turn = round(value["stamp"] / _TURN)
     return f"{value['robot']} setpoints asked for", (turn,), value["asked"]
 

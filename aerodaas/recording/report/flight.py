@@ -1,4 +1,4 @@
-"""A recording as arrays, for reports, comparisons and notebooks."""
+"""Flight data of a recording as arrays, for reports, comparisons and notebooks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Band:
-    """A mission state from one moment to the next, mission seconds."""
+    """A mission state with its start and end in mission seconds."""
 
     state: str
     start: float
@@ -39,10 +39,10 @@ class Band:
 
 @dataclass(frozen=True, slots=True)
 class RecordedDetection:
-    """One object found in one frame."""
+    """One object detected in one frame."""
 
     stamp: int
-    """Of the frame, mission nanoseconds."""
+    """Capture time of the frame, mission nanoseconds."""
     source: str
     """The frame's camera."""
     label: str
@@ -51,43 +51,43 @@ class RecordedDetection:
 
 @dataclass(frozen=True, slots=True)
 class RecordedDecision:
-    """One record of the analytics scheduler about one task."""
+    """One decision of the analytics scheduler for a task, or the task's outcome."""
 
     time: float
     """Mission seconds."""
     analysis: str
     action: str
-    """`edge`, `cloud` and `drop` are decisions; `done`, `late` and the like are outcomes."""
+    """`edge`, `cloud`, `drop` and `retry` are decisions; others, such as `done`, outcomes."""
 
 
 @dataclass
 class Load:
-    """Load of a process, or a machine, over time."""
+    """Processor and memory use of a process or a machine over time."""
 
     time: list[float] = field(default_factory=list)
     """Mission seconds."""
     cpu: list[float] = field(default_factory=list)
-    """Cores in use by a process; share of all cores, 0 to 1, of a machine."""
+    """Cores in use by a process; fraction of all cores, 0 to 1, of a machine."""
     memory: list[float] = field(default_factory=list)
-    """Megabytes of a process; share, 0 to 1, of a machine."""
+    """Megabytes of a process; fraction, 0 to 1, of a machine."""
 
 
 @dataclass
 class RobotFlight:
-    """One robot's flight."""
+    """Recorded flight of one robot: states, mission states, plan and geofence."""
 
     states: list[tuple[float, float, float, float, float]] = field(default_factory=list)
     """Mission seconds, east, north and up in metres, battery 0 to 1."""
     bands: list[Band] = field(default_factory=list)
     plan: dict[str, tuple[float, float, float]] = field(default_factory=dict)
-    """Every waypoint that was ever planned, by id, local ENU metres."""
+    """All waypoints planned during the flight, by id, local ENU metres."""
     visited: tuple[str, ...] = ()
     given_up: tuple[str, ...] = ()
     distance: float = 0.0
-    """Metres flown, by the mission's own count."""
+    """Metres flown, from the mission status."""
     fence: list[tuple[float, float]] = field(default_factory=list)
     clipped: Counter[str] = field(default_factory=Counter)
-    """Setpoints that were changed, by the limit that did it."""
+    """Number of setpoints changed by a limit, by limit."""
 
     @property
     def time(self) -> Floats:
@@ -96,12 +96,12 @@ class RobotFlight:
 
     @property
     def position(self) -> Floats:
-        """ENU metres, shape (N, 3)."""
+        """Position in local ENU metres, shape (N, 3)."""
         return self._columns[:, 1:4]
 
     @property
     def battery(self) -> Floats:
-        """Charge left, 0 to 1, shape (N,)."""
+        """Battery charge, 0 to 1, shape (N,)."""
         return self._columns[:, 4]
 
     @property
@@ -127,12 +127,12 @@ class RobotFlight:
 
 @dataclass
 class StreamLatency:
-    """Latencies of one stream's messages, in milliseconds of the host's clock."""
+    """Latencies of the messages of one stream, in milliseconds of the host's clock."""
 
     total: list[float] = field(default_factory=list)
     """From capture to publishing."""
     overhead: list[float] = field(default_factory=list)
-    """The overhead in it: transport between actors, and waiting for one."""
+    """The part of `total` without computation: transport between actors and queueing."""
     wait: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
     """From the previous actor's publishing to this one's receiving, by actor."""
     work: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
@@ -141,42 +141,42 @@ class StreamLatency:
 
 @dataclass
 class RecordedFlight:
-    """Everything in a recording but the images."""
+    """All flight data of a recording except the images."""
 
     robots: dict[str, RobotFlight] = field(default_factory=lambda: defaultdict(RobotFlight))
     latencies: dict[str, StreamLatency] = field(default_factory=lambda: defaultdict(StreamLatency))
-    """By stream."""
+    """Latencies by stream."""
     frames: Counter[str] = field(default_factory=Counter)
-    """Frames by camera."""
+    """Number of frames by camera."""
     frame_stamps: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
-    """Mission nanoseconds of the frames, by camera."""
+    """Capture times of the frames in mission nanoseconds, by camera."""
     sightings: list[RecordedDetection] = field(default_factory=list)
     detections: Counter[str] = field(default_factory=Counter)
-    """Objects found, by label."""
+    """Number of detections by label."""
     decisions: Counter[str] = field(default_factory=Counter)
-    """Scheduler decisions, by action."""
+    """Number of scheduler decisions and outcomes by action."""
     outcomes: list[RecordedDecision] = field(default_factory=list)
     reasons: Counter[tuple[str, str]] = field(default_factory=Counter)
-    """Scheduler decisions and outcomes, by action and reason."""
+    """Number of scheduler decisions and outcomes by action and reason."""
     utility: dict[str, float] = field(default_factory=dict)
-    """Utility of the analytics scheduler: `QoS`, and `QoE`, the bonuses of its windows."""
+    """Utility gained by the analytics scheduler: `QoS`, and `QoE`, the bonuses of its windows."""
     loads: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
-    """By actor."""
+    """Load by actor."""
     machines: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
-    """By machine."""
+    """Load by machine."""
     gpus: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
-    """Graphics processors, as machines, by machine and number."""
+    """Load of GPUs by machine and number, in the units of a machine's."""
     alerts: list[tuple[float, str, str]] = field(default_factory=list)
     """Mission seconds, kind, text."""
     drops: dict[str, int] = field(default_factory=dict)
-    """Messages lost on their way to the recorder, by stream."""
+    """Number of messages lost before the recorder, by stream."""
 
     @classmethod
     def read(cls, recording: Recording) -> RecordedFlight:
-        """Read a recording in one pass; missing data stays empty."""
+        """Read an open recording in one pass; fields without recorded data stay empty."""
         flight = cls()
         for record in recording.records(schemas=_READERS):
-            # Another version's message: the rest of the flight is still worth showing.
+            # A message of another version is skipped; the rest of the flight remains usable.
             with suppress(KeyError, TypeError, ValueError, AttributeError):
                 _READERS[record.schema](flight, record)
         for robot in flight.robots.values():
@@ -185,7 +185,7 @@ class RecordedFlight:
 
 
 def _closed(robot: RobotFlight) -> Iterator[Band]:
-    """The bands, each up to the start of the next, the last up to the last state."""
+    """Bands extended to the start of the next one, the last to the last vehicle state."""
     ends = [band.start for band in robot.bands[1:]]
     if robot.bands:
         last = robot.states[-1][0] if robot.states else 0.0
@@ -284,7 +284,7 @@ def _vitals(flight: RecordedFlight, record: Record) -> None:
         load.cpu.append(value["cpu_cores"])
         load.memory.append(value["memory_mb"])
     machine = flight.machines[value["machine"]]
-    # Each of a machine's actors tells of it; one reading a moment is enough.
+    # Every actor of a machine reports the machine's load; one reading per moment is enough.
     if not machine.time or now > machine.time[-1]:
         machine.time.append(now)
         machine.cpu.append(value["machine_cpu"])

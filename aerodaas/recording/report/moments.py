@@ -1,4 +1,4 @@
-"""Key moments of a flight, to be shown as images."""
+"""Selection of a flight's key moments and their images."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _MOST = 12
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """A frame to be shown, and why."""
+    """A frame selected for the report, and the reason."""
 
     stamp: int
     """Mission nanoseconds of the frame."""
@@ -33,22 +33,29 @@ class Moment:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MomentPicture:
-    """A moment with its frame, boxes drawn."""
+    """A moment with its image, detections drawn."""
 
     moment: Moment
     image: NDArray[np.uint8]
 
     @property
     def caption(self) -> str:
-        """When, and why."""
+        """Mission time and reason."""
         return f"{seconds(self.moment.stamp):.1f} s: {self.moment.reason}"
 
 
 def key_moments(flight: RecordedFlight, most: int = _MOST) -> list[Moment]:
-    """Choose at most `most` frames, in order of time.
+    """Choose the key moments of a flight.
 
-    What was seen first and best comes first, then alerts, then changes of the mission's state;
-    what is left is spread evenly over the flight.
+    The first and the most confident detections have priority, then alerts, then changes of the
+    mission state; remaining frames are spread evenly over the flight.
+
+    Args:
+        flight: The flight.
+        most: Most frames to choose; default 12.
+
+    Returns:
+        The moments, in order of time.
     """
     chosen: dict[tuple[str, int], Moment] = {}
     for stamp, source, reason in _candidates(flight, most):
@@ -62,7 +69,15 @@ def key_moments(flight: RecordedFlight, most: int = _MOST) -> list[Moment]:
 
 
 def picture_moments(recording: Recording, moments: list[Moment]) -> list[MomentPicture]:
-    """Fetch the frames of `moments` with detections drawn in; those without are left out."""
+    """Read the frames of key moments and draw their detections.
+
+    Args:
+        recording: The open recording.
+        moments: Moments of this recording, as from `key_moments`.
+
+    Returns:
+        The images, in the order of recording; moments without an image are left out.
+    """
     wanted = {(moment.source, moment.stamp): moment for moment in moments}
     stamps = {moment.stamp for moment in moments}
     found = detections_by_frame(recording)
@@ -77,7 +92,7 @@ def picture_moments(recording: Recording, moments: list[Moment]) -> list[MomentP
 
 
 def _candidates(flight: RecordedFlight, most: int) -> Iterator[tuple[int, str, str]]:
-    """Stamp, camera and reason, the most telling first."""
+    """Yield timestamp, camera and reason, by descending priority."""
     yield from _sightings(flight, max(1, most // 4))
     yield from _alerts(flight)
     yield from _states(flight)
@@ -87,7 +102,7 @@ def _candidates(flight: RecordedFlight, most: int) -> Iterator[tuple[int, str, s
 
 
 def _sightings(flight: RecordedFlight, labels: int) -> Iterator[tuple[int, str, str]]:
-    """The first and the surest sighting of each of the first few labels."""
+    """Yield the first and the most confident detection of each of the first few labels."""
     first: dict[str, RecordedDetection] = {}
     best: dict[str, RecordedDetection] = {}
     for sighting in flight.sightings:
@@ -100,7 +115,7 @@ def _sightings(flight: RecordedFlight, labels: int) -> Iterator[tuple[int, str, 
 
 
 def _alerts(flight: RecordedFlight) -> Iterator[tuple[int, str, str]]:
-    """The first alert of each kind, with the first camera."""
+    """Yield the first alert of each kind, with the first camera."""
     told: set[str] = set()
     for time, kind, text in flight.alerts:
         if kind not in told and flight.frame_stamps:
@@ -109,7 +124,7 @@ def _alerts(flight: RecordedFlight) -> Iterator[tuple[int, str, str]]:
 
 
 def _states(flight: RecordedFlight) -> Iterator[tuple[int, str, str]]:
-    """Where each robot's mission changed its state; a state met before comes after the new ones."""
+    """Yield each robot's changes of mission state; those to new states before repeated ones."""
     for name, robot in flight.robots.items():
         met: set[str] = set()
         again = []

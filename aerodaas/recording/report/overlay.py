@@ -1,4 +1,4 @@
-"""Boxes, keypoints and text drawn into an image, as Foxglove's annotations."""
+"""Drawing of boxes, keypoints and text into an image, in the style of Foxglove's overlays."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ __all__ = ["draw_detections", "draw_line"]
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 _VISIBLE = 0.3
-"""Keypoints of less confidence are not drawn."""
+"""Least confidence of a drawn keypoint."""
 _REFERENCE = 640
-"""Width in pixels at which lines are two pixels wide and letters half the font's size."""
+"""Image width in pixels at which lines are two pixels wide and text has half the font's size."""
 
 Image = NDArray[np.uint8]
 
@@ -47,7 +47,7 @@ def draw_line(image: Image, text: str) -> None:
 
 
 def _write(image: Image, text: str, at: tuple[int, int], size: float) -> None:
-    """Write white on black, inside the image; the font has ASCII only."""
+    """Write white text on black inside the image; the font has ASCII only."""
     text = text.encode("ascii", "replace").decode()
     weight = max(1, round(2 * size))
     (width, height), below = cv2.getTextSize(text, _FONT, size, weight)

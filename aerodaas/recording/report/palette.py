@@ -35,7 +35,7 @@ STATE_COLOURS = {
     "landed": OKABE_ITO["grey"],
     "aborted": OKABE_ITO["black"],
 }
-"""One colour for each mission state; states that never follow one another may share one."""
+"""Colour of each mission state; states that never follow one another may share one."""
 
 _LABELS = ("orange", "sky", "green", "yellow", "blue", "vermilion", "purple")
 
@@ -48,5 +48,5 @@ def rgb(colour: str) -> tuple[float, float, float]:
 
 @lru_cache(maxsize=1024)
 def label_colour(label: str) -> str:
-    """A detection label's colour: the same label has the same one in every recording."""
+    """Colour of a detection label, the same in every recording."""
     return OKABE_ITO[_LABELS[zlib.crc32(label.encode()) % len(_LABELS)]]

@@ -1,4 +1,4 @@
-"""A drawn plot of a flight."""
+"""Rendered plot of a flight."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ __all__ = ["Plot"]
 
 
 class Plot(NamedTuple):
-    """One plot of a flight."""
+    """A rendered plot with its texts."""
 
     name: str
-    """Of its file."""
+    """Name of its file, without suffix."""
     title: str
     description: str
-    """Text for readers who cannot see it."""
+    """Alternative text of the image."""
     png: bytes

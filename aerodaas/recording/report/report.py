@@ -1,4 +1,4 @@
-"""From a recording to the files of its report."""
+"""Report of a recording: an HTML page, a summary and plots."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = ["Report", "ReportFiles", "read_report", "write_report"]
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """A recording, worked out."""
+    """Summary, plots and key moments of a recording."""
 
     summary: FlightSummary
     plots: list[Plot]
@@ -32,7 +32,7 @@ class Report:
 
 @dataclass(frozen=True, slots=True)
 class ReportFiles:
-    """Files of a report; plots without data are missing."""
+    """Files written by `write_report`; plots without data are omitted."""
 
     summary: FlightSummary
     page: Path
@@ -44,7 +44,14 @@ class ReportFiles:
 def read_report(recording: str | Path) -> Report:
     """Compute the report of a recording.
 
-    Raises RecordingError if it cannot be read, or holds no flight.
+    Args:
+        recording: The MCAP file.
+
+    Returns:
+        Summary, plots and key moments; no plots without the extra `plots`.
+
+    Raises:
+        RecordingError: If the recording cannot be read or holds no flight.
     """
     with Recording.open(recording) as opened:
         flight = RecordedFlight.read(opened)
@@ -65,10 +72,18 @@ def _plots(flight: RecordedFlight) -> list[Plot]:
 
 
 def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
-    """Write `report.html`, `summary.json`, `summary.txt` and the plots as PNG into `folder`.
+    """Write `report.html`, `summary.json`, `summary.txt` and the plots as PNG.
 
-    An earlier report in `folder` is replaced. Raises RecordingError if the recording cannot be
-    read, holds no flight, or the folder cannot be written.
+    Args:
+        recording: The MCAP file.
+        folder: Folder of the files, created if necessary; an earlier report is replaced.
+
+    Returns:
+        The summary and the files.
+
+    Raises:
+        RecordingError: If the recording cannot be read or holds no flight, or the folder cannot
+            be written.
     """
     report, folder = read_report(recording), Path(folder)
     files = ReportFiles(

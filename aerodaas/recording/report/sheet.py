@@ -1,4 +1,4 @@
-"""The contact sheet: a flight's key moments in one image."""
+"""Contact sheet: a flight's key moments in one image."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["contact_sheet"]
 
 _COLUMNS = 3
 _WIDTH = 480
-"""Pixels of each image."""
+"""Width of each tile in pixels."""
 _GAP = 8
 
 
 def contact_sheet(moments: Sequence[MomentPicture]) -> NDArray[np.uint8]:
-    """Tile the images, three a row, each with its caption; BGR."""
+    """Tile the images of `moments`, three per row, each with its caption; BGR."""
     tiles = [_tile(moment) for moment in moments]
     rows = [tiles[at : at + _COLUMNS] for at in range(0, len(tiles), _COLUMNS)]
     strips = []

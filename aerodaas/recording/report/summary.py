@@ -1,4 +1,4 @@
-"""A flight in figures, as text and as JSON."""
+"""Summary of a flight in figures, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -19,36 +19,36 @@ __all__ = ["FlightSummary", "LatencyFigures", "RobotFigures"]
 
 @dataclass(frozen=True, slots=True)
 class LatencyFigures:
-    """From capture to publishing, milliseconds of the host's clock."""
+    """Latency from capture to publishing, in milliseconds of the host's clock."""
 
     count: int
     median_ms: float
     p99_ms: float
     overhead_ms: float
-    """Median of the overhead: transport, and waiting for an actor."""
+    """Median of the part without computation: transport between actors and queueing."""
 
 
 @dataclass(frozen=True, slots=True)
 class RobotFigures:
-    """One robot's flight in figures."""
+    """Figures of one robot's flight."""
 
     outcome: str
     """Last mission state and its reason."""
     duration_s: float
-    """Mission seconds from taking off to landed, or to the end of the recording."""
+    """Mission seconds from take-off to landing or to the end of the recording."""
     distance_m: float
     waypoints_planned: int
     waypoints_visited: int
     waypoints_given_up: int
     max_height_m: float | None
     battery_used: float | None
-    """Share of the full charge, 0 to 1."""
+    """Fraction of the full charge, 0 to 1; None if unknown."""
     setpoints_clipped: dict[str, int]
-    """Setpoints that a limit changed, by limit."""
+    """Number of setpoints changed by a limit, by limit."""
 
     @property
     def course(self) -> str:
-        """How far it flew, in one line."""
+        """Waypoints, distance, duration and battery used, in one line."""
         visited = f"{self.waypoints_visited} of {self.waypoints_planned} waypoints, "
         used = self.battery_used
         return (
@@ -59,34 +59,34 @@ class RobotFigures:
 
 @dataclass(frozen=True, slots=True)
 class FlightSummary:
-    """A recording in figures."""
+    """Figures of a recording."""
 
     title: str
     duration_s: float
     """Mission seconds recorded."""
     complete: bool
-    """The recording was closed properly."""
+    """Whether the recording was closed properly and is undamaged."""
     robots: dict[str, RobotFigures]
     frames: dict[str, int]
-    """Frames by camera."""
+    """Number of frames by camera."""
     latencies: dict[str, LatencyFigures]
-    """By stream."""
+    """Latencies by stream."""
     detections: dict[str, int] = field(default_factory=dict)
-    """Objects found in single frames, by label."""
+    """Number of detections over all frames, by label."""
     decisions: dict[str, int] = field(default_factory=dict)
-    """Scheduler decisions, by action."""
+    """Number of scheduler decisions and outcomes by action."""
     reasons: dict[str, int] = field(default_factory=dict)
-    """Scheduler decisions and outcomes, by `action: reason`."""
+    """Number of scheduler decisions and outcomes by `action: reason`."""
     utility: dict[str, float] = field(default_factory=dict)
-    """Utility of the analytics scheduler: `QoS` and `QoE`."""
+    """Utility gained by the analytics scheduler: `QoS` and `QoE`."""
     alerts: list[dict[str, Any]] = field(default_factory=list)
     drops: dict[str, int] = field(default_factory=dict)
-    """Messages that did not reach the recorder, by stream."""
+    """Number of messages that did not reach the recorder, by stream."""
     provenance: dict[str, str] = field(default_factory=dict)
 
     @classmethod
     def of(cls, recording: Recording, flight: RecordedFlight) -> Self:
-        """Work out the figures of a flight read from `recording`."""
+        """Compute the figures of a flight read from `recording`."""
         return cls(
             title=recording.provenance.get("name") or recording.path.stem,
             duration_s=round(recording.duration, 3),
@@ -105,7 +105,7 @@ class FlightSummary:
 
     @property
     def begun(self) -> str:
-        """Date and time of day at which it began, with the zone; empty if unknown."""
+        """Date, time and time zone of the start; empty if unknown."""
         try:
             seconds = int(self.provenance["epoch_ns"]) / NANOSECONDS
             began = datetime.fromtimestamp(seconds, timezone.utc).astimezone()
@@ -114,11 +114,11 @@ class FlightSummary:
         return f"{began:%Y-%m-%d %H:%M:%S %Z}"
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, for JSON."""
+        """All fields as a dictionary, for JSON."""
         return asdict(self)
 
     def __str__(self) -> str:
-        """A few lines for a person."""
+        """A few readable lines."""
         lines = [f"{self.title}: {self.duration_s:.1f} s recorded"]
         if not self.complete:
             lines[0] += " (cut off: the file was not closed or is damaged)"

@@ -1,1 +1,1 @@
-"""Reports as single HTML files: no script, no font and no image from elsewhere."""
+"""Reports as single HTML files without scripts or external fonts and images."""

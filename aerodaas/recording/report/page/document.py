@@ -1,4 +1,4 @@
-"""HTML in small pieces; all text from a recording is escaped."""
+"""HTML building blocks; text from a recording is escaped."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _STYLE = Path(__file__).with_name("style.css")
 
 
 def document(title: str, head: Iterable[str], sections: Iterable[str], foot: str = "") -> str:
-    """A whole page: `head` stands under the title, `sections` in columns, `foot` at the end."""
+    """A whole page: `head` below the title, `sections` in columns, `foot` at the end."""
     return "\n".join(
         [
             "<!doctype html>",
             '<html lang="en"><head><meta charset="utf-8">',
             '<meta name="viewport" content="width=device-width, initial-scale=1">',
-            # A page without an icon of its own makes browsers ask the server for one.
+            # Without an icon in the page, browsers request one from the server.
             '<link rel="icon" href="data:,">',
             f"<title>{escape(title)}</title><style>{_style()}</style></head><body>",
             f"<header><h1>{escape(title)}</h1>",
@@ -34,18 +34,18 @@ def document(title: str, head: Iterable[str], sections: Iterable[str], foot: str
 
 
 def section(title: str, *content: str, wide: bool = False) -> str:
-    """A part of the page, over both columns if `wide`."""
+    """A section of the page, across both columns if `wide`."""
     kind = ' class="wide"' if wide else ""
     return f"<section{kind}><h2>{escape(title)}</h2>{''.join(content)}</section>"
 
 
 def paragraph(text: str, kind: str = "") -> str:
-    """Text, in the style `kind`."""
+    """A paragraph of text with the CSS class `kind`."""
     return f'<p class="{kind}">{escape(text)}</p>' if kind else f"<p>{escape(text)}</p>"
 
 
 def picture(data: bytes, alt: str, *, media: str = "image/png", caption: str = "") -> str:
-    """An image inside the page."""
+    """An image embedded in the page."""
     text = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
     kind = "" if caption else ' class="plot"'
     source = f"data:{media};base64,{base64.b64encode(data).decode()}"
@@ -53,7 +53,7 @@ def picture(data: bytes, alt: str, *, media: str = "image/png", caption: str = "
 
 
 def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table; numbers stand at the right."""
+    """A table; numbers are aligned to the right."""
     rows = list(rows)
     body = [
         "<tr>" + "".join(_cell(value, first=not place) for place, value in enumerate(row)) + "</tr>"

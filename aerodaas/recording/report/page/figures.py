@@ -1,4 +1,4 @@
-"""Which plots a flight has data for, as PNG."""
+"""Plots of a flight as PNG."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _DPI = 200
 
 
 def plots_of(flight: RecordedFlight) -> list[Plot]:
-    """Every plot that has data, in the order of the page."""
+    """All plots that the flight has data for, the most important first."""
     flown = any(robot.states for robot in flight.robots.values())
     makers: list[tuple[str, str, str, Callable[[RecordedFlight], Figure], bool]] = [
         (

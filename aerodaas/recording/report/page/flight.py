@@ -1,4 +1,4 @@
-"""The page of one flight."""
+"""HTML page of one flight."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 80]
 def flight_page(
     summary: FlightSummary, plots: Sequence[Plot], moments: Sequence[MomentPicture]
 ) -> str:
-    """All of a flight in one HTML file."""
+    """Return the report of a flight as one HTML page."""
     parts = [section(plot.title, picture(plot.png, plot.description)) for plot in plots]
     parts += sections(summary)
     if moments:
@@ -32,7 +32,7 @@ def flight_page(
 
 
 def origin_line(summary: FlightSummary) -> str:
-    """Where a recording comes from, in one line."""
+    """Application, revision, seed and versions of a recording, in one line."""
     wanted = ("app", "revision", "seed", "speed", "aerodaas", "python", "platform")
     known = summary.provenance
     return ", ".join(f"{name} {known[name]}" for name in wanted if known.get(name))

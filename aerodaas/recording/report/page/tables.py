@@ -1,4 +1,4 @@
-"""The figures of a flight as tables."""
+"""Tables of a flight's figures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["figures", "sections"]
 
 
 def figures(summary: FlightSummary) -> dict[str, object]:
-    """Every single figure of a flight by its name, in reading order."""
+    """All single figures of a flight by name, in reading order."""
     found: dict[str, object] = {"recorded (s)": summary.duration_s}
     for name, robot in summary.robots.items():
         found |= {
@@ -40,7 +40,7 @@ def figures(summary: FlightSummary) -> dict[str, object]:
 
 
 def sections(summary: FlightSummary) -> Iterator[str]:
-    """Figures, latencies, alerts, and drops."""
+    """Yield sections of figures, latencies, scheduler reasons, alerts and dropped messages."""
     yield section("Figures", table(["", ""], figures(summary).items()))
     if summary.latencies:
         rows = [
@@ -63,7 +63,7 @@ def sections(summary: FlightSummary) -> Iterator[str]:
 
 
 def _alerts(summary: FlightSummary) -> list[tuple[str, str, str]]:
-    """The first alert of each kind, with how often it came."""
+    """The first alert of each kind, with its number of occurrences."""
     first: dict[str, tuple[str, str]] = {}
     times: dict[str, int] = {}
     for alert in summary.alerts:

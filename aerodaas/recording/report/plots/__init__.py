@@ -1,1 +1,1 @@
-"""A flight's plots, one module each; none depends on colour alone."""
+"""Plots of a flight, one module each; no plot relies on colour alone."""

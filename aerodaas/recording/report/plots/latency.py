@@ -1,4 +1,4 @@
-"""Latency as violins: transport to each actor, work in it, since capture, and overhead."""
+"""Violin plot of latencies: to each actor, in it, since capture, and overhead."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ __all__ = ["latency_figure"]
 
 _SMALLEST_MS = 0.001
 _TELLING = 0.01
-"""Resolution in milliseconds, below which a figure is drawn as this."""
+"""Milliseconds below which a figure is written as an upper bound only."""
 _MOST = 50_000
-"""Values that a violin is drawn from: more change nothing that could be seen."""
+"""Most values that a violin is drawn from: more make no visible difference."""
 _COLOURS = {"wait": "sky", "work": "blue", "total": "orange", "overhead": "yellow"}
 _MEANINGS = {
     "wait": "on the way to an actor",
@@ -33,7 +33,7 @@ Floats = NDArray[np.float64]
 
 
 def latency_figure(flight: RecordedFlight) -> Figure:
-    """A violin a row, on a logarithmic scale, with the median and the 99th percentile written."""
+    """One violin per row on a logarithmic scale, with median and 99th percentile as text."""
     rows = _rows(flight)
     figure = new_figure(1.5 + 0.4 * len(rows))
     axes = figure.add_subplot()
@@ -74,7 +74,7 @@ def latency_figure(flight: RecordedFlight) -> Figure:
 
 
 def _rows(flight: RecordedFlight) -> list[tuple[str, str, Floats]]:
-    """Label, kind and milliseconds, in the order of the stages."""
+    """Label, kind and milliseconds of each row, in the order of the data's path."""
     longest = max(flight.latencies.values(), key=lambda latency: len(latency.work), default=None)
     nodes = dict.fromkeys(
         node

@@ -1,4 +1,4 @@
-"""Processor and memory over time."""
+"""Plot of processor and memory use over time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _MOST_LINES = 10
 
 
 def loads_figure(flight: RecordedFlight) -> Figure:
-    """Cores and memory of each actor over mission time; the busiest ten of them."""
+    """Cores and memory of the ten busiest actors over mission time, with machines and GPUs."""
     figure = new_figure(4.6)
     cores, memory = figure.subplots(2, 1, sharex=True)
     busiest = sorted(flight.loads, key=lambda name: -sum(flight.loads[name].cpu))[:_MOST_LINES]

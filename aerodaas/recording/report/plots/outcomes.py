@@ -1,4 +1,4 @@
-"""Decisions of the analytics scheduler, and their outcomes."""
+"""Plot of the analytics scheduler's decisions and the tasks' outcomes."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _LOOKS = {
     "dropped": ("vermilion", ".."),
     "retry": ("yellow", ""),
 }
-"""Colour and hatching of each action; hatching distinguishes them in black and white."""
+"""Colour and hatching of each action; the hatching distinguishes them in black and white."""
 _DECISIONS = frozenset({"edge", "cloud", "drop", "retry"})
 _LEAST_SHARE = 0.08
 

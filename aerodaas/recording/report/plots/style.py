@@ -1,4 +1,4 @@
-"""Common style of the plots: size, type and legends for a phone, a page and a screen."""
+"""Shared style of the plots: size, type and legends readable on phone, paper and screen."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 WIDTH = 4.8
-"""Inches; a phone shows less than four, on which 10 points stay readable."""
+"""Width in inches; a phone shows less than four, at which 10 points stay readable."""
 
 CYCLE: tuple[tuple[str, str], ...] = tuple(
     (OKABE_ITO[colour], line)
@@ -40,7 +40,7 @@ CYCLE: tuple[tuple[str, str], ...] = tuple(
 """Colour and line style of the first, second, … line of a plot; no two alike."""
 
 _NARROW = 0.11
-"""Share of the time axis below which a state's band is too narrow for its name."""
+"""Fraction of the time axis below which a state's band is too narrow for its name."""
 _DECADES = (1, 2, 5)
 
 
@@ -50,13 +50,13 @@ def new_figure(height: float) -> Figure:
 
 
 def grid(axes: Axes, axis: str = "both") -> None:
-    """Light lines behind the data."""
+    """Draw light grid lines behind the data."""
     axes.grid(visible=True, axis=axis, color="0.9")  # type: ignore[arg-type]
     axes.set_axisbelow(True)
 
 
 def legend(figure: Figure, handles: list[Artist], columns: int = 2) -> None:
-    """A legend below the plot."""
+    """Add a legend below the plot."""
     if handles:
         figure.legend(
             handles=handles,
@@ -69,12 +69,12 @@ def legend(figure: Figure, handles: list[Artist], columns: int = 2) -> None:
 
 
 def words(name: str) -> str:
-    """A name as a person writes it."""
+    """A name with blanks instead of underscores."""
     return name.replace("_", " ")
 
 
 def colours_of(states: Iterable[str]) -> list[tuple[str, str]]:
-    """Each colour once, with the names of all states that it stands for."""
+    """Each colour once, with the names of all its states."""
     names: dict[str, list[str]] = {}
     for state in dict.fromkeys(states):
         names.setdefault(STATE_COLOURS.get(state, "black"), []).append(words(state))
@@ -82,12 +82,12 @@ def colours_of(states: Iterable[str]) -> list[tuple[str, str]]:
 
 
 def mark(label: str, face: str, shape: str = "o") -> Line2D:
-    """A legend's entry for a mark."""
+    """A legend entry for a mark."""
     return Line2D([], [], linestyle="", marker=shape, color="black", mfc=face, label=label)
 
 
 def shade_states(axes: Axes, robot: RobotFlight) -> list[Artist]:
-    """Colour the time axis by the mission's states; returns the legend's entries."""
+    """Colour the time axis by mission state; returns the legend entries."""
     for band in robot.bands:
         colour = STATE_COLOURS.get(band.state, "black")
         axes.axvspan(band.start, band.end, color=colour, alpha=0.25, linewidth=0)
@@ -114,7 +114,7 @@ def name_states(axes: Axes, robot: RobotFlight) -> None:
 
 
 def log_milliseconds(axes: Axes) -> None:
-    """Label an x axis that holds logarithms of milliseconds with the milliseconds."""
+    """Label an x axis of logarithms of milliseconds with the milliseconds."""
     low, high = axes.get_xlim()
     steps = _DECADES if high - low < len(_DECADES) else (1,)
     marks = [step * 10.0**decade for decade in range(-3, 6) for step in steps]

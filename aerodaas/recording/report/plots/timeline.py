@@ -1,4 +1,4 @@
-"""Height and battery over mission time, above the states."""
+"""Plot of height and battery over mission time, shaded by mission state."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["timeline_figure"]
 
 
 def timeline_figure(flight: RecordedFlight) -> Figure:
-    """Height and battery over mission time, above the states; two rows for each robot."""
+    """Height and battery over mission time, shaded by mission state; two rows per robot."""
     robots = {name: robot for name, robot in flight.robots.items() if robot.states}
     rows = max(1, len(robots))
     figure = new_figure(1.0 + 3.0 * rows)

@@ -1,4 +1,4 @@
-"""The flight from above and from the side."""
+"""Plots of the flight from above and from the side."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ from aerodaas.types.clock import seconds
 __all__ = ["profile_figure", "trajectory_figure"]
 
 _STAYING = 0.6
-"""Metres within which a drone is taken to stay where it is …"""
+"""Metres within which a drone counts as stationary …"""
 _LONG = 1.5
-"""… if it does so for this many seconds."""
+"""… if it stays so for this many seconds."""
 _GROUND = frozenset({"idle", "preflight", "taking_off", "landing", "landed", "aborted"})
 _SHAPES = "sDv^P*X"
 """Marks of the first, second, … label seen."""
 _APART = 1.0
-"""Metres between the marks of one label: a thing seen 15 times a second is marked once."""
+"""Metres between the marks of one label: an object seen 15 times a second is marked once."""
 
 Floats = NDArray[np.float64]
 
 
 def trajectory_figure(flight: RecordedFlight) -> Figure:
-    """The flight from above: path in the colours of its states, waypoints, take-off, fence.
+    """The flight from above: path coloured by mission state, waypoints, take-off, geofence.
 
-    A ring around a waypoint shows a state in which the drone stayed there. Small marks beside
-    the path show where the drone was when it saw something.
+    A ring around a waypoint shows a state in which the drone stayed there. Small marks on the
+    path show the drone's positions at detections.
     """
     figure = new_figure(5.4)
     axes = figure.add_subplot()
@@ -64,7 +64,7 @@ def trajectory_figure(flight: RecordedFlight) -> Figure:
 
 
 def profile_figure(flight: RecordedFlight) -> Figure:
-    """The flight from the side: height over the distance flown, one row for each robot."""
+    """The flight from the side: height over ground distance flown, one row per robot."""
     robots = {name: robot for name, robot in flight.robots.items() if robot.states}
     figure = new_figure(1.1 + 1.9 * max(1, len(robots)))
     rows = figure.subplots(max(1, len(robots)), 1, squeeze=False)[:, 0]
@@ -104,7 +104,7 @@ def _state_lines(states: dict[str, None]) -> list[Artist]:
 
 
 def _pieces(robot: RobotFlight) -> Iterator[tuple[int, int, str]]:
-    """Stretches of one state, each a point longer, so that the line has no gaps."""
+    """Yield stretches of one state, each extended by a point so that the line has no gaps."""
     states = np.array(robot.state_at(robot.time))
     if not len(states):
         return
@@ -114,7 +114,7 @@ def _pieces(robot: RobotFlight) -> Iterator[tuple[int, int, str]]:
 
 
 def _way(position: Floats) -> Floats:
-    """Metres over the ground up to each point; noise while hovering does not count."""
+    """Ground distance in metres up to each point; noise while hovering does not count."""
     way = np.zeros(len(position))
     anchor = 0
     for index in range(1, len(position)):
@@ -127,13 +127,13 @@ def _way(position: Floats) -> Floats:
 
 
 def _passed(robot: RobotFlight, way: Floats) -> Iterator[tuple[str, float, float]]:
-    """Name, way flown and height of each waypoint visited, where the drone came closest."""
+    """Yield name, ground distance and height of each waypoint visited, at the closest point."""
     begin = 0
     for number, name in enumerate(robot.visited, start=1):
         if name not in robot.plan or begin >= len(robot.position):
             continue
         away = np.linalg.norm(robot.position[begin:] - np.array(robot.plan[name]), axis=1)
-        # Of the first time that it came close: a later leg may pass by the same place.
+        # From the first approach only: a later leg may pass the same place.
         close = away <= max(_STAYING, float(np.nanmin(away)))
         first = int(np.argmax(close))
         stay = int(np.argmin(np.append(close[first:], False)))
@@ -154,7 +154,7 @@ def _draw_plan(axes: Axes, robot: RobotFlight) -> None:
 
 
 def _draw_path(axes: Axes, robot: RobotFlight) -> list[str]:
-    """Draw the path and return the states met."""
+    """Draw the path and return its states."""
     met = []
     for begin, end, state in _pieces(robot):
         piece = robot.position[begin:end, :2]
@@ -174,7 +174,7 @@ def _draw_path(axes: Axes, robot: RobotFlight) -> list[str]:
 def _draw_sightings(
     axes: Axes, flight: RecordedFlight, name: str, robot: RobotFlight
 ) -> list[Artist]:
-    """Mark where the drone was when it saw something; returns the legend's entries."""
+    """Mark the drone's positions at detections; returns the legend entries."""
     if not len(robot.time):
         return []
     places: dict[str, list[Floats]] = {}
@@ -204,10 +204,10 @@ def _draw_sightings(
 
 
 def _arrow(axes: Axes, piece: Floats, colour: str) -> None:
-    """An arrow head half-way along a path, by the distance flown."""
+    """Draw an arrow head half-way along a path, by distance flown."""
     way = np.cumsum(np.linalg.norm(np.diff(piece, axis=0), axis=1))
     middle = int(np.searchsorted(way, way[-1] / 2))
-    # Over a tenth of the way, so that noise of the position does not turn it.
+    # Direction over a tenth of the path, so that position noise does not rotate the arrow.
     reach = max(1, len(piece) // 20)
     tail, head = piece[max(0, middle - reach)], piece[min(len(piece) - 1, middle + reach)]
     style = {"arrowstyle": "-|>", "color": colour, "mutation_scale": 25, "linewidth": 0}
