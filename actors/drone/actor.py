@@ -315,7 +315,7 @@ class DroneActor(StreamActor):
                 given_up = time.monotonic() + self._conduct.patience
             elif time.monotonic() > given_up:
                 sources = ", ".join(self._barrier.waiting_for())
-                self.alert("reader_lost", f"nobody answers for {sources}; flying on without")
+                self.alert("reader_lost", f"no reader answers for {sources}; flying on without")
                 self._barrier.forget()
         now = self.clock.now()
         # The order of arrival depends on the host's scheduler; that of processing must not.

@@ -84,7 +84,7 @@ def _objection(pending: Sequence[Waypoint], order: Sequence[Waypoint]) -> str:
     if len(set(answered)) < len(answered):
         return "its plan visits a waypoint twice"
     unknown = sorted(set(answered) - known)
-    return f"its plan visits {', '.join(unknown)}, which nobody asked for" if unknown else ""
+    return f"its plan visits {', '.join(unknown)}, which were not asked for" if unknown else ""
 
 
 class _SchedulerPlanner:

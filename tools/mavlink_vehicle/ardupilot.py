@@ -32,7 +32,7 @@ _LEAST = 0.5
 
 
 class EmulatedArduPilot(Firmware):
-    """Take-off above home in guided mode, nothing sent that nobody asked for, reasons as texts."""
+    """Take-off above home in guided mode, nothing sent without a request, reasons as texts."""
 
     number: ClassVar[int] = mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA
     default_rates: ClassVar[dict[int, float]] = {}

@@ -112,7 +112,8 @@ class RemoteClient:
 
     def _unreachable(self, error: Exception) -> SourceError:
         return SourceError(
-            f"nobody answers at {self._host}:{self._port} ({error or type(error).__name__}): "
+            f"no remote control answers at {self._host}:{self._port} "
+            f"({error or type(error).__name__}): "
             "is the mission flying, and does it use RemoteAnalytics?"
         )
 

@@ -198,7 +198,7 @@ def test_nobody_there() -> None:
     """Connecting ends in its time and says what was heard."""
     with pytest.raises(VehicleError, match="no HEARTBEAT on udpin"):
         vehicle_at(free_port()).connect(0.5)
-    with pytest.raises(VehicleError, match="nobody listens there"):
+    with pytest.raises(VehicleError, match="no program listens there"):
         vehicle_at(1, url=f"tcp:{LOOPBACK}:1").connect(0.5)
     with pytest.raises(VehicleError, match="no such device"):
         vehicle_at(1, url="serial:/dev/nothing:57600").connect(0.5)

@@ -61,7 +61,7 @@ class ArduPilot(Autopilot):
     stream_before: ClassVar[float] = 0.0
     stops_short: ClassVar[bool] = False
     alone: ClassVar[str] = (
-        "ArduPilot stops within 3 s and hovers until somebody lands it; it comes home only with "
+        "ArduPilot stops within 3 s and hovers until a pilot lands it; it comes home only with "
         'FS_GCS_ENABLE at 1 and "role": "ground_station"'
     )
     orphaned: ClassVar[str] = (

@@ -74,7 +74,7 @@ def _explain(error: Exception, url: str, number: str) -> str:
             f"port {number} is taken by another program; `ss -ulnp sport = :{number}` shows by "
             "which (a ground station? have one of the two forward to the other)"
         ),
-        errno.ECONNREFUSED: "nobody listens there; is the autopilot or its simulation running?",
+        errno.ECONNREFUSED: "no program listens there; is the autopilot or its simulation running?",
         errno.EACCES: "no permission (for a serial device: `sudo usermod -aG dialout $USER`)",
         errno.EPERM: "no permission",
         errno.ENOENT: "no such device; `ls /dev/serial/by-id` lists them",
