@@ -52,7 +52,7 @@ class OrphanReaper:
         self._application = application
         self._drones = drones
         self.look_after(groups, helpers)
-        self._lock = RunLock()
+        self._lock: RunLock | None = None
         self._itself = ray.get_runtime_context().current_actor
         threading.Thread(target=self._watch, name="orphan_reaper", daemon=True).start()
 
@@ -64,7 +64,12 @@ class OrphanReaper:
         leave()
 
     def heard(self) -> None:
-        """Record a heartbeat of the application."""
+        """Record a heartbeat of the application; with the first its run begins.
+
+        Before, a local Ray ends with the application; from now on it stays until the run has ended.
+        """
+        if self._lock is None:
+            self._lock = RunLock()
         self._silent_from = time.monotonic() + _SILENCE
 
     def ending(self) -> bool:
@@ -84,7 +89,8 @@ class OrphanReaper:
             time.sleep(_LOOK_INTERVAL)
         self._ending = True
         end_actors(*self._ended)
-        self._lock.release()
+        if self._lock is not None:
+            self._lock.release()
         exit_soon()
         with contextlib.suppress(RayError):
             # Through Ray, or it would print a message about a dead worker to the terminal.

@@ -27,7 +27,6 @@ __all__ = [
     "disconnect",
     "discover",
     "home_edge",
-    "is_local",
     "join",
     "nodes_at",
     "options_for",
@@ -151,11 +150,6 @@ def _require_edge(address: str) -> None:
             f"the Ray cluster at {address} has no edge node; start the one beside the drone "
             """with `ray start --address … --resources '{"edge": 1}'`"""
         )
-
-
-def is_local() -> bool:
-    """Return whether the connected Ray was started for this process alone."""
-    return _local is not None
 
 
 def disconnect() -> None:

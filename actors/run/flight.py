@@ -19,7 +19,7 @@ from aerodaas.actors.base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors.cluster.head_watch import HeadWatch
 from aerodaas.actors.cluster.liveness import ASKED_AGAIN, LIFE, LIFELINES, Life, LivenessMonitor
 from aerodaas.actors.cluster.orphan_reaper import OrphanReaper
-from aerodaas.actors.cluster.ray_cluster import Placement, is_local, nodes_at, options_for
+from aerodaas.actors.cluster.ray_cluster import Placement, nodes_at, options_for
 from aerodaas.actors.dispatch.dispatcher import DispatcherActor
 from aerodaas.actors.dispatch.executor import CloudExecutor
 from aerodaas.actors.dispatch.offload import CloudProcess
@@ -97,7 +97,6 @@ class Flight:
         self._helpers: list[Any] = []
         """Actors without streams, to be killed at the end."""
         self._job = ray.get_runtime_context().get_job_id()
-        self._reaper: Any = None
         self._pulse = SuspensionMonitor()
         self._opening: list[Any] = []
         self._liveness_monitor: list[LivenessMonitor] = []
@@ -122,8 +121,7 @@ class Flight:
         if self.recording is not None and provenance is not None:
             recorder = (session, self.recording, plan.recorded, provenance, live, page)
             self._create("recorder", RecorderActor, edge, recorder, restarts=_RESTARTS)
-        if not is_local():
-            self._appoint_reaper()
+        self._reaper = self._appoint_reaper()
         self._origin = 0
         self._answers: dict[str, tuple[float, dict[str, RobotReport]]] = {}
         """Time (monotonic seconds) and content of each drone actor's last answer."""
@@ -146,9 +144,10 @@ class Flight:
         self._prepare(list(self._members.values()), progress)
         for reference in self._opening:
             ask(reference, _PREPARE_TIMEOUT)
-        if self._reaper is None:
-            # Before this, the local Ray would have ended with this process.
-            self._appoint_reaper()
+        # Nothing starts before the reaper runs and has a heartbeat: later ones would wait in this
+        # process for the reaper's, and a suspended application sends none.
+        ask(self._reaper.heard.remote(), _PREPARE_TIMEOUT)
+        self._pulse.beat()
         self._origin = host_time_ns()
         self._start(list(self._members.values()))
         self._head = HeadWatch(ray.get_runtime_context().gcs_address, self._note)
@@ -171,8 +170,7 @@ class Flight:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
             self._record_vitals()
-        if self._reaper is not None:
-            self._reaper.heard.remote()
+        self._reaper.heard.remote()
         robots: dict[str, RobotReport] = {}
         for name in set(self._drones.values()):
             robots.update(self._robots_of(name, newest))
@@ -196,7 +194,7 @@ class Flight:
     def _drone_lost(self, member: Member) -> MissionError:
         """Error for a lost drone actor, which a suspended application may have caused itself."""
         frozen = self._pulse.frozen
-        if frozen and self._reaper is not None:
+        if frozen:
             try:
                 ended = ask(self._reaper.ending.remote())
             except DeadError:
@@ -281,8 +279,7 @@ class Flight:
         self._start(fresh)
 
     def _inform_reaper(self) -> None:
-        if self._reaper is not None:
-            self._reaper.look_after.remote(self._in_ending_order(), list(self._helpers))
+        self._reaper.look_after.remote(self._in_ending_order(), list(self._helpers))
 
     @property
     def flying(self) -> bool:
@@ -344,14 +341,15 @@ class Flight:
         others = [m.handle for m in self._members.values() if m.name != "recorder"]
         return [others, recorder]
 
-    def _appoint_reaper(self) -> None:
+    def _appoint_reaper(self) -> Any:  # noqa: ANN401 - Ray's handle
         options = self._options("orphan_reaper", Placement(), restarts=0)
         remote: Any = ray.remote(OrphanReaper)
         drones = [self._members[name].handle for name in self._ids()]
         watched = (drones, self._in_ending_order(), list(self._helpers))
         application = ApplicationProcess(self.plan.session.lockstep)
-        self._reaper = remote.options(**options).remote(application, *watched)
-        self._helpers.append(self._reaper)
+        reaper = remote.options(**options).remote(application, *watched)
+        self._helpers.append(reaper)
+        return reaper
 
     def _ids(self) -> set[str]:
         return set(self._drones.values())

@@ -28,14 +28,22 @@ class SuspensionMonitor:
 
     def __init__(self) -> None:
         self._last = float("inf")
-        self.frozen = 0.0
-        """Seconds of the last such suspension; 0 without any."""
+        self._frozen = 0.0
+
+    @property
+    def frozen(self) -> float:
+        """Seconds of the last such suspension; 0 without any.
+
+        It may have been since the last beat, in a call that waited for the very actor that ended.
+        """
+        self.beat()
+        return self._frozen
 
     def beat(self) -> None:
         """Record that this process runs; to be called regularly."""
         now = time.monotonic()
         if now - self._last > _FROZEN:
-            self.frozen = now - self._last
+            self._frozen = now - self._last
         self._last = now
 
 

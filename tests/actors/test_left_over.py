@@ -17,7 +17,7 @@ import pytest
 from flying import FLAT
 
 from aerodaas.actors.cluster.local_ray import LocalRay
-from aerodaas.actors.cluster.ray_process import VARIABLE
+from aerodaas.actors.cluster.ray_process import LOCKS, VARIABLE
 from aerodaas.actors.cluster.ray_variables import VARIABLES
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
@@ -103,12 +103,9 @@ def folders(processes: set[psutil.Process]) -> set[Path]:
 
 
 def under_way(pid: int) -> bool:
-    """Whether the run of an application has begun: its orphan reaper is there."""
-    for one in psutil.Process(pid).children(recursive=True):
-        with contextlib.suppress(psutil.Error):
-            if " ".join(one.cmdline()).startswith("ray::OrphanReaper"):
-                return True
-    return False
+    """Whether the run of an application has begun: its orphan reaper holds the local Ray."""
+    own = folders(set(psutil.Process(pid).children(recursive=True)))
+    return any(any((folder / LOCKS).glob("*")) for folder in own)
 
 
 def kill_in_flight(process: subprocess.Popen[str], recording: Path) -> None:

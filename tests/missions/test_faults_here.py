@@ -10,7 +10,7 @@ import sys
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +61,16 @@ def process_of(run: Run, actor: str) -> psutil.Process:
     return psutil.Process(run._flight.infos()[actor].pid)
 
 
+def reapers() -> set[psutil.Process]:
+    """Processes of orphan reapers below this one."""
+    found = set()
+    for process in psutil.Process().children(recursive=True):
+        with suppress(psutil.Error):
+            if process.cmdline()[0].startswith("ray::OrphanReaper"):
+                found.add(process)
+    return found
+
+
 def state_of(run: Run) -> MissionState:
     """The mission's state."""
     return run.look().robots["drone"].status.state
@@ -82,6 +92,16 @@ def frozen(process: psutil.Process) -> Iterator[None]:
         yield
     finally:
         process.send_signal(signal.SIGCONT)
+
+
+def test_a_run_is_watched_before_its_drones_fly(flyer: Flyer) -> None:
+    """An application that is suspended at once sends no later heartbeat to a reaper that starts."""
+    before = reapers()
+    with flyer.flying(hover, with_camera(), speed=1.0, lockstep=False) as env:
+        run = env.launch()
+        assert len(reapers() - before) == 1
+        until(run, lambda: state_of(run) is MissionState.ENROUTE)
+        env.get_robot_by_id("drone").end_mission()
 
 
 def test_the_recorder_dies(flyer: Flyer) -> None:
