@@ -7,6 +7,7 @@ import contextlib
 import importlib
 import logging
 import os
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -26,6 +27,7 @@ __all__ = [
     "connect",
     "disconnect",
     "discover",
+    "hardware",
     "home_edge",
     "join",
     "nodes_at",
@@ -34,6 +36,10 @@ __all__ = [
 ]
 
 _KINDS: tuple[Literal["edge", "cloud"], ...] = ("edge", "cloud")
+_ACCELERATORS = {"GPU", "TPU", "NPU", "HPU", "neuron_cores"}
+"""Ray's resource names of accelerators (docs.ray.io, "Accelerator Support")."""
+_ACCELERATOR_TYPE = "accelerator_type:"
+"""Prefix of the resource by which Ray tells an accelerator's product name."""
 _SHARE = 0.001
 """Amount of a node's `edge` or `cloud` resource per actor, for placement only."""
 _NAMESPACE = "aerodaas"
@@ -196,6 +202,27 @@ def nodes_at(place: Placement) -> list[dict[str, Any]]:
             f"`--resources '{{\"{place.kind}\": 1}}'`, or correct the resource's kind"
         )
     return [node for node in named if node in kind]
+
+
+def hardware(place: Placement) -> dict[str, Any]:
+    """Number of the nodes at `place`, and the sums of their cores, memory and accelerators.
+
+    Raises ConfigError if there are none.
+    """
+    nodes = nodes_at(place)
+    total: Counter[str] = Counter()
+    for node in nodes:
+        total.update(node["Resources"])
+    return {
+        "nodes": len(nodes),
+        "cores": total["CPU"],
+        "memory": int(total["memory"]),
+        "accelerators": {
+            name.removeprefix(_ACCELERATOR_TYPE): number
+            for name, number in total.items()
+            if name in _ACCELERATORS or name.startswith(_ACCELERATOR_TYPE)
+        },
+    }
 
 
 def _names(node: dict[str, Any]) -> set[str]:

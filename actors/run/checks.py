@@ -25,7 +25,14 @@ if TYPE_CHECKING:
     from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
     from aerodaas.dataflow.graph import Graph, Node
 
-__all__ = ["check_environment", "check_graph", "check_plugins", "check_served", "check_tasks"]
+__all__ = [
+    "check_environment",
+    "check_graph",
+    "check_plugins",
+    "check_served",
+    "check_tasks",
+    "sensor_properties",
+]
 
 _PLAYED = {"folder", "mcap", "recorded", "video"}
 """Camera drivers that read the file or folder of the setting `path`."""
@@ -143,9 +150,31 @@ def _check_names(section: str, told: Iterable[str], graph: Graph) -> None:
 
 
 def _check_settings(kind: PluginKind, name: str, settings: dict[str, Any], place: str) -> None:
-    model = getattr(load_plugin(kind, name), "settings_model", None)
-    if isinstance(model, type) and issubclass(model, BaseModel):
+    model = _settings_model(kind, name)
+    if model is not None:
         checked(model, settings, f"{place}: settings")
+
+
+def _settings_model(kind: PluginKind, name: str) -> type[BaseModel] | None:
+    """The pydantic model of a plug-in's settings, if it has one."""
+    model = getattr(load_plugin(kind, name), "settings_model", None)
+    return model if isinstance(model, type) and issubclass(model, BaseModel) else None
+
+
+def sensor_properties(config: EnvironmentConfig, sensor: SensorConfig) -> dict[str, Any]:
+    """Properties of a sensor by name; the settings of a camera's driver with their defaults.
+
+    Raises ConfigError for an invalid setting.
+    """
+    driver, settings = sensor.driver or "", sensor.settings
+    if sensor.type == "camera":
+        driver = config.camera_driver(sensor)
+        model = _settings_model("cameras", driver)
+        if model is not None:
+            place = f"sensor {sensor.full_id}: settings"
+            settings = checked(model, settings, place).model_dump()
+    own = {"id": sensor.id, "type": sensor.type, "rate": sensor.rate, "robot": sensor.robot or ""}
+    return {**own, "driver": driver, **settings}
 
 
 def _require_methods(

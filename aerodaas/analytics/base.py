@@ -158,7 +158,7 @@ class Analytics(PaperNames, IAnalyse[O_co]):
             ConfigError: If `runtime_env` is invalid.
             GraphError: If the analysis is already running.
         """
-        self._compute = str(compute.get_compute_properties()["id"])
+        self._compute = compute.get_compute_id()
         self._graph = getattr(compute, "graph", None)
         if runtime_env is not None:
             self._runtime_env = as_runtime_env(runtime_env, f"{type(self).__name__}.deploy")

@@ -31,11 +31,13 @@ SENSOR_ITEMS: dict[str, type] = {
 class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
     """A sensor of a robot or of the environment; read it as a stream, by callback, or by poll."""
 
-    def __init__(self, graph: Graph, config: SensorConfig, robot: str | None) -> None:
-        """Belong to `robot`, or to the environment if None."""
+    def __init__(
+        self, graph: Graph, config: SensorConfig, properties: Callable[[], dict[str, Any]]
+    ) -> None:
+        """Sensor described by `config`, with its `properties` by name."""
         self._graph = graph
         self._config = config
-        self._robot = robot
+        self._properties = properties
         self._poller: AeroStreamData[E] | None = None
 
     def get_sensor_id(self) -> str:
@@ -43,18 +45,21 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
         return self._config.id
 
     def get_sensor_property(self, name: str) -> str:
-        """Return one property as text: id, type, driver, rate, or one of the driver's settings.
+        """Return one property of the sensor.
 
-        Raises UnknownIdError for any other name.
+        Args:
+            name: `id`, `type`, `driver`, `rate` (in Hz), `robot` (empty for a sensor of the
+                environment), or a setting of the driver, such as a camera's `width` in pixels
+                and `horizontal_fov` in degrees.
+
+        Returns:
+            The value as text: the environment file's, or else the default.
+
+        Raises:
+            UnknownIdError: If the sensor has no such property.
+            ConfigError: If one of the driver's settings is invalid.
         """
-        known: dict[str, Any] = {
-            "id": self._config.id,
-            "type": self._config.type,
-            "driver": self._config.driver or "",
-            "rate": self._config.rate,
-            "robot": self._robot or "",
-            **self._config.settings,
-        }
+        known = self._properties()
         if name not in known:
             raise UnknownIdError(f"property of {self._config.id}", name, list(known))
         return str(known[name])
@@ -64,7 +69,7 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
         name = self._config.full_id
         item = SENSOR_ITEMS[self._config.type]
         if name not in self._graph.nodes:
-            node = self._graph.add(Node(name, "sensor", item, self._config, self._robot))
+            node = self._graph.add(Node(name, "sensor", item, self._config, self._config.robot))
             self._graph.launch(node)
         return AeroStreamData(self._graph, name, item)
 
@@ -100,12 +105,30 @@ class Sensor(PaperNames, IPushSensor[E], IPullSensor[E]):
 class Compute(PaperNames, ICompute):
     """A compute resource, to `deploy` analytics on."""
 
-    def __init__(self, graph: Graph, config: ComputeConfig) -> None:
-        """Stand for the resource that `config` describes."""
+    def __init__(
+        self, graph: Graph, config: ComputeConfig, hardware: Callable[[], dict[str, Any]]
+    ) -> None:
+        """Resource described by `config`; `hardware` returns the properties of its nodes."""
         self.graph = graph
         self.config = config
+        self._hardware = hardware
+
+    def get_compute_id(self) -> str:
+        """Return the unique ID of the compute resource."""
+        return self.config.id
 
     def get_compute_properties(self) -> dict[str, Any]:
-        """Return id, kind, node, executors and the resource's own settings."""
+        """Return the properties of the compute resource; starts or joins Ray if necessary.
+
+        Returns:
+            The settings of the environment file (`id`, `kind`, `node`, `executors`,
+            `compression`, `endpoint` and the resource's own), and the sums over its nodes of what
+            Ray offers to actors: `nodes`, `cores`, `memory` in bytes, and `accelerators`, a number
+            by name such as `{"GPU": 1.0, "H100": 1.0}`. An HTTP endpoint has no such sums.
+
+        Raises:
+            AeroDaaSError: If the cluster cannot be reached.
+            ConfigError: If no node of the cluster fits the resource.
+        """
         properties = self.config.model_dump()
-        return {**properties.pop("settings"), **properties}
+        return {**properties.pop("settings"), **properties, **self._hardware()}

@@ -52,6 +52,10 @@ class ICompute(ABC):
     """A place where analytics can run: an edge node, a cloud node, a function endpoint."""
 
     @abstractmethod
+    def get_compute_id(self) -> str:
+        """Return the unique ID of the compute resource."""
+
+    @abstractmethod
     def get_compute_properties(self) -> dict[str, Any]:
         """Return the properties of the compute resource: kind, cores, memory, accelerators."""
 
@@ -61,7 +65,7 @@ class ISensor(ABC, Generic[E]):
 
     @abstractmethod
     def get_sensor_property(self, name: str) -> str:
-        """Return one property of the sensor, such as "fps" or "width", as text."""
+        """Return one property of the sensor, such as "rate" or "width", as text."""
 
     @abstractmethod
     def get_sensor_id(self) -> str:

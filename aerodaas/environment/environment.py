@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from aerodaas.actors.run.checks import check_environment
-from aerodaas.config.model import ComputeConfig, EnvironmentConfig, RobotConfig
+from aerodaas.actors.run.checks import check_environment, sensor_properties
+from aerodaas.config.model import ComputeConfig, EnvironmentConfig, RobotConfig, SensorConfig
 from aerodaas.config.options import current_options
 from aerodaas.config.overrides import located, overridden
 from aerodaas.config.plugins import load_plugin
@@ -76,7 +77,7 @@ class Environment(PaperNames, IEnvironment):
 
     def get_env_sensors(self) -> list[ISensor[Any]]:
         """Return the sensors in the environment."""
-        return [Sensor(self.graph, sensor, None) for sensor in self.config.sensors]
+        return [self.sensor(sensor) for sensor in self.config.sensors]
 
     def get_env_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
         """Return a sensor of the environment, or a robot's by `robot/sensor`.
@@ -86,7 +87,7 @@ class Environment(PaperNames, IEnvironment):
         """
         sensors = {sensor.full_id: sensor for sensor in self.config.all_sensors()}
         sensor = sensors[find_scoped("sensor", sensor_id, sensors)]
-        return Sensor(self.graph, sensor, sensor.robot)
+        return self.sensor(sensor)
 
     def get_env_robots(self) -> list[IRobot]:
         """Return all the robots available in the environment."""
@@ -109,13 +110,13 @@ class Environment(PaperNames, IEnvironment):
 
     def get_compute_resources(self) -> list[Any]:
         """Return all the compute resources available: of the file, or of the cluster if "auto"."""
-        return [Compute(self.graph, resource) for resource in self.compute()]
+        return [self._resource(resource) for resource in self.compute()]
 
     def get_compute_resource_by_id(self, compute_id: str) -> Compute:
         """Return the requested compute resource; raises UnknownIdError."""
         for resource in self.compute():
             if resource.id == compute_id:
-                return Compute(self.graph, resource)
+                return self._resource(resource)
         raise UnknownIdError("compute resource", compute_id, [one.id for one in self.compute()])
 
     def share_out(
@@ -199,6 +200,23 @@ class Environment(PaperNames, IEnvironment):
         Raises UnknownIdError or SchedulerError if it cannot be used.
         """
         self._dispatch_with = load_scheduler(scheduler)
+
+    def sensor(self, sensor: SensorConfig) -> Sensor[Any]:
+        """The handle of a sensor."""
+        return Sensor(self.graph, sensor, partial(sensor_properties, self.config, sensor))
+
+    def _resource(self, resource: ComputeConfig) -> Compute:
+        return Compute(self.graph, resource, partial(self._hardware, resource))
+
+    def _hardware(self, resource: ComputeConfig) -> dict[str, Any]:
+        if resource.kind == "http":
+            return {}
+        from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
+            ray_cluster as cluster,
+        )
+
+        cluster.connect(current_options.get().address)
+        return cluster.hardware(cluster.Placement(resource.kind, resource.node))
 
     def compute(self) -> list[ComputeConfig]:
         """The compute resources; those of the cluster where the file says "auto"."""
@@ -362,14 +380,13 @@ class Robot(PaperNames, IRobot):
 
     def get_sensors(self) -> list[ISensor[Any]]:
         """Return all the sensors on board."""
-        graph = self._environment.graph
-        return [Sensor(graph, sensor, self.robot_id) for sensor in self.config.sensors]
+        return [self._environment.sensor(sensor) for sensor in self.config.sensors]
 
     def get_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
         """Return the requested sensor; raises UnknownIdError."""
         for sensor in self.config.sensors:
             if sensor_id in {sensor.id, sensor.full_id}:
-                return Sensor(self._environment.graph, sensor, self.robot_id)
+                return self._environment.sensor(sensor)
         known = [sensor.id for sensor in self.config.sensors]
         raise UnknownIdError(f"sensor of {self.robot_id}", sensor_id, known)
 

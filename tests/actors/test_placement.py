@@ -39,6 +39,22 @@ def test_each_analysis_runs_where_it_was_deployed(told: dict[str, Any]) -> None:
     assert places["analytics/cloud-b"] == "cloud-b"
 
 
+def test_each_resource_has_the_hardware_of_its_nodes(told: dict[str, Any]) -> None:
+    """A kind that of all its nodes, a named node its own."""
+    hardware = told["hardware"]
+    assert {name: hardware[name]["nodes"] for name in hardware} == {
+        "edge": 2,
+        "cloud": 2,
+        "second": 1,
+        "beside": 1,
+    }
+    assert hardware["cloud"]["cores"] == 2
+    assert hardware["cloud"]["memory"] > hardware["second"]["memory"] > 0
+    assert hardware["second"]["accelerators"] == {"GPU": 2, "T4": 1}
+    assert hardware["cloud"]["accelerators"] == {"GPU": 2, "T4": 1}
+    assert hardware["edge"]["accelerators"] == hardware["beside"]["accelerators"] == {}
+
+
 def test_the_drone_its_sensors_and_its_recorder_share_one_edge(told: dict[str, Any]) -> None:
     """Though another edge has room."""
     assert {told["places"][who] for who in ("drone/drone", "sensor/drone/cam", "recorder")} == {

@@ -68,14 +68,20 @@ def main() -> None:
     small: dict[str, Any] = {"num_cpus": 1, "object_store_memory": 80 * 2**20}
     cluster = Cluster()
     cluster.add_node(resources={"edge": 1}, node_name="edge-a", include_dashboard=False, **small)
-    for name in ("edge-b", "cloud-a", "cloud-b"):
+    for name in ("edge-b", "cloud-a"):
         cluster.add_node(resources={name[:-2]: 1}, node_name=name, **small)
+    accelerated = {"cloud": 1, "accelerator_type:T4": 1}
+    cluster.add_node(resources=accelerated, num_gpus=2, node_name="cloud-b", **small)
     told: dict[str, Any] = {"expected": list(PLACES)}
     try:
         run = flyer.fly(deployed, content(), address=cluster.address)
         assert run._flight is not None
         names = {node["NodeID"]: node["NodeName"] for node in ray.nodes()}
         told["places"] = {who: names[i.node_id] for who, i in run._flight.infos().items()}
+        told["hardware"] = {
+            name: run._environment.get_compute_resource_by_id(name).get_compute_properties()
+            for name in PLACES
+        }
         told["sent"] = {
             stream: count.count
             for report in run.reports().values()
