@@ -31,8 +31,8 @@ class ExecutorPool:
         speed: float = 1.0,
     ) -> None:
         """Use `executors`; `timeout_ns`, `wake` and `speed` as in `RemoteExecutor`."""
-        # Processes of one node share its link, and frames are coded once for all of them.
-        frame_uplinks = {one.site: FrameUplink(one.compression) for one in executors}
+        # Processes of one node share its link, and frames are encoded once for all of them.
+        frame_uplinks = {one.site: FrameUplink(one.codec) for one in executors}
         self._clouds = [
             RemoteExecutor(one, frame_uplinks[one.site], timeout_ns, wake, speed)
             for one in executors
@@ -91,12 +91,13 @@ class ExecutorPool:
             cloud.finish(timeout)
 
     def values(self) -> dict[str, Any]:
-        """Figures of each site: milliseconds, Mbit/s, frames by coding."""
+        """Figures of each site: codec, milliseconds, Mbit/s, frames and megabytes sent."""
         return {
             site: {
                 "latency_ms": frame_uplink.link.latency * 1e3,
                 "bandwidth_mbit": frame_uplink.link.bandwidth * 8e-6,
-                "frames": dict(frame_uplink.chosen),
+                "codec": str(frame_uplink.codec),
+                "frames": frame_uplink.frames,
                 "sent_mb": frame_uplink.bytes / 1e6,
             }
             for site, frame_uplink in self._frame_uplinks.items()

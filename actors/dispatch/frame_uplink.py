@@ -1,4 +1,4 @@
-"""Uplink of frames to one node: each frame is sent once, in the fastest coding, and timed."""
+"""Uplink of frames to one node: each frame is sent once, encoded, and timed."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors.dispatch.costs import LinkEstimate, Uplink
-from aerodaas.actors.dispatch.frame_codec import CODINGS, Coder, Coding, fastest
+from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.actors.streams import encode_message
 from aerodaas.types.data import Frame
 from aerodaas.types.status import Message
@@ -36,31 +36,28 @@ class FrameTransfer:
     """Stream and number of the message."""
     data: bytes
     """The encoded message."""
-    frame: Frame | None
-    coding: Coding
     original: int
-    """Bytes before coding."""
+    """Bytes before encoding."""
     expected: float
-    """Expected seconds of coding and transfer."""
+    """Expected seconds of encoding, transfer and decoding."""
 
 
 class FrameUplink:
-    """Link to one node: estimates, coding of frames, and pings, in a packing thread."""
+    """Link to one node: estimates, encoding of frames, and pings, in a packing thread."""
 
-    def __init__(self, compression: str) -> None:
-        """Create the uplink; `compression` is that of `ComputeConfig`."""
+    def __init__(self, codec: Codec) -> None:
+        """Create the uplink of frames in `codec`."""
+        self.codec = codec
         self.link = LinkEstimate()
         self.uplink = Uplink(self.link)
-        self.chosen: dict[str, int] = {}
-        """Frames coded, by coding."""
+        self.frames = 0
+        """Frames encoded."""
         self.bytes = 0
         """Bytes of frames sent."""
-        self._allowed = CODINGS[compression]
-        self._coder = Coder()
         self._transfers: OrderedDict[tuple[str, int], FrameTransfer] = OrderedDict()
         self._packer = ThreadPoolExecutor(1, "packer")
-        self._coding_seconds = self._size = 0.0
-        """Coding time and size of the newest transfer."""
+        self._encoding = self._decoding = self._size = 0.0
+        """Seconds of encoding and decoding, and bytes, of the newest transfer."""
         self._announced: dict[tuple[str, int], None] = {}
         """Messages that wait to be packed."""
         self._pinged = self._transferred = float("-inf")
@@ -87,28 +84,28 @@ class FrameUplink:
                 self._transfers.popitem(last=False)
         return transfer
 
-    def arrived(
-        self, transfer: FrameTransfer, way: tuple[str, int], at: float, decoding: float
-    ) -> None:
+    def arrived(self, way: tuple[str, int], at: float, decoding: float) -> None:
         """Update the estimates from the call that carried a frame.
 
         `at` is the time of its answer less the execution, `way` its name on the uplink,
-        `decoding` the seconds of decompression.
+        `decoding` the seconds of decoding.
         """
         self._transferred = time.monotonic()
         self.uplink.arrive(way, at)
-        if transfer.frame is not None and decoding > 0:
-            self._coder.took_to_decode(transfer.frame, transfer.coding, decoding)
-        transfer.frame = None
+        self._decoding = decoding
 
     @property
     def expected(self) -> float:
-        """Expected seconds of coding and transfer for a frame like the last one.
+        """Expected seconds of encoding, transfer and decoding for a frame like the last one.
 
         Current transfers and messages that wait to be packed precede it.
         """
         size = self._size * (1 + len(self._announced))
-        return max(self._coding_seconds + self.uplink.seconds(size), self.link.latency)
+        return max(self._coding + self.uplink.seconds(size), self.link.latency)
+
+    @property
+    def _coding(self) -> float:
+        return self._encoding + self._decoding
 
     def ping(self, executor: Any) -> None:  # noqa: ANN401 - a Ray handle
         """Measure the link with a ping, if one is due."""
@@ -147,22 +144,17 @@ class FrameUplink:
         pinging.add_done_callback(answered)
 
     def _pack(self, message: Message[Any]) -> FrameTransfer:
-        frame = message.item if isinstance(message.item, Frame) else None
-        coding: Coding = "raw"
-        original = 0
-        if frame is not None:
-            original = frame.nbytes
-            costs = self._coder.costs(frame, self._allowed)
-            coding, _ = fastest(costs, self.link.seconds)
-            self._coding_seconds = costs[coding].seconds
-            if coding != "raw":
-                message = _with_item(message, self._coder.encode(frame, coding))
+        frame = message.item
+        if isinstance(frame, Frame):
+            began = time.perf_counter()
+            message = _with_item(message, self.codec.encoded(frame))
+            self._encoding = time.perf_counter() - began
         data = encode_message(message)
         self._size = len(data)
-        self.chosen[coding] = self.chosen.get(coding, 0) + 1
+        self.frames += 1
         name = (message.stream, message.seq)
-        expected = self._coding_seconds + self.uplink.seconds(self._size)
-        return FrameTransfer(name, data, frame, coding, original or len(data), expected)
+        original = frame.nbytes if isinstance(frame, Frame) else len(data)
+        return FrameTransfer(name, data, original, self._coding + self.uplink.seconds(self._size))
 
 
 def _with_item(message: Message[Any], item: Any) -> Message[Any]:  # noqa: ANN401

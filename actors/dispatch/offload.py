@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.actors.cluster.ray_cluster import Placement
+from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.endpoint.analysis import endpoint_analysis
 from aerodaas.config.model import ComputeConfig, RuntimeEnvConfig
@@ -26,7 +27,7 @@ class CloudProcess:
     slots: int
     works: dict[str, Analytics[Any]]
     """Analyses that it can run, by stream."""
-    compression: str
+    codec: Codec
     runtime_env: RuntimeEnvConfig | None
 
 
@@ -74,7 +75,7 @@ def cloud_processes(
                     else Placement("cloud", resource.node),
                     slots=resource.executors,
                     works=works,
-                    compression="none" if resource.kind == "http" else resource.compression,
+                    codec=_codec(resource),
                     runtime_env=envs[next(iter(works))],
                 )
             )
@@ -90,6 +91,13 @@ def priced(profile: Profile, resources: Sequence[ComputeConfig]) -> Profile:
         for resource in resources
     ]
     return replace(profile, cloud_cost=max(costs, default=max(profile.benefit, 0.0)))
+
+
+def _codec(resource: ComputeConfig) -> Codec:
+    # An endpoint's client is on the edge; the endpoint's protocol has its own encoding.
+    if resource.kind == "http":
+        return Codec("none")
+    return Codec(resource.compression, resource.jpeg_quality)
 
 
 def _work(node: Node, resource: ComputeConfig) -> Analytics[Any]:

@@ -23,6 +23,7 @@ from aerodaas.actors.dispatch.executor import (
     MissingFrameError,
     UnpreparedError,
 )
+from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.actors.dispatch.frame_uplink import FrameTransfer, FrameUplink
 from aerodaas.actors.streams import UnreadableError, decode_message
 from aerodaas.schedulers.analytics.base import Task
@@ -53,7 +54,7 @@ class Executor:
     models: frozenset[str]
     """Streams of these analyses."""
     slots: int
-    compression: str
+    codec: Codec
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ class RemoteResult:
     error: str = ""
     """Exception of the analysis, or the reason of the failure."""
     way: str = ""
-    """Coding and destination of the frame."""
+    """Codec and destination of the frame."""
     figures: dict[str, float] | None = None
     """Durations in milliseconds and sizes in kilobytes."""
 
@@ -293,7 +294,7 @@ class RemoteExecutor:
         there = (span.published - span.received) / NANOSECONDS
         link = max(0.0, sent.ended - sent.began - there)
         if sent.carries:
-            self.frame_uplink.arrived(transfer, sent.way, sent.began + link, executed.decoding)
+            self.frame_uplink.arrived(sent.way, sent.began + link, executed.decoding)
         self.executions.observe(sent.task.profile.model, there - executed.decoding)
         figures = {
             "link_ms": link * 1e3,
@@ -303,5 +304,5 @@ class RemoteExecutor:
             "frame_kb": transfer.original / 1e3,
             "expected_way_ms": transfer.expected * 1e3,
         }
-        way = f"{transfer.coding} to {self.executor.site}"
+        way = f"{self.executor.codec} to {self.executor.site}"
         return RemoteResult(sent.task, message, way=way, figures=figures)

@@ -434,7 +434,7 @@ class Flight:
         works = ray.put(process.works)
         self._opening.append(handle.prepare.remote(works))
         models = frozenset(process.works)
-        return Executor(process.site, handle, [works], models, process.slots, process.compression)
+        return Executor(process.site, handle, [works], models, process.slots, process.codec)
 
     def _prepare(self, members: list[Member], progress: Callable[[str], None]) -> None:
         waiting = {member.handle.prepare.remote(*member.setup): member for member in members}

@@ -295,8 +295,9 @@ class ComputeConfig(_Strict):
     """A named node's address, where the kind alone does not say."""
     executors: Annotated[int, Field(ge=1, le=256)] = 1
     """Inferences that may run at once."""
-    compression: Literal["auto", "lossless", "none"] = "auto"
-    """How a scheduler's frames may travel to a cloud node; which way is faster is measured."""
+    compression: Literal["jpeg", "png", "none"] = "jpeg"
+    """Of frames that an analytics scheduler sends to a cloud node; `png` is lossless."""
+    jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 90
     endpoint: EndpointConfig | None = None
     """Of the kind `http`."""
     settings: dict[str, Any] = Field(default_factory=dict)

@@ -24,6 +24,7 @@ from test_sites import Desk, Mean  # noqa: E402
 
 from aerodaas.actors.cluster.ray_cluster import Placement, options_for  # noqa: E402
 from aerodaas.actors.dispatch.executor import CloudExecutor  # noqa: E402
+from aerodaas.actors.dispatch.frame_codec import Codec  # noqa: E402
 from aerodaas.actors.dispatch.remote_executor import Executor  # noqa: E402
 from aerodaas.types.data import Frame, Header  # noqa: E402
 from aerodaas.types.status import Message  # noqa: E402
@@ -38,7 +39,7 @@ def executor(*models: str) -> Executor:
     handle = remote.options(**options, max_concurrency=6).remote()
     works = ray.put({model: Mean() for model in models})
     ray.get(handle.prepare.remote(works), timeout=200)
-    return Executor("cloud", handle, [works], frozenset(models), 4, "none")
+    return Executor("cloud", handle, [works], frozenset(models), 4, Codec("none"))
 
 
 def noise(message: Message[Frame]) -> Message[Frame]:

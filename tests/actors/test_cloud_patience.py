@@ -12,6 +12,7 @@ import pytest
 
 from aerodaas.actors.dispatch.executor import Executed
 from aerodaas.actors.dispatch.executor_pool import ExecutorPool
+from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.actors.dispatch.frame_uplink import FrameUplink
 from aerodaas.actors.dispatch.remote_executor import Executor, RemoteExecutor, RemoteResult
 from aerodaas.actors.streams import encode_message
@@ -36,8 +37,8 @@ class _Frozen:
 @pytest.fixture
 def cloud() -> RemoteExecutor:
     """One that may take 10 s by its resources."""
-    executor = Executor("site", _Frozen(), [], frozenset({"m"}), 2, "none")
-    return RemoteExecutor(executor, FrameUplink("none"), 10 * NANOSECONDS, lambda: None)
+    executor = Executor("site", _Frozen(), [], frozenset({"m"}), 2, Codec("none"))
+    return RemoteExecutor(executor, FrameUplink(Codec("none")), 10 * NANOSECONDS, lambda: None)
 
 
 def _task(number: int, deadline: float) -> Task:
@@ -114,7 +115,7 @@ def test_frames_that_were_given_up_are_still_on_the_link(cloud: RemoteExecutor) 
 def test_a_frame_that_has_to_be_late_is_not_sent(budget: float, *, sent: bool) -> None:
     """50 kB over 25 kB/s take two seconds; the task ends at once where that is too long."""
     handle = _Frozen()
-    executor = Executor("site", handle, [], frozenset({"m"}), 2, "none")
+    executor = Executor("site", handle, [], frozenset({"m"}), 2, Codec("none"))
     sites = ExecutorPool((executor,), 10 * NANOSECONDS, lambda: None)
     frame_uplink = sites._frame_uplinks["site"]
     frame_uplink.link.observe(50_000, 2.0)

@@ -17,7 +17,7 @@ from aerodaas.actors.dispatch.executor import (
     MissingFrameError,
     UnpreparedError,
 )
-from aerodaas.actors.dispatch.frame_codec import Coder
+from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.actors.streams import decode_message, encode_message
 from aerodaas.analytics.base import Context
 from aerodaas.types.data import Header
@@ -63,7 +63,7 @@ def executor() -> CloudExecutor:
 
 def test_a_frame_is_carried_once_and_then_named(executor: CloudExecutor) -> None:
     """The second analysis gets the picture as it was unpacked for the first."""
-    coded = encoded(Coder().encode(FRAME, "jpeg"))
+    coded = encoded(Codec("jpeg").encoded(FRAME))
     first = executor.execute("one", ("camera", 7), coded)
     second = executor.execute("two", ("camera", 7), b"")
     assert result(first) == result(second) == pytest.approx(200, abs=2)

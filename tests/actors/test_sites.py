@@ -18,6 +18,7 @@ from ray.exceptions import RayActorError
 from aerodaas import Analytics, Frame
 from aerodaas.actors.dispatch.executor import FRAMES_KEPT, CloudExecutor
 from aerodaas.actors.dispatch.executor_pool import ExecutorPool
+from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.actors.dispatch.remote_executor import Executor, RemoteResult
 from aerodaas.analytics.base import Context, TimedContext
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, Task
@@ -26,6 +27,7 @@ from aerodaas.types.data import Header
 from aerodaas.types.status import Message
 
 pytestmark = pytest.mark.wall_clock
+_JPEG = Codec()
 
 
 class Mean(Analytics[dict[str, Any]]):
@@ -58,14 +60,14 @@ def started(runtime: None) -> Iterator[Callable[..., Executor]]:  # noqa: ARG001
     handles = []
 
     def start(
-        site: str = "cloud", slots: int = 4, compression: str = "auto", **works: Analytics[Any]
+        site: str = "cloud", slots: int = 4, codec: Codec = _JPEG, **works: Analytics[Any]
     ) -> Executor:
         remote: Any = ray.remote(CloudExecutor)
         handle = remote.options(num_cpus=0, max_concurrency=slots + 2, max_restarts=-1).remote()
         handles.append(handle)
         given = ray.put(works)
         ray.get(handle.prepare.remote(given), timeout=120)
-        return Executor(site, handle, [given], frozenset(works), slots, compression)
+        return Executor(site, handle, [given], frozenset(works), slots, codec)
 
     yield start
     for handle in handles:
@@ -127,17 +129,17 @@ def test_a_frame_is_sent_once_however_many_want_it(started: Callable[..., Execut
     assert not any(one.error or one.lost or one.timed_out for one in found)
     items = [one.message.item for one in found if one.message]
     assert sorted(round(item["mean"]) for item in items if item) == [10, 10, 200, 200]
-    assert all(one.way.endswith(" to cloud") for one in found)
+    assert {one.way for one in found} == {"jpeg to cloud"}
     sent = [one.figures["sent_kb"] for one in found if one.figures]
     assert sum(size > 0 for size in sent) == len(frames)
     values = desk.sites.values()["cloud"]
-    assert sum(values["frames"].values()) == len(frames)
+    assert (values["codec"], values["frames"]) == ("jpeg", len(frames))
     desk.sites.finish(1.0)
 
 
 def test_uncompressed_where_that_is_asked_for(started: Callable[..., Executor]) -> None:
     """The picture arrives bit by bit as it was."""
-    desk = Desk(started(one=Mean(), compression="none"))
+    desk = Desk(started(one=Mean(), codec=Codec("none")))
     desk.send("one", desk.frame())
     (answer,) = desk.answers(1)
     assert answer.way == "raw to cloud"
@@ -152,7 +154,7 @@ def test_what_a_node_costs_becomes_known(started: Callable[..., Executor]) -> No
     assert desk.sites.expected("slow") is None
     desk.look_until(lambda: desk.sites.values()["cloud"]["latency_ms"] > 0)
     desk.look_until(lambda: desk.sites.values()["cloud"]["bandwidth_mbit"] < float("inf"))
-    assert desk.sites.values()["cloud"]["frames"] == {}
+    assert desk.sites.values()["cloud"]["frames"] == 0
     desk.send("slow", desk.frame())
     (answer,) = desk.answers(1)
     assert answer.figures is not None
