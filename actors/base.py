@@ -10,7 +10,6 @@ from __future__ import annotations
 import logging
 import os
 import threading
-import traceback
 from abc import abstractmethod
 from collections import deque
 from dataclasses import dataclass, field
@@ -23,10 +22,10 @@ from aerodaas.actors.priority import be_nice
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.session import Session
 from aerodaas.actors.stream_names import alert_stream
-from aerodaas.actors.streams import MAX_DEPTH, UNDER_WAY, Publisher, RemoteReader, Subscriber
-from aerodaas.types.clock import NANOSECONDS, LockstepClock, host_time_ns
+from aerodaas.actors.streams import UNDER_WAY, Publisher, RemoteReader, Subscriber
+from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.data import Alert, Header
-from aerodaas.types.errors import AeroDaaSError, MissionError
+from aerodaas.types.errors import AeroDaaSError, MissionError, failure_line
 from aerodaas.types.vitals import Vitals, read_vitals
 
 __all__ = [
@@ -35,7 +34,6 @@ __all__ = [
     "SentCount",
     "StreamActor",
     "StreamCount",
-    "failure_line",
 ]
 
 _ALERTS_KEPT = 50
@@ -95,17 +93,6 @@ class ActorReport:
     """Figures specific to the kind of actor."""
 
 
-def failure_line(error: BaseException) -> str:
-    """One line with an exception's type, message, file and line."""
-    frames = traceback.extract_tb(error.__traceback__)
-    place = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""  # noqa: PTH119
-    try:
-        said = str(error)
-    except Exception:  # noqa: BLE001 - a plug-in's class, whose `__str__` may raise
-        said = "it cannot say why"
-    return f"{type(error).__name__}: {said}{place}"
-
-
 class _AlertHandler(logging.Handler):
     """Publishes the warnings of the project's own modules as alerts."""
 
@@ -122,6 +109,8 @@ class StreamActor:
 
     niceness = 10
     """Niceness of its process; only the drone's actor has the normal one."""
+    most_under_way = UNDER_WAY
+    """Most unanswered messages of a stream to a reader on another node; later ones are dropped."""
 
     def __init__(self, session: Session, name: str, reads: dict[str, int]) -> None:
         """Create the actor `name` of `session`; `reads` are queue depths by stream read."""
@@ -183,10 +172,10 @@ class StreamActor:
 
     def connect(self, readers: dict[str, list[Any]]) -> None:
         """Set the actors on other nodes that read this actor's streams."""
-        # In lockstep nothing may be dropped; the barrier keeps the number in transit small.
-        window = MAX_DEPTH if self.session.lockstep else UNDER_WAY
         for stream, actors in readers.items():
-            self.publishers[stream].remote = [RemoteReader(actor, window) for actor in actors]
+            self.publishers[stream].remote = [
+                RemoteReader(actor, self.most_under_way) for actor in actors
+            ]
 
     def start(self, origin_ns: int) -> None:
         """Start the actor's thread; mission time is zero at host time `origin_ns`."""
@@ -310,13 +299,7 @@ class StreamActor:
             self._newest_alerts.append(alert)
 
     def follow(self, stamp: int) -> None:
-        """In lockstep, advance the mission clock to `stamp`, the time of a received message.
-
-        Not for the drone's actor, which conducts mission time.
-        """
-        with self._alerting:
-            if isinstance(self.clock, LockstepClock) and stamp > self.clock.now():
-                self.clock.advance_to(stamp)
+        """Note the mission time of a received message; the wall clock advances by itself."""
 
     def reads(self) -> list[str]:
         """Names of the streams that this actor reads."""

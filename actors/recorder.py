@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from aerodaas.actors.base import StreamActor
 from aerodaas.actors.session import Session
-from aerodaas.actors.stream_names import ACKS, vitals_stream
+from aerodaas.actors.stream_names import vitals_stream
 from aerodaas.recording.provenance import Provenance
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Header
@@ -72,7 +72,6 @@ class RecorderActor(StreamActor):
             fences={robot.id: robot.limits.geofence for robot in environment.robots},
             live=self._live,
         )
-        self._acks = self.publisher(f"{ACKS}/recorder") if self.session.lockstep else None
 
     def tell(self, kind: str, text: str, stamp: int, values: dict[str, Any]) -> None:
         """Publish an alert and record it directly: the recorder does not read its own alerts."""
@@ -100,14 +99,17 @@ class RecorderActor(StreamActor):
             messages = deque(self.subscriber.receive(0.2))
             if self.stopping and not messages:
                 return
-            done = tuple((one.header.source, one.header.stamp) for one in messages)
+            headers = [one.header for one in messages]
             last = replace(messages[-1], item=None) if messages else None
             while messages:
                 # Each message is released as soon as it is written: frames are large.
                 self._take(messages.popleft())
             self._note_drops()
-            if self._acks is not None and last is not None:
-                self._acks.derive(done, last, host_time_ns(), last.stamp)
+            if last is not None:
+                self._written(headers, last)
+
+    def _written(self, headers: list[Header], last: Message[None]) -> None:
+        """Called when the messages with these headers are written; `last` has lost its item."""
 
     def _take(self, message: Message[Any]) -> None:
         self.follow(message.stamp)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount
-from aerodaas.actors.session import MESSAGE_DEPTH, Session, next_due
+from aerodaas.actors.session import Session, next_due
 from aerodaas.actors.stream_names import end_stream
 from aerodaas.cameras.base import Camera, Picture
 from aerodaas.config.model import SensorConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.mission.commands import End
-from aerodaas.types.clock import host_time_ns
+from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.data import Frame, Header
 from aerodaas.types.status import Message
 from aerodaas.types.vehicle import VehicleState
@@ -23,11 +23,12 @@ class SensorActor(StreamActor):
     """Actor that publishes a camera's newest image as a Frame at the sensor's rate."""
 
     niceness = 5
+    state_depth = 1
+    """Queue depth of the vehicle's states, of which the newest is used."""
 
     def __init__(self, session: Session, stream: str, sensor: SensorConfig, state: str) -> None:
         """Publish `stream` from `sensor`, with odometry from the vehicle states of `state`."""
-        depth = MESSAGE_DEPTH if session.lockstep else 1
-        super().__init__(session, f"sensor/{stream}", {state: depth})
+        super().__init__(session, f"sensor/{stream}", {state: self.state_depth})
         self._stream = stream
         self._sensor = sensor
         self._ends = False
@@ -53,20 +54,13 @@ class SensorActor(StreamActor):
 
     def _run(self) -> None:
         assert self.subscriber is not None  # noqa: S101 - set by prepare
-        if self.session.lockstep:
-            while not self.stopping:
-                for message in self.subscriber.receive(0.5):
-                    self._take(message)
-                    if self.session.is_due(self._stream, self._sensor.rate, message.stamp):
-                        self._capture(message.stamp, lockstep=True)
-            return
         due = next_due(self._sensor.rate, self.clock.now())
         while not self.stopping:
             self.clock.sleep_until(due)
             for message in self.subscriber.receive(0.0):
                 self._take(message)
             now = self.clock.now()
-            self._capture(now, lockstep=False)
+            self._capture(now)
             due = next_due(self._sensor.rate, now)
 
     def counts(self) -> dict[str, StreamCount]:
@@ -78,26 +72,29 @@ class SensorActor(StreamActor):
         if isinstance(message.item, VehicleState):
             self._vehicle = message.item
 
-    def _capture(self, stamp: int, *, lockstep: bool) -> None:
+    def _capture(self, stamp: int) -> None:
         vehicle = self._vehicle
         picture = self._camera.capture(stamp, vehicle.truth if vehicle else None)
         taken = host_time_ns()
-        # Before the frame: in lockstep time may advance as soon as the frame is processed.
+        # Before the frame: mission time may wait for the frame's readers, and then advance.
         if self._camera.finished and self._ends and not self._ended:
             self._ended = True
             header = Header(0, stamp, self._stream)
             self._commands.measure(End(f"{self._stream} has no more pictures"), header, taken)
-        if picture is not None:
-            # An image of a live camera is already some milliseconds old.
-            age = 0 if lockstep else max(0, stamp - picture.stamp)
-            header = Header(self._frames.sent, picture.stamp, self._stream)
-            frame = self._frame(header, picture)
-            self._frames.measure(frame, header, taken - int(self.session.host_seconds(age) * 1e9))
-        elif lockstep:
-            header = Header(self._frames.sent, stamp, self._stream)
-            self._frames.measure(None, header, taken)
+        self._publish(picture, stamp, taken)
 
-    def _frame(self, header: Header, picture: Picture) -> Frame:
+    def _publish(self, picture: Picture | None, stamp: int, taken: int) -> None:
+        """Publish an image captured at mission time `stamp` and host time `taken`, if there is one.
+
+        A live camera's image is already some milliseconds old.
+        """
+        if picture is not None:
+            age = self.session.host_seconds(max(0, stamp - picture.stamp))
+            frame = self._frame(picture)
+            self._frames.measure(frame, frame.header, taken - int(age * NANOSECONDS))
+
+    def _frame(self, picture: Picture) -> Frame:
+        header = Header(self._frames.sent, picture.stamp, self._stream)
         odometry = picture.odometry
         if odometry is None and self._vehicle is not None:
             odometry = self._vehicle.odometry

@@ -43,8 +43,8 @@ class OrphanReaper:
     ) -> None:
         """Wait until `application` has ended and none of the `drones` flies; then end all actors.
 
-        `groups` are stopped in turn, the `helpers` killed. In lockstep, where drones are
-        simulated, it does not wait for them.
+        `groups` are stopped in turn, the `helpers` killed. Drones whose time waits for the
+        application are not waited for.
         """
         self._ended: tuple[Sequence[Sequence[Any]], Sequence[Any]] = (), ()
         self._ending = False
@@ -84,8 +84,8 @@ class OrphanReaper:
             actor.meet.remote()
 
     def _watch(self) -> None:
-        lockstep = self._application.lockstep
-        while not self._gone() or (not lockstep and any(map(may_fly, self._drones))):
+        drones = () if self._application.time_waits else self._drones
+        while not self._gone() or any(map(may_fly, drones)):
             time.sleep(_LOOK_INTERVAL)
         self._ending = True
         end_actors(*self._ended)
@@ -101,5 +101,5 @@ class OrphanReaper:
             return time.monotonic() > self._silent_from
         if self._application.ended():
             return True
-        # A suspended application has lost its drones in real time; in lockstep they wait.
-        return not self._application.lockstep and time.monotonic() > self._silent_from
+        # A suspended application has lost its drones, unless their time stands still, too.
+        return not self._application.time_waits and time.monotonic() > self._silent_from

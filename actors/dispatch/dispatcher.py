@@ -20,7 +20,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from aerodaas.actors.base import StreamActor, failure_line
+from aerodaas.actors.base import StreamActor
 from aerodaas.actors.cluster.liveness import Life, LivenessMonitor
 from aerodaas.actors.dispatch.deadline_reserve import DeadlineReserve
 from aerodaas.actors.dispatch.decisions import Counts, DecisionLog
@@ -48,6 +48,7 @@ from aerodaas.schedulers.analytics.base import (
 from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.data import Frame
+from aerodaas.types.errors import failure_line
 from aerodaas.types.status import Message
 
 __all__ = ["DispatcherActor", "Managed"]
@@ -72,7 +73,7 @@ class Managed:
     profile: Profile
     """Times, deadline and utility; its model's name is the stream."""
     acknowledges: bool = False
-    """True in lockstep for an analysis whose results have no readers."""
+    """Whether mission time waits for each of its frames, because its results have no readers."""
     open_times: frozenset[str] = frozenset()
     """Times of the profile that are to be measured, because the user gave none."""
     triggers: tuple[TriggerSpec, ...] = ()
@@ -82,6 +83,8 @@ class DispatcherActor(StreamActor):
     """Actor that runs `scheduler` for the executors of the `managed` analyses."""
 
     niceness = 5
+    answers_always = False
+    """Whether a frame without a result in time is answered, too."""
 
     def __init__(
         self,
@@ -99,13 +102,10 @@ class DispatcherActor(StreamActor):
         self._by_done = {done_stream(one.stream): one for one in managed}
         self._resources = resources
         self._dispatch = GuardedDispatch(scheduler, resources, self)
-        self._dispatch.hurried = not session.lockstep
         self._replaced = False
         self._numbers = itertools.count()
         self._frames: dict[int, Message[Any]] = {}
         self._references = FrameReferences()
-        self._held: deque[Message[Any]] = deque()
-        """Lockstep: frames that wait until every task of earlier ones has ended."""
         self._carried = 0
         """Tasks on the edge whose frame was sent again, because its executor no longer had it."""
         self._results: dict[int, Message[Any]] = {}
@@ -167,7 +167,7 @@ class DispatcherActor(StreamActor):
         self._acks = {
             one.stream: self.publisher(f"{ACKS}/{one.stream}")
             for one in self._managed
-            if one.acknowledges and self.session.lockstep
+            if one.acknowledges
         }
         self._answers = {one.stream: self.publisher(one.stream) for one in self._managed}
         self._triggers = {
@@ -183,10 +183,7 @@ class DispatcherActor(StreamActor):
                 self._take(message)
             while self._lives:
                 self._executor_is(*self._lives.popleft(), self._time())
-            if self.session.lockstep:
-                self._settle()
-            else:
-                self._catch_up()
+            self._advance()
 
     # Events.
 
@@ -196,10 +193,10 @@ class DispatcherActor(StreamActor):
             self._edge_answered(managed, message, self._time(message.stamp))
             return
         self._references.note(message)
-        if self.session.lockstep:
-            self._held.append(message)
-        else:
-            self._arrive(message, self._time())
+        self._receive(message)
+
+    def _receive(self, message: Message[Any]) -> None:
+        self._arrive(message, self._time())
 
     def _arrive(self, message: Message[Any], now: int) -> None:
         for one in self._managed:
@@ -213,7 +210,7 @@ class DispatcherActor(StreamActor):
         cloud = self._cloud.expected(managed.stream) if self._cloud is not None else None
         link = self._cloud.on_the_way(managed.stream) if self._cloud is not None else 0.0
         profile = self._estimates.profile(managed.profile, managed.open_times, cloud, link)
-        reserve = 0 if self.session.lockstep else self._way.reserve(profile.deadline)
+        reserve = self._reserve(profile.deadline)
         task = Task(
             id=next(self._numbers),
             profile=profile,
@@ -240,11 +237,17 @@ class DispatcherActor(StreamActor):
             self._send_task(task, frame.item)
             return
         self._results[task.id] = message
-        if not self.session.lockstep:
-            self._way.travelled(message, now - self._edge_since)
-            taken = self.session.host_seconds(now - self._edge_since)
-            self._estimates.edge.observe(managed.stream, taken)
+        self._measure(managed, message, now - self._edge_since)
         self._guarded("finished", task, now)
+
+    def _reserve(self, deadline: int) -> int:
+        """Nanoseconds by which a task's relative deadline is shortened."""
+        return self._way.reserve(deadline)
+
+    def _measure(self, managed: Managed, answer: Message[Any], taken: int) -> None:
+        """Update the estimates with an execution on the edge of `taken` nanoseconds."""
+        self._way.travelled(answer, taken)
+        self._estimates.edge.observe(managed.stream, self.session.host_seconds(taken))
 
     def _executor_is(self, model: str, life: Life, now: int) -> None:
         """Handle an executor on the edge that died, is back, or will not come back."""
@@ -267,8 +270,8 @@ class DispatcherActor(StreamActor):
         if running is not None and running.profile.model == model:
             self._lose(running, "its executor on the edge died", now)
 
-    def _catch_up(self) -> None:
-        """Real time: handle due timers, answers from the cloud, and hanging executions."""
+    def _advance(self) -> None:
+        """Handle due timers, answers from the cloud, and hanging executions."""
         self._wake_scheduler()
         now = self._time()
         if self._cloud is not None:
@@ -283,8 +286,8 @@ class DispatcherActor(StreamActor):
             self._require_decisions(now)
 
     def _wake_scheduler(self) -> None:
-        """Real time: deliver due timers to the scheduler before later events."""
-        while not self.session.lockstep and self._timers and self._timers[0] <= self._time():
+        """Deliver due timers to the scheduler before later events."""
+        while self._timers and self._timers[0] <= self._time():
             self._way.delayed(self._now - heapq.heappop(self._timers))
             self._guarded("timer", self._now)
 
@@ -334,25 +337,6 @@ class DispatcherActor(StreamActor):
         if oldest is None or self._replaced or now <= oldest.deadline + _FORGOTTEN:
             return
         self._replace(f"left {self._log.label(oldest)} undecided beyond its deadline", now)
-
-    def _settle(self) -> None:
-        """Lockstep: deliver each frame once every task of earlier ones has ended.
-
-        Neither the host's execution times nor a camera's lead may affect the result. Meanwhile
-        the scheduler's own time advances from timer to timer.
-        """
-        while self._dispatch.running is None:
-            if not self._dispatch.undecided:
-                if not self._held:
-                    return
-                message = self._held.popleft()
-                self._arrive(message, self._time(message.stamp))
-            elif self._timers:
-                self._now = max(self._now, heapq.heappop(self._timers))
-                self._guarded("timer", self._now)
-            else:
-                self._replace("left tasks undecided without asking to be woken", self._now)
-                return
 
     def _guarded(self, event: str, *args: Any) -> None:  # noqa: ANN401
         """Pass an event to the scheduler; replace one that raises, misbehaves or is slow."""
@@ -473,9 +457,9 @@ class DispatcherActor(StreamActor):
 
     def _publish(self, node: str, origin: Message[Any], item: Any) -> None:  # noqa: ANN401
         if item is not None:
-            stamp = origin.stamp if self.session.lockstep else self.clock.now()
-            self._triggers[node].fire(item, origin, stamp, partial(self._complain, node))
-        if item is not None or self.session.lockstep:
+            complain = partial(self._complain, node)
+            self._triggers[node].fire(item, origin, self._stamp(origin), complain)
+        if item is not None or self.answers_always:
             self._answers[node].derive(item, origin, host_time_ns(), origin.stamp)
         if node in self._acks:
             done = ((origin.header.source, origin.header.stamp),)
@@ -484,12 +468,20 @@ class DispatcherActor(StreamActor):
     def _complain(self, node: str, error: Exception) -> None:
         self.alert("analysis_failed", f"{node}: {failure_line(error)}")
 
+    def _stamp(self, origin: Message[Any]) -> int:
+        """Mission time of what follows from `origin`: now."""
+        del origin
+        return self.clock.now()
+
     def _time(self, stamp: int = 0) -> int:
-        self._now = max(self._now, stamp if self.session.lockstep else self.clock.now())
+        """Advance to the present time and return it; `stamp` is that of a received message."""
+        del stamp
+        self._now = max(self._now, self.clock.now())
         return self._now
 
     def _patience(self) -> float:
-        if self._timers and not self.session.lockstep:
+        """Wall seconds to wait for messages: until the next timer, but not long."""
+        if self._timers:
             return min(0.2, max(0.0, self.session.host_seconds(self._timers[0] - self._time())))
         return 0.2
 

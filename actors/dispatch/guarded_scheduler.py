@@ -21,7 +21,7 @@ _SLOW_IN_A_ROW = 5
 _LIMIT = 2.0
 """Timeout in seconds of one event."""
 _PATIENT_LIMIT = 10.0
-"""The same for `start`, which may load data, and for lockstep."""
+"""The same for `start`, which may load data, and where events do not hurry."""
 
 _Answer = tuple[Any, BaseException | None, float]
 

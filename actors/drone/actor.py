@@ -1,15 +1,10 @@
-"""Drone actor: the 20 Hz setpoint loop on the vehicle's edge, independent of all other actors.
-
-In real time each robot has an actor of its own. In lockstep one actor flies all the simulated
-robots of a run and conducts mission time: it advances to the next due time, publishes the
-measurements, and continues once all analyses that can affect a drone have processed them.
-"""
+"""Drone actor: the 20 Hz setpoint loop on the vehicle's edge, independent of all other actors."""
 
 from __future__ import annotations
 
-import contextlib
 import time
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -19,57 +14,31 @@ from aerodaas.actors.drone.background_publisher import BackgroundPublisher
 from aerodaas.actors.drone.loop_calls import LoopCalls, LoopOverError
 from aerodaas.actors.drone.robot_report import RobotReport
 from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
-from aerodaas.actors.lockstep.barrier import Barrier
-from aerodaas.actors.lockstep.growth_gate import GrowthGate
 from aerodaas.actors.priority import Slack, punctual, raise_niceness
 from aerodaas.actors.run.losses import ALONE
 from aerodaas.actors.session import (
     CONTROL_PERIOD_NS,
     CONTROL_RATE,
     MESSAGE_DEPTH,
-    NEVER,
     Session,
     next_due,
 )
-from aerodaas.actors.stream_names import (
-    ACKS,
-    end_stream,
-    reply_stream,
-    request_stream,
-    state_stream,
-)
+from aerodaas.actors.stream_names import reply_stream, request_stream, state_stream
 from aerodaas.mission.commands import Answer, Command, ReturnHome
 from aerodaas.mission.safety.setpoint_filter import Neighbour
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
-from aerodaas.types.clock import LockstepClock
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.status import Message
 from aerodaas.types.vehicle import VehicleState
 
-__all__ = ["COMMANDS", "DroneActor", "LockstepSchedule"]
+__all__ = ["ANSWER_TIMEOUT", "COMMANDS", "DroneActor"]
 
 _APPLICATION_TIMEOUT = 5.0
 """Seconds without a heartbeat of the application's process after which the drone returns home."""
-_ANSWER_TIMEOUT = 4.0
+ANSWER_TIMEOUT = 4.0
 """Wall seconds within which the loop must execute a command; less than the sender's timeout."""
 COMMANDS = "commands"
 """Concurrency group of an actor for commands only, which wait for the loop."""
-
-
-@dataclass(frozen=True)
-class LockstepSchedule:
-    """Sources and acknowledgements of a lockstep run, for the actor that conducts its time."""
-
-    rates: dict[str, float] = field(default_factory=dict)
-    """Rates in Hz of the sources of other actors (cameras, external analyses)."""
-    acknowledgements: dict[str, int] = field(default_factory=dict)
-    """Number of acknowledgements of one measurement, by source."""
-    windows: dict[str, int] = field(default_factory=dict)
-    """Most unprocessed measurements while time advances, by source."""
-    readers: tuple[str, ...] = ()
-    """Streams of acknowledgements."""
-    patience: float = 20.0
-    """Timeout of an acknowledgement in wall seconds."""
 
 
 class DroneActor(StreamActor):
@@ -82,28 +51,23 @@ class DroneActor(StreamActor):
         session: Session,
         name: str,
         robots: tuple[RobotSpec, ...],
-        conduct: LockstepSchedule,
         neighbours: tuple[str, ...] = (),
     ) -> None:
-        """Create the actor `name` of `session`; `conduct` is used in lockstep only.
+        """Create the actor `name` of `session`, which flies `robots`.
 
         `neighbours` are the robots of other actors, from which to keep separation.
         """
-        depths = dict.fromkeys(_streams(robots, conduct), MESSAGE_DEPTH)
+        depths = dict.fromkeys(_streams(robots), MESSAGE_DEPTH)
         depths.update(dict.fromkeys((state_stream(other) for other in neighbours), 1))
         super().__init__(session, name, depths)
-        self._conduct = conduct
         self._whereabouts: dict[str, Neighbour] = {}
         self._neighbours = {state_stream(other): other for other in neighbours}
-        self._steering = {stream for robot in robots for stream in robot.navigation}
         self._specs = robots
         self._controllers: dict[str, VehicleController] = {}
         self._reports: dict[str, RobotReport] = {}
         """Newest report of each robot: replaced by the loop, never mutated."""
         self._calls = LoopCalls(self._wake, self._publish_reports)
         self._publisher = BackgroundPublisher(self._unpublished)
-        self._gate = GrowthGate(self._calls.serve)
-        self._due: dict[str, int] = {}
         self._late = 0
         self._refused: tuple[str, ...] = ()
         """Reasons why this machine refuses real-time priority or locked memory."""
@@ -112,18 +76,24 @@ class DroneActor(StreamActor):
 
     def _open(self) -> None:
         nice = raise_niceness()
-        if nice > 0 and not self.session.lockstep:
-            self.alert(
-                "niceness",
-                f"the process that flies runs at nice {nice} and must not raise itself: start "
-                "this node's Ray with RAY_worker_niceness=0",
-            )
+        if nice > 0:
+            self._warn_of_niceness(nice)
         for spec in self._specs:
-            controller = VehicleController(spec, self.session, self._publisher)
+            controller = self._controller(spec)
             streams = (*VehicleController.streams(spec), *map(reply_stream, spec.requesters))
             controller.open({stream: self.publisher(stream) for stream in streams})
             self._controllers[controller.id] = controller
         self._publish_reports()
+
+    def _controller(self, spec: RobotSpec) -> VehicleController:
+        return VehicleController(spec, self.session, self._publisher)
+
+    def _warn_of_niceness(self, nice: int) -> None:
+        self.alert(
+            "niceness",
+            f"the process that flies runs at nice {nice} and must not raise itself: start "
+            "this node's Ray with RAY_worker_niceness=0",
+        )
 
     def command(self, robot: str, command: Command) -> Answer:
         """Execute a command of the application's process on one robot's mission.
@@ -133,28 +103,18 @@ class DroneActor(StreamActor):
         controller = self._controllers[robot]
         try:
             return self._calls.ask(
-                lambda: controller.handle(command, self.clock.now()), _ANSWER_TIMEOUT
+                lambda: controller.handle(command, self.clock.now()), ANSWER_TIMEOUT
             )
         except LoopOverError as over:
             state = self._reports[robot].status.state.value
             return Answer(accepted=False, text=f"{over}: {state}")
 
-    def hold(self, timeout: float) -> bool:
-        """In lockstep, hold mission time; returns False if not held within `timeout` seconds."""
-        return self._gate.hold(timeout)
-
-    def release(self) -> None:
-        """Let mission time advance again."""
-        self._gate.release()
-
-    def grow(
-        self, robots: tuple[RobotSpec, ...], conduct: LockstepSchedule, timeout: float
-    ) -> ActorInfo:
+    def grow(self, robots: tuple[RobotSpec, ...], timeout: float) -> ActorInfo:
         """Subscribe to the streams added to `robots`; returns once the loop uses them.
 
         Raises MissionError if the loop has ended or does not answer.
         """
-        self._calls.ask(lambda: self._grow(robots, conduct), timeout)
+        self._calls.ask(lambda: self._grow(robots), timeout)
         return self.info()
 
     def use_scheduler(self, scheduler: TrajectoryScheduler, timeout: float) -> None:
@@ -167,33 +127,27 @@ class DroneActor(StreamActor):
             planner = controller.make_planner(scheduler)
             self._calls.ask(partial(controller.use_planner, planner), timeout)
 
-    def _grow(self, robots: tuple[RobotSpec, ...], conduct: LockstepSchedule) -> None:
+    def _grow(self, robots: tuple[RobotSpec, ...]) -> None:
         assert self.subscriber is not None  # noqa: S101 - set by prepare
         for spec in robots:
             controller = self._controllers[spec.robot.id]
             replies = [reply_stream(node) for node in spec.requesters]
             fresh = {one: self.publisher(one) for one in replies if one not in self.publishers}
             controller.grow(spec, fresh)
-        depths = dict.fromkeys(_streams(robots, conduct), MESSAGE_DEPTH)
+        self._read(_streams(robots))
+        self._specs = robots
+
+    def _read(self, streams: Iterable[str]) -> None:
+        """Subscribe to further streams, in the loop's thread."""
+        assert self.subscriber is not None  # noqa: S101 - set by prepare
+        depths = dict.fromkeys(streams, MESSAGE_DEPTH)
         self.subscriber.add(depths)
         self.subscriber.subscribe_added()
         self._reads.update(depths)
-        self._specs, self._conduct = robots, conduct
-        self._steering = {stream for robot in robots for stream in robot.navigation}
-        if self.session.lockstep:
-            self._barrier.windows = conduct.windows
-            for source in conduct.rates:
-                self._due.setdefault(source, self._next_due(source, self.clock.now()))
 
     def note(self, kind: str, text: str) -> None:
         """Publish an alert of the application's process, so that it is recorded."""
         self.alert(kind, text)
-
-    def wait_no_longer(self) -> None:
-        """In lockstep, stop waiting for current acknowledgements, as a reader died or is new."""
-        if self.session.lockstep:
-            with contextlib.suppress(LoopOverError):
-                self._calls.ask(self._barrier.forget, _ANSWER_TIMEOUT)
 
     def robots(self, newest: int = 200) -> dict[str, RobotReport]:
         """Report of each robot's last loop cycle, with the `newest` latencies.
@@ -224,20 +178,20 @@ class DroneActor(StreamActor):
         for controller in self._controllers.values():
             controller.start(self.clock)
         try:
-            if self.session.lockstep:
-                self._run_lockstep()
-            else:
-                self._publisher.start()
-                with punctual() as refused:
-                    self._refused = refused
-                    self._run_real_time()
+            self._fly()
         finally:
             self._publisher.close()
             self._calls.close("the mission is over")
             self._publish_reports()
             lock.release()
 
-    def _run_real_time(self) -> None:
+    def _fly(self) -> None:
+        self._publisher.start()
+        with punctual() as refused:
+            self._refused = refused
+            self._loop()
+
+    def _loop(self) -> None:
         assert self.subscriber is not None  # noqa: S101 - set by prepare
         due, slack = self.clock.now(), Slack()
         while not self._over():
@@ -259,75 +213,6 @@ class DroneActor(StreamActor):
             due = next_due(CONTROL_RATE, now)
             if due > self.clock.now():
                 slack.use()
-
-    def _run_lockstep(self) -> None:
-        assert isinstance(self.clock, LockstepClock)  # noqa: S101 - the session says so
-        self._barrier = Barrier(self._conduct.windows)
-        self._due = {source: self._next_due(source, -1) for source in self._conduct.rates}
-        due = 0
-        while not self._over():
-            self._gate.visit(lambda: self._await(drain=True))
-            readings = [controller.next_reading for controller in self._controllers.values()]
-            now = min([due, *self._due.values(), *readings])
-            if now == NEVER:
-                break
-            self.clock.advance_to(now)
-            for controller in self._controllers.values():
-                controller.advance_to(now)
-                if now == due:
-                    self._turn(controller, now)
-            if now == due:
-                due = next_due(CONTROL_RATE, now)
-            self._measure(now)
-            self._publish_reports()
-            self._await(drain=False)
-        self._await(drain=True)
-
-    def _next_due(self, source: str, after: int) -> int:
-        return self.session.next_due(source, self._conduct.rates[source], after)
-
-    def _measure(self, now: int) -> None:
-        """Publish the vehicles' measurements, and expect those of the sources that are due."""
-        counts = self._conduct.acknowledgements
-        for source, stamp in self._due.items():
-            if stamp == now:
-                self._barrier.expect(source, now, counts.get(source, 0))
-                self._due[source] = self._next_due(source, now)
-        for controller in self._controllers.values():
-            for stream, stamp in controller.observe(now):
-                self._barrier.expect(stream, stamp, counts.get(stream, 0))
-
-    def _await(self, *, drain: bool) -> None:
-        assert self.subscriber is not None  # noqa: S101 - set by prepare
-        given_up = time.monotonic() + self._conduct.patience
-        arrived: list[Message[Any]] = []
-        while not self.stopping:
-            clear = self._barrier.clear(drain=drain)
-            messages = self.subscriber.receive(0.0 if clear else 0.5)
-            self._calls.serve()
-            for message in messages:
-                self._acknowledge(message)
-                if not message.stream.startswith(ACKS):
-                    arrived.append(message)
-            if clear:
-                break
-            if messages:
-                given_up = time.monotonic() + self._conduct.patience
-            elif time.monotonic() > given_up:
-                sources = ", ".join(self._barrier.waiting_for())
-                self.alert("reader_lost", f"no reader answers for {sources}; flying on without")
-                self._barrier.forget()
-        now = self.clock.now()
-        # The order of arrival depends on the host's scheduler; that of processing must not.
-        for message in sorted(arrived, key=_order):
-            self._take(message, now)
-
-    def _acknowledge(self, message: Message[Any]) -> None:
-        if message.stream.startswith(ACKS):
-            for source, stamp in message.item or ():
-                self._barrier.acknowledge(source, stamp)
-        elif message.stream in self._steering:
-            self._barrier.acknowledge(message.header.source, message.header.stamp)
 
     def _turn(self, controller: VehicleController, now: int) -> None:
         others = [where for name, where in self._whereabouts.items() if name != controller.id]
@@ -384,16 +269,10 @@ class DroneActor(StreamActor):
             controller.vehicle.close()
 
 
-def _streams(robots: tuple[RobotSpec, ...], conduct: LockstepSchedule) -> list[str]:
+def _streams(robots: tuple[RobotSpec, ...]) -> list[str]:
     """Streams that the actor of these robots reads."""
     streams = [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
-    streams += [request_stream(node) for robot in robots for node in robot.requesters]
-    return [*streams, *conduct.readers]
-
-
-def _order(message: Message[Any]) -> tuple[bool, str, int]:
-    """Sort key of messages: results of a camera's last image before the camera's end command."""
-    return message.stream.endswith(end_stream("")), message.stream, message.seq
+    return streams + [request_stream(node) for robot in robots for node in robot.requesters]
 
 
 def _neighbour(state: VehicleState) -> Neighbour:

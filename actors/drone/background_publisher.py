@@ -21,7 +21,7 @@ class BackgroundPublisher:
     """Queue of work for a thread of its own, done in order; before `start` done at once."""
 
     def __init__(self, on_drop: Callable[[int], None] = lambda _: None) -> None:
-        """Publish in the caller's own thread until `start`, as lockstep requires.
+        """Publish in the caller's own thread until `start`.
 
         `on_drop` is called in the publishing thread, once its queue is empty after drops, with
         the number of messages dropped since the last call.

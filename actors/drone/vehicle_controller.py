@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from aerodaas.actors.base import failure_line
 from aerodaas.actors.drone.background_publisher import BackgroundPublisher
 from aerodaas.actors.drone.planner import PlannerExecutor
 from aerodaas.actors.drone.robot_report import Latencies
@@ -35,13 +34,13 @@ from aerodaas.mission.commands import (
 )
 from aerodaas.mission.loop import SetpointLoop
 from aerodaas.mission.mission import Mission
-from aerodaas.mission.planner import BackgroundPlanner, InlinePlanner, Planner, solve
+from aerodaas.mission.planner import BackgroundPlanner, Planner, solve
 from aerodaas.mission.rehearsal import give
 from aerodaas.mission.safety.setpoint_filter import Neighbour
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.clock import NANOSECONDS, Clock, host_time_ns
 from aerodaas.types.data import Alert, Header
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.errors import AeroDaaSError, failure_line
 from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.status import Message, MissionStatus, SetpointRecord
 from aerodaas.types.vehicle import (
@@ -108,8 +107,6 @@ class VehicleController:
         self._due = {sensor.id: self._next_due(sensor, -1) for sensor in spec.sensors}
         self._failures = 0
         """Loop cycles in a row that raised."""
-        self._blamed: set[tuple[str, type[Exception]]] = set()
-        """Sources and kinds of failures that have already raised an alert."""
         self._alerts: list[Alert] = []
         plugin = load_plugin("drivers", spec.robot.driver)
         self.vehicle: Vehicle = plugin(spec.robot, session.environment)
@@ -137,9 +134,6 @@ class VehicleController:
 
     def make_planner(self, scheduler: TrajectoryScheduler) -> Planner:
         """Create the planner for `scheduler`; may take seconds to start."""
-        # In lockstep plans are made inline, so that they do not depend on the host's speed.
-        if self._session.lockstep:
-            return InlinePlanner(scheduler)
         if not scheduler.isolated:
             return BackgroundPlanner(scheduler)
         patience = _PLANS_PATIENCE * self.spec.robot.mission.plan_timeout
@@ -168,10 +162,12 @@ class VehicleController:
         """Start the mission with the time of `clock`."""
         if isinstance(self.vehicle, ClockedVehicle):
             self.vehicle.use_clock(clock)
-        if not self._session.lockstep:
-            # A replay needs the mission's take-off position, which lockstep publishes at 0 s.
-            self._publish(state_stream(self.id), self.state, clock.now())
+        self._publish_takeoff(clock.now())
         self.handle(Start(), clock.now())
+
+    def _publish_takeoff(self, now: int) -> None:
+        """Publish the state in which the mission takes off, which a replay needs."""
+        self._publish(state_stream(self.id), self.state, now)
 
     def grow(self, spec: RobotSpec, publishers: dict[str, Publisher]) -> None:
         """Accept further streams; `publishers` are for replies to further analyses."""
@@ -193,47 +189,22 @@ class VehicleController:
 
     def handle(self, command: Command, now: int) -> Answer:
         """Execute a command; one that raises is refused, with an alert."""
-        return self._obey(command, now, f"the command {type(command).__name__}")
-
-    def _obey(self, command: Command, now: int, source: str) -> Answer:
-        try:
-            answer: object = self.mission.handle(command, now)
-            if isinstance(answer, Answer):
-                return answer
-            raise TypeError(f"{type(command).__name__} is no command")  # noqa: TRY301 - as any
-        except Exception as error:  # noqa: BLE001 - a command's failure must not end the loop
-            return self._refuse(source, error, now)
-
-    def _refuse(self, source: str, error: Exception, now: int) -> Answer:
-        """Refuse a command of `source` that raised; one alert per source and kind of error."""
-        text = f"{source} failed: {failure_line(error)}"
-        if (source, type(error)) not in self._blamed:
-            self._blamed.add((source, type(error)))
-            self._tell(now, "command_failed", text)
-        return Answer(accepted=False, text=text)
+        return self.mission.handle(command, now)
 
     def _tell(self, now: int, kind: str, text: str) -> None:
         self._alerts.append(Alert(Header(len(self._alerts), now, self.id), kind, text))
 
     def take(self, message: Message[Any], now: int) -> None:
         """Execute a received message: navigation, a trigger's command, or a request."""
-        try:
-            self._take(message, now)
-        except Exception as error:  # noqa: BLE001 - an item's failure must not end the loop
-            self._refuse(f"an item of {message.stream}", error, now)
-
-    def _take(self, message: Message[Any], now: int) -> None:
         if message.item is None:
             return
         if message.stream in self.spec.navigation:
             self.latencies.append((host_time_ns() - message.captured) / 1e6)
-            command = StreamItem(message.stream, message.item, message.header)
-            self._obey(command, now, f"an item of {message.stream}")
+            self.mission.handle(StreamItem(message.stream, message.item, message.header), now)
         elif message.stream in self.spec.commands:
-            item: Any = message.item
-            self._obey(item, now, f"an item of {message.stream}")
+            self.mission.handle(message.item, now)
         elif message.stream in self._replies and isinstance(message.item, Request):
-            answer = self._obey(message.item.command, now, f"a request on {message.stream}")
+            answer = self.mission.handle(message.item.command, now)
             reply = Reply(message.item.number, answer)
             self._publish(self._replies[message.stream], reply, now)
 
@@ -260,7 +231,7 @@ class VehicleController:
         if self._failures == 1:
             text = f"the queue was emptied, for flying by it raised {failure_line(error)}"
             self._tell(now, "turn_failed", text)
-            self._obey(ClearNavigation(), now, "emptying the queue")
+            self.mission.handle(ClearNavigation(), now)
             with contextlib.suppress(AeroDaaSError):
                 self.vehicle.hold()
         return SetpointRecord(now, None, None)

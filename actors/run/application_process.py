@@ -23,8 +23,8 @@ def _pid_namespace() -> str:
 class ApplicationProcess:
     """The application's process: created by the application, checked by the reaper."""
 
-    lockstep: bool
-    """Whether the run is in lockstep: its drones are simulated and wait for it."""
+    time_waits: bool
+    """Whether mission time stands while it does: its drones are simulated and cannot fall."""
     node: str = field(default_factory=lambda: ray.get_runtime_context().get_node_id())
     pid: int = field(default_factory=os.getpid)
     pids: str = field(default_factory=_pid_namespace)

@@ -14,20 +14,18 @@ import ray
 from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
 from typing_extensions import Self
 
-from aerodaas.actors.analytics import AnalyticsActor
 from aerodaas.actors.base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors.cluster.head_watch import HeadWatch
 from aerodaas.actors.cluster.liveness import ASKED_AGAIN, LIFE, LIFELINES, Life, LivenessMonitor
 from aerodaas.actors.cluster.orphan_reaper import OrphanReaper
 from aerodaas.actors.cluster.ray_cluster import Placement, nodes_at, options_for
-from aerodaas.actors.dispatch.dispatcher import DispatcherActor
 from aerodaas.actors.dispatch.executor import CloudExecutor
 from aerodaas.actors.dispatch.offload import CloudProcess
 from aerodaas.actors.dispatch.remote_executor import Executor
 from aerodaas.actors.drone.actor import COMMANDS, DroneActor
 from aerodaas.actors.drone.robot_report import RobotReport
 from aerodaas.actors.isolation import isolation_options
-from aerodaas.actors.recorder import RecorderActor
+from aerodaas.actors.run.actor_classes import actor_classes
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.growth import Growth, growth
@@ -35,7 +33,6 @@ from aerodaas.actors.run.losses import DeadError, SilentError, SuspensionMonitor
 from aerodaas.actors.run.member import Member, ask, require_clock, routes
 from aerodaas.actors.run.plan import AnalyticsActorPlan, Cameras, DispatchPlan, FlightPlan
 from aerodaas.actors.run.shutdown import end_actors, may_fly
-from aerodaas.actors.sensor import SensorActor
 from aerodaas.actors.stream_names import done_stream
 from aerodaas.mission.commands import Answer, Command
 from aerodaas.recording.provenance import Provenance
@@ -90,6 +87,7 @@ class Flight:
         page; None for none.
         """
         self.plan = plan
+        self._classes = actor_classes(plan.session)
         # The recorder on a cluster node does not share our working directory.
         self.recording = recording.absolute() if recording and plan.recorded else None
         self._drones: dict[str, str] = {}
@@ -113,14 +111,15 @@ class Flight:
                 for spec in group
                 if spec.robot.id not in mine
             )
-            self._create(name, DroneActor, place, (session, name, specs, plan.conduct, others))
+            own = others if plan.conduct is None else plan.conduct
+            self._create(name, self._classes.drone, place, (session, name, specs, own))
         self._create_cameras(plan.cameras)
         self._create_analyses(plan.analyses, environments)
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch, environments)
         if self.recording is not None and provenance is not None:
             recorder = (session, self.recording, plan.recorded, provenance, live, page)
-            self._create("recorder", RecorderActor, edge, recorder, restarts=_RESTARTS)
+            self._create("recorder", self._classes.recorder, edge, recorder, restarts=_RESTARTS)
         self._reaper = self._appoint_reaper()
         self._origin = 0
         self._answers: dict[str, tuple[float, dict[str, RobotReport]]] = {}
@@ -227,11 +226,11 @@ class Flight:
         """
         change = growth(self.plan, plan)
         drones = [self._members[name].handle for name in sorted(self._ids())]
-        held = drones if plan.session.lockstep else []
+        held = drones if plan.conduct is not None else []
         try:
             if not all(ask(one.hold.remote(_GROWING), 2 * _GROWING) for one in held):
                 raise MissionError("the mission did not come to rest, so nothing can join it")
-            self._join(change)
+            self._join(change, plan)
         finally:
             for drone in held:
                 drone.release.remote()
@@ -243,7 +242,7 @@ class Flight:
             handle = self._members[name].handle
             ask(handle.use_scheduler.remote(scheduler, _GROWING), _PREPARE_TIMEOUT)
 
-    def _join(self, change: Growth) -> None:
+    def _join(self, change: Growth, plan: FlightPlan) -> None:
         known = set(self._members)
         environments = _environments(replace(self.plan, analyses=change.analyses))
         try:
@@ -269,8 +268,10 @@ class Flight:
             recorder.info = ask(recorder.handle.listen.remote(change.recorded), _GROWING)
         for robots in change.drones:
             drone = self._members[self._drones[robots[0].robot.id]]
-            grown = drone.handle.grow.remote(robots, change.conduct, _GROWING)
-            drone.info = ask(grown, 2 * _GROWING)
+            drone.info = ask(drone.handle.grow.remote(robots, _GROWING), 2 * _GROWING)
+            if plan.conduct is not None:
+                scheduled = drone.handle.use_schedule.remote(plan.conduct, _GROWING)
+                drone.info = ask(scheduled, 2 * _GROWING)
         for stream, ends in change.ending.items():
             camera = self._members[f"sensor/{stream}"]
             camera.setup = (ends,)
@@ -285,7 +286,7 @@ class Flight:
     def flying(self) -> bool:
         """Whether a drone may be in the air and thus needs its actor."""
         drones = [self._members[name].handle for name in self._ids()]
-        return not self.plan.session.lockstep and any(map(may_fly, drones))
+        return self.plan.conduct is None and any(map(may_fly, drones))
 
     @property
     def headless(self) -> str:
@@ -346,7 +347,7 @@ class Flight:
         remote: Any = ray.remote(OrphanReaper)
         drones = [self._members[name].handle for name in self._ids()]
         watched = (drones, self._in_ending_order(), list(self._helpers))
-        application = ApplicationProcess(self.plan.session.lockstep)
+        application = ApplicationProcess(time_waits=self.plan.conduct is not None)
         reaper = remote.options(**options).remote(application, *watched)
         self._helpers.append(reaper)
         return reaper
@@ -368,7 +369,7 @@ class Flight:
         remote: Any = ray.remote
         # Pending calls, of the liveness monitor or for the loop, must not block others.
         groups = {LIFE: LIFELINES} if restarts else {}
-        groups |= {COMMANDS: 1} if kind is DroneActor else {}
+        groups |= {COMMANDS: 1} if issubclass(kind, DroneActor) else {}
         if groups:
             remote = remote(concurrency_groups=groups)
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}
@@ -385,7 +386,9 @@ class Flight:
             args = (self.plan.session, camera.stream, camera.sensor, camera.state)
             name = f"sensor/{camera.stream}"
             setup = (camera.ends,)
-            self._create(name, SensorActor, camera.place, args, restarts=_RESTARTS, setup=setup)
+            self._create(
+                name, self._classes.sensor, camera.place, args, restarts=_RESTARTS, setup=setup
+            )
 
     def _create_analyses(
         self, actors: Iterable[AnalyticsActorPlan], environments: Mapping[str, Mapping[str, Any]]
@@ -393,7 +396,7 @@ class Flight:
         for actor in actors:
             self._create(
                 actor.name,
-                AnalyticsActor,
+                self._classes.analytics,
                 actor.place,
                 (self.plan.session, actor.name),
                 setup=actor.nodes,
@@ -416,9 +419,8 @@ class Flight:
         edge = {one.stream: hosts[done_stream(one.stream)] for one in dispatch.managed}
         args = (self.plan.session, dispatch.scheduler, dispatch.managed, dispatch.resources)
         setup = (edge, executors)
-        self._create(
-            "dispatcher", DispatcherActor, Placement(), args, restarts=_RESTARTS, setup=setup
-        )
+        kind = self._classes.dispatcher
+        self._create("dispatcher", kind, Placement(), args, restarts=_RESTARTS, setup=setup)
 
     def _create_executor(
         self, name: str, process: CloudProcess, environments: Mapping[str, Mapping[str, Any]]
@@ -519,8 +521,9 @@ class Flight:
             self._note("actor_back", f"{member.name} is back after {absence:.1f} s")
 
     def _wait_no_longer(self) -> None:
-        for name in self._ids():
-            self._members[name].handle.wait_no_longer.remote()
+        if self.plan.conduct is not None:
+            for name in self._ids():
+                self._members[name].handle.wait_no_longer.remote()
 
     def _note(self, kind: str, text: str) -> None:
         for name in self._ids():

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from aerodaas.actors.analytics import NodeSpec
-from aerodaas.actors.drone.actor import LockstepSchedule
 from aerodaas.actors.drone.vehicle_controller import RobotSpec
 from aerodaas.actors.run.plan import AnalyticsActorPlan, Cameras, FlightPlan
+from aerodaas.actors.worker import NodeSpec
 from aerodaas.types.errors import GraphError
 
 __all__ = ["Growth", "growth"]
@@ -26,11 +25,10 @@ class Growth:
     joining: dict[str, tuple[NodeSpec, ...]]
     """Analyses that join a running actor, by its name."""
     acknowledging: dict[str, dict[str, bool]]
-    """In lockstep, running analyses that start or stop to acknowledge, because they are, or are
-    no longer, the last of their path: by actor and stream."""
+    """Running analyses that start or stop to acknowledge, because they are, or are no longer, the
+    last of their path: by actor and stream."""
     drones: tuple[tuple[RobotSpec, ...], ...]
     """All robots of the new plan, by actor."""
-    conduct: LockstepSchedule
     recorded: dict[str, int]
     """Further streams for the recorder, and their queue depths."""
 
@@ -72,7 +70,6 @@ def growth(old: FlightPlan, new: FlightPlan) -> Growth:
         joining={actor.name: nodes for actor, nodes in fresh if nodes and actor.name in known},
         acknowledging={name: streams for name, streams in acknowledging.items() if streams},
         drones=new.drones,
-        conduct=new.conduct,
         recorded={
             stream: depth for stream, depth in new.recorded.items() if stream not in old.recorded
         },

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from aerodaas.actors.analytics import NodeSpec, Wake
 from aerodaas.actors.cluster.ray_cluster import Placement
 from aerodaas.actors.dispatch.dispatcher import Managed
 from aerodaas.actors.dispatch.offload import (
@@ -15,9 +14,9 @@ from aerodaas.actors.dispatch.offload import (
     priced,
     short_name,
 )
-from aerodaas.actors.drone.actor import LockstepSchedule
 from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
 from aerodaas.actors.lockstep.barrier import paths, widest
+from aerodaas.actors.lockstep.schedule import LockstepSchedule
 from aerodaas.actors.run.checks import check_graph, check_plugins, check_tasks
 from aerodaas.actors.session import FRAME_DEPTH, MESSAGE_DEPTH, Session
 from aerodaas.actors.stream_names import (
@@ -31,6 +30,7 @@ from aerodaas.actors.stream_names import (
     trigger_stream,
 )
 from aerodaas.actors.triggers import TriggerSpec
+from aerodaas.actors.worker import NodeSpec, Wake
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.analytics.endpoint.analysis import endpoint_analysis
@@ -100,7 +100,8 @@ class FlightPlan:
     cameras: tuple[Cameras, ...]
     analyses: tuple[AnalyticsActorPlan, ...]
     dispatch: DispatchPlan | None
-    conduct: LockstepSchedule
+    conduct: LockstepSchedule | None
+    """None in real time."""
     recorded: dict[str, int]
     """Streams for the recorder and their queue depths; empty without a recorder."""
 
@@ -170,6 +171,10 @@ class _Planner:
     def acknowledgements(self, stream: str) -> int:
         return paths(self.graph, stream, self.steering, recorded=self.recorded)
 
+    def is_waited_for(self, node: Node) -> bool:
+        """Whether mission time waits for the analysis itself, for want of a reader."""
+        return self.session.lockstep and not self.acknowledgements(node.id)
+
     def cameras(self) -> tuple[Cameras, ...]:
         return tuple(
             Cameras(
@@ -217,7 +222,7 @@ class _Planner:
             stream=node.id,
             inputs=tuple(node.inputs),
             profile=priced(profile, allowed(node, self.compute)),
-            acknowledges=self.acknowledgements(node.id) == 0,
+            acknowledges=self.is_waited_for(node),
             open_times=frozenset(time for time in times if getattr(own, time) is None),
             triggers=self.triggers_of(node),
         )
@@ -250,8 +255,8 @@ class _Planner:
             # The dispatcher publishes the results of managed analyses, from edge and cloud.
             triggers=() if managed else self.triggers_of(node),
             kind=self.place_of(node).kind,
-            acknowledges=self.acknowledgements(node.id) == 0 and not managed,
-            answers_always=managed,
+            acknowledges=self.is_waited_for(node) and not managed,
+            answers_always=managed or self.session.lockstep,
             wakes=tuple(trigger_stream(node.id, waker.id) for waker in wakers),
             frames=tuple(node.inputs) if managed else (),
         )
@@ -408,7 +413,7 @@ def make_plan(
         cameras=cameras,
         analyses=analyses,
         dispatch=dispatch,
-        conduct=planner.conduct(specs, cameras) if session.lockstep else LockstepSchedule(),
+        conduct=planner.conduct(specs, cameras) if session.lockstep else None,
         recorded={stream: planner.depth(stream) for stream in streams} if planner.recorded else {},
     )
 

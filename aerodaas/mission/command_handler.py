@@ -9,7 +9,6 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.mission.commands import (
     AddNavigation,
     Answer,
-    ClearNavigation,
     CloseStream,
     OpenStream,
     StreamItem,
@@ -32,7 +31,7 @@ class CommandHandler:
 
     def __init__(self, navigator: Navigator, log: MissionLog) -> None:
         """Feed `navigator`; refusals go to `log`."""
-        self.last_word = 0
+        self.last_received = 0
         """Mission clock of the last navigation message, nanoseconds."""
         self._navigator = navigator
         self._log = log
@@ -44,39 +43,31 @@ class CommandHandler:
         """Whether a live stream may still deliver navigation."""
         return any(stream.feeds for stream in self._streams.values())
 
-    def handle(
-        self,
-        command: AddNavigation | StreamItem | OpenStream | CloseStream | ClearNavigation,
-        now: int,
-    ) -> Answer:
-        """Execute a navigation command at `now` (mission clock, nanoseconds)."""
-        match command:
-            case AddNavigation():
-                return self._add(command, now)
-            case StreamItem():
-                return self._receive(command, now)
-            case OpenStream():
-                self._streams[command.name] = command
-                self.last_word = now
-            case CloseStream():
-                self._streams.pop(command.name, None)
-            case ClearNavigation():
-                self._clear(now)
-        return DONE
+    def open(self, stream: OpenStream, now: int) -> None:
+        """Accept items of `stream` from `now` on, a time of the mission clock in nanoseconds."""
+        self._streams[stream.name] = stream
+        self.last_received = now
 
-    def _clear(self, now: int) -> None:
+    def close(self, stream: CloseStream) -> None:
+        """Accept no further items of `stream`."""
+        self._streams.pop(stream.name, None)
+
+    def clear(self, now: int) -> None:
+        """Discard all queued navigation and the live command."""
         self._navigator.clear()
-        self.last_word = now
+        self.last_received = now
 
-    def _add(self, command: AddNavigation, now: int) -> Answer:
+    def add(self, command: AddNavigation, now: int) -> Answer:
+        """Add navigation of the application or a remote user."""
         if command.clear_first:
-            self._clear(now)
+            self.clear(now)
             if command.navigation.stream is None and not len(command.navigation):
                 return DONE
         by_hand = OpenStream("", index=command.index, deadline=command.deadline)
         return self._take(command.navigation, by_hand, now, command.cause)
 
-    def _receive(self, message: StreamItem, now: int) -> Answer:
+    def receive(self, message: StreamItem, now: int) -> Answer:
+        """Add an item of an open stream."""
         stream = self._streams.get(message.name)
         if stream is None:
             return Answer(accepted=False, text=f"no stream called {message.name!r} is open")
@@ -84,7 +75,7 @@ class CommandHandler:
         if item is None or (isinstance(item, Sized) and not len(item)):
             return DONE
         if stream.clear_first:
-            self._clear(now)
+            self.clear(now)
             stream = self._streams[stream.name] = replace(stream, clear_first=False)
         if not isinstance(item, AeroNavigation):
             return DONE
@@ -127,5 +118,5 @@ class CommandHandler:
             self._log.give_up(now, waypoint_id, reason)
         accepted = bool(taken or navigation.commands)
         if accepted:
-            self.last_word = now
+            self.last_received = now
         return Answer(accepted, "; ".join(refused.values()), refused)

@@ -45,6 +45,7 @@ from aerodaas.types.braking import stopping_point
 from aerodaas.types.clock import NANOSECONDS, seconds
 from aerodaas.types.data import Alert
 from aerodaas.types.energy import EnergyMeter, EnergyModel
+from aerodaas.types.errors import failure_line
 from aerodaas.types.geometry import GeodeticOrigin, Vector, body_to_enu
 from aerodaas.types.status import MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState, VelocitySetpoint
@@ -173,29 +174,37 @@ class Mission:
         """
         self._now = max(self._now, now)
         try:
-            return self._obey(command)
+            if self.finished:
+                return Answer(accepted=False, text=f"the mission is over: {self.state.value}")
+            match command:
+                case AddNavigation() | StreamItem() if self.state in _LEAVING:
+                    return Answer(accepted=False, text=f"the drone is {self.state.value} by now")
+                case StreamItem():
+                    return self._command_handler.receive(command, self._now)
+                case AddNavigation():
+                    return self._command_handler.add(command, self._now)
+                case _:
+                    return self._control(command)
         except Exception as error:  # noqa: BLE001 - a sender's objects may raise anything
-            source = f"an item of {command.name}" if isinstance(command, StreamItem) else ""
-            what = source or type(command).__name__
-            text = f"{what} failed: {type(error).__name__}: {error}"
+            what = f"the command {type(command).__name__}"
+            if type(command) is StreamItem:  # isinstance would ask the object itself
+                what = f"an item of {command.name}"
+            text = f"{what} failed: {failure_line(error)}"
             self._log.alert(self._now, "command_failed", text)
             return Answer(accepted=False, text=text)
 
-    def _obey(self, command: Command) -> Answer:
-        if self.finished:
-            return Answer(accepted=False, text=f"the mission is over: {self.state.value}")
+    def _control(self, command: object) -> Answer:
         match command:
-            case AddNavigation() | StreamItem() if self.state in _LEAVING:
-                return Answer(accepted=False, text=f"the drone is {self.state.value} by now")
-            case AddNavigation() | StreamItem() | OpenStream() | CloseStream() | ClearNavigation():
-                return self._command_handler.handle(command, self._now)
-            case _:
-                return self._control(command)
-
-    def _control(self, command: Start | Pause | Resume | ReturnHome | End) -> Answer:
-        match command:
+            case OpenStream():
+                self._command_handler.open(command, self._now)
+            case CloseStream():
+                self._command_handler.close(command)
+            case ClearNavigation():
+                self._command_handler.clear(self._now)
+            case Start() if self.state is MissionState.IDLE:
+                self._to(MissionState.PREFLIGHT)
             case Start():
-                return self._start()
+                return Answer(accepted=False, text="the mission has already been started")
             case Pause():
                 return self._pause()
             case Resume():
@@ -204,11 +213,8 @@ class Mission:
                 return self._leave(MissionState.RETURNING, command.reason)
             case End():
                 return self._leave(MissionState.LANDING, command.reason)
-
-    def _start(self) -> Answer:
-        if self.state is not MissionState.IDLE:
-            return Answer(accepted=False, text="the mission has already been started")
-        self._to(MissionState.PREFLIGHT)
+            case _:
+                raise TypeError(f"{type(command).__name__} is no command")
         return DONE
 
     def _pause(self) -> Answer:
@@ -221,7 +227,7 @@ class Mission:
         if not self._paused:
             return Answer(accepted=False, text="the mission is not paused")
         self._paused = False
-        self._command_handler.last_word = self._now
+        self._command_handler.last_received = self._now
         if self.state is MissionState.PAUSED:
             self._to(MissionState.HOLDING, "resumed")
         return DONE
@@ -366,7 +372,7 @@ class Mission:
         height = state.odometry.height - float(self.home[2])
         if state.mode in _SETTLED and height >= self.limits.takeoff_height - tolerance:
             self._to(MissionState.HOLDING)
-            self._command_handler.last_word = self._now
+            self._command_handler.last_received = self._now
             return self._fly(state)
         if seconds(self._now - self._machine.since) > self.limits.takeoff_timeout:
             self._to(MissionState.LANDING, "the take-off took too long")
@@ -455,7 +461,7 @@ class Mission:
     def _idle(self, state: VehicleState) -> Action:
         options, limits = self._options, self.limits
         if self._command_handler.is_fed:
-            quiet = seconds(self._now - self._command_handler.last_word)
+            quiet = seconds(self._now - self._command_handler.last_received)
             if quiet <= limits.command_timeout + limits.silence_return:
                 self._to(MissionState.HOLDING, "waiting for navigation")
                 return self._hover(state)

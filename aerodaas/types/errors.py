@@ -7,6 +7,8 @@ something failed that the input could not have told.
 from __future__ import annotations
 
 import difflib
+import os
+import traceback
 
 __all__ = [
     "AeroDaaSError",
@@ -23,6 +25,7 @@ __all__ = [
     "SourceError",
     "UnknownIdError",
     "VehicleError",
+    "failure_line",
 ]
 
 
@@ -122,3 +125,14 @@ class EndpointError(AeroDaaSError):
 
 class RecordingError(AeroDaaSError):
     """A recording cannot be written or read."""
+
+
+def failure_line(error: BaseException) -> str:
+    """One line with an exception's type, message, file and line."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f" at {os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else ""  # noqa: PTH119
+    try:
+        said = str(error)
+    except Exception:  # noqa: BLE001 - a plug-in's class, whose `__str__` may raise
+        said = "it cannot say why"
+    return f"{type(error).__name__}: {said}{place}"

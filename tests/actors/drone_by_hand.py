@@ -7,8 +7,10 @@ from typing import Any
 
 from flying import robot
 
-from aerodaas.actors.drone.actor import DroneActor, LockstepSchedule
+from aerodaas.actors.drone.actor import DroneActor
 from aerodaas.actors.drone.vehicle_controller import RobotSpec
+from aerodaas.actors.lockstep.drone import LockstepDroneActor
+from aerodaas.actors.lockstep.schedule import LockstepSchedule
 from aerodaas.actors.session import Session
 from aerodaas.actors.stream_names import state_stream
 from aerodaas.actors.streams import Subscriber
@@ -16,7 +18,7 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.mission.commands import Command
 from aerodaas.schedulers.trajectory.nearest_neighbor import NearestNeighborScheduler
 
-__all__ = ["DroneByHand", "drone_by_hand"]
+__all__ = ["DroneByHand", "LockstepDroneByHand", "drone_by_hand"]
 
 
 class DroneByHand(DroneActor):
@@ -33,6 +35,10 @@ class DroneByHand(DroneActor):
         self.alerts = self.publisher(f"alerts/{self.name}")
         self._open()
         self._phase = "ready"
+
+
+class LockstepDroneByHand(DroneByHand, LockstepDroneActor):
+    """The same in lockstep."""
 
 
 class _InThisProcess(NearestNeighborScheduler):
@@ -62,7 +68,12 @@ def drone_by_hand(
         initial=tuple(initial),
         scheduler=_InThisProcess(),
     )
-    conduct = LockstepSchedule(windows={state_stream("drone"): 0})
-    actor = DroneByHand(Session(environment, speed), "drone/drone", (spec,), conduct)
+    session, name = Session(environment, speed), "drone/drone"
+    actor: DroneByHand
+    if speed is None:
+        schedule = LockstepSchedule({}, {}, windows={state_stream("drone"): 0})
+        actor = LockstepDroneByHand(session, name, (spec,), schedule)
+    else:
+        actor = DroneByHand(session, name, (spec,))
     actor.open_here()
     return actor

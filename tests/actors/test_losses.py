@@ -15,7 +15,7 @@ from aerodaas.actors.run.losses import SuspensionMonitor
 
 def test_an_application_in_another_container_is_not_looked_for_here(runtime: None) -> None:  # noqa: ARG001
     """Its number means another process here, or none: it lives for as long as it is heard."""
-    here = ApplicationProcess(lockstep=False)
+    here = ApplicationProcess(time_waits=False)
     assert here.near
     assert not here.ended()
     assert not replace(here, pids="pid:[1]").near
@@ -24,7 +24,7 @@ def test_an_application_in_another_container_is_not_looked_for_here(runtime: Non
 
 def test_a_process_that_has_the_number_of_an_earlier_one_is_another(runtime: None) -> None:  # noqa: ARG001
     """And one that waits for its parent has ended."""
-    here = ApplicationProcess(lockstep=False)
+    here = ApplicationProcess(time_waits=False)
     assert replace(here, began=here.began - 100).ended()
     child = subprocess.Popen([sys.executable, "-c", ""])
     os.waitid(os.P_PID, child.pid, os.WEXITED | os.WNOWAIT)

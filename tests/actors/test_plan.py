@@ -11,6 +11,7 @@ from flying import FLAT, Flyer, hop, robot
 
 from aerodaas import Environment
 from aerodaas.actors.cluster.ray_cluster import Placement
+from aerodaas.actors.lockstep.schedule import LockstepSchedule
 from aerodaas.actors.run.plan import FlightPlan, make_plan
 from aerodaas.actors.session import Session
 from aerodaas.analytics import SyntheticAnalytics
@@ -51,6 +52,13 @@ def plan(env: Environment, speed: float | None = None) -> FlightPlan:
     """The plan of what was built so far; None is lockstep."""
     scheduler = env.trajectory_scheduler()
     return make_plan(Session(env.config, speed), env.graph, env.compute(), scheduler)
+
+
+def conduct(env: Environment) -> LockstepSchedule:
+    """The plan's schedule of acknowledgements."""
+    schedule = plan(env).conduct
+    assert schedule is not None
+    return schedule
 
 
 def test_nothing_flies_without_navigation(environment: Environment) -> None:
@@ -116,7 +124,7 @@ def test_what_steers_is_waited_for(environment: Environment) -> None:
     env = environment
     env.get_robot_by_id("drone").navigate(Weave().analyse(odometry(env)))
     Broken().analyse(camera(env))
-    windows = plan(env).conduct.windows
+    windows = conduct(env).windows
     assert windows["drone/odom"] == 0
     assert windows["drone/cam"] > 0
     assert windows["drone/@state"] > 0
@@ -131,11 +139,11 @@ def test_what_triggers_or_wakes_what_steers_is_waited_for(environment: Environme
     sleeper.analyse(odometry(env))
     waker.analyse(camera(env))
     waker.trigger(sleeper)
-    assert plan(env).conduct.windows["drone/cam"] > 0
+    assert conduct(env).windows["drone/cam"] > 0
     sleeper.trigger(drone.end_mission)
     ticker.deploy(env.get_compute_resource_by_id("edge")).instantiate()
     ticker.trigger(drone.pause_mission)
-    windows = plan(env).conduct.windows
+    windows = conduct(env).windows
     assert windows["drone/cam"] == windows["drone/odom"] == windows["ticker"] == 0
 
 
@@ -148,7 +156,7 @@ def test_analyses_that_wake_each_other_are_no_endless_question(environment: Envi
     other.analyse(odometry(env))
     one.trigger(other)
     other.trigger(one)
-    assert plan(env).conduct.windows["drone/odom"] > 0
+    assert conduct(env).windows["drone/odom"] > 0
 
 
 @pytest.mark.parametrize("recording", [True, False])
@@ -159,7 +167,7 @@ def test_every_measurement_is_acknowledged_by_its_readers(tmp_path: Path, record
     follow = Weave().analyse(odometry(env))
     env.get_robot_by_id("drone").navigate(follow)
     Jitter().analyse(odometry(env))
-    counts = plan(env).conduct.acknowledgements
+    counts = conduct(env).acknowledgements
     # The drone for what Weave says, and Jitter itself; or the recorder for each of the streams.
     assert counts["drone/odom"] == (4 if recording else 2)
     assert counts["drone/@state"] == (1 if recording else 0)
@@ -176,7 +184,7 @@ def test_in_real_time_each_drone_has_its_own_actor(tmp_path: Path) -> None:
         env.get_robot_by_id(name).navigate(hop((1, 0)))
     assert [len(group) for group in plan(env, speed=1.0).drones] == [1, 1]
     assert [len(group) for group in plan(env).drones] == [2]
-    assert plan(env, speed=1.0).conduct.windows == {}
+    assert plan(env, speed=1.0).conduct is None
 
 
 def test_triggers_belong_to_whoever_publishes_the_results(environment: Environment) -> None:

@@ -49,25 +49,25 @@ class Withdrawal:
         self._land = land
         self._flies = flies
         self._calm = 0
-        self._last_word = now
+        self._last_received = now
         self._go_on(now)
 
     def observe(self, now: float, *, armed: bool) -> None:
         """Take note of a HEARTBEAT."""
         waits = self._commander.under_way(self._disarm.number) is not None
         if armed:
-            self._last_word, self._calm = now, 0
+            self._last_received, self._calm = now, 0
             if not waits:
                 self._go_on(now)
         elif not waits:
             self._calm += 1
-        self.over = self._calm >= _CALM and now - self._last_word > _SETTLED
+        self.over = self._calm >= _CALM and now - self._last_received > _SETTLED
 
     def _go_on(self, now: float) -> None:
         if self._flies:
             self._land()
             return
-        self._last_word = now
+        self._last_received = now
         self._commander.give(self._disarm, self._done, now=now)
 
     def _done(self, outcome: CommandResult) -> None:
