@@ -7,8 +7,6 @@ itself with a traceback; a query of its head reports both at once.
 from __future__ import annotations
 
 import contextlib
-import json
-import logging
 import os
 import platform
 import socket
@@ -16,13 +14,13 @@ from collections.abc import Iterator
 from typing import Any
 
 import ray
-from ray._raylet import GcsClient  # type: ignore[attr-defined]  # compiled
 from ray.exceptions import RayError, RpcError
 
 from aerodaas.actors.cluster.encryption import require_same_encryption
+from aerodaas.actors.cluster.ray_internals import cluster_metadata, take_up_token
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["greet", "hushed", "listener_of", "take_up_token"]
+__all__ = ["greet", "hushed", "listener_of"]
 
 _PROBE_SECONDS = 5.0
 _TOKEN_ADVICE = (
@@ -60,26 +58,11 @@ def listener_of(address: str) -> tuple[str, int] | None:
     return (host.strip("[]"), int(port)) if host and port.isdigit() else None
 
 
-def take_up_token() -> None:
-    """Enable the user's token for joining; Ray does so only for a cluster that it starts."""
-    try:
-        from ray._private.authentication import (  # noqa: PLC0415 - since Ray 2.59
-            authentication_token_setup as tokens,
-        )
-
-        logger = logging.getLogger(tokens.__name__)
-        with _level(logger, logging.ERROR):
-            tokens.maybe_enable_token_auth_if_token_available(warn_if_disabled=False)
-    except (ImportError, AttributeError, TypeError):
-        return
-
-
 def _metadata(address: str) -> dict[str, Any]:
     """Cluster metadata from the head; raises AeroDaaSError if refused or not a Ray head."""
     try:
         with hushed():
-            client = GcsClient(address=address)
-            told = client.internal_kv_get(b"CLUSTER_METADATA", b"cluster", timeout=_PROBE_SECONDS)
+            return cluster_metadata(address, _PROBE_SECONDS)
     except (RayError, RpcError) as error:
         reason = str(error).strip().splitlines()[0]
         if "token" in reason.lower():
@@ -89,7 +72,6 @@ def _metadata(address: str) -> dict[str, Any]:
         raise AeroDaaSError(
             f"what listens at {address} is not the head of a Ray cluster: {reason}"
         ) from None
-    return dict(json.loads(told)) if told else {}
 
 
 def _compare(address: str, head: dict[str, Any]) -> None:
@@ -114,16 +96,6 @@ def _compare(address: str, head: dict[str, Any]) -> None:
 
 def _minor(version: str) -> str:
     return ".".join(version.split(".")[:2])
-
-
-@contextlib.contextmanager
-def _level(logger: logging.Logger, level: int) -> Iterator[None]:
-    before = logger.level
-    logger.setLevel(level)
-    try:
-        yield
-    finally:
-        logger.setLevel(before)
 
 
 @contextlib.contextmanager

@@ -30,13 +30,11 @@ class LivenessMonitor:
         """
         self._tell = tell
         self._names: dict[Any, list[str]] = {}
-        self._handles: dict[Any, Any] = {}
+        """Names of each actor; Ray's handles of one actor are equal."""
         self._ended = False
-        for name, handle in actors.items():
-            actor = handle._actor_id  # noqa: SLF001 - Ray has no other name for it
+        for name, actor in actors.items():
             self._names.setdefault(actor, []).append(name)
-            self._handles[actor] = handle
-        for actor in self._handles:
+        for actor in self._names:
             self._ask(actor, "await_start")
 
     def end(self) -> None:
@@ -44,7 +42,7 @@ class LivenessMonitor:
         self._ended = True
 
     def _ask(self, actor: Any, what: Literal["await_start", "await_stop"]) -> None:  # noqa: ANN401
-        method = getattr(self._handles[actor], what)
+        method = getattr(actor, what)
         reference = method.options(concurrency_group=LIFE).remote()
 
         def heard(future: Future[None]) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import atexit
 import contextlib
-import importlib
 import logging
 import os
 from collections import Counter
@@ -15,8 +14,9 @@ from typing import Any, Literal
 import ray
 from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-from aerodaas.actors.cluster.handshake import greet, hushed, take_up_token
+from aerodaas.actors.cluster.handshake import greet, hushed
 from aerodaas.actors.cluster.local_ray import LocalRay
+from aerodaas.actors.cluster.ray_internals import silence_nodes, take_up_token
 from aerodaas.actors.cluster.ray_variables import VARIABLES
 from aerodaas.config.model import ComputeConfig
 from aerodaas.types.errors import AeroDaaSError, ConfigError
@@ -44,8 +44,6 @@ _SHARE = 0.001
 """Amount of a node's `edge` or `cloud` resource per actor, for placement only."""
 _NAMESPACE = "aerodaas"
 """Ray namespace for the names of actors that outlive their application."""
-
-_PRINTS = "print_to_stdstream"
 
 _local: LocalRay | None = None
 """Local Ray started by this process, if any."""
@@ -115,17 +113,7 @@ def _init(address: str, **more: Any) -> None:  # noqa: ANN401 - as Ray takes the
     except (ConnectionError, RuntimeError, ValueError) as error:
         reason = str(error).strip().splitlines()[0]
         raise _unreachable(address, reason) from None
-    _silence_nodes()
-
-
-def _silence_nodes() -> None:
-    """Stop Ray from printing its nodes' messages about dead processes.
-
-    The run reports these by name. Neither `log_to_driver` nor another option of Ray covers it.
-    """
-    worker = importlib.import_module("ray._private.worker")
-    if hasattr(worker, _PRINTS):
-        setattr(worker, _PRINTS, lambda *_, **__: None)
+    silence_nodes()
 
 
 @contextlib.contextmanager

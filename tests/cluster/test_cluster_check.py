@@ -282,9 +282,9 @@ def _devices() -> set[str]:
 
 _PRETEND = """
 import json, sys
-from aerodaas.actors.cluster import handshake
+from aerodaas.actors.cluster import ray_internals
 from ray._raylet import GcsClient
-handshake.take_up_token()
+ray_internals.take_up_token()
 client = GcsClient(address=sys.argv[1])
 told = json.loads(client.internal_kv_get(b"CLUSTER_METADATA", b"cluster"))
 import platform, ray

@@ -1,0 +1,67 @@
+"""What is used of Ray's internals works with this Ray, and its loss costs a message at most."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+import types
+from collections.abc import Callable
+
+import pytest
+import ray
+
+from aerodaas.actors.cluster import ray_internals
+
+MODULES = (
+    "ray._raylet",
+    "ray._private.authentication.authentication_token_setup",
+    "ray._private.worker",
+)
+
+
+def gone(name: str) -> types.ModuleType | None:
+    """The module does not exist any more."""
+    del name
+    return None
+
+
+def emptied(name: str) -> types.ModuleType:
+    """Its names are others."""
+    return types.ModuleType(name)
+
+
+def changed(name: str) -> types.ModuleType:
+    """Its functions take other arguments."""
+    module = types.ModuleType(name)
+    for attribute in ("GcsClient", "maybe_enable_token_auth_if_token_available"):
+        setattr(module, attribute, lambda _other, _arguments: None)
+    return module
+
+
+@pytest.mark.parametrize("become", [gone, emptied, changed])
+def test_a_ray_that_has_changed_fails_nothing(
+    become: Callable[[str], types.ModuleType | None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Versions are unknown then, and the rest does nothing."""
+    for name in MODULES:
+        importlib.import_module(name)
+        monkeypatch.setitem(sys.modules, name, become(name))
+    assert ray_internals.cluster_metadata("127.0.0.1:1", 0.1) == {}
+    ray_internals.take_up_token()
+    ray_internals.silence_nodes()
+
+
+@pytest.mark.usefixtures("runtime")
+def test_the_head_tells_its_versions() -> None:
+    """As this Ray's own."""
+    found = ray_internals.cluster_metadata(ray.get_runtime_context().gcs_address, 5.0)
+    assert found["ray_version"] == ray.__version__
+
+
+@pytest.mark.usefixtures("runtime")
+def test_nodes_are_silent(capfd: pytest.CaptureFixture[str]) -> None:
+    """Where Ray would print what a node says."""
+    worker = importlib.import_module("ray._private.worker")
+    data = {"lines": ["a worker died"], "pid": "raylet", "is_err": False}
+    worker.print_to_stdstream(data, ignore_prefix=False)
+    assert capfd.readouterr() == ("", "")
