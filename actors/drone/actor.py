@@ -164,7 +164,7 @@ class DroneActor(StreamActor):
     def _publish_reports(self) -> None:
         """Replace the robots' reports; in the loop's thread only."""
         self._reports = {
-            name: RobotReport(controller.status, controller.state, (), self._late)
+            name: RobotReport(controller.status, controller.state, ())
             for name, controller in self._controllers.items()
         }
 

@@ -19,8 +19,6 @@ class RobotReport:
     state: VehicleState | None
     latencies: tuple[float, ...]
     """Milliseconds from capture to command, newest last."""
-    loop_late: int
-    """Number of setpoint loop cycles more than half a period late."""
 
 
 class Latencies:

@@ -19,7 +19,6 @@ __all__ = [
     "Clock",
     "LockstepClock",
     "ScaledClock",
-    "clock_for_speed",
     "host_time_ns",
     "seconds",
 ]
@@ -116,18 +115,3 @@ class LockstepClock:
         """Block the calling thread until another one advances time to `stamp`."""
         with self._changed:
             self._changed.wait_for(lambda: self._now >= stamp)
-
-
-def clock_for_speed(speed: str | float) -> Clock:
-    """Make the clock for a `--speed` argument: a positive factor, or "max" for lockstep.
-
-    Raises ConfigError for anything else.
-    """
-    if speed == "max":
-        return LockstepClock()
-    try:
-        factor = float(speed)
-    except ValueError:
-        message = f'speed must be a positive number or "max", not {speed!r}'
-        raise ConfigError(message) from None
-    return ScaledClock(factor)

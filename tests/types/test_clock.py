@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.types import clock
-from aerodaas.types.clock import NANOSECONDS, LockstepClock, ScaledClock, clock_for_speed
+from aerodaas.types.clock import NANOSECONDS, LockstepClock, ScaledClock
 from aerodaas.types.errors import ClockError, ConfigError
 
 
@@ -81,17 +81,6 @@ def test_a_lockstep_sleeper_wakes_at_its_stamp_and_no_sooner() -> None:
     lockstep.advance_to(10)
     sleeper.join(10)
     assert woke == [10]
-
-
-def test_clocks_by_the_word_of_a_command_line() -> None:
-    """A factor, or "max" for lockstep; anything else is refused."""
-    assert isinstance(clock_for_speed("max"), LockstepClock)
-    made = clock_for_speed("2.5")
-    assert isinstance(made, ScaledClock)
-    assert made.speed == 2.5
-    for wrong in ("fast", "0", "nan"):
-        with pytest.raises(ConfigError, match="speed"):
-            clock_for_speed(wrong)
 
 
 def test_seconds_and_host_time() -> None:

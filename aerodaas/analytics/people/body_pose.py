@@ -124,8 +124,6 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
         self.tracker = Tracker(max_age=1.0, min_hits=1)
         self.person: int | None = None
         """Track id of the monitored person."""
-        self.unusable = 0
-        """Number of bodies so far with unusable keypoints."""
         self._downfall = Downfall(min_confidence)
         self._events = {
             "fallen": Debounce(needed, of, hold),
@@ -232,7 +230,6 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
     def _people(self, found: Detections) -> Detections:
         """Return the people with usable keypoints, with their tracks."""
         usable = [one for one in found if _is_usable(one)]
-        self.unusable += len(found) - len(usable)
         middle = found.width / 2
         usable.sort(key=lambda one: _off_centre(one, middle))
         items = (replace(one, label="person") for one in _once(usable[:_MOST_PEOPLE]))
