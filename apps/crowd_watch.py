@@ -1,4 +1,4 @@
-"""Crowd Watch: how many people are where a drone flies; a guest of whoever flies it.
+"""Crowd Watch: how many people are where a drone flies; a guest of the application that flies it.
 
 aerodaas run apps/disaster_survey.py --guest apps/crowd_watch.py
 """

@@ -1,4 +1,4 @@
-"""Search and Rescue: search an area; whoever is found is escorted to safety (paper, section 6)."""
+"""Search and Rescue: search an area; the person found is escorted to safety (paper, section 6)."""
 
 from math import dist
 

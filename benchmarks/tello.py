@@ -117,7 +117,7 @@ def _measure(
 
 
 def _connected(port: int, video: int) -> TelloVehicle:
-    """Whoever switches the stream on."""
+    """The application, which switches the stream on."""
     robot = RobotConfig.model_validate(
         {
             "id": "tello",

@@ -188,7 +188,7 @@ class Run:
     def _keep_alive(self) -> None:
         """Keep the drones informed that the application lives, even while it is busy."""
         while not self._finished.wait(_BEAT_SECONDS):
-            # Whoever waits for the run meets the same error and deals with it.
+            # The thread that waits for the run meets the same error and handles it.
             with contextlib.suppress(AeroDaaSError):
                 self.look()
 

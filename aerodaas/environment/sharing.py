@@ -1,6 +1,6 @@
 """Several applications on one drone: one owns its navigation, guests share its sensors and compute.
 
-A guest is an application like any other, written by somebody who need not know of the owner. It
+A guest is an application like any other, whose author need not know of the owner. It
 is run up to its `start_mission()`, which returns at once; its dataflow then joins the owner's, and
 both fly as one run: one camera, one analytics scheduler that shares the compute out, one recording.
 """

@@ -35,6 +35,6 @@ def raise_on_termination() -> None:
 
 def _raise(number: int, _: FrameType | None) -> None:
     if number == signal.SIGHUP:
-        # Nobody reads what is written from now on, and writing to a closed terminal fails.
+        # Output has no reader from now on, and writing to a closed terminal fails.
         sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for good
     raise TerminatedError(number)

@@ -99,7 +99,7 @@ class EnergyModel:
 class EnergyMeter:
     """Compares the charge that a flight took with the model, and scales the model by it.
 
-    A battery that is older than its data sheet, or a wind that nobody told us of, shows here. The
+    A battery that is older than its data sheet, or an unknown wind, shows here. The
     scale never makes the model more hopeful than it was.
     """
 

@@ -31,7 +31,7 @@ def load_scheduler(
 ) -> AnalyticsScheduler:
     """Make a scheduler of a name, `module:Class`, `file.py:Class`, a class, or an instance.
 
-    Raises UnknownIdError for a name that nobody registered and SchedulerError for something that
+    Raises UnknownIdError for an unregistered name and SchedulerError for something that
     cannot be imported, built without arguments, or is no scheduler.
     """
     if isinstance(wanted, AnalyticsScheduler):

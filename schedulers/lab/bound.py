@@ -1,6 +1,6 @@
 """A clairvoyant bound: utility that no scheduler can exceed on a given sample path.
 
-Whoever knows every arrival and every execution time still has one serial edge. A task is worth
+With all arrivals and execution times known, the edge is still serial. A task is worth
 c = max(cloud gain, 0) if the cloud could finish it in time, else 0, wherever the edge does not
 take it; cloud slots are not counted. What remains is to choose tasks for the edge, each worth its
 edge gain less c, on one machine with release times and deadlines and without preemption, which

@@ -80,7 +80,7 @@ class EmulatedArduPilot(Firmware):
         self._mode = _STABILIZE
 
     def hear_heartbeat(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Somebody else's HEARTBEAT."""
+        """HEARTBEAT of another system."""
         if message.get_srcSystem() == int(self.parameters.values["SYSID_MYGCS"]):
             self._station_at = self.now
 
@@ -107,7 +107,7 @@ class EmulatedArduPilot(Firmware):
         if number == mavlink.MAV_CMD_DO_SET_MODE:
             return self._set_mode(int(values[1]))
         if number == mavlink.MAV_CMD_DO_REPOSITION and frame is not None:
-            # Whatever way it is told to face, it faces as it did.
+            # It keeps its heading, whatever yaw is commanded.
             return self.go_to(math.nan, *values[4:]) if self.guided else _FAILED
         if number == mavlink.MAV_CMD_NAV_TAKEOFF:
             relative = {None, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT}

@@ -19,7 +19,7 @@ class AutopilotOptions:
     vehicle_type: int = 2
     """MAV_TYPE of its HEARTBEAT; 2 is a quadrotor."""
     peer: tuple[str, int] = ("127.0.0.1", 14540)
-    """Where it sends from the start; it answers to whoever speaks to it as well."""
+    """Where it sends from the start; it also answers each sender."""
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """Where it stands, ENU metres."""
     start_yaw: float = 0.0

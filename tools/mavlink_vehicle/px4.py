@@ -125,7 +125,7 @@ class EmulatedPX4(Firmware):
 
     @property
     def sinks_blind(self) -> bool:
-        """Shown as altitude mode, or as position mode with nobody at the sticks."""
+        """Shown as altitude mode, or as position mode without a pilot at the sticks."""
         return self._main == _ALTITUDE or (self._main == _POSITION and self.failsafe)
 
     def go_blind(self) -> None:
@@ -210,7 +210,7 @@ class EmulatedPX4(Firmware):
             sub = {_RETURN_ACTION: _RETURN, _HOLD_ACTION: _HOLD}.get(action)
             self._event("commander_failsafe_enter_generic", mavlink.MAV_SEVERITY_CRITICAL)
             if sub is None:
-                # Position mode, by sticks that nobody holds: it sinks where it is.
+                # Position mode, by sticks without a pilot: it sinks where it is.
                 self._main, self._sub = _POSITION, 0
                 self.flight.land()
             else:

@@ -24,7 +24,7 @@ STORE_BYTES = 128 * 2**20
 _TOKEN = Path.home() / ".ray" / "auth_token"
 _SLIM = {
     **VARIABLES,
-    # Workers started before anybody asks for them take 80 MB each.
+    # Workers started in advance take 80 MB each.
     "RAY_enable_worker_prestart": "0",
     "RAY_prestart_worker_first_driver": "0",
 }

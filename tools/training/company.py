@@ -22,7 +22,7 @@ Step = TypeVar("Step")
 def company(size: int, work: Callable[[], object]) -> Iterator[None]:
     """Be the first of `size` processes (1 or more); the others call `work`, which is pickled.
 
-    Threads are shared out evenly. Whoever is left when this ends, is ended.
+    Threads are shared out evenly. Processes left when this ends are ended.
     """
     if size == 1:
         yield

@@ -76,7 +76,7 @@ class LabellingRenderer(Renderer):
 
     def _code_camera(self) -> Camera:
         eye = Camera("codes", self._eye.node().get_lens())
-        # Whatever bears no label is black, yet keeps the holes of its texture.
+        # Unlabelled things are black, yet keeps the holes of its texture.
         black = ColorScaleAttrib.make(LVecBase4f(0, 0, 0, 1))
         eye.set_initial_state(RenderState.make(black, _OVERRIDE))
         eye.set_tag_state_key(LABEL)

@@ -124,7 +124,7 @@ def draw_view(world: World, camera: CameraModel, time: float, rng: np.random.Gen
     steep = rng.uniform(-0.08, 0.22) if rng.random() < 0.62 else rng.uniform(0.0, 1.25)  # noqa: PLR2004
     bearing = rng.uniform(-math.pi, math.pi)
     if wanted == "car" and rng.integers(2):
-        # As whoever drives behind or ahead of it sees it.
+        # As seen from a car behind or ahead of it.
         bearing = target.yaw + rng.normal(0.0, 0.25) + math.pi * rng.integers(2)
     x = target.centre[0] - distance * math.cos(steep) * math.cos(bearing)
     y = target.centre[1] - distance * math.cos(steep) * math.sin(bearing)

@@ -268,7 +268,7 @@ class MavlinkVehicle:
         Setpoints go out from the first call on; the autopilot is asked to follow them when it has
         seen enough of them, and holds until then. Raises InvalidWaypointError for numbers that
         are not finite, and VehicleError on the ground, during take-off and landing, and when
-        somebody else flies. Without a position it is told to stand still.
+        another pilot flies. Without a position it is told to stand still.
         """
         require_finite(self._name, setpoint)
         self._watchdog.feed()

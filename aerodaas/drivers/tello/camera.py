@@ -47,7 +47,7 @@ class VideoCounts:
     frames: int = 0
     """Images decoded."""
     overtaken: int = 0
-    """Pictures that a newer one replaced before anybody asked: no loss, the camera is asked at
+    """Pictures that a newer one replaced before they were read: no loss, the camera is asked at
     its own rate."""
     broken: int = 0
     """Frames that could not be decoded, or only with damage."""

@@ -70,7 +70,7 @@ class TelloLink:
 
     `request` and `steer` return at once. `on_state` and `on_turn` are called in the link's
     thread, the latter 20 times a second. Nothing is sent of the link's own accord except the
-    centring of sticks that nobody renews: when the loop above falls silent, so does the wire.
+    centring of sticks that are not renewed: when the loop above falls silent, so does the wire.
     """
 
     def __init__(

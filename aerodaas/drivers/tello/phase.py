@@ -116,7 +116,7 @@ class FlightPhase:
         elif self.mode is VehicleMode.TAKING_OFF and now - self._since > _NO_LIFT:
             self.rose(refusal="it did not lift; is there room and light below it?")
         elif self.steered:
-            # Low battery, too hot, or held for too long without a command: nobody asked for it.
+            # Low battery, too hot, or held for too long without a command: it was not requested.
             self._end(VehicleMode.FAILSAFE, now)
 
     def _end(self, mode: VehicleMode, now: float) -> None:

@@ -66,7 +66,7 @@ def datagrams(source: socket.socket) -> list[tuple[bytes, str, int]]:
         except BlockingIOError:
             break
         except ConnectionError:
-            # The system reports here that an earlier datagram found nobody at its port.
+            # The system reports here that an earlier datagram found no socket at its port.
             continue
         arrived.append((content, address, port))
     return arrived

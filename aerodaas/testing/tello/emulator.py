@@ -33,7 +33,7 @@ _HOT = 90.0
 class EmulatedTello(EmulatedVehicle[TelloFlight]):
     """A Tello on loopback, from `start` (or `with`) to `stop`.
 
-    It replies to whoever spoke last, as the real one does, and sends state and video there.
+    It replies to the last sender, as the real one does, and sends state and video there.
     """
 
     kind = "emulated-tello"

@@ -1,6 +1,6 @@
 """Flight phase of the vehicle: its HEARTBEAT compared with the requested action.
 
-A mode that nobody asked for is a pilot's, a ground station's, or the autopilot's own protection:
+A mode that was not requested is a pilot's, a ground station's, or the autopilot's own protection:
 from then on until it is disarmed nothing is sent that steers.
 """
 

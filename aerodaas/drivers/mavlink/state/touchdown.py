@@ -87,7 +87,7 @@ class Touchdown:
         """Take note of a HEARTBEAT."""
         if armed:
             if not self._armed:
-                # Found armed, it is taken to fly: nobody saw it stand.
+                # Found armed, it is taken to fly: it was not seen to stand.
                 self.flew = self._armed is None and self._on_ground is not True
                 self._ground = self._up
                 self.fault, self.falling, self._blind = "", False, False

@@ -1,6 +1,6 @@
 """Where packets begin and end in a stream of bytes, and which of them are worth decoding.
 
-Autopilots send hundreds of packets a second that nobody asked us about, and decoding one in
+Autopilots send hundreds of packets a second of no interest here, and decoding one in
 Python costs more than a driver may take, so packets are cut out by their headers first.
 """
 

@@ -108,7 +108,7 @@ class _Udp:
             try:
                 content, sender = self._socket.recvfrom(_LARGEST)
             except ConnectionError:
-                # The system reports here that an earlier datagram found nobody at its port.
+                # The system reports here that an earlier datagram found no socket at its port.
                 continue
             except OSError:
                 break
