@@ -117,7 +117,7 @@ def _measure(
 
 
 def _connected(port: int, video: int) -> TelloVehicle:
-    """The application, which switches the stream on."""
+    """A vehicle that has connected and switched the stream on."""
     robot = RobotConfig.model_validate(
         {
             "id": "tello",
