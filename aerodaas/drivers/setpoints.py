@@ -1,4 +1,4 @@
-"""Checks of a setpoint that every driver makes before it sends it."""
+"""Checks of a setpoint by every driver, before it is sent."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ class SimulatedVehicle:
         self._connected = True
 
     def close(self) -> None:
-        """Let go; a drone in the air lands by itself as time goes on."""
+        """Disconnect; a drone in the air lands by itself as time advances."""
         if self._connected and self._autopilot.flying:
             self._autopilot.land()
         self._connected = False
@@ -136,7 +136,7 @@ class SimulatedVehicle:
         return faults
 
     def preflight(self) -> list[str]:
-        """Reasons for which a take-off would be refused now; empty when ready."""
+        """Reasons against a take-off now; empty when ready."""
         reasons = []
         if not self._connected:
             reasons.append("not connected")
@@ -198,7 +198,7 @@ class SimulatedVehicle:
         return PositionSetpoint(np.array([x, y, z]), yaw, speed)
 
     def hold(self) -> None:
-        """Stop and stay; raise VehicleError on the ground."""
+        """Brake and hover; raise VehicleError on the ground."""
         self._require_flight("hold")
         self._autopilot.hold()
 

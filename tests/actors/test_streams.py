@@ -138,7 +138,7 @@ def test_a_slow_reader_gets_the_newest_and_counts_what_it_missed(
     assert received + dropped == 31
 
 
-def test_the_last_received_arrives_though_the_link_was_busy(connect: Connect) -> None:
+def test_the_last_message_arrives_though_the_link_was_busy(connect: Connect) -> None:
     """A command that ends a burst is not lost to what came before it."""
     link = connect(depth=MAX_DEPTH)
     picture = np.zeros((720, 1280, 3), np.uint8)

@@ -1,4 +1,4 @@
-"""Look at a vehicle: `python -m aerodaas.drivers.mavlink udpin:0.0.0.0:14540`."""
+"""Vehicle check: `python -m aerodaas.drivers.mavlink udpin:0.0.0.0:14540`."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.types.errors import AeroDaaSError
 
 _SETTLING = 2.0
-"""Seconds in which the slowest of its messages have come."""
+"""Seconds within which its slowest messages arrive."""
 
 
 def main(
@@ -39,7 +39,7 @@ def main(
         vehicle.connect(timeout)
         time.sleep(_SETTLING)
         _tell(vehicle)
-        # Judged by the role, but never in it: leaving would then be a loss of the ground station.
+        # Judged by this role, but never in it: its end would then be a loss of the ground station.
         role = MavlinkSettings(role="ground_station" if as_station else "companion")
         _judge(vehicle.connection, role, fix=set_failsafes)
     except AeroDaaSError as error:

@@ -61,7 +61,7 @@ def establish(
     home: GeodeticOrigin | None,
     pause: Callable[[], None],
 ) -> Connection:
-    """Wait until it is ready, see to its failsafes and its fence; raises VehicleError."""
+    """Wait until it is ready, check its failsafes and upload its fence; raises VehicleError."""
     assert link.target is not None  # noqa: S101 - it was just adopted
     commander.give(autopilot.version(), now=time.monotonic())
     _await_ready(autopilot, commander, telemetry, robot.id, settings, pause)
@@ -141,7 +141,7 @@ def _frame(
 
 
 def _armed_at(telemetry: Telemetry, pause: Callable[[], None]) -> Vector:
-    """Where a vehicle that is in the air already took off, NED metres."""
+    """Take-off position of a vehicle that is already in the air, NED metres."""
     patience = 3.0
     deadline = time.monotonic() + patience
     while telemetry.home is None and time.monotonic() < deadline:

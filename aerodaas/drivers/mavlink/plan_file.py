@@ -1,4 +1,4 @@
-"""`.plan` files of QGroundControl, read as navigation of ours."""
+"""Reader of QGroundControl's `.plan` files."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _OURS = {
     mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
     mavlink.MAV_CMD_NAV_LAND,
 }
-"""Items with which every mission of ours begins and ends anyway."""
+"""Items that are left out, because every mission begins and ends with them anyway."""
 _RELATIVE = {
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT,
     mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT,
@@ -35,7 +35,7 @@ def read_plan(path: str | Path, home: GeodeticOrigin) -> AeroNavigation:
     """The waypoints of a `.plan` file, in order, local to `home` (the environment's).
 
     Take-off, landing and return are left out, as every mission has its own. Heights are above the
-    plan's own home, which is taken to stand as high as ours. Raises ConfigError for a file that
+    plan's own home, whose height is assumed to be ours. Raises ConfigError for a file that
     is no plan, and for items that cannot be flown as waypoints.
     """
     place = str(path)

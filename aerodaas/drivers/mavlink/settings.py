@@ -15,7 +15,7 @@ KEY_VARIABLE = "AERODAAS_MAVLINK_KEY"
 """Environment variable that may hold the signing key, as 64 hexadecimal digits."""
 
 _STATION = 255
-"""The system id by which autopilots know their ground station, unless they were told another."""
+"""System id of an autopilot's ground station, by default."""
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Identity = Annotated[int, Field(ge=1, le=255)]

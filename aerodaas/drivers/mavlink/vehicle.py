@@ -1,4 +1,4 @@
-"""MavlinkVehicle: PX4 and ArduCopter behind the protocol of every drone."""
+"""Driver of PX4 and ArduCopter over MAVLink."""
 
 from __future__ import annotations
 
@@ -46,18 +46,17 @@ __all__ = ["MavlinkVehicle"]
 _log = logging.getLogger(__name__)
 
 _PARTING = 4.0
-"""Seconds that `close` waits for a vehicle in the air to begin its landing, and for motors that may
-be starting to stand."""
+"""Seconds that `close` waits for a vehicle in the air to begin its landing, and for starting motors
+to stop."""
 _SHORT = 1.5
-"""Metres below the height asked for within which an autopilot may call its take-off done."""
+"""Metres below the commanded height within which an autopilot may report a take-off as done."""
 _STEERED = {VehicleMode.HOLDING, VehicleMode.GUIDED, VehicleMode.RETURNING}
 
 
 class MavlinkVehicle:
     """One multicopter with PX4 or ArduPilot; implements `aerodaas.types.vehicle.ClockedVehicle`.
 
-    One thread at a time may use it, the link's own apart. Raises ConfigError for settings that it
-    does not know.
+    One thread at a time may use it, except the link's own. Raises ConfigError for unknown settings.
     """
 
     settings_model = MavlinkSettings
@@ -112,7 +111,7 @@ class MavlinkVehicle:
         """Find the vehicle within `timeout` seconds, and wait for its position.
 
         The latter may take `ready_timeout` seconds more: an autopilot needs up to a minute after
-        its start. Raises VehicleError that says what is missing.
+        its start. Raises VehicleError with what is missing.
         """
         self.close()
         self._forget()
@@ -172,7 +171,7 @@ class MavlinkVehicle:
         time.sleep(0.02)
 
     def close(self) -> None:
-        """Disconnect; a vehicle in the air that we fly is commanded to land."""
+        """Disconnect; a vehicle that this driver flies is commanded to land."""
         link, self._link = self._link, None
         if link is None:
             return
@@ -210,7 +209,7 @@ class MavlinkVehicle:
             return self._report.state(self._clock.now(), time.monotonic(), counts)
 
     def preflight(self) -> list[str]:
-        """Reasons for which a take-off would be refused now; empty when ready."""
+        """Reasons against a take-off now; empty when ready."""
         with self._lock:
             if self._link is None or self._connection is None:
                 return ["not connected"]
@@ -265,10 +264,10 @@ class MavlinkVehicle:
     def send(self, setpoint: Setpoint) -> Setpoint:
         """Send one setpoint and return it after clipping to the limits of the vehicle.
 
-        Setpoints go out from the first call on; the autopilot is asked to follow them when it has
-        seen enough of them, and holds until then. Raises InvalidWaypointError for numbers that
-        are not finite, and VehicleError on the ground, during take-off and landing, and when
-        another pilot flies. Without a position it is told to stand still.
+        Setpoints are sent from the first call on; the autopilot is commanded to follow them when
+        it has received enough of them, and holds until then. Without a position it is commanded
+        to stand still. Raises InvalidWaypointError for numbers that are not finite, and
+        VehicleError on the ground, during take-off and landing, and when another pilot flies.
         """
         require_finite(self._name, setpoint)
         self._watchdog.feed()
@@ -297,7 +296,7 @@ class MavlinkVehicle:
         return aligned and self._telemetry.knows_place(now)
 
     def hold(self) -> None:
-        """Stop and stay by the autopilot's own mode; raise VehicleError on the ground."""
+        """Brake and hover by the autopilot's own mode; raise VehicleError on the ground."""
         with self._lock:
             self._require_flight("hold")
             self._change(FlightMode.HOLD)
@@ -314,8 +313,7 @@ class MavlinkVehicle:
     def land(self) -> None:
         """Land here; does nothing on the ground. Raises VehicleError while another pilot flies.
 
-        A take-off that has not come to its end is taken back: until its motors surely stand, the
-        mode is LANDING.
+        A take-off in progress is withdrawn: the mode is LANDING until its motors certainly stand.
         """
         with self._lock:
             connection = self._connected()
@@ -326,7 +324,7 @@ class MavlinkVehicle:
                 if self._touchdown.flew:
                     self._change(FlightMode.LAND)
                 else:
-                    # A landing mode stops no motors that have never lifted it.
+                    # A landing mode does not stop motors before the first lift-off.
                     connection.departure.withdraw(time.monotonic())
 
     def _change(self, wish: FlightMode) -> None:
@@ -353,11 +351,11 @@ class MavlinkVehicle:
     def upload_mission(
         self, items: Sequence[MissionItem], progress: Progress = lambda _, __: None
     ) -> None:
-        """Put `items` in the place of the mission on the vehicle; waits, raises VehicleError."""
+        """Replace the mission on the vehicle by `items`; blocks, raises VehicleError."""
         upload(self._connected().link, items, mavlink.MAV_MISSION_TYPE_MISSION, progress)
 
     def download_mission(self, progress: Progress = lambda _, __: None) -> list[MissionItem]:
-        """The mission on the vehicle; waits, raises VehicleError."""
+        """The mission on the vehicle; blocks, raises VehicleError."""
         return download(self._connected().link, mavlink.MAV_MISSION_TYPE_MISSION, progress)
 
     @property
@@ -440,7 +438,7 @@ class MavlinkVehicle:
         self._told = phase.taken
 
     def _turned(self, now: float) -> None:
-        """20 times a second, in the link's thread."""
+        """Called 20 times a second, in the link's thread."""
         with self._lock:
             if self._commander is None or self._rates is None:
                 return
@@ -454,14 +452,14 @@ class MavlinkVehicle:
         self._log()
 
     def _log(self) -> None:
-        """Outside the lock, and never in the loop's thread in flight: a log may block."""
+        """Log outside the lock and never in the loop's thread in flight: logging may block."""
         while self._words:
             _log.warning("%s: %s", self._name, self._words.popleft())
 
     def _climb_on(self, connection: Connection, now: float) -> None:
-        """Fly the rest ourselves: PX4 calls its take-off done up to 0.8 m below its height.
+        """Complete a take-off by setpoints: PX4 ends its own up to 0.8 m below the height.
 
-        It shows hold before it takes off, too. Once it was asked to follow setpoints it gets them,
+        PX4 reports hold before it takes off, too. Once commanded to follow setpoints, it gets them,
         whatever it shows: without, it would leave that mode by its own protection.
         """
         goal, frame, phase = connection.departure.goal, connection.alignment.frame, self._phase
@@ -484,7 +482,7 @@ class MavlinkVehicle:
         return -math.inf if position is None else -float(position[2])
 
     def _mind_the_loop(self, now: float) -> None:
-        """If the loop above hangs, hold; if it does not come back, return.
+        """Hold if the control loop hangs; return home if it does not recover.
 
         An autopilot may follow its last target for ever, and heartbeats alone do not stop it.
         """

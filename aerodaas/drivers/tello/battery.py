@@ -1,4 +1,4 @@
-"""The battery by its percentage, which jumps when a packet is damaged or the load changes."""
+"""Filter of the battery's percentage, which jumps with damaged packets and load changes."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ class BatteryGauge:
         self._percent: deque[int] = deque(maxlen=_WINDOW)
 
     def take(self, percent: int) -> None:
-        """Take note of one packet's figure, 0 to 100."""
+        """Add the percentage of one packet, 0 to 100."""
         self._percent.append(percent)
 
     @property
     def battery(self) -> Battery:
-        """Charge at present; not a number before the first packet."""
+        """Present charge; NaN before the first packet."""
         if not self._percent:
             return Battery(float("nan"))
         return Battery(statistics.median(self._percent) / 100)

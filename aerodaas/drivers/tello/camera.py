@@ -33,9 +33,9 @@ __all__ = ["TelloCamera", "VideoCounts"]
 _log = logging.getLogger(__name__)
 
 _BUFFER = 1 << 20
-"""Bytes that the system may hold for us, two seconds of video: a held-up host loses none."""
+"""Bytes of the socket's receive buffer: two seconds of video, to lose none while stalled."""
 _LISTEN = 0.2
-"""Seconds between looks at whether to stop."""
+"""Seconds between checks for the end."""
 _QUIET = 3.0
 """Seconds without video after which an alert is due."""
 
@@ -47,16 +47,16 @@ class VideoCounts:
     frames: int = 0
     """Images decoded."""
     overtaken: int = 0
-    """Pictures that a newer one replaced before they were read: no loss, the camera is asked at
-    its own rate."""
+    """Images replaced by a newer one before they were read: no loss, as the camera is read at its
+    own rate."""
     broken: int = 0
     """Frames that could not be decoded, or only with damage."""
     waiting: int = 0
-    """Frames left out while waiting for a key frame."""
+    """Frames skipped while waiting for a key frame."""
     dropped: int = 0
     """Packets that belong to no frame."""
     strangers: int = 0
-    """Packets from elsewhere than the Tello."""
+    """Packets of other senders."""
 
 
 class TelloCamera:
@@ -91,12 +91,12 @@ class TelloCamera:
 
     @property
     def finished(self) -> bool:
-        """Never: video that stops may come again."""
+        """False: video that stops may resume."""
         return False
 
     @property
     def skipped(self) -> int:
-        """Frames that could not be shown for damage."""
+        """Frames that could not be decoded."""
         return self.counts.broken
 
     def open(self) -> None:

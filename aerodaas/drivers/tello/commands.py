@@ -1,8 +1,8 @@
 """Commands of a Tello, and the meaning of its replies (SDK 2.0 and 3.0 user guides).
 
 No relative move (`forward 50`, `go …`) is among the commands: its reply may be lost although the
-move was made, so that it can be neither repeated nor left. All motion goes by `rc`, whose newest
-word simply replaces the one before, and which has no smallest distance.
+move was made, so that it can be neither repeated nor omitted. All motion is by `rc`, whose newest
+value replaces the previous one, and which has no minimum distance.
 """
 
 from __future__ import annotations
@@ -44,10 +44,10 @@ class Command:
     timeout: float
     """Seconds to wait for the reply."""
     tries: int = 1
-    """More than one only where doing it twice comes to the same as doing it once."""
+    """More than one only for idempotent commands."""
 
     def accepts(self, reply: str) -> bool:
-        """Whether `reply` can be an answer to this: numbers answer questions only."""
+        """Whether `reply` can belong to this command: numbers answer queries only."""
         if reply.startswith("unknown command"):
             return True
         if self.text.endswith("?"):
@@ -72,13 +72,13 @@ LAND = Command("land", timeout=8.0, tries=3)
 
 
 def ports(state: int, video: int) -> Command:
-    """Have the Tello send to these ports of this host; SDK 3.0."""
+    """Set the ports of this host to which the Tello sends; SDK 3.0."""
     return Command(f"port {state} {video}", timeout=1.0, tries=3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyMotion:
-    """How a Tello flies in its own level frame."""
+    """Velocity of a Tello in its own level frame."""
 
     velocity: Vector
     """m/s forward, left, up (FLU)."""
@@ -97,7 +97,7 @@ class Sticks:
 
     @property
     def text(self) -> str:
-        """The command that sets them; it has no reply."""
+        """The command that sets the sticks; it has no reply."""
         return f"rc {self.right} {self.ahead} {self.up} {self.clockwise}"
 
 
@@ -117,7 +117,7 @@ class StickScale:
     """rad/s."""
 
     def sticks(self, motion: BodyMotion) -> Sticks:
-        """Sticks that fly `motion`, cut to 100 %."""
+        """Sticks for `motion`, clipped to 100 %."""
         ahead, left, up = motion.velocity
         return Sticks(
             _percent(-left / self.speed),
@@ -127,7 +127,7 @@ class StickScale:
         )
 
     def motion(self, sticks: Sticks) -> BodyMotion:
-        """How a Tello flies by these `sticks` once it has taken them up."""
+        """Steady motion of a Tello with these `sticks`."""
         ahead, left = sticks.ahead * self.speed, -sticks.right * self.speed
         velocity = np.array([ahead, left, sticks.up * self.climb]) / _FULL
         return BodyMotion(velocity, -sticks.clockwise * self.turn / _FULL)

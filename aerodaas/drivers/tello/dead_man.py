@@ -1,6 +1,6 @@
-"""A process of its own that stops the Tello when the one that flies it is gone.
+"""Watchdog process that stops the Tello when the driver's process is gone.
 
-A Tello goes on flying as the last `rc` said until it lands by itself, 15 seconds later. The
+A Tello continues to fly by the last `rc` until it lands by itself, 15 seconds later. The
 driver hands this process its own socket and tells it through a pipe, with every `rc`, whether
 that moves the Tello. When the pipe closes without a goodbye, or falls silent while the Tello
 moves (the driver's process hangs), this process centres the sticks, and then keeps silent, so
@@ -44,13 +44,13 @@ class DeadMan:
         os.set_blocking(self._pipe.fileno(), False)
 
     def note(self, *, moving: bool) -> None:
-        """Report that the sticks were set."""
-        # A guard that has died must not end the flight that it guards.
+        """Record that the sticks were set."""
+        # A watchdog that has died must not end the flight.
         with contextlib.suppress(OSError):
             self._pipe.write(_MOVING if moving else _STILL)
 
     def close(self) -> None:
-        """End the watch: the driver will send nothing any more."""
+        """End the watchdog: the driver sends nothing any more."""
         with contextlib.suppress(OSError):
             self._pipe.write(_GOODBYE)
             self._pipe.close()

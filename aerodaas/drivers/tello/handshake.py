@@ -26,7 +26,7 @@ _REFUSALS = 2
 
 
 def meaning(reply: str) -> str:
-    """Meaning of a refusal whose text is known from reports of other users' Tellos."""
+    """Meaning of refusals whose texts are known from reports of users."""
     for words, text in _MEANINGS.items():
         if words in reply.lower():
             return text
@@ -65,10 +65,10 @@ def greet(
 
 
 def _ask(link: TelloLink, command: Command, deadline: float) -> str | None:
-    """The reply to `command`; None if none comes in time.
+    """The reply to `command`; None after the timeout.
 
-    Only `command` itself is asked for until time is up; a refusal is asked about again, as the
-    question or the answer may have been garbled.
+    Only `command` itself is repeated until the timeout; also after a refusal, as the request or
+    the reply may have been garbled.
     """
     answers: queue.SimpleQueue[str | None] = queue.SimpleQueue()
     reply, refusals = None, 0
@@ -103,7 +103,7 @@ def _explain_silence(link: TelloLink, name: str, settings: TelloSettings) -> str
 
 
 def explain_no_states(link: TelloLink, name: str, settings: TelloSettings) -> str:
-    """Why no state packet comes although the Tello answers to commands."""
+    """Reason why no state packet arrives although the Tello replies to commands."""
     port, counts = settings.state_port, link.counts
     if counts.malformed:
         return (

@@ -1,4 +1,4 @@
-"""The link: one thread that owns the sockets to one Tello and sends only what it is given."""
+"""Link to one Tello: one thread that owns its sockets and sends only what it is given."""
 
 from __future__ import annotations
 
@@ -24,16 +24,16 @@ __all__ = ["LinkCounts", "TelloLink"]
 _log = logging.getLogger(__name__)
 
 _TICK = 0.05
-"""Seconds at most between two turns of the thread."""
+"""Longest time between two turns of the thread, seconds."""
 _STALE_STICKS = 0.3
 """Seconds after which sticks that are not renewed are centred: six turns of the loop."""
 _CENTRINGS = 3
 """Number of centring `rc` packets, which have no reply; then the link is silent."""
 _SETTLE = 0.1
-"""Seconds between a reply and the next command: a Tello overhears commands in quick succession,
+"""Seconds between a reply and the next command: a Tello misses commands in quick succession,
 and a duplicate of the reply must not be taken for the next one's."""
 _SETTLE_LATE = 0.5
-"""The same after a reply that did not come, and may still."""
+"""The same after a missing reply, which may still arrive."""
 
 
 @dataclass(slots=True)
@@ -42,11 +42,11 @@ class LinkCounts:
 
     states: int = 0
     malformed: int = 0
-    """State packets and replies that could not be understood."""
+    """State packets and replies that could not be parsed."""
     strangers: int = 0
-    """Packets from elsewhere than the Tello."""
+    """Packets of other senders."""
     stray_replies: int = 0
-    """Replies that came late, twice, or to nothing."""
+    """Late, duplicate and unexpected replies."""
     timeouts: int = 0
     """Requests without a reply."""
     sticks: int = 0
@@ -54,7 +54,7 @@ class LinkCounts:
 
 
 Done = Callable[[str | None], None]
-"""Called with the reply to a command, or None without one, in the link's thread."""
+"""Called in the link's thread with the reply to a command, or None without one."""
 
 
 @dataclass(slots=True)
@@ -66,11 +66,11 @@ class _Pending:
 
 
 class TelloLink:
-    """Commands one after the other, `rc` as it is fed, state packets as they come.
+    """Link that sends commands one after the other and `rc` as it is set, and receives states.
 
     `request` and `steer` return at once. `on_state` and `on_turn` are called in the link's
-    thread, the latter 20 times a second. Nothing is sent of the link's own accord except the
-    centring of sticks that are not renewed: when the loop above falls silent, so does the wire.
+    thread, the latter 20 times a second. The link sends nothing by itself except the
+    centring of sticks that are not renewed: when the setpoint loop stops, so does the link.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class TelloLink:
         """Prepare the link of the robot `name`; nothing is opened yet."""
         self.counts = LinkCounts()
         self.failure: OSError | None = None
-        """Why the latest packet could not be sent, if it could not."""
+        """Error of the latest packet; None if it was sent."""
         self.flown = STILL
         """The sticks as they were last sent."""
         self._name = name
@@ -132,7 +132,7 @@ class TelloLink:
         self._thread.start()
 
     def request(self, command: Command, done: Done, *, urgent: bool = False) -> None:
-        """Send `command` when those before it are through; an urgent one goes first, at once."""
+        """Send `command` after those before it; an urgent one at once, before them."""
         with self._lock:
             if urgent:
                 self._queue.clear()
@@ -142,14 +142,14 @@ class TelloLink:
         self._ring()
 
     def steer(self, sticks: Sticks) -> None:
-        """Set the sticks, until the next call or until they are not renewed in time."""
+        """Set the sticks, until the next call or the timeout."""
         with self._lock:
             self._sticks = sticks
             self._steered_at = time.monotonic()
         self._ring()
 
     def release(self) -> None:
-        """Send no more `rc`: the Tello itself flies (take-off, landing)."""
+        """Stop sending `rc`: the Tello flies by itself (take-off, landing)."""
         with self._lock:
             self._sticks = None
             self.flown = STILL
@@ -220,7 +220,7 @@ class TelloLink:
         pending.done(reply)
 
     def _speak(self, now: float) -> None:
-        """Send the next command, or the present one again, or give it up."""
+        """Send the next command, repeat the present one, or give it up."""
         given_up = None
         with self._lock:
             pending = self._pending
@@ -242,7 +242,7 @@ class TelloLink:
             given_up.done(None)
 
     def _fly(self, now: float) -> None:
-        """Pass the sticks on once each time they are set; centre them if that ends."""
+        """Send the sticks once each time they are set; centre them after the timeout."""
         with self._lock:
             sticks, self._sticks = self._sticks, None
             if sticks is None:
@@ -263,7 +263,7 @@ class TelloLink:
         try:
             self._commands.sendto(text.encode("ascii"), self._peer)
         except OSError as error:
-            # Wi-Fi comes and goes; what is lost shows as a missing reply or state.
+            # Wi-Fi is unreliable; a lost packet shows as a missing reply or state.
             self.failure = error
         else:
             self.failure = None

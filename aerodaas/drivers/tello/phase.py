@@ -1,4 +1,4 @@
-"""Flight phase of a Tello, by its state packets, as replies get lost and carry little."""
+"""Flight phase of a Tello, from its state packets: replies get lost and say little."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ __all__ = ["LIFTED", "FlightPhase"]
 _MOTORS_STOPPED = 1.5
 """Seconds without a tick of the motors' clock, which counts whole seconds, for them to stand."""
 _CALLED_OFF = 4.0
-"""Seconds that it must stand after a landing that called a take-off off: a `takeoff` that was sent
-may come later than the `land`, and its motors' clock tells of them a second late."""
+"""Seconds that it must stand after a landing that cancelled a take-off: a `takeoff` that was sent
+may arrive later than the `land`, and its motors' clock is a second late."""
 LIFTED = 0.3
 """Metres from which it counts as flying."""
 _LOW = 0.3
@@ -32,17 +32,17 @@ _NO_LIFT = 12.0
 
 
 class FlightPhase:
-    """The mode of one Tello, moved by requests and by its packets."""
+    """Mode of one Tello, changed by requests and its packets."""
 
     def __init__(self) -> None:
-        """Stand on the ground."""
+        """Start on the ground."""
         self.mode = VehicleMode.GROUNDED
         self.risen = False
         """In a take-off: the Tello has done its own part of it and hovers."""
         self.refusal = ""
-        """Why the latest take-off came to nothing."""
+        """Reason why the latest take-off failed."""
         self.ended: FlightEnd | None = None
-        """How the latest flight ended; None before and during one."""
+        """End of the latest flight; None before and during one."""
         self._lifted = False
         self._fell_at = -math.inf
         self._since = -math.inf
@@ -82,7 +82,7 @@ class FlightPhase:
         self.ended, self._lifted, self._fell_at = None, False, -math.inf
 
     def rose(self, refusal: str = "") -> None:
-        """The Tello has answered to `takeoff`: it hovers, or it gives a reason."""
+        """Handle the reply to `takeoff`: it hovers, or it gives a reason."""
         if self.mode is not VehicleMode.TAKING_OFF:
             return
         if refusal:
@@ -92,7 +92,7 @@ class FlightPhase:
             self.risen = True
 
     def observe(self, state: TelloState, now: float) -> None:
-        """Take note of a packet that came at `now` seconds."""
+        """Update by a packet received at `now` seconds."""
         if self._motor_time is not None and state.motor_time != self._motor_time:
             self._ticked_at = now
         self._motor_time = state.motor_time

@@ -1,9 +1,9 @@
-"""Dead reckoning: where a Tello is, from velocities that it reports in steps of 0.1 m/s.
+"""Dead reckoning of a Tello's position from velocities reported in steps of 0.1 m/s.
 
-Each quantity is carried on by a model of how the Tello answers to its sticks, and each packet
-then cuts it to what its rounded figure allows: an observer with a set-valued measurement. Slow
-motion, which the packets alone report as standing still, is so not lost, while no error of the
-model can grow beyond one step of the figures.
+Each quantity is predicted by a model of the Tello's response to its sticks, and each packet then
+clips it to the range that its rounded value allows: an observer with a set-valued measurement. So
+slow motion, which the packets alone report as standing still, is not lost, while no error of the
+model can grow beyond one step of the values.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _HEIGHT_STEP = 0.1
 _YAW_STEP = math.radians(1.0)
 
 _VELOCITY_LAG = 0.35
-"""Seconds in which a Tello takes up a commanded velocity: an assumption, which packets correct."""
+"""Time constant in seconds of the response to a velocity (assumed; packets correct it)."""
 _YAW_LAG = 0.2
 """The same for its yaw rate."""
 
@@ -36,21 +36,21 @@ stays the same for about a second."""
 _SCALE_ERROR = 0.05
 """Error as a share of the distance flown, by optical flow's error in height (assumed)."""
 _BLIND = 0.5
-"""m/s by which the uncertainty grows while no packets come."""
+"""m/s by which the uncertainty grows without packets."""
 _PACKET_PERIOD = 0.1
 _LATE = 3
-"""Packets missed in a row from which on we fly blind."""
+"""Packets missed in a row after which the estimate is blind."""
 
 
 class DeadReckoning:
     """Position and velocity of one Tello in ENU.
 
-    Times are in seconds of any steady clock. It starts where the environment file says that the
-    Tello stands, and looks where the file says when the first packet comes.
+    Times are in seconds of any monotonic clock. Position and heading at the first packet are those
+    of the environment file.
     """
 
     def __init__(self, start: Vector, yaw: float) -> None:
-        """Stand at `start` (ENU metres) with this `yaw` (radians, counter-clockwise from east)."""
+        """Start at `start` (ENU metres) with this `yaw` (radians, counter-clockwise from east)."""
         self._ground = float(start[2])
         self._start_yaw = yaw
         self._offset: float | None = None
@@ -65,13 +65,13 @@ class DeadReckoning:
         self._way = 0.0
         self._blind_for = 0.0
         self.time: float = -math.inf
-        """When the estimate holds."""
+        """Time of the estimate."""
         self._packet_at = -math.inf
         self._standing = True
 
     @property
     def odometry(self) -> Odometry:
-        """The newest estimate; its `position_sigma` is the possible error."""
+        """The newest estimate; `position_sigma` is its standard deviation."""
         return Odometry(
             self._position.copy(),
             self._velocity.copy(),
@@ -90,7 +90,7 @@ class DeadReckoning:
         )
 
     def predict(self, now: float, asked: BodyMotion) -> None:
-        """Carry the estimate on to `now`, with the sticks as `asked` since the last call."""
+        """Predict the estimate at `now`, with the sticks as `asked` since the last call."""
         elapsed = now - self.time
         self.time = now
         if self._standing or not 0.0 < elapsed < math.inf:

@@ -21,7 +21,7 @@ __all__ = [
 ]
 
 STATE_PORT = 8890
-"""Where a Tello sends its state unless the SDK 3.0 command `port` says otherwise."""
+"""Port to which a Tello sends its state unless changed by the SDK 3.0 command `port`."""
 
 VIDEO_PORT = 11111
 """The same for its video."""

@@ -1,4 +1,4 @@
-"""The UDP sockets of one Tello on this host, opened with errors that give a remedy."""
+"""UDP sockets of one Tello on this host, with errors that name the remedy."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ __all__ = ["bound_socket", "datagrams"]
 
 _LARGEST = 65535
 _AT_ONCE = 256
-"""Datagrams taken before others get their turn."""
+"""Most datagrams received in one turn."""
 
 
 def bound_socket(
@@ -66,7 +66,7 @@ def datagrams(source: socket.socket) -> list[tuple[bytes, str, int]]:
         except BlockingIOError:
             break
         except ConnectionError:
-            # The system reports here that an earlier datagram found no socket at its port.
+            # The system reports here that an earlier datagram reached no socket.
             continue
         arrived.append((content, address, port))
     return arrived

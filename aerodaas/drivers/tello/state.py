@@ -1,7 +1,7 @@
 """The state that a Tello sends ten times a second: `pitch:0;roll:0;…;bat:87;…`.
 
-Truncated, garbled or foreign packets are common enough on Wi-Fi that they are an expected result,
-not an error: what cannot be understood whole is refused whole.
+Truncated, garbled or foreign packets are common on Wi-Fi, so they are an expected result and no
+error: a packet that cannot be parsed completely is refused.
 """
 
 from __future__ import annotations
@@ -36,8 +36,8 @@ _RANGES = {
 class TelloState:
     """One state packet in SI units.
 
-    Velocities stand in the ground frame whose x points where the Tello looked when it was
-    switched on (yaw zero), y to the right of that, z down. The SDK gives no unit; pilots measured
+    Velocities are in the ground frame whose x points along the Tello's heading when it was switched
+    on (yaw zero), y to the right of that, z down. The SDK gives no unit; pilots measured
     decimetres per second (tello-vision-telemetry-lab, aerostack2).
     """
 
@@ -46,7 +46,7 @@ class TelloState:
     pitch: float
     """Radians, positive with the nose down; the SDK's own sign is the other."""
     yaw: float
-    """Radians clockwise from where it looked when it was switched on."""
+    """Radians clockwise from its heading when it was switched on."""
     velocity: tuple[float, float, float]
     """m/s along x, y, z (down); in steps of 0.1 m/s."""
     height: float
@@ -54,7 +54,7 @@ class TelloState:
     ground_distance: float
     """Metres to the surface below, by time of flight: 0.1 on the ground, 65.53 out of range."""
     barometer: float
-    """Metres above the sea by air pressure: its changes mean something, its value little."""
+    """Metres above the sea by air pressure: only its changes are accurate."""
     battery: int
     """Percent."""
     motor_time: float
@@ -64,7 +64,7 @@ class TelloState:
 
 
 def parse_state(datagram: bytes) -> TelloState | None:
-    """Read a state packet; None if it is not one, or not a whole one."""
+    """Parse a state packet; None if it is invalid or incomplete."""
     try:
         text = datagram.decode("ascii")
     except UnicodeDecodeError:
@@ -90,9 +90,9 @@ def parse_state(datagram: bytes) -> TelloState | None:
 
 
 def _fields(text: str) -> dict[str, float] | None:
-    """Fields of `text` by name; None if a field that we need is broken or comes twice.
+    """Fields of `text` by name; None if a needed field is invalid or duplicate.
 
-    What follows the last semicolon may have been cut off, so that it counts for nothing.
+    The rest after the last semicolon may be truncated and is ignored.
     """
     found: dict[str, float] = {}
     for part in text.split(";")[:-1]:

@@ -1,4 +1,4 @@
-"""The Tello behind the same protocol as every other drone."""
+"""Driver of the DJI Ryze Tello."""
 
 from __future__ import annotations
 
@@ -42,14 +42,14 @@ from aerodaas.types.vehicle import (
 __all__ = ["TelloVehicle"]
 
 _LOST_AFTER = 1.0
-"""Seconds without a state packet, of which ten come in one, until the Tello counts as lost."""
+"""Seconds without a state packet, sent ten times a second, after which the Tello counts as lost."""
 _BLIND_AFTER = 0.5
-"""Seconds without a state packet after which a setpoint is answered by hovering."""
+"""Seconds without a state packet after which it hovers instead of obeying setpoints."""
 _GREET_AGAIN = 2.0
-"""Seconds between greetings of a Tello that stands on the ground and has fallen silent."""
+"""Seconds between handshakes with a silent Tello on the ground."""
 _LAND_AGAIN = 3.0
-"""Seconds after which a landing is asked for again where no packet shows a descent: replies carry
-no id, so that another one's may have been taken for this one's."""
+"""Seconds after which a landing is commanded again if no packet shows a descent: replies have no
+id, so another command's may have been taken for this one's."""
 _DESCENDING = 0.1
 """m/s."""
 _DOWN = 0.2
@@ -57,25 +57,25 @@ _DOWN = 0.2
 _HOT = 85.0
 """Degrees Celsius inside that raise an alert; it switches itself off a little above."""
 _BRAKING = 1.0
-"""m/s^2 that its own braking is counted on for when flying to a place (assumed)."""
+"""Deceleration in m/s^2 assumed when flying to a position."""
 _REACTION = 0.3
-"""Seconds from a setpoint to its answer, Wi-Fi and its own controller together (assumed)."""
+"""Seconds from a setpoint to its effect, Wi-Fi and its own controller included (assumed)."""
 _AT_REST = 0.08
-"""Metres from its target at which its own position hold does better than ours."""
+"""Metres from its target within which its own position hold is better than ours."""
 _FACING = math.radians(2.0)
 _CLIMBED = 0.15
-"""Metres from the height of a take-off that count as there."""
+"""Tolerance of the take-off height, metres."""
 _CLIMB_MARGIN = 3.0
-"""Seconds that a take-off's climb may take beyond the longest expected."""
+"""Seconds that a take-off's climb may exceed its longest expected time."""
 
 
 class TelloVehicle:
     """A DJI Ryze Tello; implements `aerodaas.types.vehicle.Vehicle`.
 
-    Every motion goes by `rc`: velocities straight, places by our own loop from dead reckoning, so
-    that a target can change at any moment and nothing is too small to be flown. Each `send` is one
-    `rc` on the wire: when the setpoint loop stops, the sticks are centred and the wire falls
-    silent, so that the Tello lands by itself after 15 s. Its thread is the link's; all methods but
+    All motion is by `rc`: velocities directly, positions by our own loop on dead reckoning, so that
+    a target can change at any time and has no minimum distance. Each `send` is one `rc`: when the
+    setpoint loop stops, the sticks are centred and the link becomes silent, so that the Tello
+    lands by itself after 15 s. Its thread is the link's; all methods but
     `connect` and `close` return at once, and any thread may call them.
 
     Raises ConfigError if the robot's settings are not those of a `TelloSettings`.
@@ -195,7 +195,7 @@ class TelloVehicle:
             )
 
     def preflight(self) -> list[str]:
-        """Reasons for which a take-off would be refused now; empty when ready."""
+        """Reasons against a take-off now; empty when ready."""
         if self._link is None:
             return ["not connected"]
         with self._lock:
@@ -214,7 +214,7 @@ class TelloVehicle:
             return reasons
 
     def take_off(self, height: float) -> None:
-        """Rise to `height` metres: its own take-off to about one, then our climb.
+        """Take off to `height` metres: its own take-off to about one, then our climb.
 
         Raises VehicleError if preflight has objections, and the next time after the Tello itself
         has refused, with its words.
@@ -247,7 +247,7 @@ class TelloVehicle:
             link = self._require_flight("follow a setpoint")
             now = time.monotonic()
             if now - self._heard_at > _BLIND_AFTER:
-                # Where a target lies from here is not known any more.
+                # The relative position of a target is unknown now.
                 link.steer(STILL)
                 return VelocitySetpoint(np.zeros(3))
             self._predict(now)
@@ -270,13 +270,13 @@ class TelloVehicle:
             return setpoint
 
     def hold(self) -> None:
-        """Stop and stay by its own position hold; raise VehicleError on the ground."""
+        """Brake and hover by its own position hold; raise VehicleError on the ground."""
         with self._lock:
             self._require_flight("hold").steer(STILL)
             self._phase.mode = VehicleMode.HOLDING
 
     def return_home(self) -> None:
-        """Land here: a Tello has no return mode, and is asked for it when its place is unknown."""
+        """Land here: a Tello has no return mode, and is asked only when its position is unknown."""
         with self._lock:
             if not self._phase.airborne:
                 raise VehicleError(f"{self._name} cannot return home on the ground; take off first")
@@ -292,12 +292,12 @@ class TelloVehicle:
                 self._ask_to_land(link)
 
     def _ask_to_land(self, link: TelloLink) -> None:
-        """That it descends and stands is judged by its packets: the reply means little."""
+        """Command the landing; its packets, not the reply, show the descent and the touchdown."""
         self._landing_seen_at = time.monotonic()
         link.request(LAND, lambda _: None, urgent=True)
 
     def _take(self, state: TelloState, now: float) -> None:
-        """A state packet has come; in the link's thread."""
+        """Handle a state packet, in the link's thread."""
         with self._lock:
             self._latest, self._heard_at = state, now
             self._gauge.take(state.battery)
@@ -306,7 +306,7 @@ class TelloVehicle:
             self._reckoning.correct(state, now, standing=not self._phase.airborne)
 
     def _turned(self, now: float) -> None:
-        """20 times a second, in the link's thread."""
+        """Called 20 times a second, in the link's thread."""
         with self._lock:
             link = self._link
             if link is None:
@@ -318,12 +318,12 @@ class TelloVehicle:
                 self._see_landing_through(link, now)
             silent = self._latest is not None and now - self._heard_at > _GREET_AGAIN
             if silent and not self._phase.airborne and now - self._greeted_at > _GREET_AGAIN:
-                # It was switched off and on again, perhaps, and waits for its greeting.
+                # It may have been switched off and on, and wait for its handshake.
                 self._greeted_at = now
                 link.request(ENTER, lambda _: None)
 
     def _see_landing_through(self, link: TelloLink, now: float) -> None:
-        """Ask again for a landing that no packet shows to be under way."""
+        """Repeat the command of a landing that no packet shows."""
         latest = self._latest if now - self._heard_at < _BLIND_AFTER else None
         if latest is not None and (
             latest.velocity[2] >= _DESCENDING or latest.ground_distance < _DOWN
@@ -333,7 +333,7 @@ class TelloVehicle:
             self._ask_to_land(link)
 
     def _climb_on(self, link: TelloLink, now: float) -> None:
-        """The rest of a take-off; it flies without setpoints, but never for longer than its way."""
+        """Continue a take-off, without setpoints, for a limited time."""
         up = self._climb_to - float(self._reckoning.odometry.position[2])
         if self._climb_until is None:
             self._climb_until = now + _CLIMB_MARGIN + 2.0 * abs(up) / self._climb
@@ -346,7 +346,7 @@ class TelloVehicle:
         link.steer(self._scale.sticks(BodyMotion(np.array([0.0, 0.0, speed]))))
 
     def _risen(self, reply: str | None) -> None:
-        """The Tello has answered to `takeoff`, or has not; in the link's thread."""
+        """Handle the reply to `takeoff`, or its timeout, in the link's thread."""
         with self._lock:
             flying = self._latest is not None and self._latest.height >= LIFTED
             if (reply is not None and Command.succeeded(reply)) or flying:

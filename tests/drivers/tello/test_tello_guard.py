@@ -10,7 +10,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from aerodaas.drivers.tello import dead_man as last_received
+from aerodaas.drivers.tello import dead_man
 from aerodaas.drivers.tello.dead_man import DeadMan
 
 PEER = ("192.168.10.1", 8889)
@@ -36,7 +36,7 @@ class Guarded:
             ("os", SimpleNamespace(read=self._read)),
             ("time", SimpleNamespace(sleep=self.pauses.append)),
         ):
-            monkeypatch.setattr(last_received, name, fake)
+            monkeypatch.setattr(dead_man, name, fake)
 
     def _select(self, readable: list[int], *_: object) -> tuple[list[int], list[int], list[int]]:
         assert readable == [99]
@@ -62,7 +62,7 @@ class Guarded:
 
     def run(self) -> int:
         """Let the guard run until it ends; how often it centred the sticks."""
-        last_received._guard(self, PEER)  # type: ignore[arg-type]
+        dead_man._guard(self, PEER)  # type: ignore[arg-type]
         assert not self.events
         assert set(self.said) <= {b"rc 0 0 0 0"}
         return len(self.said)
@@ -126,7 +126,7 @@ class Process:
             return SimpleNamespace(stdin=self.pipe, wait=self._wait, kill=self._kill)
 
         quiet = SimpleNamespace(Popen=start, PIPE=-1, TimeoutExpired=subprocess.TimeoutExpired)
-        monkeypatch.setattr(last_received, "subprocess", quiet)
+        monkeypatch.setattr(dead_man, "subprocess", quiet)
         self.guard = DeadMan(SimpleNamespace(fileno=lambda: 42), PEER)  # type: ignore[arg-type]
 
     def _wait(self, timeout: float | None = None) -> None:
@@ -159,7 +159,7 @@ def test_how_a_guard_is_started(started: Process) -> None:
         sys.executable,
         "-I",
         "-S",
-        last_received.__file__,
+        dead_man.__file__,
         "42",
         "192.168.10.1",
         "8889",

@@ -354,7 +354,7 @@ def test_wifi_that_goes_is_remembered_until_it_comes_back(wire: Wire) -> None:
 
 
 @pytest.mark.parametrize(("last", "said"), [(LAND, ["land"]), (None, [])])
-def test_the_last_received_is_said_before_the_ports_are_freed(
+def test_the_last_command_is_sent_before_the_ports_are_freed(
     wire: Wire, last: Command | None, said: list[str]
 ) -> None:
     """Without waiting for a reply; the thread ends, and the guard is told goodbye."""

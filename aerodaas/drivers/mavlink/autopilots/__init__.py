@@ -1,1 +1,1 @@
-"""The autopilot families, each behind the same seam."""
+"""The autopilot families behind one interface."""

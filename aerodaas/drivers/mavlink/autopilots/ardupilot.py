@@ -16,7 +16,7 @@ _GUIDED, _LAND, _RETURN, _BRAKE = 4, 9, 6, 17
 _ASKED = {
     FlightMode.GUIDED: _GUIDED,
     FlightMode.TAKE_OFF: _GUIDED,
-    # Loiter would take the throttle of a remote control that may not be there, and sink.
+    # Loiter would follow the throttle of a possibly missing remote control, and sink.
     FlightMode.HOLD: _BRAKE,
     FlightMode.RETURN: _RETURN,
     FlightMode.LAND: _LAND,
@@ -103,7 +103,7 @@ class ArduPilot(Autopilot):
         return _NAMES.get(custom_mode, f"mode {custom_mode}")
 
     def ask_mode(self, mode: FlightMode) -> PendingCommand:
-        """Ask for one of its modes."""
+        """Command one of its modes."""
         values = (1.0, float(_ASKED[mode]), 0.0, 0.0, 0.0, 0.0, 0.0)
         return PendingCommand(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}", mode=mode)
 

@@ -1,4 +1,4 @@
-"""The seam between autopilot families: everything in which PX4 and ArduPilot differ."""
+"""Interface of an autopilot family: everything in which PX4 and ArduPilot differ."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["ANYWHERE", "NOT_GIVEN", "Autopilot", "Failsafe", "FenceAction"]
 FenceAction = Literal["warn", "hold", "return", "land"]
 NOT_GIVEN = float("nan")
 ANYWHERE = 0x7FFFFFFF
-"""Latitude or longitude of a COMMAND_INT that means: where it is."""
+"""Latitude or longitude of a COMMAND_INT for the vehicle's present position."""
 
 
 @dataclass(frozen=True)
@@ -27,10 +27,10 @@ class Failsafe:
     unsafe: frozenset[float]
     """Values that leave it unprotected."""
     safe: float
-    """The value that we would set."""
+    """The value to be set."""
     why: str
     role: Literal["any", "ground_station"] = "any"
-    """It matters only if we are the ground station."""
+    """True if it matters in the role of the ground station only."""
 
 
 class Autopilot(ABC):
@@ -40,7 +40,7 @@ class Autopilot(ABC):
     family: ClassVar[int]
     """MAV_AUTOPILOT of its HEARTBEAT."""
     stream_before: ClassVar[float]
-    """Seconds of setpoints before it may be asked for guided flight."""
+    """Seconds of setpoints before guided flight may be commanded."""
     stops_short: ClassVar[bool]
     """Whether it holds before it has reached the height of a take-off."""
     failsafes: ClassVar[tuple[Failsafe, ...]]
@@ -60,7 +60,7 @@ class Autopilot(ABC):
         mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
         mavlink.MAVLINK_MSG_ID_VIBRATION: 1.0,
     }
-    """Messages that we live by, and how often a second we ask for them."""
+    """Required messages, and their rates in Hz."""
 
     @abstractmethod
     def mode(self, custom_mode: int) -> FlightMode:
@@ -72,19 +72,19 @@ class Autopilot(ABC):
 
     @abstractmethod
     def ask_mode(self, mode: FlightMode) -> PendingCommand:
-        """Ask for one of its modes."""
+        """Command one of its modes."""
 
     @abstractmethod
     def take_off(self, height: float, telemetry: Telemetry) -> tuple[PendingCommand, ...]:
-        """Orders for one armed climb to `height` metres above here, each after the other's end."""
+        """Orders for arming and a climb of `height` metres, each after the previous one's end."""
 
     @abstractmethod
     def ready(self, telemetry: Telemetry) -> bool | None:
-        """Whether its arming checks pass; None where it does not report them."""
+        """Whether its arming checks pass; None if it does not report them."""
 
     @abstractmethod
     def objections(self, telemetry: Telemetry, now: float) -> list[str]:
-        """Why it would not arm, in its own texts as far as it sends any."""
+        """Reasons why it would not arm, in its own texts as far as it sends any."""
 
     @abstractmethod
     def encode(self, value: float, kind: int) -> float:
@@ -118,13 +118,13 @@ class Autopilot(ABC):
 
     @staticmethod
     def interval(message: int, rate: float) -> PendingCommand:
-        """Ask for a message `rate` times a second."""
+        """Request a message `rate` times a second."""
         values = (float(message), 1e6 / rate, 0.0, 0.0, 0.0, 0.0, 0.0)
         what = f"send message {message} at {rate:g} Hz"
         return PendingCommand(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, values, what)
 
     @staticmethod
     def version() -> PendingCommand:
-        """Ask for AUTOPILOT_VERSION."""
+        """Request AUTOPILOT_VERSION."""
         values = (float(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
         return PendingCommand(mavlink.MAV_CMD_REQUEST_MESSAGE, values, "tell the version")

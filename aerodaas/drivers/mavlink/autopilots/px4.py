@@ -112,7 +112,7 @@ class PX4(Autopilot):
         return names.get(number, f"mode {main}/{sub}")
 
     def ask_mode(self, mode: FlightMode) -> PendingCommand:
-        """Ask for one of its modes."""
+        """Command one of its modes."""
         main, sub = _MODES[mode]
         values = (1.0, float(main), float(sub), 0.0, 0.0, 0.0, 0.0)
         return PendingCommand(mavlink.MAV_CMD_DO_SET_MODE, values, f"mode {mode.value}", mode=mode)

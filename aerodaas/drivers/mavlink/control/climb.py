@@ -1,6 +1,6 @@
-"""One take-off: mode, arming and climb, each after the other was done, none of them twice.
+"""Sequence of one take-off: mode, arming and climb, each after the previous one, none twice.
 
-Acknowledgements get lost: an order counts as done when the vehicle shows that it is.
+Acknowledgements get lost: an order counts as executed when the vehicle's state shows it.
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ __all__ = ["Climb"]
 _PATIENCE = 20.0
 """Seconds from the first order within which it must be armed and climbing."""
 _NEAR = 0.2
-"""Metres below the height asked for at which it is reached; a tenth of it where that is more."""
+"""Tolerance of the height in metres; a tenth of the height if that is more."""
 _CALM = 0.3
 """m/s."""
 _DOUBT = 3.0
-"""Seconds in which a refusal of an order that was sent twice may mean that it was done before."""
+"""Seconds in which the refusal of an order sent twice may mean that the first was executed."""
 
 
 class _Refusal(NamedTuple):
@@ -34,7 +34,7 @@ class _Refusal(NamedTuple):
 
 
 class Climb:
-    """Commands of one take-off; `failed` gets the reason of a failure, at most once."""
+    """Sequencer of one take-off; `failed` is called with the reason of a failure, at most once."""
 
     def __init__(
         self,
@@ -51,12 +51,12 @@ class Climb:
     ) -> None:
         """Climb `height` metres to `goal`, metres up.
 
-        `shows` tells whether the vehicle is seen to have done an order; `climbs` is called before
-        the last order.
+        `shows` returns whether the vehicle's state shows that an order was executed; `climbs` is
+        called before the last order.
         """
         self.goal = goal
         self.may_start = False
-        """Whether something has been sent that starts motors."""
+        """Whether an order that starts motors has been sent."""
         self._near = max(_NEAR, 0.1 * height)
         self._commander = commander
         self._orders = list(orders)
@@ -75,7 +75,7 @@ class Climb:
         return not self._orders
 
     def turn(self, now: float, up: float, rise: float) -> bool:
-        """Look how far it is: `up` metres, rising at `rise` m/s; True once it is done."""
+        """Update with the height `up` in metres and climb rate `rise` in m/s; True when done."""
         self._now = now
         self._settle_doubt(now)
         if self._over:
@@ -88,7 +88,7 @@ class Climb:
         return self._over
 
     def cancel(self) -> None:
-        """Give no further order, and repeat none."""
+        """Send no further order, and repeat none."""
         self._over = True
         self._orders.clear()
         for number in (
@@ -99,7 +99,7 @@ class Climb:
             self._commander.withdraw(number)
 
     def fail(self, text: str) -> None:
-        """It comes to nothing."""
+        """End with a failure."""
         if not self._over:
             self.cancel()
             self._failed(text)

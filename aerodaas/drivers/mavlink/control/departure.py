@@ -1,4 +1,4 @@
-"""A take-off from its order to its end: done, refused, or called off and taken back."""
+"""Take-off from its command to its end: done, refused, or withdrawn."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
 __all__ = ["Departure"]
 _TAKING_OFF = frozenset({FlightMode.TAKE_OFF, FlightMode.HOLD, FlightMode.GUIDED})
-"""Modes that a vehicle may show while a take-off is taken back."""
+"""Modes that a vehicle may report while a take-off is withdrawn."""
 
 
 class Departure:
-    """The take-offs of one vehicle, one at a time; under the driver's lock."""
+    """Take-offs of one vehicle, one at a time; called under the driver's lock."""
 
     def __init__(
         self,
@@ -31,12 +31,12 @@ class Departure:
         words: Callable[[], list[str]],
         land: Callable[[], None],
     ) -> None:
-        """`flies` says whether it has left the ground; `land` lands a flying vehicle.
+        """`flies` returns whether it has left the ground; `land` lands a flying vehicle.
 
-        `words` are the autopilot's own about why it refuses.
+        `words` returns the autopilot's own texts about its refusal.
         """
         self.refusal = ""
-        """Why the latest take-off came to nothing."""
+        """Reason why the latest take-off failed."""
         self._commander = commander
         self._telemetry = telemetry
         self._phase = phase
@@ -50,7 +50,7 @@ class Departure:
 
     @property
     def goal(self) -> float | None:
-        """Metres up in the autopilot's frame, once the whole climb is ordered."""
+        """Target height in metres in the autopilot's frame, once the whole climb is commanded."""
         return self._climb.goal if self._climb is not None and self._climb.ordered else None
 
     @property
@@ -60,11 +60,11 @@ class Departure:
 
     @property
     def withdrawing(self) -> bool:
-        """Whether one was called off, and motors might still start or turn."""
+        """Whether one was withdrawn, and motors might still start or turn."""
         return self._withdrawal is not None
 
     def begin(self, orders: Sequence[PendingCommand], height: float, now: float) -> None:
-        """Rise `height` metres above here by `orders`."""
+        """Climb `height` metres by `orders`."""
         assert self._telemetry.position is not None  # noqa: S101 - checked before
         self._phase.rest()
         self._climb = Climb(
@@ -92,14 +92,14 @@ class Departure:
         """Stop motors that turn, or may yet start, on the ground; land a flying vehicle."""
         self._phase.ask(FlightMode.LAND, now, meanwhile=_TAKING_OFF)
         if not self._flies():
-            # In the mode of a take-off, an order to arm that comes late would have it fly.
+            # In the mode of a take-off, a late order to arm would make it fly.
             self._commander.give(self._hold, now=now)
         self._withdrawal = Withdrawal(
             self._commander, self._disarm, self._land, now, flies=self._flies()
         )
 
     def restart(self) -> None:
-        """The autopilot has started anew."""
+        """Handle a restart of the autopilot."""
         if self._climb is not None:
             self._climb.fail("the autopilot started anew")
 
@@ -110,7 +110,7 @@ class Departure:
         self._climb = self._withdrawal = None
 
     def observe(self, now: float, *, was_armed: bool) -> None:
-        """A HEARTBEAT has come, and the phase has taken note of it."""
+        """Handle a HEARTBEAT, after the phase's update by it."""
         phase = self._phase
         if was_armed and not phase.armed and self._climb is not None:
             self._climb.fail("it stopped its motors again")
@@ -123,7 +123,7 @@ class Departure:
                 phase.rest()
 
     def turn(self, now: float) -> None:
-        """See how far the climb is; 20 times a second."""
+        """Update the climb; called 20 times a second."""
         position, velocity = self._telemetry.position, self._telemetry.velocity
         if self._climb is None or position is None:
             return

@@ -1,12 +1,12 @@
-"""Places to fly to, turned into a target that moves there at the speed asked for.
+"""Guidance to a position: a target that moves there at the commanded speed.
 
-Neither autopilot takes a speed with a position: PX4 would fly at its own. So the target itself
-moves, as far ahead of the vehicle as a moment's flight, and a velocity is sent along. If we
-fall silent, the vehicle stops at the target, which is near, instead of flying on to the place.
+Neither autopilot accepts a speed with a position: PX4 would fly at its own. So the target itself
+moves, a moment's flight ahead of the vehicle, and a velocity is sent along. If the setpoints end,
+the vehicle stops at the target, which is near, instead of flying on to the position.
 
-An autopilot adds the velocity that it is sent to what draws it to the target. What is sent leaves
-room for that, so that both together are the speed asked for, and less in time before the place:
-who lands there must not be fast.
+An autopilot adds the velocity setpoint to its own position control. The setpoint leaves room for
+that, so that both together are the commanded speed, reduced in time before the position: a vehicle
+that lands there must not be fast.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ and what it says of itself is a little old."""
 _BRAKING = 1.5
 """Assumed braking of a vehicle in m/s², half of its capability."""
 _LEASH = 1.0
-"""Seconds of flight that the target may be ahead of the vehicle, and a metre beside that."""
+"""Lead of the target in seconds of flight, plus a metre."""
 _LONGEST = 0.2
-"""Seconds of motion at most between two calls: a loop that was held up does not catch up."""
+"""Longest step in seconds: a loop that was delayed does not catch up."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """One moment of the target's way: ENU metres, ENU m/s, radians."""
+    """State of the moving target: ENU metres, ENU m/s, radians."""
 
     position: Vector
     velocity: Vector
@@ -45,7 +45,7 @@ class Target:
 
 
 class MovingTarget:
-    """The target of one vehicle that keeps to `acceleration` (m/s²) and `yaw_rate` (rad/s)."""
+    """Moving target of one vehicle, limited to `acceleration` (m/s²) and `yaw_rate` (rad/s)."""
 
     def __init__(self, acceleration: float, yaw_rate: float) -> None:
         self._acceleration = acceleration
@@ -57,7 +57,7 @@ class MovingTarget:
         self._now = 0.0
 
     def forget(self) -> None:
-        """Begin anew from where the vehicle is at the next call."""
+        """Restart from the vehicle's position at the next call."""
         self._position = None
 
     def towards(
@@ -72,10 +72,10 @@ class MovingTarget:
         now: float,
         waits: bool = False,
     ) -> Target:
-        """Where the target is at `now` (seconds) on its way to `place` at `speed` (m/s).
+        """The target at `now` (seconds), moving to `place` at `speed` (m/s).
 
-        `vehicle`, `velocity` and `facing` say how the vehicle itself is; while it `waits` for
-        its mode the target stays with it.
+        `vehicle`, `velocity` and `facing` are the vehicle's own state; while it `waits` for its
+        mode the target stays with it.
         """
         duration = min(_LONGEST, max(0.0, now - self._now))
         self._now = now

@@ -1,4 +1,4 @@
-"""Setpoints as packets: SET_POSITION_TARGET_LOCAL_NED in the frame common to both autopilots."""
+"""Encoding of setpoints: SET_POSITION_TARGET_LOCAL_NED in the frame common to both autopilots."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _NO_ACCELERATION = 0b0000_0001_1100_0000
 _PLACE_VELOCITY_YAW = _NO_ACCELERATION | 0b1000_0000_0000
 """Bits of the ignored fields: acceleration and yaw rate."""
 _VELOCITY_YAW_RATE = _NO_ACCELERATION | 0b0100_0000_0111
-"""The same: acceleration, place and yaw."""
+"""The same: acceleration, position and yaw."""
 _MASK32 = 0xFFFFFFFF
 
 
@@ -25,7 +25,7 @@ def position_message(
     vehicle: tuple[int, int],
     now: float,
 ) -> Any:  # noqa: ANN401 - pymavlink has no types
-    """The target's place, velocity and heading, for the `vehicle` (system, component)."""
+    """Packet of the target's position, velocity and heading, for `vehicle` (system, component)."""
     north, east, down = frame.place(target.position)
     ahead, right, sinking = frame.velocity(target.velocity)
     return mavlink.MAVLink_set_position_target_local_ned_message(
@@ -42,7 +42,7 @@ def position_message(
 
 
 def velocity_message(setpoint: VelocitySetpoint, vehicle: tuple[int, int], now: float) -> Any:  # noqa: ANN401 - pymavlink has no types
-    """A velocity and a yaw rate, for the `vehicle` (system, component)."""
+    """Packet of a velocity and a yaw rate, for the `vehicle` (system, component)."""
     return mavlink.MAVLink_set_position_target_local_ned_message(
         int(now * 1e3) & _MASK32,
         *vehicle,

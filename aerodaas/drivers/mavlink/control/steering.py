@@ -1,4 +1,4 @@
-"""The stream of setpoints: clipped to the vehicle's limits, and checked to be followed."""
+"""Stream of setpoints, clipped to the vehicle's limits, with a check that they are followed."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 __all__ = ["Steering"]
 
 _STREAM_GAP = 0.5
-"""Seconds between setpoints after which the stream counts as begun anew."""
+"""Seconds between setpoints after which the stream counts as restarted."""
 _ASK_AGAIN = 2.0
-"""Seconds after which guided flight is asked for again."""
+"""Seconds after which guided flight is requested again."""
 
 
 class Steering:
-    """The stream of setpoints to one vehicle; under the driver's lock."""
+    """Stream of setpoints to one vehicle; called under the driver's lock."""
 
     def __init__(self, robot: RobotConfig, settings: MavlinkSettings) -> None:
         limits = robot.limits
@@ -52,8 +52,8 @@ class Steering:
     ) -> tuple[Message, Setpoint]:
         """The packet for `target` and the setpoint as it was clipped.
 
-        Without a `frame`, which is without a position, it is told to stand still; while it `waits`
-        for its mode the target of a flight stays with it.
+        Without a `frame`, that is without a position, it is commanded to stand still; while it
+        `waits` for its mode, the target of a flight stays with it.
         """
         if now - self._streamed_at > _STREAM_GAP:
             self._stream_since = now

@@ -1,4 +1,4 @@
-"""Whether the control loop above the driver is alive; heartbeats and setpoints rest on it."""
+"""Watchdog of the control loop above the driver, a condition of heartbeats and setpoints."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ __all__ = ["Watchdog"]
 _SILENT = 1.0
 """Seconds without a turn of the loop, which turns 20 times a second."""
 _GONE = 20.0
-"""Seconds after which the loop is taken for dead."""
+"""Seconds without a turn after which the loop counts as dead."""
 
 
 class Watchdog:
-    """Fed by each turn of the loop."""
+    """Watchdog fed by each turn of the loop."""
 
     def __init__(self) -> None:
         self._fed_at = -math.inf
         self._loop: int | None = None
 
     def belong(self) -> None:
-        """From now on only the calling thread is the loop; others read states, too."""
+        """Accept only the calling thread as the loop; other threads read states, too."""
         self._loop = threading.get_ident()
         self.feed()
 
     def feed(self) -> None:
-        """The loop has come round."""
+        """Record a turn of the loop."""
         if self._loop in {None, threading.get_ident()}:
             self._fed_at = time.monotonic()
 
@@ -36,5 +36,5 @@ class Watchdog:
         return now - self._fed_at < _SILENT
 
     def gone(self, now: float) -> bool:
-        """Whether the loop has been still for so long that it is taken for dead."""
+        """Whether the loop has stopped for so long that it counts as dead."""
         return now - self._fed_at > _GONE

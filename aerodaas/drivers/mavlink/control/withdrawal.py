@@ -1,8 +1,8 @@
-"""A take-off that is called off: seen through until the motors surely stand.
+"""Withdrawal of a take-off: it ends when the motors certainly stand.
 
 An order to arm that was sent may be carried out later than the order to stop: packets overtake
-each other, and an acknowledgement does not say which of two orders it means. So what counts is
-what HEARTBEATs show for a while after the last word.
+each other, and an acknowledgement does not say which of two orders it means. So the HEARTBEATs of
+some time after the last order decide.
 """
 
 from __future__ import annotations
@@ -38,36 +38,36 @@ class Withdrawal:
         *,
         flies: bool,
     ) -> None:
-        """Order `disarm` at once; `land` is called if it `flies`, or refuses, for it does then.
+        """Send `disarm` at once; `land` is called if it `flies`, or refuses, because then it does.
 
         `land` is called with each HEARTBEAT of a vehicle that flies, and must bear that.
         """
         self.over = False
-        """Whether the motors stand, and no order is left that could start them."""
+        """Whether the motors stand, and no pending order could start them."""
         self._commander = commander
         self._disarm = disarm
         self._land = land
         self._flies = flies
         self._calm = 0
-        self._last_received = now
+        self._last_order = now
         self._go_on(now)
 
     def observe(self, now: float, *, armed: bool) -> None:
-        """Take note of a HEARTBEAT."""
+        """Update by a HEARTBEAT."""
         waits = self._commander.under_way(self._disarm.number) is not None
         if armed:
-            self._last_received, self._calm = now, 0
+            self._last_order, self._calm = now, 0
             if not waits:
                 self._go_on(now)
         elif not waits:
             self._calm += 1
-        self.over = self._calm >= _CALM and now - self._last_received > _SETTLED
+        self.over = self._calm >= _CALM and now - self._last_order > _SETTLED
 
     def _go_on(self, now: float) -> None:
         if self._flies:
             self._land()
             return
-        self._last_received = now
+        self._last_order = now
         self._commander.give(self._disarm, self._done, now=now)
 
     def _done(self, outcome: CommandResult) -> None:

@@ -1,4 +1,4 @@
-"""Commands and their acknowledgements: asked again when lost, never done twice by mistake."""
+"""Commands and their acknowledgements: repeated when lost, never executed twice by mistake."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PROGRESS = 5.0
 """The same after an acknowledgement IN_PROGRESS."""
 _TRIES = 6
 _LATER = 1.0
-"""Seconds after which an order is tried again that was rejected for now, such as one to arm while
+"""Seconds after which a temporarily rejected command is repeated, such as one to arm while
 the estimator still settles."""
 _RESULTS = {
     mavlink.MAV_RESULT_TEMPORARILY_REJECTED: "rejected for now",
@@ -42,9 +42,9 @@ class PendingCommand:
     """Description of the command, for messages."""
     frame: int | None = None
     mode: FlightMode | None = None
-    """The mode that it asks for, if it asks for one."""
+    """The commanded mode, if any."""
     insists: bool = True
-    """Whether it is tried again when it is rejected for now."""
+    """Whether it is repeated after a temporary rejection."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,9 @@ class CommandResult:
     text: str = ""
     """Reason of a refusal, in a few words."""
     replaced: bool = False
-    """A newer order of the same number has taken its place: neither done nor refused."""
+    """Superseded by a newer command of the same number: neither executed nor refused."""
     tries: int = 1
-    """How often it was sent."""
+    """Number of transmissions."""
 
 
 def always() -> bool:
@@ -73,11 +73,11 @@ class _Pending:
     tries: int = 0
     deadline: float = 0.0
     answer: str = "no answer"
-    """Text for the case that it is given up."""
+    """Error text for giving up."""
 
 
 class Commander:
-    """One outstanding order of each number; the link's thread calls `take` and `turn`."""
+    """Commander with one pending command per number; the link's thread calls `take` and `turn`."""
 
     def __init__(self, send: Callable[[Any], None], target: tuple[int, int], ours: int) -> None:
         """Send by `send` to `target` (system, component); `ours` is our own system id."""
@@ -99,9 +99,9 @@ class Commander:
     ) -> None:
         """Send a command; `done` gets its outcome, in the link's thread.
 
-        It is repeated while it is not answered or rejected for now, and only while `still` says
-        that it needs doing: what the vehicle shows to be done is done, acknowledged or not. A
-        newer order of the same number takes the place of an older one, whose `done` is told so.
+        It is repeated without an answer and after a temporary rejection, and only while `still`
+        returns True: what the vehicle's state shows is done, acknowledged or not. A newer command
+        of the same number supersedes an older one, whose `done` gets that outcome.
         """
         with self._lock:
             before = self._pending.get(order.number)
@@ -124,7 +124,7 @@ class Commander:
             return None if pending is None else pending.order
 
     def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Take a COMMAND_ACK."""
+        """Process a COMMAND_ACK."""
         if message.target_system not in {0, self._ours}:
             return
         with self._lock:
@@ -138,7 +138,7 @@ class Commander:
             later = message.result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
             if later and pending.order.insists:
                 if pending.answer != _RESULTS[message.result]:
-                    # PX4 says it twice, and only the first time counts.
+                    # PX4 sends it twice, and only the first counts.
                     pending.answer = _RESULTS[message.result]
                     pending.deadline = now + _LATER
                 return

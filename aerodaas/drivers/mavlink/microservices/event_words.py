@@ -1,4 +1,4 @@
-"""PX4's events as plain text, by the event's own name without its component's."""
+"""Texts of PX4's events, by the event's name without its component's."""
 
 from __future__ import annotations
 
@@ -165,4 +165,4 @@ def _table(lines: str) -> dict[str, str]:
 CHECKS = _table(_CHECKS)
 """Of the arming and health checks, `check_…`."""
 COMMANDER = _table(_COMMANDER)
-"""Of the commander itself, `commander_…`; that its protection takes over is known by its mode."""
+"""Of the commander itself, `commander_…`; the mode shows that its protection takes over."""

@@ -1,8 +1,8 @@
 """PX4's events, which it sends instead of STATUSTEXT.
 
 An event's number is a hash of its name (`events::ID` of PX4: 24 bits of 32-bit FNV-1a below the
-component's number). The full texts lie in a file on the autopilot whose version they belong to;
-people are told ours, and nothing of an event that we have no words for.
+component's number). The full texts are in a file on the autopilot of the same version; the operator
+gets our texts, and none for other events.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class EventText(NamedTuple):
 
 
 class EventReader:
-    """Reads events, and gathers those of each report of the arming checks."""
+    """Decoder of events, which collects those of each report of the arming checks."""
 
     def __init__(self) -> None:
         self.objections: tuple[str, ...] = ()
@@ -60,7 +60,7 @@ class EventReader:
 
     @property
     def objections_to_hold(self) -> tuple[str, ...]:
-        """The same without those that its present mode alone calls for: hold needs none of them."""
+        """The same without those of its present mode's own requirements: hold has none of them."""
         return tuple(text for text in self.objections if text not in _OF_THE_MODE)
 
     def take(self, number: int, log_levels: int, sequence: int) -> EventText | None:
@@ -81,8 +81,8 @@ class EventReader:
             return None
         text = _TEXTS.get(number)
         if self._report is not None:
-            # What a check objects to is for who wants to take off; in flight it is told by health.
+            # Failed checks matter before a take-off; in flight the health monitor reports them.
             self._report.append(text or f"a check that is not known here (event {number:#010x})")
             return None
-        # A check outside a report is of one whose beginning got lost.
+        # A check outside a report belongs to one whose beginning was lost.
         return None if text is None or number in _CHECKS else EventText(text, severity)

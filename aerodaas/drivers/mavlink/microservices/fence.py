@@ -1,4 +1,4 @@
-"""The robot's geofence on the vehicle itself, with the action that makes it more than a drawing."""
+"""Upload of the robot's geofence to the vehicle, with the parameters that enforce it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["fence_items", "upload_fence"]
 
 
 def fence_items(fence: GeofenceConfig, origin: GeodeticOrigin) -> list[MissionItem]:
-    """The polygons of `fence`, whose ENU zero lies at `origin`, as items of the fence protocol."""
+    """Items of the fence protocol for the polygons of `fence`, whose ENU origin is `origin`."""
     inside = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION
     outside = mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION
     outlines = [(inside, fence.polygon)] if fence.polygon else []
@@ -50,8 +50,8 @@ def upload_fence(
 ) -> None:
     """Upload `fence` and have it enforced by `action`.
 
-    The floor stays with us: neither autopilot's can be left for a landing. Waits for the vehicle;
-    raises VehicleError.
+    The floor is not uploaded: neither autopilot allows a landing below it. Blocks; raises
+    VehicleError.
     """
     items = fence_items(fence, origin)
     upload(link, items, mavlink.MAV_MISSION_TYPE_FENCE, progress)

@@ -1,4 +1,4 @@
-"""The autopilot's parameters: read, set, and judged for safety. These calls wait for replies."""
+"""Parameters of the autopilot: read, set, and checked for safety, by blocking calls."""
 
 from __future__ import annotations
 
@@ -28,19 +28,19 @@ class _Value:
 
 
 class Parameters:
-    """One vehicle's parameters, by name; not for use in the link's thread."""
+    """Parameters of one vehicle, by name; not for use in the link's thread."""
 
     def __init__(self, link: MavlinkLink, autopilot: Autopilot) -> None:
         self._link = link
         self._autopilot = autopilot
 
     def get(self, name: str) -> float | None:
-        """The value of `name`; None if the vehicle has no such parameter, or does not answer."""
+        """Value of `name`; None if the vehicle has no such parameter, or does not answer."""
         found = self._read(name)
         return None if found is None else found.value
 
     def set(self, name: str, value: float) -> None:
-        """Set `name`, and see that it was set; raises VehicleError if it was not."""
+        """Set `name` and verify it; raises VehicleError if it was not set."""
         before = self._read(name)
         if before is None:
             raise VehicleError(f"the autopilot knows no parameter {name}")
@@ -63,7 +63,7 @@ class Parameters:
         return next(self._answers(name, request), None)
 
     def _answers(self, name: str, request: object) -> Iterator[_Value]:
-        """Values of `name` that come after `request`, which is repeated while none do."""
+        """Values of `name` received after `request`, which is repeated until one arrives."""
         with self._link.listen("PARAM_VALUE") as inbox:
             for _ in range(_TRIES):
                 self._link.send(request)
@@ -79,7 +79,7 @@ class Parameters:
 
     @staticmethod
     def _same(one: _Value, value: float) -> bool:
-        # They are singles on the autopilot.
+        # They are single-precision on the autopilot.
         return abs(one.value - value) <= 1e-5 * max(1.0, abs(value))
 
     def _target(self) -> tuple[int, int]:
@@ -103,7 +103,7 @@ class UnsafeParameter:
 
     @property
     def text(self) -> str:
-        """One sentence, with the value that we would set."""
+        """One sentence, with the value to be set."""
         failsafe = self.failsafe
         return (
             f"{failsafe.name} is {self.value:g}, so that {failsafe.why}; {failsafe.safe:g} is safer"
@@ -113,7 +113,7 @@ class UnsafeParameter:
 def unsafe_parameters(
     parameters: Parameters, autopilot: Autopilot, settings: MavlinkSettings
 ) -> list[UnsafeParameter]:
-    """Failsafes that the vehicle's parameters leave off; takes a moment for each."""
+    """Failsafes that are off by the vehicle's parameters; each is read from the vehicle."""
     found = []
     for failsafe in autopilot.failsafes:
         if failsafe.role not in {"any", settings.role}:

@@ -1,4 +1,4 @@
-"""Missions, fences and rally points to and from the autopilot (MAVLink's mission protocol)."""
+"""Transfer of missions, fences and rally points (MAVLink's mission protocol)."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from aerodaas.types.errors import VehicleError
 __all__ = ["MissionItem", "Progress", "download", "upload"]
 
 _TIMEOUT = 1.5
-"""Seconds to wait for the other side, and 0.25 in the midst of a transfer (MAVLink's advice)."""
+"""Timeout in seconds, and 0.25 within a transfer (MAVLink's recommendation)."""
 _ITEM_TIMEOUT = 0.25
 _TRIES = 5
 _MOST = 2000
-"""Items that we take at most."""
+"""Most items accepted."""
 _RESULTS = {
     mavlink.MAV_MISSION_UNSUPPORTED_FRAME: "it does not know this frame",
     mavlink.MAV_MISSION_UNSUPPORTED: "it does not know this command",
@@ -59,7 +59,7 @@ def upload(
 ) -> None:
     """Replace the vehicle's plan by `items`; raises VehicleError with the reason of a failure.
 
-    Waits for the vehicle; not for use in the link's thread.
+    Blocks; not for use in the link's thread.
     """
     target = _target(link)
     count = mavlink.MAVLink_mission_count_message(*target, len(items), kind)
@@ -86,7 +86,7 @@ def upload(
                     link.send(say)
                     whole |= reply.seq == len(items) - 1
             if whole:
-                # The acknowledgement was lost; who has all items answers to none of them any more.
+                # The acknowledgement was lost; with all items it answers to none of them.
                 say = count
     raise VehicleError(f"the autopilot stopped answering while taking the {_name(kind)}")
 
@@ -96,7 +96,7 @@ def download(
     kind: int = mavlink.MAV_MISSION_TYPE_MISSION,
     progress: Progress = _ignore,
 ) -> list[MissionItem]:
-    """The vehicle's plan; raises VehicleError. Waits; not for use in the link's thread."""
+    """The vehicle's plan; raises VehicleError. Blocks; not for use in the link's thread."""
     target = _target(link)
     with link.listen("MISSION_COUNT", "MISSION_ITEM_INT") as inbox:
         ask: Any = mavlink.MAVLink_mission_request_list_message(*target, kind)

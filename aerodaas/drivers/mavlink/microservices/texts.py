@@ -1,4 +1,4 @@
-"""Recent texts of the autopilot: STATUSTEXT, put together from its pieces."""
+"""Recent texts of the autopilot: STATUSTEXT, assembled from its pieces."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["Texts"]
 _KEPT = 40
 _PIECES = 16
 _GRAVE = 4
-"""Severity of a warning; smaller is graver."""
+"""Severity of a warning; smaller is more severe."""
 
 
 class _Text(NamedTuple):
@@ -27,7 +27,7 @@ class Texts:
         self._pieces: dict[int, dict[int, str]] = {}
 
     def take(self, text: str, severity: int, now: float, number: int = 0, piece: int = 0) -> None:
-        """Take note of one STATUSTEXT; one in pieces has a `number` other than zero."""
+        """Add one STATUSTEXT; one in pieces has a `number` other than zero."""
         whole = 50
         if number == 0:
             self.add(text, severity, now)
@@ -41,13 +41,13 @@ class Texts:
             self._pieces.pop(next(iter(self._pieces)))
 
     def add(self, text: str, severity: int, now: float) -> None:
-        """Take note of a whole text."""
+        """Add a complete text."""
         text = "".join(letter for letter in text if letter.isprintable()).strip()
         if text:
             self._texts.append(_Text(now, severity, text))
 
     def recent(self, now: float, seconds: float, severity: int = _GRAVE) -> list[str]:
-        """Texts of the last `seconds` that are as grave as `severity`, each once, oldest first."""
+        """Texts of the last `seconds` of at least this `severity`, each once, oldest first."""
         fresh = (
             one.text for one in self._texts if now - one.at <= seconds and one.severity <= severity
         )

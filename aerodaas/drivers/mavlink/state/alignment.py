@@ -1,8 +1,8 @@
-"""Where the autopilot's local frame lies in ours, for as long as that can be believed.
+"""Alignment of the autopilot's local frame with ours, and its validity.
 
-An autopilot that starts anew begins a new local frame, and an estimator that finds its position
-again moves the vehicle within the old one. Places from before and after are never mixed: there is
-no position until the frame has been laid over the earth again by the global position.
+An autopilot that restarts begins a new local frame, and an estimator that recovers its position
+moves the vehicle within the old one. Positions from before and after are never mixed: there is no
+position until the frame has been aligned again by the global position.
 """
 
 from __future__ import annotations
@@ -18,15 +18,15 @@ from aerodaas.types.geometry import GeodeticOrigin, Vector, ned_to_enu
 __all__ = ["Alignment", "global_origin"]
 
 _STEP = 2.0
-"""Metres that a position may differ from where the velocity has led."""
+"""Metres by which a position may differ from the integrated velocity."""
 _ACCELERATION = 10.0
-"""m/s² by which the velocity may have changed unseen meanwhile."""
+"""m/s² by which the velocity may have changed between two samples."""
 _SETTLING = 2.0
-"""Seconds for which local and global positions must agree before a frame is believed again."""
+"""Seconds for which local and global positions must agree before a frame is valid again."""
 _AGREED = 1.5
 """Metres within which they agree."""
 _SAME = 3.0
-"""Metres within which a frame found again is the one from before."""
+"""Metres within which a new alignment counts as the previous one."""
 _TOLD = 10.0
 """Seconds for which a corrected jump is reported."""
 
@@ -39,18 +39,18 @@ class _Sample:
 
 
 class Alignment:
-    """The frame of one connection."""
+    """Alignment of one connection."""
 
     def __init__(self, frame: LocalFrame, telemetry: Telemetry) -> None:
-        """Believe in `frame`, which was pinned by what `telemetry` holds now."""
+        """Start with `frame`, which was aligned by the present `telemetry`."""
         self.frame: LocalFrame | None = frame
-        """None while no position can be believed."""
+        """The frame; None while no position is valid."""
         self.fault = ""
-        """Report of it for the operator."""
+        """Text for the operator; empty if aligned."""
         self._telemetry = telemetry
         self._pinned = frame
         self.origin = global_origin(telemetry, frame)
-        """Where zero of our frame lies on the earth."""
+        """Geodetic origin of our frame."""
         self._sea_level = _sea_level(telemetry, frame)
         self._last: _Sample | None = None
         self._candidates: list[tuple[float, Vector]] = []
@@ -58,7 +58,7 @@ class Alignment:
         self._mended_at = 0.0
 
     def move(self) -> None:
-        """Take note of a new local position."""
+        """Update by a new local position."""
         telemetry = self._telemetry
         assert telemetry.position is not None  # noqa: S101 - it is new
         sample = _Sample(telemetry.position, telemetry.velocity, telemetry.boot_time)
@@ -71,14 +71,14 @@ class Alignment:
             self._lose(f"position: jumped by {leap:.0f} m")
 
     def restart(self, *, stands: bool) -> None:
-        """The autopilot has started anew; `stands`: with still motors, before and after."""
+        """Handle a restart of the autopilot; `stands`: with still motors, before and after."""
         last, self._last = self._last, None
         if self._stood_at is None and self.frame is not None and last is not None and stands:
             self._stood_at = self.frame.position(last.position)
         self._lose("" if stands else "position: not believed, its local frame is a new one")
 
     def place(self, now: float, *, sure: bool) -> None:
-        """Take note of a new global position; `sure`: the estimator has no doubt of it."""
+        """Update by a new global position; `sure`: the estimator reports it as valid."""
         telemetry, last = self._telemetry, self._last
         if self.frame is not None:
             if self.fault and now - self._mended_at > _TOLD:
@@ -113,7 +113,7 @@ class Alignment:
 
 
 def _leap(before: _Sample, after: _Sample) -> float:
-    """Metres by which a position is not where the velocity led; 0 if that may be so."""
+    """Metres by which a position differs from the integrated velocity; 0 within the tolerance."""
     duration = after.boot_time - before.boot_time
     led = 0.5 * (before.velocity + after.velocity) * duration
     miss = float(np.linalg.norm(after.position - before.position - led))
@@ -121,7 +121,7 @@ def _leap(before: _Sample, after: _Sample) -> float:
 
 
 def global_origin(telemetry: Telemetry, frame: LocalFrame) -> GeodeticOrigin:
-    """Where zero of our local frame lies on the earth, by the autopilot's own estimate."""
+    """Geodetic origin of our local frame by the autopilot's own estimate."""
     assert telemetry.place is not None  # noqa: S101 - it is ready
     assert telemetry.position is not None  # noqa: S101 - the same
     here = GeodeticOrigin(*telemetry.place)
@@ -130,7 +130,7 @@ def global_origin(telemetry: Telemetry, frame: LocalFrame) -> GeodeticOrigin:
 
 
 def _sea_level(telemetry: Telemetry, frame: LocalFrame) -> float | None:
-    """Metres above mean sea level at which zero of our frame lies, by its own estimate."""
+    """Metres above mean sea level of our frame's origin, by its own estimate."""
     if telemetry.altitude is None or telemetry.position is None:
         return None
     return telemetry.altitude - float(frame.position(telemetry.position)[2])

@@ -14,13 +14,13 @@ _STANDS = 1.0
 _SILENT = 4.0
 """Seconds without the GPS' messages, sent twice a second, while other messages came."""
 _GAP = 1.0
-"""Greatest counted time between two messages: a longer gap is the link's."""
+"""Longest counted gap between two messages in seconds: a longer one is the link's."""
 _FIX = 3
 """GPS fix types from this one on are positions in space."""
 _UNSURE = (100, 50, 20, 10, 5)
 """Step in metres in which a slowly growing fault is reported anew."""
 _DOES_NOT_FIT = 0.8
-"""Variance, of 1, from which ArduPilot mistrusts a sensor (its FS_EKF_THRESH)."""
+"""Variance, of 1, from which ArduPilot rejects a sensor (its FS_EKF_THRESH)."""
 _SHAKES = (60, 30)
 """Excessive vibration in m/s², and the level worth a report."""
 _CLIPS = 10
@@ -74,7 +74,7 @@ class _Complaint(NamedTuple):
 
 
 class Health:
-    """Takes messages, each with the second of its arrival; ready to be asked at any moment."""
+    """Health monitor of one vehicle, updated by messages with their arrival times in seconds."""
 
     def __init__(self) -> None:
         self._complaints: dict[str, _Complaint] = {}
@@ -120,7 +120,7 @@ class Health:
         return not any(name in self._complaints for name in ("fix", "unsure", "lost", "glitch"))
 
     def _note(self, name: str, text: str, now: float) -> None:
-        """Set the complaint of `name`, or clear it without a text."""
+        """Set the fault `name`, or clear it without a text."""
         if not text:
             self._complaints.pop(name, None)
             return
@@ -131,7 +131,7 @@ class Health:
         self._gps_silence = 0.0
         if message.fix_type >= _FIX:
             self._fixed_at = now
-        # A vehicle that never had a fix flies by something else, or says itself why it does not.
+        # A vehicle that never had a fix flies without GPS, or reports the reason itself.
         lost = message.fix_type < _FIX and math.isfinite(self._fixed_at)
         kind = "a fix in the plane only" if message.fix_type == _FIX - 1 else "no fix"
         self._note("fix", f"GPS: {kind}" if lost else "", now)
@@ -158,7 +158,7 @@ class Health:
         self._fit(misfits, _DOES_NOT_FIT, now)
 
     def _flags(self, flags: int, now: float, *, glitch: int) -> None:
-        """The bits that both kinds of status have in common."""
+        """Process the bits that both kinds of status have in common."""
         lost = not flags & _HORIZONTAL or flags & mavlink.ESTIMATOR_CONST_POS_MODE
         self._note("lost", "estimator: no position along the ground" if lost else "", now)
         jumps = "estimator: GPS positions jump, and are not believed"

@@ -1,7 +1,7 @@
 """Flight phase of the vehicle: its HEARTBEAT compared with the requested action.
 
 A mode that was not requested is a pilot's, a ground station's, or the autopilot's own protection:
-from then on until it is disarmed nothing is sent that steers.
+from then on until it is disarmed no steering message is sent.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from aerodaas.types.vehicle import VehicleMode
 __all__ = ["FlightMode", "FlightPhase"]
 
 _LAG = 2.5
-"""Seconds that HEARTBEATs may show the mode before after a change was accepted."""
+"""Seconds for which HEARTBEATs may show the previous mode after a change was accepted."""
 
 
 class FlightMode(enum.Enum):
@@ -26,7 +26,7 @@ class FlightMode(enum.Enum):
     RETURN = "return"
     LAND = "land"
     OTHER = "other"
-    """Flown by a pilot, or by a mission of the autopilot's own."""
+    """Flown by a pilot, or by the autopilot's own mission."""
 
 
 _FOLLOWS = {
@@ -49,7 +49,7 @@ _SHOWN = {
 
 
 class FlightPhase:
-    """The mode of one vehicle."""
+    """Mode of one vehicle."""
 
     def __init__(self) -> None:
         self.armed = False
@@ -58,11 +58,11 @@ class FlightPhase:
         self.wish: FlightMode | None = None
         """The last requested action, until it is disarmed."""
         self.seen = False
-        """Whether it has been seen doing that."""
+        """Whether a HEARTBEAT has shown that action."""
         self.taken: VehicleMode | None = None
         """MANUAL or FAILSAFE once another pilot or the autopilot itself flies."""
         self._before: frozenset[FlightMode] = frozenset()
-        """Modes that HEARTBEATs may go on to show for a moment after the wish."""
+        """Modes that HEARTBEATs may still show for a moment after the request."""
         self._asked_at = -math.inf
 
     @property
@@ -75,18 +75,18 @@ class FlightPhase:
     def ask(
         self, wish: FlightMode, now: float, meanwhile: frozenset[FlightMode] = frozenset()
     ) -> None:
-        """Take note that the vehicle is being asked for a mode; it may show others `meanwhile`."""
+        """Record a requested mode; HEARTBEATs may show others `meanwhile`."""
         if wish is not self.wish:
             follows = _FOLLOWS[self.wish] if self.wish is not None else frozenset()
             self._before, self.seen = follows | {self.shown} | meanwhile, False
         self.wish, self._asked_at = wish, now
 
     def rest(self) -> None:
-        """Nothing is asked of it any more: it stands."""
+        """Clear the request: the vehicle stands."""
         self.wish, self.seen = None, False
 
     def observe(self, shown: FlightMode, now: float, *, armed: bool, critical: bool) -> None:
-        """Take note of a HEARTBEAT."""
+        """Update by a HEARTBEAT."""
         if not armed:
             if self.armed:
                 self.wish = self.taken = None

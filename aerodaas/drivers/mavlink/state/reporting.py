@@ -1,4 +1,4 @@
-"""The state that the mission gets of one vehicle, combined from all its messages."""
+"""State report of one vehicle for the mission, combined from all its messages."""
 
 from __future__ import annotations
 
@@ -27,19 +27,19 @@ _LOST_AFTER = 1.5
 _FINDING = 1.0
 """Seconds for a first position after the link is back."""
 _GRAVE = 3
-"""Severity of an error; smaller is graver."""
+"""Severity of an error; smaller is more severe."""
 
 
 class VehicleReport:
-    """The state of one vehicle from its messages; seconds are monotonic."""
+    """Reporter of one vehicle's state; seconds are monotonic."""
 
     def __init__(self, telemetry: Telemetry, phase: FlightPhase, touchdown: Touchdown) -> None:
         self.departure: Departure | None = None
-        """Its take-offs; None before it is met."""
+        """Its take-offs; None before it is found."""
         self.alignment: Alignment | None = None
-        """Where its frame lies in ours; None before it is connected."""
+        """Alignment of its frame; None before it is connected."""
         self.restarted = ""
-        """That the autopilot has started anew, until motors start again."""
+        """Text about a restart of the autopilot, until motors start again."""
         self._telemetry = telemetry
         self._phase = phase
         self._touchdown = touchdown
@@ -47,8 +47,8 @@ class VehicleReport:
     def state(self, stamp: int, now: float, counts: LinkCounts) -> VehicleState:
         """The newest state at `now`, which is `stamp` (nanoseconds) on the mission's clock."""
         telemetry, lost = self._telemetry, self.lost(now)
-        # A silent link says nothing of the position: what was known with the last word counts,
-        # and its age tells. Only a vehicle that speaks can have lost its position.
+        # A silent link is no loss of the position: the last known one stays, with its age. Only a
+        # vehicle that still sends messages can have lost it.
         age = now - telemetry.position_at
         heard = telemetry.knows_place(now - self._silence(now)) and age <= _LOST_AFTER
         known = heard or (lost and math.isfinite(age))
@@ -73,7 +73,7 @@ class VehicleReport:
         )
 
     def odometry(self, frame: LocalFrame | None, *, known: bool) -> Odometry:
-        """Where it is in our frame; NaN unless that is `known`."""
+        """Its position in our frame; NaN unless that is `known`."""
         telemetry, attitude = self._telemetry, self._telemetry.attitude
         position: Vector = np.full(3, np.nan)
         if known and frame is not None and telemetry.position is not None:
@@ -106,7 +106,7 @@ class VehicleReport:
         return self._silence(now) > _LOST_AFTER or (back and not telemetry.knows_place(now))
 
     def _silence(self, now: float) -> float:
-        # Standing motors need no fresh telemetry to be believed: HEARTBEATs tell of them.
+        # Standing motors need no recent telemetry: HEARTBEATs report them.
         telemetry = self._telemetry
         return telemetry.silence(now) if telemetry.armed else now - telemetry.heard_at
 

@@ -19,11 +19,11 @@ from aerodaas.types.geometry import Vector
 __all__ = ["Sensors", "Telemetry"]
 
 _FRESH = 1.0
-"""Seconds after which a position or an attitude is none any more."""
+"""Seconds after which a position or an attitude is invalid."""
 _FIX = 2
 """GPS fix types from this one on are positions."""
 _FAR = 5.0
-"""Seconds: packets may overtake each other by less, and only a restart goes back by more."""
+"""Seconds by which time stamps may go back, as packets overtake each other; more is a restart."""
 _UNKNOWN_SATELLITES = 255
 _UNKNOWN_VOLTAGE = 65535
 
@@ -37,7 +37,7 @@ class Sensors(NamedTuple):
 
 
 class Telemetry:
-    """Takes messages, each with the monotonic second of its arrival; in the autopilot's frames."""
+    """Newest messages of one vehicle in its own frames, with arrival times in monotonic seconds."""
 
     def __init__(self) -> None:
         self.heard_at = -math.inf
@@ -59,7 +59,7 @@ class Telemetry:
         self.attitude = Attitude()
         self.attitude_at = -math.inf
         self.home: Vector | None = None
-        """Where it was armed, NED metres."""
+        """Position where it was armed, NED metres."""
         self.altitude: float | None = None
         """Metres above mean sea level, by its own estimate."""
         self.place: tuple[float, float] | None = None
@@ -80,7 +80,7 @@ class Telemetry:
         self.software = ""
         self._stamps: dict[str, int] = {}
         self.seen: dict[str, float] = {}
-        """When each kind of message came last."""
+        """Arrival time of each kind of message."""
         self.texts = Texts()
         self.events = EventReader()
         self._takers: dict[str, Callable[[Any, float], None]] = {
@@ -99,7 +99,7 @@ class Telemetry:
         }
 
     def take(self, message: Any, now: float) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Take note of a message of the vehicle."""
+        """Update by a message of the vehicle."""
         if now - self.heard_at > _FRESH:
             self.back_at = now
         self.heard_at = now
@@ -113,7 +113,7 @@ class Telemetry:
             taker(message, now)
 
     def silence(self, now: float) -> float:
-        """Seconds since its last new data; timestamps that stand still are no new data."""
+        """Seconds since its last new data; repeated timestamps are no new data."""
         return now - min(self.heard_at, self.ticked_at)
 
     def knows_place(self, now: float) -> bool:
@@ -124,7 +124,7 @@ class Telemetry:
     def _heartbeat(self, message: Any, now: float) -> None:  # noqa: ANN401
         self.beat_at = now
         self.custom_mode = message.custom_mode
-        # Terminated, it calls itself armed for ever, and no motor turns.
+        # A terminated autopilot reports itself as armed for ever, but no motor turns.
         self.armed = (
             bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
             and message.system_status != mavlink.MAV_STATE_FLIGHT_TERMINATION
@@ -134,7 +134,7 @@ class Telemetry:
             mavlink.MAV_STATE_EMERGENCY,
         }
         booting = message.system_status == mavlink.MAV_STATE_BOOT
-        # The very first one may find it just starting, which is no new start.
+        # The first one may find it just starting, which is no restart.
         if booting and self._booting is False:
             self._restarted()
         self._booting = booting
@@ -152,7 +152,7 @@ class Telemetry:
 
     def _global_position(self, message: Any, _: float) -> None:  # noqa: ANN401
         if message.lat == 0 and message.lon == 0:
-            # That is how an autopilot says that it does not know.
+            # An autopilot's value for "unknown".
             self.altitude = self.place = None
             return
         self.altitude = message.alt / 1e3
@@ -199,7 +199,7 @@ class Telemetry:
         self.clock = message.time_unix_usec / 1e6
 
     def _fresh(self, kind: str, message: Any, now: float) -> bool:  # noqa: ANN401
-        """Mind the autopilot's own clock; False for a message no newer than the one before."""
+        """Update the autopilot's clock; False for a message not newer than the previous one."""
         stamp = getattr(message, "time_boot_ms", None)
         if stamp is None:
             return True
@@ -217,7 +217,7 @@ class Telemetry:
     def _restarted(self) -> None:
         """Forget messages from before a restart of the autopilot."""
         self.reboots += 1
-        # Its first HEARTBEAT comes a second after its first other words, and no motor turns.
+        # Its first HEARTBEAT comes a second after its first other messages, and no motor turns.
         self.armed = False
         self.boot_time = math.nan
         self._stamps.clear()

@@ -1,8 +1,8 @@
-"""Whether motors that stopped did so on the ground, or in the air.
+"""Touchdown detection: whether motors stopped on the ground or in the air.
 
-An autopilot calls a disarmed vehicle landed, wherever it is. So a landing is one only if the
-vehicle was seen to stand; what was moving, or had not begun to land, falls. What came down while
-nothing was heard is not thought to have fallen.
+An autopilot reports a disarmed vehicle as landed, wherever it is. So a landing counts only if the
+vehicle was seen to stand; one that was moving, or had not begun to land, falls. A vehicle that came
+down while the link was silent is not counted as fallen.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from aerodaas.types.vehicle import FlightEnd
 __all__ = ["Touchdown"]
 
 _LIFTED = 0.5
-"""Metres above the place of arming from which it flies."""
+"""Metres above the place of arming above which it flies."""
 _SINKING = 0.35
 """m/s up or down below which it may stand: a landing sinks faster to the end."""
 _MOVING = 1.0
@@ -29,8 +29,8 @@ _FRESH = 1.0
 _LATE = 2.5
 """Seconds by which a HEARTBEAT with the motors' state may be late, as one may be lost."""
 _SAID = 1.8
-"""Seconds of its own word for it to stand though its estimate moves: who is stopped in the air says
-so too, but is heard to be disarmed within a second."""
+"""Seconds of its own report for it to stand though its estimate moves: a vehicle stopped in the air
+reports so, too, but is reported as disarmed within a second."""
 _FALLS = 2.0
 """m/s downwards at which it does not stand, even if it reports so."""
 _FALLEN = 10.0
@@ -38,15 +38,15 @@ _FALLEN = 10.0
 
 
 class Touchdown:
-    """Takes note of positions, landed states and HEARTBEATs; seconds, metres up, m/s."""
+    """Detector fed with positions, landed states and HEARTBEATs; seconds, metres up, m/s."""
 
     def __init__(self) -> None:
         self.fault = ""
         """The reported end of the latest flight, until motors start again."""
         self.falling = False
-        """Motors stopped in the air, and it does not lie yet."""
+        """Whether motors stopped in the air and it has not come to rest yet."""
         self.ended: FlightEnd | None = None
-        """How the latest flight ended; None before and during one."""
+        """End of the latest flight; None before and during one."""
         self.flew = False
         """Whether it has left the ground since motors started."""
         self._armed: bool | None = None
@@ -62,10 +62,10 @@ class Touchdown:
         self._rise = 0.0
         self._stopped_at = -math.inf
         self._blind = False
-        """The positions that come are of another life of the autopilot."""
+        """Forget positions, because the autopilot has restarted."""
 
     def move(self, up: float, rise: float, speed: float, now: float) -> None:
-        """Take note of a position: `up` metres, rising at `rise`, moving at `speed` in all."""
+        """Update by a position: `up` metres, climb rate `rise` and total `speed` in m/s."""
         if now - self._moved_at > _FRESH:
             self._back_at = now
         if rise < -_FALLS:
@@ -78,16 +78,16 @@ class Touchdown:
         self.flew |= self._armed is True and up - self._ground > _LIFTED
 
     def report(self, now: float, *, on_ground: bool | None) -> None:
-        """Process the autopilot's own landed state; None: it sends none."""
+        """Update by the autopilot's own landed state; None if it sends none."""
         self._on_ground = on_ground
         self._on_ground_since = min(self._on_ground_since, now) if on_ground else math.inf
         self.flew |= self._armed is True and on_ground is False
 
     def observe(self, mode: FlightMode, now: float, *, armed: bool) -> None:
-        """Take note of a HEARTBEAT."""
+        """Update by a HEARTBEAT."""
         if armed:
             if not self._armed:
-                # Found armed, it is taken to fly: it was not seen to stand.
+                # Found armed, it counts as flying: it was not seen to stand.
                 self.flew = self._armed is None and self._on_ground is not True
                 self._ground = self._up
                 self.fault, self.falling, self._blind = "", False, False
@@ -98,7 +98,7 @@ class Touchdown:
         self._armed = armed
 
     def restart(self, now: float) -> None:
-        """The autopilot starts anew: no motor turns meanwhile."""
+        """Handle a restart of the autopilot: no motor turns meanwhile."""
         if self._armed and self.flew:
             self._fall()
             self._stopped_at = now
@@ -121,7 +121,7 @@ class Touchdown:
         self.fault = f"motors: stopped in flight{where}"
 
     def turn(self, now: float) -> None:
-        """See whether it has come to lie."""
+        """Check whether it has come to rest."""
         lies = now - self._moved_at < _FRESH and now - self._still_since > 2 * _STILL
         if (lies and not self._blind) or now - self._stopped_at > _FALLEN:
             self.falling = False
@@ -137,5 +137,5 @@ class Touchdown:
             return True
         if self._mode is FlightMode.RETURN and self._up - self._ground < _NEAR:
             return True
-        # The word of one that has just been stopped in the air is this, too, and soon it falls.
+        # A vehicle that has just been stopped in the air reports this, too, and soon falls.
         return said >= _STILL

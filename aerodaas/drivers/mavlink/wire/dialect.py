@@ -1,4 +1,4 @@
-"""MAVLink's messages: pymavlink's, and the one of PX4 that it lacks."""
+"""MAVLink messages: pymavlink's, and PX4's EVENT, which it lacks."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class EventMessage(mavlink.MAVLink_message):  # type: ignore[misc]
         log_levels: int,
         arguments: list[int],
     ) -> None:
-        """Hold the fields; `event` is the message's field `id`."""
+        """Message with these fields; `event` is the field `id`."""
         super().__init__(self.id, self.msgname)
         self._fieldnames = self.fieldnames
         self._instance_field = None

@@ -30,7 +30,7 @@ _MOST = 64
 
 @dataclass(frozen=True)
 class FoundVehicle:
-    """A vehicle that we can fly."""
+    """A vehicle that can be flown."""
 
     system: int
     component: int
@@ -38,7 +38,7 @@ class FoundVehicle:
 
 
 class Finder:
-    """Takes HEARTBEATs until one is the vehicle's."""
+    """Finder that processes HEARTBEATs until one is the vehicle's."""
 
     def __init__(self, settings: MavlinkSettings) -> None:
         self._settings = settings
@@ -67,7 +67,7 @@ class Finder:
         return "", family
 
     def explain(self, counts: LinkCounts) -> str:
-        """Why no vehicle was found."""
+        """Reason why no vehicle was found."""
         url, wanted = self._settings.url, self._settings.system
         if self._others:
             heard = "; ".join(f"system {one[0]}: {text}" for one, text in self._others.items())

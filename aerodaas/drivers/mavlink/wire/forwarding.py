@@ -1,4 +1,4 @@
-"""A ground station or another program on the same link: everything passed on, both ways."""
+"""Forwarding of all packets between the vehicle and a ground station or another program."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ __all__ = ["Forwarder"]
 
 
 class Forwarder:
-    """Passes packets on as they are, signatures included, without reading them."""
+    """Forwarder of unchanged packets, signatures included."""
 
     def __init__(self, url: str, name: str) -> None:
         """Open `url` for robot `name`; raises ConfigError and VehicleError."""

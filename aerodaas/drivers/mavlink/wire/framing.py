@@ -1,4 +1,4 @@
-"""Where packets begin and end in a stream of bytes, and which of them are worth decoding.
+"""Framing: extraction of the packets of interest from a stream of bytes.
 
 Autopilots send hundreds of packets a second of no interest here, and decoding one in
 Python costs more than a driver may take, so packets are cut out by their headers first.
@@ -26,7 +26,7 @@ def signed(frame: bytes | bytearray) -> bool:
 
 
 class Framer:
-    """Cuts packets out of bytes.
+    """Extractor of packets from bytes.
 
     `decode` turns a packet whose message id is among `wanted` into a message, or returns None if
     it is none after all, in which case the search goes on behind its first byte.
@@ -37,10 +37,10 @@ class Framer:
         self._decode = decode
         self._buffer = bytearray()
         self.damaged = 0
-        """Bytes and packets thrown away."""
+        """Discarded bytes and packets."""
 
     def feed(self, content: bytes) -> Iterator[object]:
-        """Take bytes, and yield the messages that they complete."""
+        """Process bytes, and yield the messages that they complete."""
         buffer = self._buffer
         buffer += content
         while (start := _next_mark(buffer)) is not None:
@@ -51,7 +51,7 @@ class Framer:
             if length is None or len(buffer) < length:
                 break
             if _message_id(buffer) not in self._wanted:
-                # Only a packet is followed by a packet; without decoding that must do.
+                # Only a packet is followed by a packet: a sufficient test without decoding.
                 whole = len(buffer) == length or buffer[length] in _HEADER
                 self.damaged += not whole
                 del buffer[: length if whole else 1]
@@ -65,7 +65,7 @@ class Framer:
             buffer.clear()
 
     def flush(self) -> None:
-        """Forget the beginning of a packet: the next bytes come from elsewhere."""
+        """Forget the beginning of a packet: the next bytes are of another sender."""
         self._buffer.clear()
 
 

@@ -1,4 +1,4 @@
-"""The link: one thread that owns the wire to one vehicle, listens, and sends our heartbeats."""
+"""Link to one vehicle: one thread that owns its wire, receives, and sends our heartbeats."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ Message: TypeAlias = Any
 """One of pymavlink's, which has no types."""
 
 _TICK = 0.05
-"""Seconds at most between two turns of the thread."""
+"""Longest time between two turns of the thread, seconds."""
 _HEARTBEAT = 1.0
 _PEERS = 16
 """Senders remembered at most on one port."""
@@ -55,20 +55,20 @@ class LinkCounts:
     """Counters of the wire."""
 
     received: int = 0
-    """Packets of the vehicle that were of use."""
+    """Packets of the vehicle that were decoded."""
     damaged: int = 0
-    """Bytes and packets that made no sense, or whose signature did not."""
+    """Invalid bytes and packets, and those with an invalid signature."""
     strangers: int = 0
     """Packets of other systems and components."""
     sent: int = 0
 
 
 class MavlinkLink:
-    """Receives from one vehicle, and sends; `send` may be called from any thread.
+    """Link to one vehicle; `send` may be called from any thread.
 
     `on_message` and `on_turn` are called in the link's thread, the latter 20 times a second, and
-    `healthy` before each heartbeat: what does not know how the system fares must not say that it
-    lives. Everything heard before `adopt` counts as the vehicle's.
+    `healthy` before each heartbeat: no heartbeat without a working control loop. Every message
+    before `adopt` counts as the vehicle's.
     """
 
     def __init__(
@@ -120,7 +120,7 @@ class MavlinkLink:
         self._thread.start()
 
     def adopt(self, system: int, component: int) -> None:
-        """From now on only this system's component is the vehicle."""
+        """Accept only this system's component as the vehicle."""
         self.target = (system, component)
 
     def send(self, message: Message) -> None:
@@ -133,7 +133,7 @@ class MavlinkLink:
 
     @contextmanager
     def listen(self, *names: str) -> Iterator[queue.SimpleQueue[Message]]:
-        """A queue of the vehicle's messages of these names, for as long as it is needed."""
+        """Context manager: queue of the vehicle's messages of these names."""
         entry: tuple[frozenset[str], queue.SimpleQueue[Message]] = (
             frozenset(names),
             queue.SimpleQueue(),
@@ -145,7 +145,7 @@ class MavlinkLink:
             self._listeners = [other for other in self._listeners if other is not entry]
 
     def close(self) -> None:
-        """End the thread and let the wire go."""
+        """End the thread and close the wire."""
         self._closing.set()
         with contextlib.suppress(OSError):
             self._rope.send(b"!")

@@ -1,4 +1,4 @@
-"""The messages that we live by, asked for until they come: at first, and after a restart."""
+"""Requests of the required messages, repeated until they arrive: at first, and after a restart."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _PAUSE = 5.0
 
 
 class RateKeeper:
-    """Asks for one message after the other; an autopilot takes one such order at a time."""
+    """Requester of one message after the other; an autopilot accepts one such command at a time."""
 
     def __init__(self, autopilot: Autopilot, commander: Commander) -> None:
         self._autopilot = autopilot
@@ -29,7 +29,7 @@ class RateKeeper:
         self._waiting = False
 
     def turn(self, telemetry: Telemetry, now: float) -> None:
-        """Ask for the next message that is missing; called by the link's thread."""
+        """Request the next missing message; called by the link's thread."""
         if telemetry.reboots != self._reboots:
             self._reboots = telemetry.reboots
             self._asked_at = dict.fromkeys(self._asked_at, -math.inf)

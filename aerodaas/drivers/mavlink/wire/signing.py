@@ -1,4 +1,4 @@
-"""MAVLink 2 signing: the key, which is never shown, and the accepted packets."""
+"""MAVLink 2 signing: the key, which is never printed, and the accepted packets."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _EPOCH = 1_420_070_400
 _TICKS = 100_000
 """Ticks of a timestamp in a second."""
 _RADIO_STATUS = 109
-"""Radios put this into the stream themselves, and have no key."""
+"""Messages that radios insert themselves, without a key."""
 
 
 def load_key(settings: MavlinkSettings, name: str) -> bytes | None:
@@ -56,12 +56,12 @@ def _key(content: bytes, place: str) -> bytes:
 
 
 def sign_with(mav: Any, key: bytes) -> None:  # noqa: ANN401 - pymavlink has no types
-    """Have `mav` sign its packets, and refuse unsigned ones."""
+    """Make `mav` sign its packets and refuse unsigned ones."""
     signing = mav.signing
     signing.secret_key = key
     signing.sign_outgoing = True
     signing.timestamp = int((time.time() - _EPOCH) * _TICKS)
-    # Another run within the same clock tick would be taken for a replay.
+    # Another run within the same clock tick would be rejected as a replay.
     signing.link_id = os.getpid() % 256
     signing.allow_unsigned_callback = _let_through
 
@@ -71,10 +71,10 @@ def _let_through(_: object, message_id: int) -> bool:
 
 
 def signature_fits(key: bytes, frame: bytearray) -> bool:
-    """Check a packet's signature before its timestamp is believed.
+    """Check a packet's signature before its timestamp is used.
 
-    pymavlink takes note of the timestamp first, so that one forged packet from the future would
-    lock the true sender out. An unsigned packet passes here and is judged by `decode`.
+    pymavlink stores the timestamp first, so that one forged packet from the future would lock the
+    true sender out. An unsigned packet passes here and is judged by `decode`.
     """
     if not signed(frame):
         return True

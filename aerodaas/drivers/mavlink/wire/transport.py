@@ -1,4 +1,4 @@
-"""The wires: UDP, TCP and serial, none of which ever blocks for long."""
+"""Transports: UDP, TCP and serial, none of which blocks for long."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from aerodaas.types.errors import ConfigError, VehicleError
 __all__ = ["Peer", "Transport", "open_transport"]
 
 Peer = tuple[str, int] | None
-"""Address of a sender; None where a wire has one other end only."""
+"""Address of a sender; None for a wire with a single peer."""
 
 _LARGEST = 65535
 _AT_ONCE = 256
-"""Datagrams taken before others get their turn."""
+"""Most datagrams received in one turn."""
 _RETRY = 1.0
 """Seconds between attempts to reach a TCP server or a serial device again."""
 
 
 class Transport(Protocol):
-    """One wire."""
+    """One transport."""
 
     def fileno(self) -> int:
         """File descriptor to wait for; -1 while the wire is cut."""
@@ -37,18 +37,18 @@ class Transport(Protocol):
         ...
 
     def send(self, packet: bytes, peers: tuple[Peer, ...]) -> None:
-        """Send to `peers`, where the wire has several other ends; drops unsendable packets."""
+        """Send to `peers`, if the wire has several; drops unsendable packets."""
         ...
 
     def close(self) -> None:
-        """Cut the wire."""
+        """Close the wire."""
         ...
 
 
 def open_transport(url: str, name: str) -> Transport:
     """Open `url` for robot `name`.
 
-    Raises ConfigError for an address that is none, VehicleError for one that cannot be opened.
+    Raises ConfigError for an invalid address, VehicleError for one that cannot be opened.
     """
     kind, _, rest = url.partition(":")
     host, _, number = rest.rpartition(":")
@@ -93,7 +93,7 @@ class _Udp:
             if listens:
                 self._socket.bind((host, port))
             else:
-                # Packets from elsewhere are none of ours, which the system sees to.
+                # The system filters packets of other senders.
                 self._socket.connect((host, port))
         except BaseException:
             self._socket.close()
@@ -108,7 +108,7 @@ class _Udp:
             try:
                 content, sender = self._socket.recvfrom(_LARGEST)
             except ConnectionError:
-                # The system reports here that an earlier datagram found no socket at its port.
+                # The system reports here that an earlier datagram reached no socket.
                 continue
             except OSError:
                 break
