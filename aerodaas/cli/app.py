@@ -21,7 +21,7 @@ from aerodaas.types.errors import AeroDaaSError, GraphError, InvalidWaypointErro
 __all__ = ["app", "main", "run_typer"]
 
 _CAUSED_BY_A_LINE = (GraphError, InvalidWaypointError, UnknownIdError)
-"""Errors of which the application's own line is the place."""
+"""Errors reported with the application's own line."""
 
 app = typer.Typer(
     no_args_is_help=True,

@@ -15,7 +15,7 @@ __all__ = ["run_application", "speed_option"]
 def run_application(application: Path, words: list[str], options: RunOptions) -> None:
     """Run `application` with the arguments `words`, as Python itself would.
 
-    Raises ConfigError if there is no such file, and whatever the application raises.
+    Raises ConfigError if there is no such file, and the application's own exceptions.
     """
     if not application.is_file():
         raise ConfigError(f"there is no application {application}")

@@ -1,4 +1,4 @@
-"""The tasks of a recorded flight: when each came, where it ran, how it ended."""
+"""Tasks of a recorded flight: arrival, place of execution, and outcome."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ class FlownTask:
     source: str
     arrival: int
     number: int
-    """Of its arrival: the tasks of one frame arrive at one moment, but in an order."""
+    """Number of its arrival: the tasks of one frame arrive at the same time, but in order."""
     reserve: int
     began: int | None = None
     place: TaskPlace = TaskPlace.NOWHERE
-    """Where its execution began."""
+    """Place where its execution began."""
     ended: int = 0
     outcome: TaskOutcome | None = None
     """None if the flight was over before."""
@@ -48,12 +48,12 @@ class FlownTask:
 
     @property
     def took(self) -> int | None:
-        """How long its execution took, if an answer came."""
+        """Duration of its execution, if answered."""
         answered = self.outcome in _ANSWERED and self.began is not None
         return self.ended - (self.began or 0) if answered else None
 
     def note(self, record: dict[str, Any]) -> None:
-        """Take note of a recorded decision or of the end."""
+        """Update by a recorded decision or outcome."""
         action = record["action"]
         if action in {"edge", "cloud"}:
             self.began, self.place, self.why = record["stamp"], TaskPlace(action), record["reason"]
@@ -69,7 +69,7 @@ class FlownTask:
 
 @dataclass(frozen=True)
 class Flown:
-    """A recording's tasks, as its analytics scheduler decided on them."""
+    """Tasks of a recording, with the decisions of its analytics scheduler."""
 
     name: str
     tasks: list[FlownTask]

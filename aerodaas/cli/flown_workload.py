@@ -1,4 +1,4 @@
-"""A recorded flight as a workload for the lab: its tasks as they came, its times as observed."""
+"""Workload for the lab from a recorded flight: its arrivals and the observed times."""
 
 from __future__ import annotations
 
@@ -32,9 +32,9 @@ def flown_workload(flown: Flown) -> Workload:
 
 
 def flown_trace(flown: Flown, tasks: list[Task]) -> Trace:
-    """A flight's trace, in the form of the lab's.
+    """Trace of a flight, in the lab's format.
 
-    `tasks` are those of `flown_workload`. So one and the same code judges flight and lab.
+    `tasks` are those of `flown_workload`. So the same code evaluates flight and lab.
     """
     trace = Trace(end=max(one.ended for one in flown.tasks))
     for task, one in zip(tasks, flown.tasks, strict=True):

@@ -59,7 +59,7 @@ def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> 
         return f"{text}: there is no such setting{whose}{near(str(place[-1]), known)}"
     value = problem["input"]
     number = value is None or isinstance(value, bool | int | float)
-    # A word may be shown, but no address, which may hold a password, and no secret.
+    # A word may be printed, but no address, which may hold a password, and no secret.
     word = isinstance(value, str) and _WORD.fullmatch(value) and _SECRET not in text
     shown = repr(value) if number or word else ""
     if problem["type"] == "missing" or not shown:
@@ -68,7 +68,7 @@ def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> 
 
 
 def _whose(content: object, place: Sequence[int | str]) -> str:
-    """The ids along `place`, as a number in a list says little: ` (of drone, cam)`."""
+    """The ids along `place`, which are clearer than list indices: ` (of drone, cam)`."""
     found = []
     for part in place:
         try:

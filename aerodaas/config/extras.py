@@ -1,4 +1,4 @@
-"""Parts of the project that need packages which many never use: the extras of its distribution."""
+"""Extras of the distribution: optional packages, and errors that name them."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def require_extra(extra: str, purpose: str) -> None:
 
     Args:
         extra: `plots`, `remote`, `ros` or `routing`.
-        purpose: What needs it, as the subject of the error's sentence, in the singular.
+        purpose: The feature, as the subject of the error's sentence, in the singular.
 
     Raises:
         ConfigError: If a package is missing; says how to install it.

@@ -1,4 +1,4 @@
-"""Settings laid over an environment file: `camera.rate=5`, `simulation.seed=3`."""
+"""Overrides of an environment file's settings: `camera.rate=5`, `simulation.seed=3`."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def overridden(config: EnvironmentConfig, settings: Mapping[str, Any]) -> Enviro
     """Return `config` with `settings` laid over it.
 
     The part before the first dot is the id of a robot, a sensor (or `robot/sensor`) or a compute
-    resource, or a section of the file such as `simulation`. What bears an id that others bear, too,
-    goes by `robots/…`, `sensors/…` or `compute/…`. Raises ConfigError for an unknown setting,
+    resource, or a section of the file such as `simulation`. Parts with ambiguous ids are named
+    `robots/…`, `sensors/…` or `compute/…`. Raises ConfigError for an unknown setting,
     UnknownIdError for an unknown id and AmbiguousIdError for one that fits several.
     """
     if not settings:
@@ -45,8 +45,8 @@ def overridden(config: EnvironmentConfig, settings: Mapping[str, Any]) -> Enviro
 def located(config: EnvironmentConfig, folder: Path) -> EnvironmentConfig:
     """Return `config` with the relative paths in its settings made absolute.
 
-    What lies in `folder`, or else in the working directory, is meant; a path that leads nowhere
-    stays as it is. Actors have other working directories than the application.
+    Paths are relative to `folder`, or else to the working directory; a path to no file stays as it
+    is. Actors have other working directories than the application.
     """
     content = config.model_dump(by_alias=True)
     places: list[dict[str, Any]] = [*content["robots"], *content["sensors"]]

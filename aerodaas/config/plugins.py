@@ -81,7 +81,7 @@ def plugin_names(kind: PluginKind) -> list[str]:
 
 
 def require_plugin(kind: PluginKind, name: str) -> None:
-    """Import nothing, but raise UnknownIdError if nothing is called `name`."""
+    """Raise UnknownIdError if no plug-in is called `name`; imports nothing."""
     _target(kind, name)
 
 
@@ -114,7 +114,7 @@ def main_name(namespace: Mapping[str, Any]) -> str | None:
 
 
 def _imported(name: str) -> ModuleType:
-    # Imported once more, the application's own file would start its mission once more.
+    # Imported again, the application's own file would start its mission again.
     main = sys.modules.get("__main__")
     if main is not None and name == main_name(vars(main)):
         return main

@@ -65,7 +65,7 @@ class Environment(PaperNames, IEnvironment):
         self.run: Run | None = None
         self._flights = 0
         self._flown = 0
-        """How much of the graph's navigation the flights that have ended were given."""
+        """Number of the graph's navigation edges that went to flights that have ended."""
         self._robots = {robot.id: Robot(self, robot) for robot in self.config.robots}
         self._trajectory: TrajectoryScheduler | None = None
         self._dispatch_with: AnalyticsScheduler | None = None
@@ -185,7 +185,7 @@ class Environment(PaperNames, IEnvironment):
     def set_trajectory_scheduler(self, scheduler: INavigate) -> None:
         """Plug in the trajectory scheduler; raises ConfigError if it is none.
 
-        In flight, all that is queued is planned anew by it.
+        In flight, the whole queue is planned again by it.
         """
         if not isinstance(scheduler, TrajectoryScheduler):
             kind = type(scheduler).__name__
@@ -259,7 +259,7 @@ class Environment(PaperNames, IEnvironment):
             self.get_robot_by_id(entry.robot)
         flying = list(dict.fromkeys(edge.robot for edge in self.graph.navigation))
         if not self.graph.flying:
-            # One that is called for no robot may yet be meant for the only one that will fly.
+            # Without a robot's name it may be for the only robot that will fly.
             if len(flying) > 1:
                 _addressee(entry, flying)
             return False
@@ -321,10 +321,10 @@ class Environment(PaperNames, IEnvironment):
         return self.run
 
     def launch_again(self) -> Run:
-        """Start the first mission, or once that has ended the next one; else the one that flies.
+        """Start the first mission, or the next one after its end; returns a running one.
 
-        The next mission flies what was given to it since the last one ended, and the streams of
-        those before; where nothing was given, it flies the same again.
+        The next mission flies the navigation given since the last one ended, and the streams of
+        those before; without new navigation, it flies the same again.
         """
         if self.run is None or not self.run.over:
             return self.launch()
@@ -351,9 +351,9 @@ class Environment(PaperNames, IEnvironment):
         self._flown = len(self.graph.navigation)
 
     def _place_entries(self) -> None:
-        """Assign the scheduler's navigation to the robots that it is meant for.
+        """Assign the scheduler's navigation to its robots.
 
-        Raises GraphError where several fly and nothing says for which.
+        Raises GraphError if several fly and none is named.
         """
         entries = self.trajectory_scheduler().entries
         named = [edge.robot for edge in self.graph.navigation]
@@ -425,8 +425,8 @@ class Robot(PaperNames, IRobot):
         """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
 
         With `wait=False`, return as soon as it flies; as a guest of another application, which
-        flies, at once. While the mission flies, this waits for it; after it has ended, it flies
-        anew: what was given to `navigate` since, or where that is nothing, the same again. Raises
+        flies, at once. While the mission flies, this waits for it; after its end, it flies again:
+        the navigation given to `navigate` since, or else the same. Raises
         the project's errors; whatever happens, the drone is landed and the recording closed first.
         """
         self._environment.start_mission(hook, wait=wait)
@@ -459,7 +459,7 @@ class Robot(PaperNames, IRobot):
 
 
 def _addressee(entry: NavigationEntry, flying: list[str]) -> str:
-    """The robot that navigation is meant for; raises GraphError where several could be."""
+    """The robot of navigation without a robot's name; raises GraphError if there are several."""
     if entry.robot is not None:
         return entry.robot
     if len(flying) != 1:

@@ -1,4 +1,4 @@
-"""Waypoints shared out over the robots of an environment."""
+"""Distribution of waypoints over the robots of an environment."""
 
 from __future__ import annotations
 

@@ -42,10 +42,10 @@ __all__ = ["Run"]
 _POLL_SECONDS = 0.1
 _BEAT_SECONDS = 1.0
 _LANDING_SECONDS = 60.0
-"""Wall time that an interrupted run gives its drones to land."""
+"""Wall seconds for the drones to land after an interruption."""
 _RECORDING = "flight.mcap"
 _STEPPED = {"simulated", "replayed"}
-"""Drivers of vehicles whose time is ours."""
+"""Drivers of vehicles whose time the run controls."""
 
 
 class Run:
@@ -69,7 +69,7 @@ class Run:
 
     @property
     def lockstep(self) -> bool:
-        """True where mission time moves as fast as the machine goes."""
+        """Whether mission time advances as fast as the machine can process it."""
         simulated = all(robot.driver in _STEPPED for robot in self.config.robots)
         wanted = self.options.lockstep
         if wanted and not simulated:
@@ -85,7 +85,7 @@ class Run:
         from aerodaas.recording.provenance import Provenance  # noqa: PLC0415
         from aerodaas.terminal.console import StartupView  # noqa: PLC0415
 
-        # Before Ray, which takes seconds: what is wrong with the graph should be told at once.
+        # Before Ray, which takes seconds to start: errors of the graph should appear at once.
         check_served("--live-address", self.options.live)
         check_served("--view-address", self.options.page)
         if self.options.page is not None:
@@ -186,7 +186,7 @@ class Run:
         return self.state
 
     def _keep_alive(self) -> None:
-        """Keep the drones informed that the application lives, even while it is busy."""
+        """Send the drones heartbeats, also while the application is busy."""
         while not self._finished.wait(_BEAT_SECONDS):
             # The thread that waits for the run meets the same error and handles it.
             with contextlib.suppress(AeroDaaSError):
@@ -200,7 +200,7 @@ class Run:
     def wait(self) -> None:
         """Watch until every mission has ended; raises the error that one ended with.
 
-        Ctrl-C lands the drones first; after a second one they land without us.
+        Ctrl-C lands the drones first; after a second one they land by themselves.
         """
         if self._finished.is_set():
             return
@@ -245,9 +245,9 @@ class Run:
         return plan
 
     def _application(self, *others: object) -> Application:
-        """Definitions of the application by now, those of `others` included.
+        """Present definitions of the application, those of `others` included.
 
-        Raises GraphError, by name, for what cannot be sent.
+        Raises GraphError, with the name, for an object that cannot be sent.
         """
         from aerodaas.actors.run.application import capture, require_sendable  # noqa: PLC0415
 
@@ -259,14 +259,14 @@ class Run:
         return application
 
     def _check_world(self) -> None:
-        """Raise ConfigError for a broken scenario here rather than in some actor."""
+        """Raise ConfigError for an invalid scenario here rather than in an actor."""
         from aerodaas.simulation.scenario import load_scenario  # noqa: PLC0415 - only here
 
         if any(robot.driver == "simulated" for robot in self.config.robots):
             load_scenario(self.config.simulation.world)
 
     def _timetables(self) -> dict[str, tuple[int, ...]]:
-        """When sources measure in a replay; none in any other flight."""
+        """Timetables of a replay's sources; empty in any other flight."""
         if self.options.replay is None:
             return {}
         from aerodaas.recording.replay.timetables import (  # noqa: PLC0415 - loads decoders
@@ -276,7 +276,7 @@ class Run:
         return read_timetables(self.options.replay)
 
     def _change_models(self) -> None:
-        """Give every detector the model that the command line asks for."""
+        """Set the command line's model in every detector."""
         from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415 - only here
 
         if self.options.model is not None:
@@ -312,7 +312,7 @@ class Run:
                 time.sleep(_POLL_SECONDS)
 
     def _land(self, reason: str) -> None:
-        """Have every drone land, and give it the time to do so."""
+        """Land every drone, and wait for a limited time."""
         assert self._flight is not None  # noqa: S101 - launched
         try:
             for robot in dict.fromkeys(edge.robot for edge in self.graph.navigation):

@@ -2,7 +2,7 @@
 
 A guest is an application like any other, whose author need not know of the owner. It
 is run up to its `start_mission()`, which returns at once; its dataflow then joins the owner's, and
-both fly as one run: one camera, one analytics scheduler that shares the compute out, one recording.
+both fly as one run: one camera, one analytics scheduler for the compute, one recording.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 __all__ = ["offer", "welcome"]
 
 _offered: ContextVar[list[Environment] | None] = ContextVar("offered", default=None)
-"""Where the guest that is being built puts its environment; None where none is."""
+"""Receiver of the environment of the guest under construction; None without one."""
 
 
 def offer(environment: Environment) -> bool:
-    """Take the environment of a guest that is ready; False where no guest is being built."""
+    """Receive the environment of a ready guest; False without a guest under construction."""
     offered = _offered.get()
     if offered is None:
         return False
@@ -45,7 +45,7 @@ def welcome(application: Path, host: Environment) -> None:
 
     Raises ConfigError if there is no such file or it never starts, UnknownIdError for a robot,
     sensor or compute resource that the host's environment lacks, GraphError if it would navigate,
-    and whatever the guest itself raises.
+    and the guest's own exceptions.
     """
     if not application.is_file():
         raise ConfigError(f"there is no application {application} to be a guest")
@@ -61,7 +61,7 @@ def welcome(application: Path, host: Environment) -> None:
 @contextmanager
 def _building(application: Path) -> Iterator[list[Environment]]:
     offered: list[Environment] = []
-    # The owner's overrides are meant for the owner's environment file.
+    # The owner's overrides are for the owner's environment file.
     options = replace(
         current_options.get(), application=application, environment=None, overrides={}, guests=()
     )

@@ -13,9 +13,9 @@ __all__ = ["TerminatedError", "raise_on_termination"]
 
 
 class TerminatedError(SystemExit):
-    """The process was asked to end: by a service manager, or by a terminal that was closed.
+    """Request to end the process, by a service manager or a closed terminal.
 
-    Its `code` is what a shell returns for a program that this signal ended.
+    Its `code` is a shell's exit code for a program that this signal ended.
     """
 
     def __init__(self, number: int) -> None:

@@ -48,13 +48,13 @@ class StartupView:
         self._stack.close()
 
     def step(self, text: str) -> None:
-        """Something has become ready, or is under way."""
+        """Show that a part is ready, or a step has begun."""
         if self._status is not None:
             self._status.update(text)
 
 
 class FlightView:
-    """Shows a flight as it goes on."""
+    """View of a flight in progress."""
 
     def __init__(self, options: RunOptions, config: EnvironmentConfig) -> None:
         self._title = options.application.stem if options.application else config.name
@@ -81,7 +81,7 @@ class FlightView:
             self._view.__exit__(kind, error, traceback)
 
     def update(self, state: FlightState) -> None:
-        """Show the flight as it is now."""
+        """Show the flight's present state."""
         if self._view is None:
             self._print_alerts(state)
             return
@@ -121,7 +121,7 @@ class FlightView:
         before, earlier = self._before
         if counts == earlier or now <= before:
             return
-        # Over the whole flight so far: in lockstep a short stretch of wall time says little.
+        # Over the whole flight so far: in lockstep short intervals of wall time vary much.
         self._rates = {stream: count / now for stream, count in counts.items()}
         self._before = now, counts
 
@@ -143,7 +143,7 @@ class FlightView:
 
 
 def _scheduler_text(state: FlightState) -> str:
-    """How the analytics scheduler fares; empty before it has decided anything."""
+    """Figures of the analytics scheduler; empty before its first decision."""
     report = state.reports.get("dispatcher")
     values = report.values if report is not None else {}
     ended = sum(values.get("outcomes", {}).values())

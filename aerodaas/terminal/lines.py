@@ -1,4 +1,4 @@
-"""The view for a log file or a pipe: one line now and then."""
+"""View for a log file or a pipe: one line every few seconds."""
 
 from __future__ import annotations
 

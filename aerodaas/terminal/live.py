@@ -28,7 +28,7 @@ _STEP = 0.1
 
 
 class MissionView:
-    """Shows snapshots of a mission as they come; as often as you like, it redraws sparingly.
+    """View of a mission's snapshots; it may be updated often and redraws at a limited rate.
 
     On a terminal it draws a panel in place; into a pipe or a file it prints one line for each
     robot every few seconds and whenever a mission's state changes.

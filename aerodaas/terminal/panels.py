@@ -1,4 +1,4 @@
-"""The parts of the terminal view, each a function from data to a renderable of rich's."""
+"""Parts of the terminal view, each a function from data to a renderable of rich."""
 
 from __future__ import annotations
 

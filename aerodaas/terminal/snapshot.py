@@ -30,7 +30,7 @@ class StreamSnapshot:
     """From capture to publishing, milliseconds of the host's clock."""
     p99_ms: float | None = None
     drops: int = 0
-    """Items that were overtaken by newer ones before they were read."""
+    """Items that newer ones replaced before they were read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +47,9 @@ class Snapshot:
     alerts: tuple[str, ...] = ()
     """One line each, newest last; the view shows the last few."""
     scheduler: str = ""
-    """How the analytics scheduler fares, one line; empty without one."""
+    """Figures of the analytics scheduler in one line; empty without one."""
     speed: float | None = None
-    """Mission seconds per wall second; None: worked out from the two times."""
+    """Mission seconds per wall second; None: computed from the two times."""
 
     @property
     def factor(self) -> float:

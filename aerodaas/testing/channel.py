@@ -1,4 +1,4 @@
-"""A radio link on loopback: packets that get lost, late, doubled or garbled, by seed."""
+"""Simulated radio link on loopback: lost, late, duplicated or garbled packets, by seed."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class Impairment:
     lateness: float = 1.0
     delay: float = 0.0
     jitter: float = 0.0
-    """Drawn evenly from 0 to this and added to `delay`; packets may overtake each other."""
+    """Uniform jitter from 0 to this, added to `delay`; packets may overtake each other."""
     garbled: float = 0.0
     """Share in which bytes are replaced or cut off."""
 
 
 class Channel:
-    """Holds packets back until they are due; `deliver` is called with each that arrives."""
+    """Queue of delayed packets; `deliver` is called with each that arrives."""
 
     def __init__(
         self,
@@ -35,7 +35,7 @@ class Channel:
         seed: str,
         deliver: Callable[[bytes, tuple[str, int]], None],
     ) -> None:
-        """Spoil packets by `impairment`, drawn from `seed`."""
+        """Impair packets by `impairment`, drawn from `seed`."""
         self.impairment = impairment
         """May be changed in between."""
         self._random = random.Random(seed)
@@ -45,7 +45,7 @@ class Channel:
         self.lost = 0
 
     def send(self, content: bytes, peer: tuple[str, int], now: float) -> None:
-        """Take a packet at `now` seconds; one without delay is delivered at once."""
+        """Queue a packet at `now` seconds; one without delay is delivered at once."""
         bad, draw = self.impairment, self._random.random
         if draw() < bad.loss:
             self.lost += 1

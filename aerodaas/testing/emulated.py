@@ -22,7 +22,7 @@ from aerodaas.types.vehicle import VehicleMode
 __all__ = ["LONGEST_LEAP", "EmulatedFlight", "EmulatedVehicle", "watch"]
 
 LONGEST_LEAP = 0.2
-"""Seconds of flight at most in one turn: a host that was held up does not catch up."""
+"""Longest step of one turn in seconds: a delayed host does not catch up."""
 
 
 class EmulatedFlight:
@@ -35,7 +35,7 @@ class EmulatedFlight:
         limits: FlightLimits,
         noise: SensorNoise | None = None,
     ) -> None:
-        """Fly `rotor`; the autopilot believes what `noise` leaves of the truth."""
+        """Fly `rotor`; the autopilot receives the true state with `noise`."""
         self._rotor = rotor
         self._exact = SensorNoise(0.0, "")
         self._autopilot = Autopilot(airframe, rotor, noise or self._exact, limits)
@@ -126,7 +126,7 @@ class EmulatedVehicle(ABC, Generic[FlightT]):
 
 
 def watch(vehicle: EmulatedVehicle[FlightT]) -> None:
-    """Print each change of its mode, and where it is then, until interrupted."""
+    """Print each change of its mode with its position, until interrupted."""
     mode = None
     while True:
         if vehicle.mode is not mode:

@@ -171,7 +171,7 @@ class MavlinkVehicle:
         time.sleep(0.02)
 
     def close(self) -> None:
-        """Disconnect; a vehicle that this driver flies is commanded to land."""
+        """Disconnect; a vehicle in the air that this driver flies is commanded to land."""
         link, self._link = self._link, None
         if link is None:
             return

@@ -71,7 +71,7 @@ class EmulatedTello(EmulatedVehicle[TelloFlight]):
         replies: Impairment | None = None,
         states: Impairment | None = None,
     ) -> None:
-        """Change how bad the air is from now on, for each that is given."""
+        """Change the given impairments of the radio link."""
         for channel, impairment in (
             (self._ears, commands),
             (self._replies, replies),
@@ -133,7 +133,7 @@ class EmulatedTello(EmulatedVehicle[TelloFlight]):
         return Outcome("error Motor stop") if hot and text == "takeoff" else None
 
     def _dismiss(self, now: float) -> None:
-        """A motion was cut short by another command."""
+        """Handle a motion that another command has interrupted."""
         if self._awaiting is not None:
             self._replies.send(b"error", self._awaiting, now)
             self._awaiting = None
