@@ -107,7 +107,9 @@ def environment(
         for number in range(drones)
     ]
     compute: list[dict[str, Any]] = [{"id": "edge", "kind": "edge"}]
-    compute += [{"id": "cloud", "kind": "cloud", "executors": 16}] if cloud else []
+    # Noise only grows by any compression.
+    far = {"id": "cloud", "kind": "cloud", "executors": 16, "compression": "none"}
+    compute += [far] if cloud else []
     return {
         "robots": robots,
         "compute": compute,

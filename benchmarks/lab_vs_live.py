@@ -69,6 +69,7 @@ def _environment(folder: Path, drones: int, profiles: list[Profile], scheduler: 
         }
         for profile in profiles
     }
+    cloud = {"id": "cloud", "kind": "cloud", "executors": 32, "compression": "none"}
     content = {
         "robots": [
             {
@@ -77,7 +78,7 @@ def _environment(folder: Path, drones: int, profiles: list[Profile], scheduler: 
                 "sensors": [{"id": f"camera{n}", **camera} for n in range(drones)],
             }
         ],
-        "compute": [{"id": "edge"}, {"id": "cloud", "kind": "cloud", "executors": 32}],
+        "compute": [{"id": "edge"}, cloud],
         "schedulers": {"analytics": scheduler, "tasks": tasks},
         "recording": {"images": "none"},
         "simulation": {"world": "empty"},

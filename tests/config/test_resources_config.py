@@ -31,6 +31,10 @@ def file(**sections: Any) -> dict[str, Any]:  # noqa: ANN401
         ({"runtime_env": {"a": {"packages": ["--index-url x"]}}}, "neither a requirement"),
         ({"runtime_env": {"a": {"image_uri": "x", "packages": ["y"]}}}, "its own packages"),
         ({"runtime_env": {"a": {"env_vars": {"RAY_X": "1"}}}}, "cannot be set"),
+        (
+            {"compute": [{"id": "far", "compression": "auto"}]},
+            "'jpeg', 'png' or 'none', not 'auto'",
+        ),
         ({"robots": [{"id": "drone", "edge": "fn"}], "compute": [FN]}, "no edge under compute"),
     ],
 )

@@ -131,7 +131,7 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
     environment = json.loads(json.dumps(ENVIRONMENT))
     rows = {**CAMERA, "driver": "orchard:Rows", "settings": {"rows": 4}}
     environment["robots"][0]["sensors"] = [rows]
-    environment["compute"].append({"id": "cloud", "kind": "cloud"})
+    environment["compute"].append({"id": "cloud", "kind": "cloud", "compression": "png"})
     write(folder, {"orchard.py": ORCHARD, "fruit.py": FRUIT}, environment)
     flown = fly(folder, "orchard.py", "--speed", "2")
     ended = {path.name for path in Path(folder).iterdir()}
