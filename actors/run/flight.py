@@ -92,6 +92,7 @@ class Flight:
         self.recording = recording.absolute() if recording and plan.recorded else None
         self._drones: dict[str, str] = {}
         self._members: dict[str, Member] = {}
+        """By name; replaced and never changed, because other threads iterate over it."""
         self._helpers: list[Any] = []
         """Actors without streams, to be killed at the end."""
         self._job = ray.get_runtime_context().get_job_id()
@@ -258,7 +259,8 @@ class Flight:
                 member.setup += nodes
         except BaseException:
             for name in set(self._members) - known:
-                ray.kill(self._members.pop(name).handle)
+                ray.kill(self._members[name].handle)
+            self._members = {name: one for name, one in self._members.items() if name in known}
             self._inform_reaper()
             raise
         for name, streams in change.acknowledging.items():
@@ -374,7 +376,7 @@ class Flight:
             remote = remote(concurrency_groups=groups)
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}
         made = remote(kind).options(**placed)
-        self._members[name] = Member(name, made.remote(*args), setup, restarts)
+        self._members = {**self._members, name: Member(name, made.remote(*args), setup, restarts)}
 
     def _options(self, name: str, place: Placement, *, restarts: int) -> dict[str, Any]:
         """Ray options of an actor; a detached one, to outlive the application, needs a name."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 
 import pytest
 from analyses import Above, Jitter, Ticker, Weave
@@ -86,6 +87,17 @@ def pending(env: Environment) -> list[str]:
     return [waypoint.id for waypoint in status.pending]
 
 
+@contextmanager
+def in_another_thread_meanwhile(env: Environment) -> Iterator[None]:
+    """Half of what a heartbeat does before the block, and the other half after it."""
+    flight = env.launch()._flight
+    assert flight is not None
+    members = iter(flight._members.values())
+    next(members)
+    yield
+    assert list(members)
+
+
 def places(*waypoints: Waypoint, unordered: bool = False) -> AeroNavigation:
     """Waypoints as navigation."""
     order = SchedulingType.UNORDERED if unordered else SchedulingType.ORDERED
@@ -97,7 +109,8 @@ def test_an_analysis_joins_a_flight(flyer: Flyer, speed: float | None) -> None:
     """It gets what is measured from then on, is recorded, triggers, and stops with the mission."""
     with flyer.flying(stay, speed=speed, lockstep=speed is None) as env:
         until(env, lambda: state_of(env) is MissionState.LOITERING)
-        heights = Jitter().analyse(odometry_of(env))
+        with in_another_thread_meanwhile(env):
+            heights = Jitter().analyse(odometry_of(env))
         assert heights.get_data(timeout=10.0) > 1.0
         again = Above(0.0, "again").trigger(drone_of(env).end_mission).analyse(odometry_of(env))
         assert again.name == "drone/again"
@@ -171,7 +184,10 @@ def test_what_cannot_join_is_refused_at_the_call(flyer: Flyer) -> None:
     with flyer.flying(stay, content, speed=5.0) as env:
         until(env, lambda: state_of(env) is MissionState.LOITERING)
         nodes = set(env.graph.nodes)
-        with pytest.raises(MissionError, match="the model is not there"):
+        with (
+            in_another_thread_meanwhile(env),
+            pytest.raises(MissionError, match="the model is not there"),
+        ):
             Unopened(0.0).analyse(odometry_of(env))
         with pytest.raises(GraphError, match="other cannot join a mission in flight"):
             env.get_robot_by_id("other").navigate(hop((1, 1)))
