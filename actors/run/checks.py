@@ -127,7 +127,8 @@ def _check_process(node: Node) -> None:
         inspect.signature(process).bind(None, None)
     except TypeError as error:
         raise GraphError(
-            f"{name} ({node.id}): process is called with an item and a context: {error}"
+            f"{name} ({node.id}): process must take an item and a context, as in "
+            f"process(self, item, context): {error}"
         ) from None
 
 

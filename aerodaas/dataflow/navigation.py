@@ -39,8 +39,13 @@ class AeroNavigation(AeroListData[NavigationItem]):
         """Hold `data`; `priority`, where given, overrides that of each item.
 
         Raises InvalidWaypointError for an item that is neither waypoint nor velocity command,
-        and for two waypoints of one id.
+        for two waypoints of one id, and for data in the place of the navigation's type.
         """
+        if not isinstance(navigation_type, str):
+            raise InvalidWaypointError(
+                "AeroNavigation's first argument is its NavigationType; "
+                "write AeroNavigation(data=[...])"
+            )
         self.navigation_type = NavigationType(navigation_type)
         self.scheduling_type = SchedulingType(scheduling_type)
         self.priority = priority

@@ -199,7 +199,7 @@ class Narrow(Analytics[float]):
     ("kind", "message"),
     [
         (Silent, r"Silent (drone/silent) has no process(self, item, context)"),
-        (Narrow, r"Narrow (drone/narrow): process is called with an item and a context"),
+        (Narrow, r"Narrow (drone/narrow): process must take an item and a context, as in process("),
     ],
 )
 def test_analyses_that_could_not_work(

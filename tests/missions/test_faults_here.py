@@ -161,7 +161,7 @@ def test_a_sensor_dies_in_lockstep(flyer: Flyer) -> None:
     def build(env: Environment) -> None:
         drone = env.get_robot_by_id("drone")
         drone.get_sensor_by_id("cam").get_data_stream()
-        drone.navigate(hop((4, 0), hover=60))
+        drone.navigate(hop((4, 0), hover=400))
 
     with flyer.flying(build, content) as env:
         run = env.launch()

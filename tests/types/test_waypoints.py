@@ -132,9 +132,11 @@ def test_a_priority_queue_keeps_whether_it_may_be_reordered() -> None:
 
 
 def test_what_is_no_navigation_is_refused() -> None:
-    """Neither other things nor two waypoints of one id."""
+    """Other things, data in the place of the type, two waypoints of one id."""
     with pytest.raises(InvalidWaypointError, match=r"takes waypoints and velocity commands"):
         AeroNavigation(NavigationType.DISTANCE_DRIVEN, [(1, 2, 3)])  # type: ignore[list-item]
+    with pytest.raises(InvalidWaypointError, match=r"write AeroNavigation\(data=\[...\]\)"):
+        AeroNavigation([Waypoint("a", 1, 2, 3)])  # type: ignore[arg-type]
     twice = [Waypoint("a", 1, 2, 3), Waypoint("a", 2, 2, 3)]
     with pytest.raises(InvalidWaypointError, match="two waypoints are called 'a'"):
         AeroNavigation(NavigationType.DISTANCE_DRIVEN, twice)
