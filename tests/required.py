@@ -22,7 +22,7 @@ import pytest
 __all__ = ["PEERS", "needs", "needs_peer", "needs_python", "needs_root", "peer"]
 
 _Report = TypeVar("_Report", pytest.TestReport, pytest.CollectReport)
-_TRAINING = ("test_company", "test_training_run", "test_pose_training")
+_TRAINING = ("test_data_parallel", "test_training_run", "test_pose_training")
 """Modules that import PyTorch, which flying does not."""
 
 

@@ -14,7 +14,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from tools.training.company import average, rank
+from tools.training.data_parallel import average_gradients, rank
 
 __all__ = ["Course", "Loss", "Progress", "learn"]
 
@@ -61,7 +61,7 @@ def learn(network: nn.Module, loss: Loss, course: Course, folder: Path) -> Itera
     """Train from where `folder` has a checkpoint, or from the start; yields as it goes.
 
     The mean of the weights is kept in `folder/weights.pt`, everything else beside it, so that a
-    training that was stopped goes on. Runs on a GPU if there is one. In a company of processes,
+    training that was stopped goes on. Runs on a GPU if there is one. In a group of processes,
     each calls this with the same arguments, and the first one keeps the checkpoint.
     """
     cv2.setNumThreads(0)
@@ -82,7 +82,7 @@ def learn(network: nn.Module, loss: Loss, course: Course, folder: Path) -> Itera
         total, parts = loss(step, rng, device)
         optimiser.zero_grad(set_to_none=True)
         total.backward()
-        average(network)
+        average_gradients(network)
         torch.nn.utils.clip_grad_norm_(network.parameters(), course.clip)
         optimiser.step()
         step += 1

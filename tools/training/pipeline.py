@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from tools.training.card import Card, write_card
-from tools.training.company import together
+from tools.training.data_parallel import in_processes
 from tools.training.dataset import Pictures, Sample
 from tools.training.evaluate import SMALLEST, milliseconds, rankings, sightings, thresholds
 from tools.training.export import NOMINAL_SCORE, SIZE, export_detector
@@ -54,7 +54,7 @@ class Places:
 
 def trained(places: Places, recipe: Recipe) -> Iterator[Progress]:
     """Train the detector, unless it has been for that many steps already."""
-    yield from together(recipe.processes, partial(_course, places, recipe))
+    yield from in_processes(recipe.processes, partial(_course, places, recipe))
 
 
 def _course(places: Places, recipe: Recipe) -> Iterator[Progress]:

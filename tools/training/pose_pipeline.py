@@ -9,7 +9,7 @@ import torch
 
 from aerodaas.analytics.people.crop import CUT
 from tools.training.card import Card, write_card
-from tools.training.company import together
+from tools.training.data_parallel import in_processes
 from tools.training.dataset import Pictures
 from tools.training.loop import Progress
 from tools.training.pipeline import Places, spent
@@ -23,7 +23,7 @@ __all__ = ["make_pose", "trained_pose"]
 
 def trained_pose(places: Places, recipe: PoseRecipe) -> Iterator[Progress]:
     """Train the network, unless it has been for that many steps already."""
-    yield from together(recipe.processes, partial(_course, places, recipe))
+    yield from in_processes(recipe.processes, partial(_course, places, recipe))
 
 
 def _course(places: Places, recipe: PoseRecipe) -> Iterator[Progress]:

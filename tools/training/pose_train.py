@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-from tools.training.company import share
+from tools.training.data_parallel import local_batch
 from tools.training.loop import Course, Progress, learn
 from tools.training.pose_cuts import Cut, People
 from tools.training.pose_network import STRIDE, Joints, places
@@ -45,7 +45,10 @@ def train_pose(people: People, recipe: PoseRecipe, folder: Path) -> Iterator[Pro
     def loss(
         _: int, rng: np.random.Generator, device: torch.device
     ) -> tuple[Tensor, tuple[float, ...]]:
-        cuts = [people.cut(int(rng.integers(len(people))), rng) for _ in range(share(recipe.batch))]
+        cuts = [
+            people.cut(int(rng.integers(len(people))), rng)
+            for _ in range(local_batch(recipe.batch))
+        ]
         pixels, points, sizes = (part.to(device) for part in _batch(cuts))
         with torch.autocast(device.type, torch.bfloat16):
             maps, found = network(pixels.contiguous(memory_format=torch.channels_last))

@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from tools.training.augment import augmented
-from tools.training.company import share
+from tools.training.data_parallel import local_batch
 from tools.training.dataset import Pictures, Sample
 from tools.training.loop import Course, Progress, learn
 from tools.training.loss import Targets, losses
@@ -45,7 +45,7 @@ def train(pictures: Pictures, recipe: Recipe, folder: Path) -> Iterator[Progress
     ) -> tuple[Tensor, tuple[float, ...]]:
         size, draw = _source(pictures, recipe, step, rng)
         mosaics = _MOSAICS if step < (1 - _WHOLE) * recipe.steps else 0.0
-        samples = [augmented(draw, size, rng, mosaics) for _ in range(share(recipe.batch))]
+        samples = [augmented(draw, size, rng, mosaics) for _ in range(local_batch(recipe.batch))]
         inputs, targets = _batch_of(samples, device)
         with torch.autocast(device.type, torch.bfloat16):
             outputs = network(inputs)

@@ -13,13 +13,13 @@ from typing import TypeVar
 import torch
 from torch import distributed, nn
 
-__all__ = ["average", "company", "rank", "share", "together"]
+__all__ = ["average_gradients", "in_processes", "local_batch", "process_group", "rank"]
 
 Step = TypeVar("Step")
 
 
 @contextmanager
-def company(size: int, work: Callable[[], object]) -> Iterator[None]:
+def process_group(size: int, work: Callable[[], object]) -> Iterator[None]:
     """Be the first of `size` processes (1 or more); the others call `work`, which is pickled.
 
     Threads are shared out evenly. Processes left when this ends are ended.
@@ -56,9 +56,9 @@ def _join(number: int, size: int, threads: int, meeting: str, work: Callable[[],
     work()
 
 
-def together(size: int, course: Callable[[], Iterator[Step]]) -> Iterator[Step]:
+def in_processes(size: int, course: Callable[[], Iterator[Step]]) -> Iterator[Step]:
     """Take all steps of `course`, which is pickled, in `size` processes; yields the first's."""
-    with company(size, partial(_walk, course)):
+    with process_group(size, partial(_walk, course)):
         yield from course()
 
 
@@ -68,17 +68,17 @@ def _walk(course: Callable[[], Iterator[object]]) -> None:
 
 
 def rank() -> int:
-    """Return this process's number in its company, from 0."""
+    """Return this process's number in its group, from 0."""
     return distributed.get_rank() if distributed.is_initialized() else 0
 
 
-def share(batch: int) -> int:
+def local_batch(batch: int) -> int:
     """How many of `batch` pictures are this process's own."""
     return batch // distributed.get_world_size() if distributed.is_initialized() else batch
 
 
-def average(network: nn.Module) -> None:
-    """Replace the gradients by their means over the company."""
+def average_gradients(network: nn.Module) -> None:
+    """Replace the gradients by their means over the group."""
     if not distributed.is_initialized():
         return
     gradients = [p.grad for p in network.parameters() if p.grad is not None]
