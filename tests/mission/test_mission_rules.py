@@ -215,13 +215,14 @@ def test_a_speed_or_a_yaw_rate_that_is_no_number_is_refused(bad: float) -> None:
         assert clamped.setpoint.yaw_rate == 0.0
 
 
-def test_the_fence_is_seen_from_as_far_as_full_speed_needs() -> None:
+@pytest.mark.parametrize("reaction", [0.5, 2.0])
+def test_the_fence_is_seen_from_as_far_as_full_speed_needs(reaction: float) -> None:
     """At full speed the drone brakes before a far wall, for it needs all of that way."""
     limits = LimitsConfig(
         max_speed=12.0,
         max_acceleration=2.0,
         max_range=500.0,
-        reaction_time=0.5,
+        reaction_time=reaction,
         geofence=GeofenceConfig(polygon=[(-100, -100), (100, -100), (100, 100), (-100, 100)]),
     )
     guard = SetpointFilter(limits, np.zeros(3))
