@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import pytest
 from flights import Flight, add, flight, live, navigation, square
@@ -49,7 +50,7 @@ def item(
     return StreamItem(stream, navigation(waypoints), SEEN, index)
 
 
-def velocity(**axes: float) -> AeroNavigation:
+def velocity(**axes: Any) -> AeroNavigation:  # noqa: ANN401
     """One velocity command."""
     return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [VelocityCommand(**axes)])
 
@@ -267,3 +268,15 @@ def test_navigation_is_refused_while_the_drone_leaves() -> None:
     assert one.tell(add(Waypoint("late", 1, 1, 1.5))) == refusal
     assert one.tell(item(Waypoint("late", 1, 1, 1.5))) == refusal
     assert one.tell(StreamItem("drone/follow", velocity(forward=1.0))) == refusal
+
+
+def test_a_stream_with_a_priority_leaves_the_order_as_it_came() -> None:
+    """Each item says whether it may be reordered; the priority alone is the stream's."""
+    one = flight(OpenStream("urgent", priority=0), scheduler=Backwards())
+    one.run_to(S.HOLDING)
+    for name, ordered in (("a", True), ("b", False)):
+        batch = [Waypoint(f"{name}{number}", 5, 5, 1.5, priority=9) for number in (1, 2)]
+        one.tell(StreamItem("urgent", navigation(batch, ordered=ordered)))
+    one.turn()
+    assert queued(one) == ["b2", "b1", "a1", "a2"]
+    assert {waypoint.priority for waypoint in one.status.pending} == {0}

@@ -11,7 +11,15 @@ from flights import PERIOD, KinematicVehicle, add, flight, live, square
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig, MissionConfig
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.mission.commands import End, Pause, Resume, ReturnHome, StreamItem
+from aerodaas.mission.commands import (
+    Answer,
+    End,
+    Pause,
+    Resume,
+    ReturnHome,
+    Start,
+    StreamItem,
+)
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.types.status import MissionState as S
 from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
@@ -329,3 +337,99 @@ def test_a_way_home_that_is_walled_off_ends_in_a_landing() -> None:
     one.expect(S.LANDED)
     assert one.status.reason == "no way inside the geofence leads home"
     assert np.linalg.norm(one.vehicle.position[:2] - [10.0, 0.0]) < 1.5
+
+
+def test_what_cannot_be_done_now_is_answered_with_why() -> None:
+    """Each refusal is a plain no with a sentence."""
+    one = flight(add(Waypoint("far", 20, 0, 1.5)))
+
+    def refused(text: str) -> Answer:
+        return Answer(accepted=False, text=text)
+
+    assert one.tell(Start()) == refused("the mission has already been started")
+    assert one.tell(Resume()) == refused("the mission is not paused")
+    one.run(10.0)
+    assert one.tell(Pause()) == one.tell(Resume()) == Answer(accepted=True)
+    assert one.tell(Resume()) == refused("the mission is not paused")
+    assert one.tell(ReturnHome()) == Answer(accepted=True)
+    assert one.tell(Pause()) == refused("a drone that is returning goes on")
+    assert one.tell(End("now")) == Answer(accepted=True)
+    assert one.tell(Pause()) == refused("a drone that is landing goes on")
+    assert one.tell(End()) == Answer(accepted=True, text="the drone is already landing")
+    assert one.tell(ReturnHome()) == refused("the drone is already landing")
+    one.run()
+    assert one.tell(End()) == refused("the mission is over: landed")
+    assert one.status.reason == "now"
+
+
+def test_an_alert_bears_the_time_at_which_its_fault_was_found() -> None:
+    """Of each kind; the same fault a turn later is none."""
+    one = flight(add(Waypoint("far", 20, 0, 1.5)))
+    one.run(10.0)
+    for number, (name, value) in enumerate((("faults", ("GPS: no fix",)), ("lost", True)), 1):
+        setattr(one.vehicle, name, value)
+        found = one.now
+        one.run(1.0)
+        assert len(one.mission.alerts) == number
+        assert one.mission.alerts[-1].header.stamp == found
+
+
+@pytest.mark.parametrize(("up", "ended"), [(1.2, True), (1.19, False)])
+def test_a_take_off_has_ended_within_the_radius_of_arrival(up: float, ended: bool) -> None:  # noqa: FBT001
+    """At its edge it has, and not before the vehicle says that it has."""
+    limits = LimitsConfig(takeoff_height=1.5, arrival_radius=0.3)
+    one = flight(add(Waypoint("far", 20, 0, 1.5)), limits=limits)
+    one.run_to(S.TAKING_OFF)
+    one.vehicle.position[2] = up
+    one.turn()
+    one.expect(S.TAKING_OFF)
+    one.vehicle.position[2], one.vehicle.mode = up, VehicleMode.HOLDING
+    one.turn()
+    one.expect(S.ENROUTE if ended else S.TAKING_OFF)
+
+
+class Deaf(KinematicVehicle):
+    """Misses the first order to take off."""
+
+    heights: tuple[float, ...] = ()
+
+    def take_off(self, height: float) -> None:
+        """Hear the second one."""
+        self.heights = (*self.heights, height)
+        if len(self.heights) > 1:
+            super().take_off(height)
+
+
+def test_a_take_off_that_was_not_heard_is_ordered_again_to_the_same_height() -> None:
+    """A second later, and the flight goes on."""
+    one = flight(add(Waypoint("far", 5, 0, 3.0)), vehicle=Deaf(), limits=LimitsConfig())
+    one.run()
+    one.expect(S.LANDED)
+    assert isinstance(one.vehicle, Deaf)
+    assert one.vehicle.heights == (1.5, 1.5)
+    assert one.status.visited == ("far",)
+
+
+def test_a_place_is_asked_for_at_the_cruise_speed_or_its_own() -> None:
+    """So it stands in the recording, before any limit."""
+    limits = LimitsConfig(cruise_speed=2.0)
+    slow = Waypoint("slow", 9, 0, 1.5, speed=0.7)
+    one = flight(add(Waypoint("far", 5, 0, 1.5), slow), limits=limits)
+    speeds = set[float | None]()
+    while one.mission.state is not S.RETURNING:
+        asked = one.turn().asked
+        if isinstance(asked, PositionSetpoint) and one.mission.state is S.ENROUTE:
+            speeds.add(asked.speed)
+    assert speeds == {2.0, 0.7}
+
+
+def test_a_drone_over_home_need_not_stand_still_in_height_to_land() -> None:
+    """On its way up it turns round at once."""
+    one = flight(add(Waypoint("far", 20, 0, 9.0)), limits=LimitsConfig(takeoff_height=9.0))
+    one.run_to(S.TAKING_OFF)
+    one.run(3.0)
+    assert one.vehicle.velocity[2] > 0.9
+    one.tell(ReturnHome("enough"))
+    one.turn()
+    one.expect(S.LANDING)
+    assert one.status.reason == "enough"

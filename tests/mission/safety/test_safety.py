@@ -266,7 +266,8 @@ def clamped_velocity(
     """What is sent of a velocity, where the acceleration is no matter."""
     sent = guard.clamp(VelocitySetpoint(np.array(asked)), odometry, 10.0, neighbours or [])
     assert isinstance(sent.setpoint, VelocitySetpoint)
-    return sent.setpoint.velocity.tolist()
+    velocity: list[float] = sent.setpoint.velocity.tolist()
+    return velocity
 
 
 @pytest.mark.parametrize(("reaction", "acceleration"), [(0.3, 3.0), (1.0, 1.0)])
