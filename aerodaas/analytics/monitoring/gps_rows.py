@@ -120,6 +120,8 @@ def _json(text: str, name: str) -> Iterator[Mapping[str, object] | None]:
         content = json.loads(text)
     except json.JSONDecodeError as error:
         raise SourceError(f"{name} is not JSON: {error}") from None
+    except RecursionError:
+        raise SourceError(f"{name} is no GPS track: its JSON is nested too deeply") from None
     for row in content if isinstance(content, list) else [content]:
         yield {str(key): row[key] for key in row} if isinstance(row, dict) else None
 
@@ -155,8 +157,9 @@ def _fix(row: Mapping[str, object]) -> TimedFix | None:
     told = values.get("time")
     if values.get("date") and told is not None:
         told = f"{values['date']} {told}"
-    time = None if told in {None, ""} else _time(told)
-    if time is None and told not in {None, ""}:
+    untimed = told is None or told == ""
+    time = None if untimed else _time(told)
+    if time is None and not untimed:
         return None
     fix = GpsFix(
         latitude,
