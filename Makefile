@@ -53,7 +53,7 @@ lock: $(VENV)/.installed-dev
 
 # Known holes of what is locked; asks a service on the network.
 audit: $(VENV)/.installed-dev
-	$(BIN)/uv tool run pip-audit --requirement requirements-dev.txt --disable-pip
+	$(BIN)/uv tool run pip-audit --requirement requirements-dev.txt --disable-pip --strict
 
 licences: $(VENV)/.installed-dev
 	$(BIN)/python -m tools.licences
