@@ -13,7 +13,7 @@ from typing import Literal
 __all__ = ["Finding", "Kind", "by_exception", "by_fault"]
 
 Kind = Literal["exception", "hang", "memory", "crash"]
-_HARNESS = str(Path(__file__).parent / "worker.py")
+_HARNESS = {str(Path(__file__).parent / name) for name in ("worker.py", "coverage.py")}
 _FRAME = re.compile(r'File "(.+?)", line (\d+) in (\S+)')
 _REPEATED = 3
 """Times that a line is in a traceback from which on it is part of a recursion."""
@@ -62,4 +62,4 @@ def by_fault(kind: Kind, title: str, log: str, data: bytes) -> Finding:
 
 
 def _relevant(frame: traceback.FrameSummary) -> bool:
-    return frame.filename != _HARNESS
+    return frame.filename not in _HARNESS

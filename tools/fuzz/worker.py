@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from tools.fuzz.blackbox import BlackBox
+from tools.fuzz.coverage import Coverage
 from tools.fuzz.finding import Finding, by_exception
 from tools.fuzz.limits import Alarm, Limits, TooLongError, limit_memory, memory
 from tools.fuzz.minimising import smaller
@@ -21,6 +22,8 @@ from tools.fuzz.target import Target, load_target
 
 __all__ = ["Done", "Job", "work"]
 
+_LARGEST_KEPT, _MOST_KEPT = 2**14, 1000
+"""Bytes and number of inputs that are mutated further because they reached something new."""
 _WARM_UP = 50
 """Inputs after which memory is measured for the first time."""
 
@@ -72,7 +75,9 @@ class _Worker:
         self._box = box
         self._connection = connection
         self._pool = target.pool()
+        self._given = len(self._pool)
         self._alarm = Alarm(job.limits)
+        self._coverage = Coverage()
         self._number = job.first
         self._known: set[str] = set()
         self._in_thread: list[BaseException] = []
@@ -83,13 +88,15 @@ class _Worker:
         ground = 0
         for index, data in enumerate(self._inputs()):
             finding = self._attempt(data)
+            if finding is None and self._coverage.grew:
+                self._keep(data)
             if finding is not None and finding.kind == "hang":
                 finding = self._attempt(data)  # a busy machine is no hang
             if finding is not None and finding.signature not in self._known:
                 self._known.add(finding.signature)
                 self._connection.send(smaller(finding, self._attempt))
             self._number += 1
-            if index == min(_WARM_UP, len(self._pool)):
+            if index == min(_WARM_UP, self._given):
                 ground = memory()
             if finding is not None and finding.kind == "memory":
                 break  # what is left of this process has too little to go on
@@ -106,8 +113,8 @@ class _Worker:
             yield self._input(self._number)
 
     def _input(self, number: int) -> bytes:
-        """Each of the pool as it is, then mutations of them; the same for the same seed."""
-        if number < len(self._pool):
+        """Each that is given as it is, then mutations; the same for the same seed."""
+        if number < self._given:
             return self._pool[number]
         rng = random.Random(f"{self._job.seed}/{number}")
         data = rng.choice(self._pool) if self._pool else b""
@@ -117,12 +124,18 @@ class _Worker:
             data = self._target.mutate(data, rng)
         return mutated(data, self._pool, rng) if rng.random() < 0.5 else data  # noqa: PLR2004
 
+    def _keep(self, data: bytes) -> None:
+        """Mutate this input further, too."""
+        known = self._number < self._given or len(data) > _LARGEST_KEPT
+        if not known and len(self._pool) < self._given + _MOST_KEPT:
+            self._pool.append(data)
+
     def _attempt(self, data: bytes) -> Finding | None:
         """Run one input; what escapes from the target, or from a thread of its own."""
         self._box.record(self._number, data)
         self._in_thread.clear()
         try:
-            with self._alarm.set():
+            with self._alarm.set(), self._coverage.watch():
                 self._target.run(data)
         except TooLongError as error:
             return by_exception("hang", error, data)

@@ -137,8 +137,17 @@ def _csv(text: str, name: str) -> Iterator[Mapping[str, object] | None]:
             "file with columns such as time,lat,lon,elevation"
         )
     body = "\n".join(line for line in lines[lines.index(header) + 1 :] if line[0] != "#")
-    for cells in csv.reader(io.StringIO(body.replace("\0", "")), delimiter=delimiter):
-        yield dict(zip(names, cells, strict=False)) if len(cells) >= len(names) - 1 else None
+    reader = csv.reader(io.StringIO(body.replace("\0", "")), delimiter=delimiter)
+    while True:
+        try:
+            cells = next(reader)
+        except StopIteration:  # noqa: PERF203 - reading goes on after an error
+            return
+        except csv.Error:
+            # A quote that is never closed would take in the rest; reading goes on after it.
+            yield None
+        else:
+            yield dict(zip(names, cells, strict=False)) if len(cells) >= len(names) - 1 else None
 
 
 def _canonical(column: str) -> str:
