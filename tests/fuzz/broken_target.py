@@ -56,7 +56,7 @@ def _stuck(_: bytes) -> None:
 def _allocate(_: bytes) -> None:
     kept = []
     while True:
-        kept.append(bytearray(2**24))
+        kept.append(bytearray(2**22))
 
 
 def _segfault(_: bytes) -> None:

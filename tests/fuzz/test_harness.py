@@ -8,7 +8,7 @@ from tools.fuzz.campaign import Result, fuzz, replay
 from tools.fuzz.limits import Limits
 
 _TARGET = "tests.fuzz.broken_target"
-_LIMITS = Limits(seconds=0.3, wall=0.6, memory=2**28)
+_LIMITS = Limits(seconds=0.5, wall=1.5, memory=2**26)
 
 
 @pytest.fixture(scope="module")

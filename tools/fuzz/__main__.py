@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from aerodaas.cli.app import run_typer
-from tools.fuzz.campaign import Result, fuzz
+from tools.fuzz.campaign import Result, fuzz, replay
 from tools.fuzz.limits import Limits
 from tools.fuzz.target import CORPUS, load_target, target_names
 
@@ -31,6 +31,9 @@ def main(
     jobs: Annotated[int, typer.Option(help="Processes at once.", min=1)] = 1,
     limit: Annotated[float, typer.Option(help="Processor's seconds of one input.")] = 2.0,
     memory: Annotated[int, typer.Option(help="MiB of one input.")] = 512,
+    replay_: Annotated[
+        list[Path] | None, typer.Option("--replay", help="Run this input as it is; repeatable.")
+    ] = None,
     list_: Annotated[bool, typer.Option("--list", help="Name the targets.")] = False,
     output: Annotated[
         Path, typer.Option(help="Folder of the findings, one below it for each target.")
@@ -55,13 +58,18 @@ def main(
         inputs = _DEFAULT
     summary = {}
     for name in names:
+        limits = Limits(limit, 5 * limit, memory * 2**20)
+        if replay_:
+            result = replay(name, [path.read_bytes() for path in replay_], limits)
+            summary[name] = _report(result, output / name)
+            continue
         result = fuzz(
             name,
             inputs=inputs,
             seconds=seconds,
             seed=seed,
             jobs=jobs,
-            limits=Limits(limit, 5 * limit, memory * 2**20),
+            limits=limits,
             progress=_Line(),
         )
         summary[name] = _report(result, output / name)

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 
 from tools.fuzz.blackbox import BlackBox
@@ -62,7 +63,8 @@ def fuzz(
     Args:
         target: Its name.
         inputs: How many inputs, all workers together.
-        seconds: How long; whatever comes first ends it.
+        seconds: How long; seeds and corpus are run even if that takes longer. Whatever comes first
+            ends it.
         seed: The same one makes the same inputs with the same number of jobs.
         jobs: Workers at once.
         limits: Of one input.
@@ -130,7 +132,7 @@ class _Watcher:
         self._steps = 0
         self._over = False
         self._patience = _GRACE + job.limits.wall
-        self._process: multiprocessing.process.BaseProcess
+        self._process: BaseProcess
         self._connection: Connection
         self._start()
 

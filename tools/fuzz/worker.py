@@ -41,7 +41,7 @@ class Job:
     inputs: int | None = None
     """Number at which to end; none ends by time only."""
     deadline: float | None = None
-    """Of time.monotonic."""
+    """Of time.monotonic; what is given is run even then."""
     limits: Limits = field(default_factory=Limits)
     fixed: tuple[bytes, ...] | None = None
     """Inputs to run as they are, instead of mutations."""
@@ -108,7 +108,8 @@ class _Worker:
             yield from job.fixed[job.first :]
             return
         while job.inputs is None or self._number < job.inputs:
-            if job.deadline is not None and time.monotonic() > job.deadline:
+            late = job.deadline is not None and time.monotonic() > job.deadline
+            if late and self._number >= self._given:
                 return
             yield self._input(self._number)
 

@@ -79,9 +79,9 @@ def licence_of(found: Distribution, *, runtime: bool) -> Licence:
 
 def _expression(found: Distribution) -> str:
     metadata = found.metadata
-    if metadata.get("License-Expression"):
-        return metadata["License-Expression"]
-    text = (metadata.get("License") or "").strip()
+    for expression in metadata.get_all("License-Expression") or ():
+        return str(expression)
+    text = "".join(metadata.get_all("License") or ()).strip()
     known = _known([text]) or _known(
         line.rpartition("::")[2].strip()
         for line in metadata.get_all("Classifier") or ()
