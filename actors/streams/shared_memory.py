@@ -13,7 +13,9 @@ from __future__ import annotations
 import ctypes
 import functools
 import importlib
+import os
 import weakref
+from pathlib import Path
 from typing import Any
 
 from aerodaas.actors.private_folder import shared_memory_names
@@ -78,7 +80,25 @@ def _node() -> Any:  # noqa: ANN401
     config.global_cfg.prefix = iox.FileName.new(prefix)
     builder = iox.NodeBuilder.new().config(config)
     builder = builder.signal_handling_mode(iox.SignalHandlingMode.Disabled)
-    return builder.create(iox.ServiceType.Ipc)
+    node = builder.create(iox.ServiceType.Ipc)
+    _close_counter(prefix)
+    return node
+
+
+def _close_counter(prefix: str) -> None:
+    """Close iceoryx2's counter of nodes to other users, to whom it opens it.
+
+    A user who may write to it can end our processes: they map it, and it could be cut short.
+    Raises AeroDaaSError if another user made it.
+    """
+    for path in Path("/dev/shm").glob(f"{prefix}*.global_mgmt"):  # noqa: S108 - where the kernel has it
+        owner = path.stat().st_uid
+        if owner != os.geteuid():
+            raise AeroDaaSError(
+                f"{path} is a file of user {owner}, not of our own, and is not used; remove it: "
+                f"sudo rm {path}"
+            )
+        path.chmod(0o600)
 
 
 @functools.lru_cache(maxsize=512)

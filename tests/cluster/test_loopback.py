@@ -22,14 +22,15 @@ class _Actor:
 
 def _of_ray(folder: str) -> list[psutil.Process]:
     """This process, and all of the local Ray in this folder."""
-    found = [psutil.Process()]
-    for process in psutil.process_iter():
-        try:
-            if process.environ().get(VARIABLE) == folder:
-                found.append(process)
-        except psutil.Error:
-            continue
-    return found
+    found = [one for one in psutil.process_iter() if _folder_of(one) == folder]
+    return [psutil.Process(), *found]
+
+
+def _folder_of(process: psutil.Process) -> str:
+    try:
+        return str(process.environ().get(VARIABLE, ""))
+    except psutil.Error:
+        return ""
 
 
 def _loopback(address: str) -> bool:
