@@ -80,7 +80,7 @@ class SecondUser:
     def _openings(self) -> Iterator[str]:
         """Commands by which what is needed below folders closed to others can be reached."""
         needed = {Path(sys.base_prefix), Path(sys.prefix), Path(sys.executable).parent, ROOT}
-        closed = {}
+        closed: dict[Path, list[Path]] = {}
         for path in needed:
             for above in reversed(path.parents):
                 if not above.stat().st_mode & 0o001:
