@@ -29,7 +29,7 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.finder import Finder, FoundVehicle
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
 from aerodaas.drivers.mavlink.wire.rates import RateKeeper
-from aerodaas.drivers.mavlink.wire.transport import Peer
+from aerodaas.drivers.pin import Peer
 from aerodaas.drivers.setpoints import require_finite
 from aerodaas.types.clock import Clock, ScaledClock
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError

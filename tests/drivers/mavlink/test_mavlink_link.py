@@ -15,7 +15,7 @@ from aerodaas.drivers.mavlink.wire import link as module
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.drivers.mavlink.wire.signing import sign_with
-from aerodaas.drivers.mavlink.wire.transport import Peer
+from aerodaas.drivers.pin import Peer
 
 KEY = bytes(range(32))
 HERE, THERE = ("10.0.0.1", 14550), ("10.0.0.2", 14550)

@@ -11,7 +11,7 @@ from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import LinkCounts
-from aerodaas.drivers.mavlink.wire.transport import Peer
+from aerodaas.drivers.pin import Peer
 
 __all__ = ["Finder", "FoundVehicle"]
 

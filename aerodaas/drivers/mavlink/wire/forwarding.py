@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from aerodaas.drivers.mavlink.wire.pin import Pin
 from aerodaas.drivers.mavlink.wire.transport import open_transport
+from aerodaas.drivers.pin import Pin
 
 __all__ = ["Forwarder"]
 

@@ -19,9 +19,10 @@ from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import EventMessage, mavlink
 from aerodaas.drivers.mavlink.wire.forwarding import Forwarder
 from aerodaas.drivers.mavlink.wire.framing import Framer
-from aerodaas.drivers.mavlink.wire.pin import Sender, SenderPins
+from aerodaas.drivers.mavlink.wire.senders import Sender, SenderPins
 from aerodaas.drivers.mavlink.wire.signing import SignedCodec, load_key, sign_with
-from aerodaas.drivers.mavlink.wire.transport import Peer, is_exposed, open_transport
+from aerodaas.drivers.mavlink.wire.transport import is_exposed, open_transport
+from aerodaas.drivers.pin import Peer
 
 __all__ = ["LinkCounts", "MavlinkLink", "Message"]
 

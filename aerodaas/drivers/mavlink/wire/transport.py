@@ -12,12 +12,10 @@ import time
 import tty
 from typing import Protocol
 
+from aerodaas.drivers.pin import Peer
 from aerodaas.types.errors import ConfigError, VehicleError
 
-__all__ = ["Peer", "Transport", "is_exposed", "open_transport"]
-
-Peer = tuple[str, int] | None
-"""Address of a sender; None for a wire with a single peer."""
+__all__ = ["Transport", "is_exposed", "open_transport"]
 
 _LARGEST = 65535
 _AT_ONCE = 256
