@@ -21,6 +21,7 @@ __all__ = ["mutate", "run", "seeds"]
 _LENGTH = struct.Struct(">H")
 _LONGEST = 1460
 _MOST_PIXELS = 1920 * 1088
+_COLOURS = 3
 _ENVIRONMENT = EnvironmentConfig.model_validate(
     {"robots": [{"id": "d", "driver": "tello", "sensors": [{"id": "c", "driver": "tello"}]}]}
 )
@@ -59,7 +60,8 @@ def run(data: bytes) -> None:
         picture = camera.capture(10**12, None)
         if picture is not None:
             height, width, colours = picture.image.shape
-            require((picture.image.dtype, colours) == (np.uint8, 3), "a picture of another kind")
+            bytes_of_pixel = picture.image.itemsize * colours
+            require(bytes_of_pixel == _COLOURS, "a picture of another kind")
             require(0 < height * width <= _MOST_PIXELS, "a picture beyond all bounds")
             require(camera.model is not None, "a picture without a calibration")
 

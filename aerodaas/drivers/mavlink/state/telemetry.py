@@ -243,4 +243,4 @@ class Telemetry:
 
 def _on_earth(message: Any) -> bool:  # noqa: ANN401
     """Whether latitude and longitude (degrees times 10^7) are such."""
-    return abs(message.lat) <= 90 * 10**7 and abs(message.lon) <= 180 * 10**7
+    return bool(abs(message.lat) <= 90 * 10**7 and abs(message.lon) <= 180 * 10**7)
