@@ -27,6 +27,8 @@ _READ_TIMEOUT_MS = 3000
 _SHORTEST_WAIT = 0.5
 _LONGEST_WAIT = 8.0
 _OPTIONS = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
+_MOST_PIXELS = 4096 * 4096
+"""Pixels of the largest picture that is handed on: a stream may claim any size."""
 _OPENING = threading.Lock()
 
 
@@ -97,7 +99,10 @@ class LiveSource:
         any_frame = False
         while not self._closing.is_set() and capture.grab():
             grabbed = host_time_ns()
-            readable, image = capture.retrieve()
+            width, height = map(capture.get, (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+            readable, image = (
+                capture.retrieve() if width * height <= _MOST_PIXELS else (False, None)
+            )
             if not readable:
                 self.skipped += 1
                 continue

@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 import pytest
 
+from aerodaas.cameras import live
 from aerodaas.cameras.base import Camera
 from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.video import VideoCamera
@@ -135,15 +136,17 @@ def test_a_live_source_gives_each_newest_frame_once_and_reconnects(stream: str) 
     assert source.model.width == 64
     began = time.monotonic_ns()
     stamps: list[int] = []
-    live = source._source
-    assert isinstance(live, LiveSource)
-    while live.reconnections < 1 or len(stamps) < 8:
+    source_of = source._source
+    assert isinstance(source_of, LiveSource)
+    while source_of.reconnections < 1 or len(stamps) < 8:
         now = time.monotonic_ns() - began + NANOSECONDS
         picture = source.capture(now, None)
         if picture is not None:
             assert picture.stamp <= now
             stamps.append(picture.stamp)
-        assert now < 40 * NANOSECONDS, f"{len(stamps)} frames, {live.reconnections} reconnections"
+        assert now < 40 * NANOSECONDS, (
+            f"{len(stamps)} frames, {source_of.reconnections} reconnections"
+        )
         time.sleep(0.05)
     assert stamps == sorted(set(stamps))
     assert not source.finished
@@ -155,3 +158,15 @@ def test_a_silent_address_is_refused_with_a_remedy() -> None:
     source = LiveSource("http://127.0.0.1:9/none", timeout=0.5)
     with pytest.raises(SourceError, match=r"no picture from http://127.0.0.1:9/none within 0.5 s"):
         source.open()
+
+
+def test_a_stream_of_huge_pictures_is_refused(video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may claim any size; what is larger than the largest is counted and not handed on."""
+    fits = LiveSource(str(video))
+    height, width, _ = fits.open().shape
+    fits.close()
+    monkeypatch.setattr(live, "_MOST_PIXELS", width * height - 1)
+    source = LiveSource(str(video), timeout=1.0)
+    with pytest.raises(SourceError, match="no picture from"):
+        source.open()
+    assert source.skipped >= 10

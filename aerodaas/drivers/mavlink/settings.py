@@ -26,9 +26,9 @@ class MavlinkSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    url: str = "udpin:0.0.0.0:14540"
-    """`udpin:HOST:PORT` (wait for packets there), `udpout:HOST:PORT` (send there first),
-    `tcp:HOST:PORT` or `serial:DEVICE:BAUD`."""
+    url: str = "udpin:127.0.0.1:14540"
+    """`udpin:HOST:PORT` (wait for packets there; HOST is this host's own address, 0.0.0.0 for all
+    of them), `udpout:HOST:PORT` (send there first), `tcp:HOST:PORT` or `serial:DEVICE:BAUD`."""
     system: Identity | None = None
     """The vehicle's system id; None takes the first multicopter that is heard."""
     own_system: Identity = 245

@@ -108,11 +108,6 @@ def test_a_signature_covers_every_byte() -> None:
         assert not signature_fits(KEY, spoilt), index
 
 
-def test_an_unsigned_packet_is_judged_elsewhere() -> None:
-    """It has no signature that could be wrong."""
-    assert signature_fits(KEY, packet(None))
-
-
 def test_a_radio_may_speak_unsigned() -> None:
     """RADIO_STATUS is put into the stream by what has no key; nothing else is let through."""
     radio = mavlink.MAVLink_radio_status_message(1, 2, 3, 4, 5, 6, 7)
