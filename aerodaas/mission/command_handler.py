@@ -100,8 +100,6 @@ class CommandHandler:
             return Answer(accepted=False, text=text)
         if not len(navigation):
             return Answer(accepted=False, text="the navigation is empty: there is nothing to fly")
-        for velocity in navigation.commands:
-            self._navigator.obey(velocity, now, cause)
         taken, refused = self._navigator.admit(
             navigation.waypoints, seconds(now), stream.deadline, stream.name if replaces else ""
         )
@@ -114,6 +112,8 @@ class CommandHandler:
             )
         except InvalidWaypointError as error:
             return Answer(accepted=False, text=str(error))
+        for velocity in navigation.commands:
+            self._navigator.obey(velocity, now, cause)
         for waypoint_id, reason in refused.items():
             self._log.give_up(now, waypoint_id, reason)
         accepted = bool(taken or navigation.commands)

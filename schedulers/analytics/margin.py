@@ -204,8 +204,7 @@ class Margin(AnalyticsScheduler):
                 self.edge.observe(task.profile, result.finished - result.started, now)
         else:
             self.cloud.finished(result, now)
-            if self._hopeful and not self.cloud.crowded:
-                return self._fill_slots(now)
+            return self._fill_slots(now)
         return ()
 
     def resources_changed(self, resources: Resources, now: int) -> Iterable[Decision]:

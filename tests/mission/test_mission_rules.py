@@ -215,13 +215,17 @@ def test_a_speed_or_a_yaw_rate_that_is_no_number_is_refused(bad: float) -> None:
         assert clamped.setpoint.yaw_rate == 0.0
 
 
-def test_the_fence_is_seen_from_as_far_as_full_speed_needs() -> None:
-    """At full speed the drone brakes before a far wall, for it needs all of that way."""
+@pytest.mark.parametrize("reaction", [0.5, 2.0])
+def test_the_fence_is_seen_from_as_far_as_full_speed_needs(reaction: float) -> None:
+    """At full speed the drone brakes before a far wall, for it needs all of that way.
+
+    Seen later, the wall would ask at once for a speed that the drone cannot have at once.
+    """
     limits = LimitsConfig(
         max_speed=12.0,
         max_acceleration=2.0,
         max_range=500.0,
-        reaction_time=0.5,
+        reaction_time=reaction,
         geofence=GeofenceConfig(polygon=[(-100, -100), (100, -100), (100, 100), (-100, 100)]),
     )
     guard = SetpointFilter(limits, np.zeros(3))
@@ -232,6 +236,7 @@ def test_the_fence_is_seen_from_as_far_as_full_speed_needs() -> None:
         odometry = Odometry(np.array([x, 0.0, 5.0]), np.array([speed, 0.0, 0.0]), 0.0)
         clamped = guard.clamp(asked, odometry, step).setpoint
         assert isinstance(clamped, VelocitySetpoint)
+        assert sent[-1] - clamped.velocity[0] <= 2.0 * step + 1e-6
         sent.append(float(clamped.velocity[0]))
         wanted = sent.pop(0)
         speed += float(np.clip(wanted - speed, -2.0 * step, 2.0 * step))

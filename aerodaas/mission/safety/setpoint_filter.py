@@ -105,10 +105,10 @@ class SetpointFilter:
     ) -> FilteredSetpoint:
         names: list[str] = []
         target = self.home + limit_length(asked.position - self.home, self.limits.max_range)
-        if not np.allclose(target, asked.position, atol=1e-6):
+        if not np.allclose(target, asked.position):
             names.append("max_range")
         inside = self.fence.nearest_allowed(target)
-        if not np.allclose(inside, target, atol=1e-6):
+        if not np.allclose(inside, target):
             names.append("geofence")
         target = inside
         limits = self.limits

@@ -463,12 +463,17 @@ def test_who_came_down_by_itself_is_left_alone(world: World) -> None:
 
 
 def test_a_tello_that_fell_silent_on_the_ground_is_greeted(world: World) -> None:
-    """After two seconds, each two seconds; one in the air is not, for it hears already."""
+    """After two seconds, each two seconds; one in the air is not, for it hears already.
+
+    Whether it answers or not is no matter.
+    """
     world.speaks = False
     world.advance(2.0)
     assert world.asked == []
     world.advance(0.2)
     assert world.asked == [("command", False)]
+    world.answer("ok")
+    world.answer(None)
     world.advance(1.8)
     assert len(world.asked) == 1
     world.advance(0.3)

@@ -317,3 +317,114 @@ def test_lifting_is_counted_from_the_place_of_take_off() -> None:
         watch.observe(seen(home, 0.0, VehicleMode.TAKING_OFF, armed=True), 0)
         stopped = seen(home, 0.0, VehicleMode.GROUNDED, armed=False)
         assert watch.observe(stopped, NANOSECONDS) is Motors.NEVER_LIFTED
+
+
+def descended(watch: MotorWatch) -> int:
+    """Come down gently from 3 m, landing; returns when the motors are still running, ns."""
+    stamp = 0
+    for height in np.linspace(3.0, 0.0, 41):
+        watch.observe(seen(float(height), -0.5, VehicleMode.LANDING, armed=True), stamp)
+        stamp += NANOSECONDS // 20
+    return stamp
+
+
+@pytest.mark.parametrize(("after", "verdict"), [(0, Motors.STOPPED_IN_FLIGHT), (1, Motors.LANDED)])
+def test_a_fall_counts_for_a_second(after: int, verdict: Motors) -> None:
+    """One that began exactly a second before the stop was seen does; a nanosecond more does not."""
+    watch = MotorWatch(np.zeros(3))
+    began = descended(watch)
+    watch.observe(seen(0.2, -2.01, VehicleMode.LANDING, armed=True), began)
+    stopped = seen(0.0, 0.0, VehicleMode.GROUNDED, armed=False)
+    stamp = began + NANOSECONDS + after
+    watch.observe(stopped, stamp)
+    assert watch.observe(stopped, stamp + NANOSECONDS) is verdict
+
+
+def test_sinking_at_just_two_metres_a_second_is_still_gentle() -> None:
+    """At the limit it is a landing."""
+    watch = MotorWatch(np.zeros(3))
+    stamp = descended(watch)
+    watch.observe(seen(0.1, -2.0, VehicleMode.LANDING, armed=True), stamp)
+    stopped = seen(0.0, 0.0, VehicleMode.GROUNDED, armed=False)
+    watch.observe(stopped, stamp + 1)
+    assert watch.observe(stopped, stamp + NANOSECONDS) is Motors.LANDED
+
+
+def test_a_landing_has_settled_after_half_a_second() -> None:
+    """Exactly then, and no earlier; after that it stays a landing whatever is told."""
+    watch = MotorWatch(np.zeros(3))
+    stamp = descended(watch)
+    stopped = seen(0.0, 0.0, VehicleMode.GROUNDED, armed=False)
+    half = NANOSECONDS // 2
+    assert watch.observe(stopped, stamp) is Motors.SETTLING
+    assert watch.observe(stopped, stamp + half - 1) is Motors.SETTLING
+    assert watch.observe(stopped, stamp + half) is Motors.LANDED
+    shaken = seen(0.0, -9.0, VehicleMode.GROUNDED, armed=False)
+    assert watch.observe(shaken, stamp + half + 1) is Motors.LANDED
+
+
+@pytest.mark.parametrize("speed", [np.nan, -np.inf])
+def test_a_sink_rate_that_is_no_number_is_no_fall(speed: float) -> None:
+    """What is not known is passed by, before and after the motors stop."""
+    watch = MotorWatch(np.zeros(3))
+    stamp = descended(watch)
+    watch.observe(seen(0.0, speed, VehicleMode.LANDING, armed=True), stamp)
+    stopped = seen(0.0, speed, VehicleMode.GROUNDED, armed=False)
+    watch.observe(stopped, stamp)
+    assert watch.observe(stopped, stamp + NANOSECONDS) is Motors.LANDED
+
+
+def test_after_a_lost_link_a_vehicle_has_five_seconds_to_say_where_it_is() -> None:
+    """It stands, by its own word, and may have come home; without a place it has fallen."""
+    nowhere = seen(np.nan, 0.0, VehicleMode.GROUNDED, armed=False)
+    placed = seen(0.0, 0.0, VehicleMode.GROUNDED, armed=False)
+    for last, answer in ((placed, Motors.LANDED), (nowhere, Motors.STOPPED_IN_FLIGHT)):
+        watch = MotorWatch(np.zeros(3))
+        watch.observe(seen(3.0, 0.0, VehicleMode.GUIDED, armed=True), 0)
+        watch.observe(seen(3.0, 0.0, VehicleMode.LOST, armed=True), NANOSECONDS)
+        for second in (2, 4, 6.999):
+            heard = watch.observe(nowhere, round(second * NANOSECONDS))
+            assert heard is Motors.SETTLING, second
+        assert watch.observe(last, 7 * NANOSECONDS) is answer
+
+
+def test_a_link_that_came_back_in_flight_explains_no_stop() -> None:
+    """The vehicle was heard flying since: motors that stop then have stopped in flight."""
+    watch = MotorWatch(np.zeros(3))
+    watch.observe(seen(3.0, 0.0, VehicleMode.GUIDED, armed=True), 0)
+    watch.observe(seen(3.0, 0.0, VehicleMode.LOST, armed=True), NANOSECONDS)
+    watch.observe(seen(3.0, 0.0, VehicleMode.GUIDED, armed=True), 2 * NANOSECONDS)
+    stopped = seen(3.0, 0.0, VehicleMode.GROUNDED, armed=False)
+    assert watch.observe(stopped, 3 * NANOSECONDS) is Motors.STOPPED_IN_FLIGHT
+
+
+def test_a_fall_before_any_position_was_known_is_placed_at_home() -> None:
+    """The driver knows of the fall; where the drone was last is where it took off."""
+    home = np.array([4.0, -2.0, 1.0])
+    watch = MotorWatch(home)
+    climbing = seen(np.nan, 1.0, VehicleMode.TAKING_OFF, armed=True)
+    assert watch.observe(climbing, 0) is Motors.RUNNING
+    fallen = replace(seen(np.nan, 0.0, VehicleMode.GROUNDED, armed=False), ended=FlightEnd.FELL)
+    assert watch.observe(fallen, NANOSECONDS) is Motors.STOPPED_IN_FLIGHT
+    assert watch.place.tolist() == home.tolist()
+
+
+@pytest.mark.parametrize(("up", "verdict"), [(0.3, Motors.NEVER_LIFTED), (0.31, Motors.SETTLING)])
+def test_a_drone_has_lifted_above_thirty_centimetres(up: float, verdict: Motors) -> None:
+    """At the limit it still stands."""
+    watch = MotorWatch(np.zeros(3))
+    watch.observe(seen(up, 0.0, VehicleMode.LANDING, armed=True), 0)
+    stopped = seen(0.0, 0.0, VehicleMode.GROUNDED, armed=False)
+    assert watch.observe(stopped, NANOSECONDS) is verdict
+
+
+def test_motors_that_run_again_are_watched_anew() -> None:
+    """A drone that was kicked off and flies is not one that has landed."""
+    watch = MotorWatch(np.zeros(3))
+    stamp = descended(watch)
+    stopped = seen(0.0, 0.0, VehicleMode.GROUNDED, armed=False)
+    watch.observe(stopped, stamp)
+    flying = seen(2.0, 0.0, VehicleMode.GUIDED, armed=True)
+    assert watch.observe(flying, stamp + NANOSECONDS) is Motors.RUNNING
+    killed = seen(2.0, 0.0, VehicleMode.GROUNDED, armed=False)
+    assert watch.observe(killed, stamp + 2 * NANOSECONDS) is Motors.STOPPED_IN_FLIGHT

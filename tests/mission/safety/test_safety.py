@@ -255,3 +255,166 @@ def test_the_nearest_allowed_place_is_allowed(x: float, y: float, z: float) -> N
     """Whatever is asked, the place that is flown to lies inside."""
     fence = Geofence(LIMITS.geofence)
     assert fence.contains(fence.nearest_allowed(np.array([x, y, z])))
+
+
+def clamped_velocity(
+    guard: SetpointFilter,
+    asked: tuple[float, float, float],
+    odometry: Odometry,
+    neighbours: list[Neighbour] | None = None,
+) -> list[float]:
+    """What is sent of a velocity, where the acceleration is no matter."""
+    sent = guard.clamp(VelocitySetpoint(np.array(asked)), odometry, 10.0, neighbours or [])
+    assert isinstance(sent.setpoint, VelocitySetpoint)
+    velocity: list[float] = sent.setpoint.velocity.tolist()
+    return velocity
+
+
+@pytest.mark.parametrize(("reaction", "acceleration"), [(0.3, 3.0), (1.0, 1.0)])
+@pytest.mark.parametrize("approach", [0.0, 1.0, -1.0])
+def test_the_speed_towards_each_boundary_leaves_just_the_way_to_stop(
+    reaction: float, acceleration: float, approach: float
+) -> None:
+    """Fence, ceiling, floor and range: what is flown meanwhile and while braking fills the room."""
+    limits = LimitsConfig(
+        max_speed=9.0,
+        max_climb=9.0,
+        max_range=120.0,
+        takeoff_height=5.0,
+        reaction_time=reaction,
+        max_acceleration=acceleration,
+        separation=2.0,
+        geofence=GeofenceConfig(
+            polygon=[(-50, -500), (50, -500), (50, 500), (-50, 500)], ceiling=20, floor=4, margin=1
+        ),
+    )
+    for towards, place, room in (
+        ((1, 0, 0), (45.0, 0.0, 12.0), 4.0),
+        ((-1, 0, 0), (-45.0, 0.0, 12.0), 4.0),
+        ((0, 0, 1), (0.0, 0.0, 17.0), 3.0),
+        ((0, 0, -1), (0.0, 0.0, 7.0), 3.0),
+        ((0, 1, 0), (0.0, 115.0, 12.0), 5.0),
+    ):
+        guard = SetpointFilter(limits, np.array([0.0, 0.0, 12.0]))
+        way = np.array(towards, dtype=float)
+        here = Odometry(np.array(place), approach * way, 0.0)
+        speed = float(np.dot(clamped_velocity(guard, tuple(9.0 * way), here), way))
+        flown_on = max(0.0, approach) * reaction
+        stops_in = speed * reaction + speed**2 / (2 * acceleration)
+        assert stops_in == pytest.approx(room - flown_on), towards
+
+
+def test_each_drone_may_use_exactly_half_of_the_room() -> None:
+    """Whatever the other one does; its own reaction and braking fill that half."""
+    limits = LimitsConfig(max_speed=9.0, separation=3.0, max_acceleration=2.0, reaction_time=0.5)
+    guard = SetpointFilter(limits, np.zeros(3))
+    for other in (np.array([11.0, 0.0, 5.0]), np.array([-11.0, 0.0, 5.0])):
+        way = np.sign(other) * np.array([1.0, 0.0, 0.0])
+        near = Neighbour(other, -way)
+        speed = float(np.dot(clamped_velocity(guard, tuple(9.0 * way), at(0, 0, 5.0), [near]), way))
+        assert speed * 0.5 + speed**2 / 4 == pytest.approx((11.0 - 3.0) / 2)
+
+
+def test_two_boundaries_at_once_are_both_kept() -> None:
+    """In a corner that is narrower than square, between two neighbours, and at the ceiling."""
+    wedge = [(0.0, 0.0), (100.0, 20.0), (100.0, -20.0)]
+    limits = LimitsConfig(max_speed=4.0, geofence=GeofenceConfig(polygon=wedge, ceiling=10.0))
+    guard = SetpointFilter(limits, np.array([50.0, 0.0, 5.0]))
+    at_tip = at(2.0, 0.0, 10.0)
+    velocity = np.array(clamped_velocity(guard, (-4.0, 0.0, 1.0), at_tip))
+    normals = [np.array([-20.0, side * 100.0, 0.0]) / math.hypot(20, 100) for side in (1, -1)]
+    assert all(float(velocity @ normal) <= 1e-6 for normal in normals)
+    assert velocity[2] <= 1e-6
+    open_field = SetpointFilter(LimitsConfig(separation=2.0), np.zeros(3))
+    near = [Neighbour(np.array([1.0, side, 5.0]), np.zeros(3)) for side in (0.2, -0.2)]
+    held = np.array(clamped_velocity(open_field, (4.0, 1.0, 0.0), at(0, 0, 5.0), near))
+    for neighbour in near:
+        assert float(held @ (neighbour.position - np.array([0, 0, 5.0]))) <= 1e-6
+
+
+def test_at_exactly_its_limits_nothing_is_clamped() -> None:
+    """Speed, climb, turn, acceleration and range: equal is within."""
+    limits = LimitsConfig(max_speed=4.0, max_climb=1.5, max_yaw_rate=90.0, max_acceleration=2.0)
+    guard = SetpointFilter(limits, np.zeros(3))
+    turn = math.radians(90.0)
+    for velocity in ((4.0, 0.0, 1.5), (0.0, -4.0, -1.5)):
+        guard.forget()
+        asked = VelocitySetpoint(np.array(velocity), turn)
+        sent = guard.clamp(asked, at(0, 0, 5.0, velocity=velocity), 0.05)
+        assert sent.clipped_by == ()
+        assert isinstance(sent.setpoint, VelocitySetpoint)
+        assert sent.setpoint.velocity.tolist() == list(velocity)
+    guard.forget()
+    step = guard.clamp(VelocitySetpoint(np.array([0.5, 0, 0])), at(0, 0, 5.0), 0.25)
+    assert step.clipped_by == ()
+    high = SetpointFilter(limits, np.array([0.0, 0.0, 9.0]))
+    far = PositionSetpoint(np.array([limits.max_range, 0.0, 9.0]), None, 4.0)
+    assert high.clamp(far, at(0, 0, 9.0), 0.05).clipped_by == ()
+
+
+def test_the_speed_of_a_position_setpoint_keeps_both_limits_on_the_way() -> None:
+    """Straight up, level, and a slope where the climb limits; at the place it is as asked."""
+    limits = LimitsConfig(max_speed=4.0, max_climb=1.5, cruise_speed=2.0, max_range=500.0)
+    guard = SetpointFilter(limits, np.zeros(3))
+    for place, asked, speed, names in (
+        ((0.0, 0.0, 35.0), 3.0, 1.5, ("max_climb",)),
+        ((0.0, 0.0, 1.0), 3.0, 1.5, ("max_climb",)),
+        ((30.0, 0.0, 5.0), 9.0, 4.0, ("max_speed",)),
+        ((30.0, 0.0, 45.0), 9.0, 1.5 * 50 / 40, ("max_climb",)),
+        ((0.0, 0.0, 5.0), 3.0, 3.0, ()),
+        ((30.0, 0.0, 5.0), None, 2.0, ()),
+    ):
+        sent = guard.clamp(PositionSetpoint(np.array(place), None, asked), at(0, 0, 5.0), 0.05)
+        assert isinstance(sent.setpoint, PositionSetpoint)
+        assert sent.setpoint.speed == pytest.approx(speed)
+        assert sent.clipped_by == names
+
+
+@pytest.mark.parametrize(("asked", "turns"), [(None, 0.0), (0.4, 0.6), (-0.4, -0.6), (3.0, 1.5708)])
+def test_a_vehicle_without_position_setpoints_turns_on_its_way(
+    asked: float | None, turns: float
+) -> None:
+    """Towards the yaw of the place, by its own limit; bounded or not."""
+    limits = LimitsConfig(max_speed=4.0, max_yaw_rate=90.0, separation=2.0)
+    guard = SetpointFilter(limits, np.zeros(3), position_setpoints=False)
+    place = PositionSetpoint(np.array([20.0, 0.0, 5.0]), asked, 2.0)
+    for neighbours in ([], [Neighbour(np.array([2.0, 0.0, 5.0]), np.zeros(3))]):
+        sent = guard.clamp(place, at(0, 0, 5.0), 0.05, neighbours).setpoint
+        assert isinstance(sent, VelocitySetpoint)
+        assert sent.velocity.tolist() == pytest.approx([0.0 if neighbours else 2.0, 0.0, 0.0])
+        assert sent.yaw_rate == pytest.approx(turns, abs=1e-4)
+
+
+def test_after_a_stop_the_drone_accelerates_from_standing() -> None:
+    """What was sent last counts, not what the drone still does: bad numbers, then a wish."""
+    limits = LimitsConfig(max_speed=4.0, max_acceleration=2.0)
+    for stop in (
+        VelocitySetpoint(np.array([math.nan, 0.0, 0.0])),
+        VelocitySetpoint(np.zeros(3)),
+    ):
+        guard = SetpointFilter(limits, np.zeros(3))
+        moving = at(0, 0, 5.0, velocity=(3.0, 0.0, 0.0))
+        lost = at(math.nan, 0, 5.0, velocity=(3.0, 0.0, 0.0))
+        guard.clamp(stop, moving if math.isnan(stop.velocity[0]) else lost, 0.05)
+        sent = guard.clamp(VelocitySetpoint(np.array([4.0, 0, 0])), moving, 0.05).setpoint
+        assert isinstance(sent, VelocitySetpoint)
+        assert sent.velocity.tolist() == pytest.approx([0.1, 0.0, 0.0])
+    guard.forget()
+    sent = guard.clamp(VelocitySetpoint(np.array([4.0, 0, 0])), moving, 0.05).setpoint
+    assert isinstance(sent, VelocitySetpoint)
+    assert sent.velocity.tolist() == pytest.approx([3.1, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("which", ["position", "velocity"])
+def test_odometry_with_one_bad_number_stops_the_drone(axis: int, which: str) -> None:
+    """Any of the six, whatever it is: no boundary could be kept."""
+    guard = SetpointFilter(LimitsConfig(), np.zeros(3))
+    for bad in (math.nan, math.inf, -math.inf):
+        numbers = {"position": np.array([0.0, 0.0, 5.0]), "velocity": np.zeros(3)}
+        numbers[which][axis] = bad
+        odometry = Odometry(numbers["position"], numbers["velocity"], 0.0)
+        sent = guard.clamp(VelocitySetpoint(np.array([1.0, 0, 0]), 0.2), odometry, 0.05)
+        assert sent.clipped_by == ("no_position",)
+        assert isinstance(sent.setpoint, VelocitySetpoint)
+        assert not sent.setpoint.velocity.any()

@@ -378,3 +378,74 @@ def test_an_executor_that_is_down_leaves_the_cloud_until_the_last_moment(
         assert host.asked == [("cloud", 0, at * MILLISECOND)]
     else:
         assert [end.place for end in host.results] == [TaskPlace.NOWHERE]
+
+
+class _Timed(_Noting):
+    """Notes the start and changes of the resources as well, and answers the latter."""
+
+    def start(self, resources: Resources, now: int) -> None:
+        self.told.append(("start", now))
+        super().start(resources, now)
+
+    def resources_changed(self, resources: Resources, now: int) -> Iterable[Decision]:
+        self.told.append(("resources", now))
+        super().resources_changed(resources, now)
+        return [WakeAt(now), *(Drop(task) for task in self.waiting)]
+
+
+def test_the_time_of_a_start_and_of_a_change_of_resources_is_told() -> None:
+    """A wake-up for that very moment is no past one, and what follows it is carried out, too."""
+    scheduler = _Timed()
+    host = _RecordingHost()
+    dispatch = Dispatch(scheduler, Resources(cloud_slots=1), host)
+    dispatch.start(3)
+    dispatch.arrived(_task(0), 4)
+    dispatch.change_resources(Resources(cloud_slots=2), 5)
+    assert scheduler.told == [("start", 3), ("arrived", 4), ("idle", 4), ("resources", 5)]
+    assert host.asked == [("wake", -1, 5)]
+    assert [(end.task.id, end.finished) for end in host.results] == [(0, 5)]
+    assert not dispatch.undecided
+
+
+def test_a_scheduler_that_answers_nothing_is_named() -> None:
+    """None is a forgotten return, and the message says whose."""
+
+    class Forgetful(_Scripted):
+        def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:  # noqa: ARG002
+            return None  # type: ignore[return-value]
+
+    dispatch, _ = _dispatch_of(Forgetful())
+    with pytest.raises(SchedulerError, match=r"^Forgetful answered an event with None"):
+        dispatch.arrived(_task(0), 0)
+
+
+def test_what_is_given_up_ends_when_it_is() -> None:
+    """For an executor that is down and for a cloud that is gone, with or without a queue."""
+    scheduler = _Scripted(lambda t, _: RunOnEdge(t), *([lambda t, _: SendToCloud(t)] * 3))
+    dispatch, host = _dispatch_of(scheduler)
+    dispatch.down.add("m")
+    late = 90 * MILLISECOND
+    dispatch.arrived(_task(0), late)
+    for number in (1, 2):
+        dispatch.arrived(_task(number), late + number)
+    dispatch.change_resources(Resources(cloud_slots=0), late + 3)
+    dispatch.arrived(_task(3), late + 4)
+    ends = [(end.task.id, end.place, end.started, end.finished) for end in host.results]
+    assert ends == [
+        (number, TaskPlace.NOWHERE, late + when, late + when)
+        for number, when in ((0, 0), (2, 3), (3, 4))
+    ]
+    assert scheduler.heard == host.results
+
+
+def test_a_task_is_in_time_at_its_deadline_and_may_leave_at_its_latest_start() -> None:
+    """Equal is within, for the result and for the queue of the cloud."""
+    send = lambda t, _: SendToCloud(t, "", 40)  # noqa: E731
+    dispatch, host = _dispatch_of(_Scripted(send, send))
+    first, second = _task(0), _task(1)
+    for one in (first, second):
+        dispatch.arrived(one, 0)
+    dispatch.finished(first, 40)
+    assert host.asked[-1] == ("cloud", 1, 40)
+    dispatch.finished(second, second.deadline)
+    assert [end.outcome for end in host.results] == [TaskOutcome.DONE] * 2

@@ -19,6 +19,7 @@ from aerodaas.schedulers.analytics.base import (
 )
 from aerodaas.schedulers.analytics.estimates import TimeEstimate, TimeEstimates
 from aerodaas.schedulers.analytics.forecast import Forecast
+from aerodaas.schedulers.analytics.margin import Margin
 from aerodaas.schedulers.analytics.outlook import CloudOutlook
 from aerodaas.schedulers.analytics.planner import Job, Lane, plan
 from aerodaas.schedulers.analytics.published.cloud_only import CloudOnly
@@ -289,3 +290,87 @@ def test_a_plan_takes_a_lane_s_jobs_in_their_order_and_passes_over_the_hopeless(
     """The first of three is past its deadline; the others follow each other."""
     jobs = [Job("past", 0, 50, 100, 0), Job("next", 0, 150, 100, 0), Job("last", 0, 250, 100, 0)]
     assert chosen(Lane(TimeEstimate(100, 1e-6), jobs)) == ["next", "last"]
+
+
+@pytest.mark.parametrize(("under_way", "wait"), [(1, 0), (2, 100), (4, 300)])
+def test_the_wait_for_a_slot_shortens_patience_and_excuses_answers(
+    under_way: int, wait: int
+) -> None:
+    """A task must leave so much earlier, and an answer is overdue only so much later."""
+    free, busy = outlook(2), outlook(2, under_way)
+    longer = busy.patience(M, 0.0, 1e-3) - free.patience(M, 0.0, 1e-3)
+    assert longer / MS == pytest.approx(wait)
+    overdue = (200 + 3 * (10**2 + 1) ** 0.5 + 50 + wait) * MS
+    waiting = outlook(2, max(under_way, 2))
+    if under_way > 1:
+        waiting.listen(round(overdue - MS))
+        assert waiting.silent_since is None
+        waiting.listen(round(overdue + MS))
+        assert waiting.silent_since is not None
+
+
+@pytest.mark.parametrize(
+    ("place", "outcome"),
+    [
+        (TaskPlace.NOWHERE, TaskOutcome.DROPPED),
+        (TaskPlace.CLOUD, TaskOutcome.FAILED),
+        (TaskPlace.CLOUD, TaskOutcome.TIMEOUT),
+    ],
+)
+def test_what_never_came_back_teaches_nothing(place: TaskPlace, outcome: TaskOutcome) -> None:
+    """Neither how long the cloud takes nor that it is there again; its slot is free, though."""
+    cloud = outlook(2, 3)
+    cloud.listen(900 * MS)
+    assert cloud.silent_since is not None
+    task = Task(9, M, 0, M.deadline)
+    cloud.sent(task, 901 * MS)
+    cloud.finished(Result(task, outcome, place, 901 * MS, 990 * MS), 990 * MS)
+    assert cloud.silent_since is not None
+    assert cloud.beliefs.belief(M).mean == 200 * MS
+    assert cloud.patience(M, 0.0, 1e-3) == outlook(2, 3).patience(M, 0.0, 1e-3)
+
+
+def test_a_probe_is_due_a_second_after_the_last_task() -> None:
+    """At exactly a second; never where there is no cloud."""
+    cloud = outlook(2, 1)
+    assert not cloud.wants_probe(1000 * MS - 1)
+    assert cloud.wants_probe(1000 * MS)
+    assert not outlook(0).wants_probe(5000 * MS)
+
+
+@pytest.mark.parametrize(("slots", "priced"), [(4, True), (5, False)])
+def test_slots_have_a_price_where_what_arrives_needs_more(slots: int, priced: bool) -> None:  # noqa: FBT001
+    """20 a second of 200 ms need four slots; a tenth is kept free, so that five do and four don't.
+
+    The price is what the model gains there for each nanosecond.
+    """
+    scheduler = Margin()
+    scheduler.start(Resources(cloud_slots=slots), 0)
+    for number in range(100):
+        at = number * 50 * MS
+        task = Task(number, M, at, at + M.deadline)
+        list(scheduler.task_arrived(task, at))
+        list(scheduler.executor_idle(at))
+    expected = 80 / (200 * MS) if priced else 0.0
+    assert scheduler.cloud.slot_price == pytest.approx(expected, rel=0.2)
+
+
+def test_margin_reckons_with_the_time_that_is_left_and_not_with_the_clock() -> None:
+    """A task that the cloud cannot do in time runs on the edge, at the start as after 10 s."""
+    quick = Profile("quick", 100, 100 * MS, 50 * MS, 200 * MS, 30, 1)
+    cheapest = Profile("cheapest", 100, 1000 * MS, 50 * MS, 200 * MS, 30, 0)
+    for at in (300, 10_000):
+        _, end = play(Margin(), [(0, cheapest), (at, quick)])
+        assert (end.place, end.outcome) == ("edge", "done")
+
+
+def test_margin_keeps_the_edge_free_for_what_is_about_to_come() -> None:
+    """A regular task of great worth is waited for; a small one would be in its way."""
+    great = Profile("great", 1000, 120 * MS, 100 * MS, 100 * MS)
+    small = Profile("small", 5, 1000 * MS, 200 * MS, 200 * MS)
+    tasks = [(300.0 * number, great) for number in range(5)]
+    tasks.insert(4, (1150.0, small))
+    ends = play(Margin(), tasks, resources=Resources(cloud_slots=0))
+    assert [end.outcome for end in ends] == ["done"] * 6
+    assert ends[5].started == 1200
+    assert ends[4].started >= 1300

@@ -18,6 +18,8 @@ from aerodaas.types.errors import ConfigError, VehicleError
 __all__ = ["Transport", "is_exposed", "open_transport"]
 
 _LARGEST = 65535
+_LARGEST_PORT = 65535
+_LARGEST_BAUD = 9_999_999
 _AT_ONCE = 256
 """Most datagrams received in one turn."""
 _RETRY = 1.0
@@ -51,18 +53,22 @@ def open_transport(url: str, name: str) -> Transport:
     """
     kind, _, rest = url.partition(":")
     host, _, number = rest.rpartition(":")
-    if kind not in {"udpin", "udpout", "tcp", "serial"} or not host or not number.isdecimal():
+    largest = _LARGEST_BAUD if kind == "serial" else _LARGEST_PORT
+    known = kind in {"udpin", "udpout", "tcp", "serial"}
+    if not (known and host and number.isdecimal() and len(number) <= len(str(largest))):
         raise ConfigError(
             f"{name}: {url!r} is no address; write udpin:HOST:PORT, udpout:HOST:PORT, "
             "tcp:HOST:PORT or serial:DEVICE:BAUD"
         )
+    if int(number) > largest:
+        raise ConfigError(f"{name}: {url!r}: {number} is too large, {largest} is the largest")
     try:
         if kind == "serial":
             return _Serial(host, int(number))
         if kind == "tcp":
             return _Tcp(host, int(number))
         return _Udp(host, int(number), listens=kind == "udpin")
-    except (OSError, OverflowError) as error:
+    except (OSError, ValueError) as error:
         raise VehicleError(f"{name}: {_explain(error, url, number)}") from None
 
 
