@@ -52,7 +52,7 @@ def described(fleet: dict[str, list[str]], own: list[str], compute: list[str]) -
 
 def planned(env: Environment, analytics: str | None = None) -> FlightPlan:
     """The plan of what was built, without Ray."""
-    env._place_entries()
+    env.place_entries()
     dispatch = load_scheduler(analytics) if analytics else None
     scheduler = env.trajectory_scheduler()
     return make_plan(Session(env.config, 1.0), env.graph, env.compute(), scheduler, dispatch)
