@@ -9,6 +9,7 @@ import contextlib
 import ctypes
 import importlib
 import os
+import pwd
 import resource
 import signal
 import socket
@@ -16,6 +17,7 @@ import sys
 from pathlib import Path
 
 from aerodaas.analytics.guests.channel import Channel
+from aerodaas.analytics.guests.namespaces import enter_namespaces
 
 __all__ = ["main"]
 
@@ -24,7 +26,6 @@ _FILES = 256
 _FILE_BYTES = 64 << 20
 _DEATH_SIGNAL = 1
 _NO_NEW_PRIVILEGES = 38
-_NEW_IPC, _NEW_USER, _NEW_PID, _NEW_NET = 0x08000000, 0x10000000, 0x20000000, 0x40000000
 
 
 def main(number: int, memory: int, cpu: int, served_by: str) -> None:
@@ -39,7 +40,11 @@ def main(number: int, memory: int, cpu: int, served_by: str) -> None:
     channel = Channel(socket.socket(fileno=number))
     libc = ctypes.CDLL(None, use_errno=True)
     _limit(memory, cpu)
-    isolated = _enter_namespaces(libc, channel)
+    isolated = enter_namespaces(
+        lambda inside: channel.send({"process": inside, "isolated": True}),
+        Path(os.environ["HOME"]),
+        Path(pwd.getpwuid(os.getuid()).pw_dir),
+    )
     libc.prctl(_DEATH_SIGNAL, signal.SIGKILL, 0, 0, 0)
     libc.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0)
     if not isolated:
@@ -61,36 +66,6 @@ def _limit(memory: int, cpu: int) -> None:
         with contextlib.suppress(ValueError, OSError):
             resource.setrlimit(kind, (most, most))
     os.nice(_NICENESS)
-
-
-def _enter_namespaces(libc: ctypes.CDLL, channel: Channel) -> bool:
-    """Continue as the first process of namespaces without network and without other processes.
-
-    False where the system does not grant them. The process itself waits for the one inside.
-    """
-    user, group = os.getuid(), os.getgid()
-    if libc.unshare(_NEW_USER | _NEW_PID | _NEW_NET | _NEW_IPC):
-        return False
-    for file, text in {
-        "setgroups": "deny",
-        "uid_map": f"{user} {user} 1",
-        "gid_map": f"{group} {group} 1",
-    }.items():
-        with contextlib.suppress(OSError):
-            Path(f"/proc/self/{file}").write_text(text)
-    ready, go = os.pipe()
-    inside = os.fork()
-    if inside:
-        # Told from outside, by trusted code: to end this process is to end all inside.
-        channel.send({"process": inside, "isolated": True})
-        os.write(go, b"1")
-        channel.close()
-        _, status = os.waitpid(inside, 0)
-        os._exit(os.waitstatus_to_exitcode(status) & 0xFF)
-    os.read(ready, 1)
-    os.close(ready)
-    os.close(go)
-    return True
 
 
 if __name__ == "__main__":
