@@ -109,8 +109,7 @@ def run(
         aerodaas run apps/farm_survey.py
         aerodaas run apps/farm_survey.py --speed 5 --seed 7 --record /tmp/farm
         aerodaas run apps/farm_survey.py --set quadrotor_base.limits.cruise_speed=1
-        aerodaas run apps/disaster_survey.py --guest apps/crowd_watch.py \\
-            --grant crowd_watch=sense:cam1,compute
+        aerodaas run mine.py --guest theirs.py --grant theirs=sense:cam1,compute:edge
         aerodaas run apps/watch_frames.py -- pictures/ yolov8n.onnx --rate 5
     """
     factor, lockstep = speed_option(speed)

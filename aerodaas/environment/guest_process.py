@@ -10,6 +10,7 @@ from __future__ import annotations
 import pickle
 import runpy
 import sys
+import traceback
 import types
 from collections.abc import Callable
 from contextvars import ContextVar
@@ -143,14 +144,9 @@ def _built(catalogue: Catalogue, application: Path) -> tuple[dict[str, Any], byt
     sys.path.insert(0, str(application.parent))
     try:
         namespace = runpy.run_path(str(application), run_name="__main__")
-        if len(offered) != 1:
-            raise GraphError(
-                "it never called start_mission()"
-                if not offered
-                else "it started several environments; a guest has one"
-            )
-        document = _document(offered[0])
-        program = _program(offered[0], namespace)
+        environment = _only(offered)
+        document = _document(environment)
+        program = _program(environment, namespace)
     except SystemExit as error:
         return {"refused": f"it called sys.exit({error.code!r}) before start_mission()"}, b""
     except AeroDaaSError as error:
@@ -158,16 +154,22 @@ def _built(catalogue: Catalogue, application: Path) -> tuple[dict[str, Any], byt
         place = f"\n  at {line}" if line and "\n  at " not in str(error) else ""
         return {"refused": f"{error}{place}"}, b""
     except BaseException as error:  # noqa: BLE001 - a guest's file may raise anything
-        return {"refused": f"{failure_line(error)}"}, b""
+        return {"refused": failure_line(error)}, b""
     text = document.model_dump(mode="json")
     if len(str(text)) > LARGEST_TEXT:
         return {"refused": "its dataflow is too large"}, b""
     return {"document": text}, program
 
 
-def _line(error: BaseException, application: Path) -> str:
-    import traceback  # noqa: PLC0415 - only here
+def _only(offered: list[Environment]) -> Environment:
+    if not offered:
+        raise GraphError("it never called start_mission()")
+    if any(one is not offered[0] for one in offered):
+        raise GraphError("it started several environments; a guest has one")
+    return offered[0]
 
+
+def _line(error: BaseException, application: Path) -> str:
     for frame in reversed(traceback.extract_tb(error.__traceback__)):
         if Path(frame.filename) == application:
             return f"{application.name}:{frame.lineno}: {frame.line}"

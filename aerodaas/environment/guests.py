@@ -53,17 +53,23 @@ def admit_guests(options: RunOptions, host: Environment) -> list[str]:
     for wanted in options.grants:
         if wanted not in names:
             raise ConfigError(f"--grant {wanted}=…: there is no such guest{near(wanted, names)}")
-    rights = {
-        name: parse_grants(options.grants.get(name, ()), host.config, name) for name in names
-    }
+    rights = {name: parse_grants(options.grants.get(name, ()), host.config, name) for name in names}
     refused = []
     for name, path in names.items():
-        try:
-            document, program = _build(name, path, host, rights[name])
-            _Admission(name, host, rights[name], document, program).join()
-        except AeroDaaSError as error:
-            refused.append(f"the guest {name} does not take part: {error}"[:_REASON])
+        reason = _admit(name, path, host, rights[name])
+        if reason:
+            refused.append(f"the guest {name} does not take part: {reason}"[:_REASON])
     return refused
+
+
+def _admit(name: str, path: Path, host: Environment, grants: GuestGrants) -> str:
+    """Let one guest join; returns the reason if it cannot, else an empty text."""
+    try:
+        document, program = _build(name, path, host, grants)
+        _Admission(name, host, grants, document, program).join()
+    except AeroDaaSError as error:
+        return str(error)
+    return ""
 
 
 def _names(guests: Sequence[Path]) -> dict[str, Path]:

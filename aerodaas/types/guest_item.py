@@ -1,4 +1,4 @@
-"""GuestItem: a guest's result of a class of its own, which only that guest's process can rebuild."""
+"""GuestItem: a guest's result of its own class, which only that guest's process can rebuild."""
 
 from __future__ import annotations
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 import re
 import socket
+import tempfile
 import textwrap
 from pathlib import Path
+
+import psutil
 import pytest
 from flying import FLAT, Flyer, hop, recorded, robot
 
@@ -87,7 +90,11 @@ def refusal(flyer: Flyer, guest: Path, text: str, *rights: str) -> str:
 @pytest.mark.parametrize(
     ("text", "rights", "said"),
     [
-        ("drone.navigate(AeroNavigation(data=[Waypoint('m', 1, 1, 2)]))", (), "fly:drone.*navigate"),
+        (
+            "drone.navigate(AeroNavigation(data=[Waypoint('m', 1, 1, 2)]))",
+            (),
+            "fly:drone.*navigate",
+        ),
         (
             "env.trajectory_scheduler().add_navigation(AeroListData([Waypoint('m', 1, 0, 2)]))",
             (),
@@ -177,9 +184,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Run:
 def test_a_guest_sees_what_it_is_granted(flyer: Flyer, guest: Path, alone: Run) -> None:
     """Its class runs on the owner's sensor; its flight is that of the owner alone, to the digit."""
     guest.write_text(GUEST + READY)
-    run = flyer.fly(
-        owner_who_looks, CONTENT, guests=(guest,), grants={"theirs": RIGHTS}, seed=3
-    )
+    run = flyer.fly(owner_who_looks, CONTENT, guests=(guest,), grants={"theirs": RIGHTS}, seed=3)
     assert "drone/theirs_high_water" in recorded(run).latencies
     assert alerts(run) == alerts(alone)
     assert len(poses(alone)) > 100
@@ -203,9 +208,7 @@ def test_a_bad_analysis_harms_its_guest_alone(
 ) -> None:
     """It is told once; the owner's analysis goes on, and the flight is the same to the digit."""
     guest.write_text(analysis(process))
-    run = flyer.fly(
-        owner_who_looks, CONTENT, guests=(guest,), grants={"theirs": RIGHTS}, seed=3
-    )
+    run = flyer.fly(owner_who_looks, CONTENT, guests=(guest,), grants={"theirs": RIGHTS}, seed=3)
     assert poses(run) == poses(alone)
     found = [text for text in alerts(run) if text not in alerts(alone)]
     assert all("theirs" in text for text in found)
@@ -223,7 +226,9 @@ def test_a_refused_guest_is_told_and_the_owner_flies(flyer: Flyer, guest: Path, 
     assert poses(run) == poses(alone)
 
 
-NAVIGATOR = HEAD + """
+NAVIGATOR = (
+    HEAD
+    + """
 class Ahead(NavigableAnalytics):
     done = False
     def process(self, item, context):
@@ -236,6 +241,7 @@ odometry = drone.get_sensor_by_id("odom_drone").get_data_stream()
 ahead = Ahead().deploy(edge).analyse(odometry)
 drone.navigate(ahead)
 """
+)
 
 
 def test_a_guest_that_is_granted_it_flies(flyer: Flyer, guest: Path) -> None:
@@ -285,13 +291,9 @@ def test_a_stream_of_navigation_without_the_right_reaches_no_drone(
     """It may be computed, and is recorded; only `navigate` would fly it, and that is refused."""
     forged = "AeroNavigation(data=[Waypoint('theirs', 99, 99, 9, priority=0)])"
     text = HEAD + FORGED.format(forged=forged)
-    assert "fly:drone" in refusal(
-        flyer, guest, f"{text}drone.navigate(flight)\n{READY}", *RIGHTS
-    )
+    assert "fly:drone" in refusal(flyer, guest, f"{text}drone.navigate(flight)\n{READY}", *RIGHTS)
     guest.write_text(text + READY)
-    run = flyer.fly(
-        owner_who_looks, CONTENT, guests=(guest,), grants={"theirs": RIGHTS}, seed=3
-    )
+    run = flyer.fly(owner_who_looks, CONTENT, guests=(guest,), grants={"theirs": RIGHTS}, seed=3)
     assert poses(run) == poses(alone)
 
 
@@ -377,9 +379,7 @@ def test_quotas_and_grants_are_told_with_their_numbers(flyer: Flyer, guest: Path
     assert "has 5 analyses, and may have 4" in said
     text = GUEST + "fast = HighWater()\nfast.rate = 50.0\nfast.deploy(edge).instantiate()\n"
     assert "50 Hz, and may have 20" in refusal(flyer, guest, text + READY, *RIGHTS)
-    said = refusal(
-        flyer, guest, GUEST + "watch.trigger(drone.end_mission)\n" + READY, *RIGHTS
-    )
+    said = refusal(flyer, guest, GUEST + "watch.trigger(drone.end_mission)\n" + READY, *RIGHTS)
     assert "fly:drone" in said
     said = refusal(
         flyer, guest, GUEST + "RemoteAnalytics().deploy(edge).analyse(odometry)\n" + READY, *RIGHTS
@@ -408,3 +408,28 @@ def test_an_owner_is_told_of_what_is_not_there(flyer: Flyer, guest: Path) -> Non
         env = Environment(flyer.write(CONTENT))
         with pytest.raises(ConfigError, match="no such guest"):
             admit_guests(current_options.get(), env)
+
+
+def test_a_guest_that_hangs_while_it_builds(
+    flyer: Flyer, guest: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is ended, with what it has started, and its folder is gone."""
+    monkeypatch.setattr("aerodaas.environment.guests._BUILD_SECONDS", 8.0)
+    before = {one.pid for one in psutil.process_iter()}
+    text = f"{HEAD}import subprocess\nsubprocess.Popen(['sleep', '77.25'])\nwhile True: pass\n"
+    assert "did not answer in time" in refusal(flyer, guest, text)
+    left = [one.cmdline() for one in psutil.process_iter() if one.pid not in before]
+    assert not [words for words in left if "77.25" in words or "theirs.py" in " ".join(words)]
+    assert not list(Path(tempfile.gettempdir()).glob("aerodaas-guest-theirs-*"))
+
+
+def test_a_guest_that_fails_to_open(flyer: Flyer, guest: Path, alone: Run) -> None:
+    """The owner flies without it, and is told."""
+    text = analysis("return 1").replace(
+        "    count = 0\n", "    count = 0\n    def open(self):\n        os._exit(9)\n"
+    )
+    guest.write_text(text)
+    run = flyer.fly(owner_who_looks, CONTENT, guests=(guest,), grants={"theirs": RIGHTS}, seed=3)
+    (told,) = [text for text in alerts(run) if text not in alerts(alone)]
+    assert "the guest theirs has been ended" in told
+    assert poses(run) == poses(alone)

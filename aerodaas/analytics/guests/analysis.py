@@ -81,38 +81,40 @@ class GuestAnalysis(Analytics[Any]):
         self.sees_vehicle = sees_vehicle
         self.program = program
         self._alerts = 0
-        self._told = False
+        self._failed = ""
 
     def open(self) -> None:
         """Start the guest's process with its first analysis; one that fails stays silent."""
         if not self.program:
             return
-        process = GuestProcess(self.guest, self.quota.memory)
-        with _lock:
-            _processes[self.guest] = process
+        # Told with the first item: a guest that fails here must not keep its owner from flying.
         try:
+            process = GuestProcess(self.guest, self.quota.memory)
+            with _lock:
+                _processes[self.guest] = process
             process.ask({"do": "open"}, self.program, _OPENING)
-        except GuestError:
-            return  # told with the first item
+        except GuestError as error:
+            self._failed = str(error)
 
     def process(self, item: Any, context: Context) -> Any:  # noqa: ANN401 - any result
         """Ask the guest's process; None, and an error once, if it has ended."""
         _fired.pop((self.guest, self.key), None)
         process = _processes.get(self.guest)
+        if process is None:
+            failed, self._failed = self._failed, ""
+            if failed:
+                raise ModelError(f"the guest {self.guest} did not start: {failed}")
+            return None
         try:
-            if process is None:
-                raise GuestError("its process does not run")
             vehicle = context.vehicle() if self.sees_vehicle else None
             blob = pickle.dumps((item, vehicle), protocol=5)
             request = {"do": "process", "key": self.key, "now": context.now(), "on": context.kind}
             answer, _ = process.ask(request, blob, _ITEM)
             return self._result(answer, context)
         except GuestError as error:
-            if self._told or (process is not None and process.told):
+            if process.told:
                 return None
-            self._told = True
-            if process is not None:
-                process.told = True
+            process.told = True
             raise ModelError(f"the guest {self.guest} has been ended: {error}") from None
 
     def close(self) -> None:

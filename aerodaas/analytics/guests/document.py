@@ -72,4 +72,6 @@ def read_document(content: object) -> GuestDocument:
     try:
         return GuestDocument.model_validate(content)
     except ValidationError as error:
-        raise GraphError(f"its document: {explained(error, GuestDocument, content)[:500]}") from None
+        raise GraphError(
+            f"its document: {explained(error, GuestDocument, content)[:500]}"
+        ) from None

@@ -65,28 +65,26 @@ def encoded(item: object, opaque: Callable[[object], GuestItem]) -> Any:  # noqa
 
 
 def _write(item: object) -> Any:  # noqa: ANN401 - JSON
+    if isinstance(item, enum.Enum | np.generic):
+        item = item.value if isinstance(item, enum.Enum) else item.item()
     if type(item) in _PLAIN:
         return item
-    if isinstance(item, np.generic):
-        return item.item()
-    if isinstance(item, enum.Enum) and isinstance(item.value, str):
-        return item.value
-    if isinstance(item, np.ndarray) and item.dtype.kind in _KINDS:
-        content = base64.b64encode(np.ascontiguousarray(item).tobytes()).decode()
-        return {"is": "array", "type": item.dtype.str, "shape": item.shape, "data": content}
-    if type(item) is list:
-        return {"is": "list", "of": [_write(one) for one in item]}
-    if type(item) is dict and all(isinstance(key, str) for key in item):
-        return {"is": "dict", "of": {key: _write(one) for key, one in item.items()}}
-    if type(item) is tuple:
-        return {"is": "tuple", "of": [_write(one) for one in item]}
-    if isinstance(item, AeroNavigation) and item.stream is None:
-        how = item.scheduling_type.value
-        return {"is": "AeroNavigation", "of": [_write(one) for one in item], "scheduling": how}
-    name = type(item).__name__
-    if _CLASSES.get(name) is type(item):
-        return {"is": name, "of": {one: _write(getattr(item, one)) for one in _names(type(item))}}
-    raise _UnknownError
+    name, content = type(item).__name__, None
+    if type(item) in {list, tuple}:
+        content = [_write(one) for one in typing.cast("list[object]", item)]
+    elif type(item) is dict and all(isinstance(key, str) for key in item):
+        content = {key: _write(one) for key, one in item.items()}
+    elif _CLASSES.get(name) is type(item):
+        content = {one: _write(getattr(item, one)) for one in _names(type(item))}
+    elif isinstance(item, AeroNavigation) and item.stream is None:
+        inner = [_write(one) for one in item]
+        return {"is": "AeroNavigation", "of": inner, "scheduling": item.scheduling_type.value}
+    elif isinstance(item, np.ndarray) and item.dtype.kind in _KINDS:
+        whole = base64.b64encode(np.ascontiguousarray(item).tobytes()).decode()
+        return {"is": "array", "type": item.dtype.str, "shape": item.shape, "data": whole}
+    if content is None:
+        raise _UnknownError
+    return {"is": name, "of": content}
 
 
 def decoded(content: Any) -> Any:  # noqa: ANN401 - JSON to any item
@@ -95,8 +93,7 @@ def decoded(content: Any) -> Any:  # noqa: ANN401 - JSON to any item
         return _Reader().read(content)
     except ItemError:
         raise
-    except Exception as error:
-        # Whatever a stranger's numbers do to a constructor is malformed input.
+    except Exception as error:  # noqa: BLE001 - a stranger's numbers in any constructor
         raise ItemError(f"malformed result: {type(error).__name__}: {error}"[:300]) from None
 
 
@@ -174,30 +171,20 @@ def _hints(kind: type) -> dict[str, Any]:
 
 def _conforms(value: object, hint: Any) -> bool:  # noqa: ANN401 - an annotation
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if hint is Any:
-        return True
     if origin is typing.Union or isinstance(hint, types.UnionType):
         return any(_conforms(value, one) for one in arguments)
-    if origin is np.ndarray:
-        return isinstance(value, np.ndarray)
     if origin is tuple:
-        if not isinstance(value, tuple):
-            return False
-        if arguments[-1] is Ellipsis:
-            return all(_conforms(one, arguments[0]) for one in value)
-        return len(value) == len(arguments) and all(map(_conforms, value, arguments))
+        return isinstance(value, tuple) and _conform(value, arguments)
     if origin is dict:
-        return isinstance(value, dict) and all(
-            _conforms(one, arguments[1]) for one in value.values()
-        )
-    if hint is float:
+        return isinstance(value, dict) and _conform(tuple(value.values()), (arguments[1], ...))
+    if hint in {int, float} and isinstance(value, int):
         # JSON does not tell 1 from 1.0.
-        number = isinstance(value, float | int) and not isinstance(value, bool)
-        return number and (isinstance(value, float) or abs(value) < 1 << 53)
-    if hint is int:
-        return isinstance(value, int) and not isinstance(value, bool) and abs(value) < 1 << 63
-    # A member of an enumeration travels as its value, which its class turns back.
-    if isinstance(hint, type) and issubclass(hint, enum.Enum):
-        return isinstance(value, hint)
-    return isinstance(hint, type) and isinstance(value, hint)
+        most = 53 if hint is float else 63
+        return not isinstance(value, bool) and abs(value) < 1 << most
+    return isinstance(value, origin or hint)
 
+
+def _conform(values: tuple[object, ...], hints: tuple[Any, ...]) -> bool:
+    if hints[-1] is Ellipsis:
+        return all(_conforms(one, hints[0]) for one in values)
+    return len(values) == len(hints) and all(map(_conforms, values, hints))
