@@ -244,7 +244,9 @@ class _Admission:
         navigation = _waypoints(one)
         if one.stream is not None:
             name = self._names[one.stream]
-            stream = AeroStreamData(self._host.graph, name, AeroNavigation)
+            stream: AeroStreamData[AeroNavigation] = AeroStreamData(
+                self._host.graph, name, AeroNavigation
+            )
             navigation = AeroNavigation(
                 NavigationType.ANALYTICS_DRIVEN,
                 stream,

@@ -24,8 +24,8 @@ __all__ = ["GuestAnalysis", "GuestCondition"]
 
 _OPENING = 40.0
 """Wall seconds for a guest to open its analyses: models are large."""
-_ITEM = 5.0
-"""Wall seconds for a guest to process one item."""
+_ITEM = 4.0
+"""Wall seconds for a guest to process one item; shorter than the alert of a hung analysis."""
 _ALERTS = 100
 """Most alerts of one analysis in a flight."""
 _TEXT = 500

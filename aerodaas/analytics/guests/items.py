@@ -69,7 +69,8 @@ def _write(item: object) -> Any:  # noqa: ANN401 - JSON
         item = item.value if isinstance(item, enum.Enum) else item.item()
     if type(item) in _PLAIN:
         return item
-    name, content = type(item).__name__, None
+    name = type(item).__name__
+    content: list[Any] | dict[str, Any] | None = None
     if type(item) in {list, tuple}:
         content = [_write(one) for one in typing.cast("list[object]", item)]
     elif type(item) is dict and all(isinstance(key, str) for key in item):

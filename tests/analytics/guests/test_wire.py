@@ -1,4 +1,4 @@
-"""What a guest's process sends is read as data: known classes with fields of their types, bounded."""
+"""What a guest's process sends is read as data: known classes, fields of their types, bounds."""
 
 from __future__ import annotations
 

@@ -28,7 +28,19 @@ from aerodaas.types.guest_item import GuestItem
 from aerodaas.types.waypoints import VelocityCommand, Waypoint
 
 _HEAD = struct.Struct("<II")
-_VALUES = (None, True, -1, 10**30, 1e308, float("nan"), "", "a" * 300, [], {}, {"is": "tuple"})
+_VALUES: tuple[Any, ...] = (
+    None,
+    True,
+    -1,
+    10**30,
+    1e308,
+    float("nan"),
+    "",
+    "a" * 300,
+    [],
+    {},
+    {"is": "tuple"},
+)
 
 
 def seeds() -> Iterable[bytes]:
