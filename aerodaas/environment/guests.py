@@ -218,7 +218,7 @@ class _Admission:
             node.id,
             self._grants.quota,
             navigates=node.navigation,
-            sees_vehicle=node.robot in seen,
+            sees_vehicle=node.robot is not None and node.robot in seen,
             program=self._program if first else b"",
         )
         inputs = [host.graph.nodes[one].item for one in node.inputs if one in sensors]

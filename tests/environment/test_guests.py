@@ -434,3 +434,87 @@ def test_a_guest_that_fails_to_open(flyer: Flyer, guest: Path, alone: Run) -> No
     (told,) = [text for text in alerts(run) if text not in alerts(alone)]
     assert "the guest theirs has been ended" in told
     assert poses(run) == poses(alone)
+
+
+FORGED_DOCUMENT = """
+import aerodaas.environment.guest_process as inside
+
+class Forged:
+    def model_dump(self, mode):
+        return {content}
+
+inside._document = lambda environment: Forged()
+"""
+
+
+def forged(nodes: str = "[]", navigation: str = "[]") -> str:
+    """A guest that sends a document of its own making."""
+    content = f'{{"version": 1, "nodes": {nodes}, "navigation": {navigation}}}'
+    return HEAD + FORGED_DOCUMENT.format(content=content) + READY
+
+
+def node(**words: object) -> dict[str, object]:
+    """An analysis of a document."""
+    own = {"id": "drone/a", "robot": "drone", "inputs": ["drone/odom_drone"], "compute": "edge"}
+    return {**own, **words}
+
+
+@pytest.mark.parametrize(
+    ("text", "rights", "said"),
+    [
+        (forged(f"[{node()}]"), ("compute",), "sense:drone/odom_drone"),
+        (forged(f"[{node(inputs=['drone/@state'])}]"), RIGHTS, "its document"),
+        (forged(f"[{node(inputs=['other'])}]"), RIGHTS, "sense:other"),
+        (forged(f"[{node(compute='cloud')}]"), RIGHTS, "compute:cloud"),
+        (forged(f"[{node(robot='others')}]"), RIGHTS, "no robot"),
+        (forged(f"[{node(inputs=['drone/a'])}]"), RIGHTS, "circle"),
+        (forged(f"[{node()}, {node()}]"), RIGHTS, "one id"),
+        (
+            forged(f"[{node(triggers=[{'target': 'drone', 'method': 'end_mission'}])}]"),
+            RIGHTS,
+            "fly:drone",
+        ),
+        (
+            forged(f"[{node(navigation=True)}]", "[{'robot': 'drone', 'stream': 'drone/a'}]"),
+            RIGHTS,
+            "fly:drone",
+        ),
+        (
+            forged(f"[{node()}]", "[{'robot': 'drone', 'stream': 'drone/a'}]"),
+            (*RIGHTS, "fly"),
+            "cannot navigate by",
+        ),
+        (
+            forged("[]", "[{'robot': 'drone', 'waypoints': [{'is': 'Waypoint', 'of': {}}]}]"),
+            ("fly",),
+            "malformed",
+        ),
+        (forged("['x' * (100 << 20)]"), RIGHTS, "too large"),
+        (HEAD + "os.write(4, b'nonsense' * 1000); os.write(3, b'nonsense' * 1000)", (), "guest"),
+    ],
+)
+def test_a_forged_document_is_refused(
+    flyer: Flyer, guest: Path, text: str, rights: tuple[str, ...], said: str
+) -> None:
+    """By the owner, whatever the guest has made of its own process."""
+    assert said in refusal(flyer, guest, text, *rights)
+
+
+def test_a_guest_is_scheduled_as_the_owner_is(flyer: Flyer, guest: Path) -> None:
+    """By the owner's analytics scheduler, in its own actor, which takes tasks of frames."""
+    guest.write_text(
+        HEAD
+        + "class Mean(Analytics[float]):\n"
+        + "    scheduled = True\n"
+        + "    def process(self, item, context):\n"
+        + "        return float(item.image.mean())\n"
+        + "camera = drone.get_sensor_by_id('cam').get_data_stream()\n"
+        + "Mean().deploy(env.get_compute_resource_by_id('edge')).analyse(camera)\n"
+        + READY
+    )
+    camera = {"id": "cam", "rate": 5, "settings": {"width": 64, "height": 48}}
+    schedulers = {"trajectory": "ordered", "analytics": "edf"}
+    content = {**FLAT, "robots": [robot(sensors=[camera])], "schedulers": schedulers}
+    rights = ("sense:cam", "compute:edge")
+    run = flyer.fly(owner, content, guests=(guest,), grants={"theirs": rights})
+    assert results_of(run, "theirs_mean") > 10

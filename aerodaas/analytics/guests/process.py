@@ -58,13 +58,15 @@ class GuestProcess:
         code += "runpy.run_module('aerodaas.analytics.guests.sandbox', run_name='__main__')"
         words = [str(number), str(memory), str(cpu), _SERVED_BY]
         command = [sys.executable, "-I", "-c", code, *words]
+        self._outer: subprocess.Popen[bytes] | None = None
         started = threading.Event()
         ended = threading.Event()
         self._ended = ended
 
         def keep() -> None:
             # The signal of a parent's death comes at the end of the thread that has started it.
-            with theirs:
+            with theirs, contextlib.ExitStack() as done:
+                done.callback(started.set)
                 self._outer = subprocess.Popen(  # noqa: S603 - our own code
                     command,
                     stdin=subprocess.DEVNULL,
@@ -74,7 +76,6 @@ class GuestProcess:
                     pass_fds=(number,),
                     start_new_session=True,
                 )
-            started.set()
             self._outer.wait()
             ended.set()
 
@@ -121,15 +122,17 @@ class GuestProcess:
         if hasattr(self, "pid") and not self._ended.is_set():
             with contextlib.suppress(OSError):
                 os.kill(self.pid, signal.SIGKILL)
-        with contextlib.suppress(OSError):
-            os.killpg(self._outer.pid, signal.SIGKILL)
-        self._ended.wait(5.0)
+            # The process outside ends when all inside have ended.
+            self._ended.wait(2.0)
+        if self._outer is not None:
+            with contextlib.suppress(OSError):
+                os.killpg(self._outer.pid, signal.SIGKILL)
+            self._ended.wait(5.0)
         self._channel.close()
         shutil.rmtree(self._home, ignore_errors=True)
 
     def _exit_text(self) -> str:
         """How it ended by itself; empty if it still runs."""
-        if not self._ended.wait(0.5):
+        if self._outer is None or not self._ended.wait(0.5):
             return ""
-        code = self._outer.returncode
-        return f", with code {code}"
+        return f", with code {self._outer.returncode}"

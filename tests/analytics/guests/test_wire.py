@@ -17,7 +17,13 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types.data import Detection, Detections, Header, Odometry, Readings
 from aerodaas.types.errors import GraphError
 from aerodaas.types.guest_item import GuestItem
-from aerodaas.types.waypoints import SchedulingType, VelocityCommand, Waypoint, WaypointType
+from aerodaas.types.waypoints import (
+    NavigationItem,
+    SchedulingType,
+    VelocityCommand,
+    Waypoint,
+    WaypointType,
+)
 
 HEADER = Header(3, 4, "drone/cam")
 POINTS = np.arange(6, dtype=np.float32).reshape(2, 3)
@@ -54,7 +60,7 @@ def test_items_come_back(item: object) -> None:
 
 def test_navigation_comes_back() -> None:
     """Its items and whether they may be reordered."""
-    items = [Waypoint("a", 1, 2, 3), VelocityCommand(0.5)]
+    items: list[NavigationItem] = [Waypoint("a", 1, 2, 3), VelocityCommand(0.5)]
     sent = AeroNavigation(data=items, scheduling_type=SchedulingType.UNORDERED)
     back = decoded(json.loads(json.dumps(encoded(sent, opaque))))
     assert list(back) == items
