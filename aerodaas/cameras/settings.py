@@ -6,6 +6,7 @@ import math
 
 from aerodaas.config.checked import checked
 from aerodaas.config.model import CameraConfig, SensorConfig
+from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import CameraModel
 
@@ -17,9 +18,9 @@ def camera_settings(sensor: SensorConfig) -> CameraConfig:
     return checked(CameraConfig, sensor.settings, f"sensor {sensor.full_id}: settings")
 
 
-def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> str:
+def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> SecretUrl:
     """Return the path among the settings; raises ConfigError if it is missing."""
-    if not settings.path:
+    if settings.path is None or not settings.path.get_secret_value():
         message = f'sensor {sensor.full_id}: settings: give the {what} as "path"'
         raise ConfigError(message)
     return settings.path
