@@ -38,8 +38,7 @@ class FolderCamera:
         """Validate the settings of `sensor`; raises ConfigError."""
         del environment
         self._settings = camera_settings(sensor)
-        path = required_path(sensor, self._settings, "folder of pictures")
-        self._folder = Path(path.get_secret_value())
+        self._folder = Path(required_path(sensor, self._settings, "folder of pictures"))
         self._rate = sensor.rate
         self._files: list[Path] = []
         self._broken: set[Path] = set()

@@ -6,7 +6,6 @@ import math
 
 from aerodaas.config.checked import checked
 from aerodaas.config.model import CameraConfig, SensorConfig
-from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import CameraModel
 
@@ -18,12 +17,13 @@ def camera_settings(sensor: SensorConfig) -> CameraConfig:
     return checked(CameraConfig, sensor.settings, f"sensor {sensor.full_id}: settings")
 
 
-def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> SecretUrl:
+def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> str:
     """Return the path among the settings; raises ConfigError if it is missing."""
-    if settings.path is None or not settings.path.get_secret_value():
+    path = "" if settings.path is None else settings.path.get_secret_value()
+    if not path:
         message = f'sensor {sensor.full_id}: settings: give the {what} as "path"'
         raise ConfigError(message)
-    return settings.path
+    return path
 
 
 def camera_model(settings: CameraConfig, width: int, height: int) -> CameraModel:

@@ -9,6 +9,7 @@ from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
 from aerodaas.cameras.video_file import VideoFile
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
+from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import CameraModel
 
@@ -30,7 +31,7 @@ class VideoCamera:
         """Validate the settings of `sensor`; raises ConfigError."""
         del environment
         self._settings = camera_settings(sensor)
-        path = required_path(sensor, self._settings, "video file, URL or device")
+        path = SecretUrl(required_path(sensor, self._settings, "video file, URL or device"))
         self._label = str(path)
         self._source: VideoFile | LiveSource = (
             LiveSource(path)

@@ -7,7 +7,6 @@ rates Hz, times seconds.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,8 +30,8 @@ from pydantic import (
 from typing_extensions import Self
 
 from aerodaas.config.checked import checked
+from aerodaas.config.json_text import check_plain, read_json
 from aerodaas.config.secrets import SecretUrl, shown, shown_text
-from aerodaas.types.errors import ConfigError
 from aerodaas.types.identifiers import Identifier, ScopedName
 
 __all__ = [
@@ -505,6 +504,15 @@ class EnvironmentConfig(_Strict):
                 raise ValueError(message)
         return self
 
+    def for_actors(self) -> Self:
+        """The environment as a run's actors have it, without the secrets that are not for them.
+
+        The token of the remote control and environment variables reach the analysis concerned
+        alone.
+        """
+        remote = self.remote.model_copy(update={"token": None})
+        return self.model_copy(update={"remote": remote, "runtime_env": {}, "compute": "auto"})
+
     def camera_driver(self, sensor: SensorConfig) -> str:
         """The driver of a camera: its own, else its robot's, else the simulated one.
 
@@ -530,19 +538,12 @@ class EnvironmentConfig(_Strict):
     @classmethod
     def load(cls, path: str | Path) -> EnvironmentConfig:
         """Read an environment file; raises ConfigError that names the file and the place."""
-        try:
-            content = json.loads(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            message = f"cannot read the environment file {path}: {error.strerror}"
-            raise ConfigError(message) from None
-        except (json.JSONDecodeError, UnicodeDecodeError) as error:
-            message = f"{path} is not JSON: {error}"
-            raise ConfigError(message) from None
-        return validated(content, str(path))
+        return validated(read_json(path, "the environment file"), str(path))
 
 
 def validated(content: object, place: str) -> EnvironmentConfig:
     """Check the content of an environment file; raises ConfigError that names `place`."""
+    check_plain(content, place)
     return checked(EnvironmentConfig, content, place, " (see `aerodaas schema`)")
 
 
