@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.actors.cluster.ray_cluster import Placement
@@ -416,7 +416,7 @@ def make_plan(
     names += ["dispatcher"] if dispatch is not None else []
     streams += [alert_stream(name) for name in names]
     return FlightPlan(
-        session=session,
+        session=replace(session, environment=session.environment.for_actors()),
         drones=drones,
         edges=tuple(planner.edge_of(group[0].robot.id) for group in drones),
         cameras=cameras,

@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.errors import SourceError
 
@@ -35,7 +36,7 @@ _OPENING = threading.Lock()
 class LiveSource:
     """Source of the newest frame of a URL (rtsp, udp, http, …) or device (/dev/video0)."""
 
-    def __init__(self, address: str, *, timeout: float = _FIRST_FRAME_TIMEOUT) -> None:
+    def __init__(self, address: SecretUrl, *, timeout: float = _FIRST_FRAME_TIMEOUT) -> None:
         """Read from `address`; `open` waits up to `timeout` seconds for the first frame."""
         self._address = address
         self._timeout = timeout
@@ -84,7 +85,7 @@ class LiveSource:
     def _decode(self) -> None:
         wait = _SHORTEST_WAIT
         while not self._closing.is_set():
-            capture = _connect(self._address)
+            capture = _connect(self._address.get_secret_value())
             if self._drain(capture):
                 wait = _SHORTEST_WAIT
             capture.release()

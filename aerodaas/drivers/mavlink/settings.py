@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, SecretStr, model_validator
 
 from aerodaas.config.checked import checked
 from aerodaas.config.model import RobotConfig
@@ -51,7 +51,7 @@ class MavlinkSettings(BaseModel):
     forward: str | None = None
     """Pass everything on to a ground station or another program and back, such as
     `udpout:127.0.0.1:14550`."""
-    signing_key: str | None = None
+    signing_key: SecretStr | None = None
     """File with the key of MAVLink 2 signing: 32 bytes, or 64 hexadecimal digits. The environment
     variable AERODAAS_MAVLINK_KEY takes its place."""
     max_speed: Positive = 10.0

@@ -34,13 +34,15 @@ def load_key(settings: MavlinkSettings, name: str) -> bytes | None:
         return _key(text.encode(), f"{name}: the variable {KEY_VARIABLE}")
     if settings.signing_key is None:
         return None
+    path = settings.signing_key.get_secret_value()
     try:
-        content = Path(settings.signing_key).read_bytes()
+        content = Path(path).read_bytes()
     except OSError as error:
+        # Not named: a path that is none may be the key itself.
         raise ConfigError(
-            f"{name}: cannot read the signing key {settings.signing_key}: {error.strerror}"
+            f"{name}: cannot read the file that signing_key names: {error.strerror}"
         ) from None
-    return _key(content, f"{name}: the signing key in {settings.signing_key}")
+    return _key(content, f"{name}: the signing key in {path}")
 
 
 def _key(content: bytes, place: str) -> bytes:
