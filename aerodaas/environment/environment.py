@@ -56,7 +56,8 @@ class Environment(PaperNames, IEnvironment):
                 replay_environment,
             )
 
-            config = overridden(replay_environment(options.replay), options.overrides)
+            local = self.path if options.environment is not None else None
+            config = overridden(replay_environment(options.replay, local), options.overrides)
         self.config: EnvironmentConfig = located(config, self.path.parent)
         check_environment(self.config, str(options.replay or self.path))
         self.env_data = self.config.model_dump(by_alias=True)
