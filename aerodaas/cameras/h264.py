@@ -19,6 +19,8 @@ start code instead, as FFmpeg's own parser must, would add a frame interval of l
 _START_CODE = b"\x00\x00\x00\x01"
 _UNIT = re.compile(rb"\x00\x00\x01(.)", re.DOTALL)
 _SLICES = frozenset({1, 2, 5})
+_MOST_PIXELS = 1 << 25
+"""Width times height of a frame: 8K has 33.2 million."""
 _LARGEST_FRAME = 1 << 20
 """Size in bytes above which the content is discarded as invalid."""
 
@@ -93,6 +95,8 @@ class FrameDecoder:
         # Frame threading would delay frames, as does reordering for B frames.
         codec.thread_count = 1
         codec.flags |= Flags.low_delay
+        # A frame's header may claim any size; its memory is taken before the frame is decoded.
+        codec.options = {"max_pixels": str(_MOST_PIXELS)}
         return codec
 
     def decode(self, frame: WholeFrame) -> VideoFrame | None:
