@@ -19,9 +19,9 @@ start code instead, as FFmpeg's own parser must, would add a frame interval of l
 _START_CODE = b"\x00\x00\x00\x01"
 _UNIT = re.compile(rb"\x00\x00\x01(.)", re.DOTALL)
 _SLICES = frozenset({1, 2, 5})
-_MOST_PIXELS = 4096 * 4096
-"""Pixels of the largest picture that is decoded; a stream may claim any size, and FFmpeg allocates
-several pictures of it at once."""
+_MOST_PIXELS = 1 << 25
+"""Pixels of the largest picture that is decoded: 8K has 33.2 million. A stream may claim any size,
+and FFmpeg allocates several pictures of it before the first is decoded."""
 _LARGEST_FRAME = 1 << 20
 """Size in bytes above which the content is discarded as invalid."""
 

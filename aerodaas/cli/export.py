@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from aerodaas.cli.printable import printable
 from aerodaas.cli.report import Recorded
 
 if TYPE_CHECKING:
@@ -54,4 +55,4 @@ def export(
 
 def _channels(recording: Recording) -> list[str]:
     topics = sorted(recording.topics.values(), key=lambda topic: topic.name)
-    return [f"{topic.count:>9}  {topic.name}  {topic.schema}" for topic in topics]
+    return [printable(f"{topic.count:>9}  {topic.name}  {topic.schema}") for topic in topics]

@@ -58,7 +58,8 @@ class Environment(PaperNames, IEnvironment):
                 replay_environment,
             )
 
-            config = overridden(replay_environment(options.replay), options.overrides)
+            local = self.path if options.environment is not None else None
+            config = overridden(replay_environment(options.replay, local), options.overrides)
         self.config: EnvironmentConfig = located(config, self.path.parent)
         self.refused_guests: list[str] = []
         """Reasons of the guests that do not take part."""

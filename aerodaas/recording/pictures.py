@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import defaultdict, deque
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -21,6 +22,7 @@ from aerodaas.recording.images import (
     picture_bytes,
     picture_field,
 )
+from aerodaas.recording.limits import MAX_VIDEO_GROUP
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.states import odometry_of
 from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry
@@ -36,6 +38,7 @@ __all__ = [
     "shots",
 ]
 
+_log = logging.getLogger(__name__)
 _PICTURE_SCHEMAS = IMAGE_SCHEMAS | VIDEO_SCHEMAS
 _DEPTH = "/aligned_depth"
 """End of the topic of a frame's depth image, next to the topic of its header."""
@@ -49,11 +52,17 @@ class _Video:
 
     decoder: H264Decoder = field(default_factory=H264Decoder)
     group: list[bytes] = field(default_factory=list)
+    size: int = 0
+    """Bytes of the frames since the last key frame."""
 
     def add(self, value: Any) -> _VideoFrame:  # noqa: ANN401 - by the schema
         data = picture_bytes(value)
         if is_key_frame(data):
-            self.group = []
+            self.group, self.size = [], 0
+        self.size += len(data)
+        if self.size > MAX_VIDEO_GROUP:
+            # It cannot be decoded, nor can those after it until the next key frame.
+            return _VideoFrame(self.decoder, self.group, -1)
         self.group.append(data)
         return _VideoFrame(self.decoder, self.group, len(self.group) - 1)
 
@@ -67,7 +76,7 @@ class _VideoFrame:
     place: int
 
     def image(self) -> NDArray[np.uint8] | None:
-        return self.decoder.decode(self.group, self.place)
+        return None if self.place < 0 else self.decoder.decode(self.group, self.place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +112,7 @@ class Shot:
         if self.decoded is not None:
             return self.decoded()
         if self.video is None:
-            return decode_image(self.record.schema, self.record.value)
+            return self._of_size(decode_image(self.record.schema, self.record.value))
         if self.format != "h264":
             raise SourceError(
                 f"videos in {self.format!r} cannot be decoded; record them in h264, or as images"
@@ -112,7 +121,13 @@ class Shot:
         if image is None or self.size is None:
             return image
         width, height = self.size
-        return image[:height, :width]
+        return self._of_size(image[:height, :width])
+
+    def _of_size(self, image: NDArray[np.uint8] | None) -> NDArray[np.uint8] | None:
+        """The image, or None if it has not the recorded size."""
+        if image is None or (self.size is not None and image.shape[1::-1] != self.size):
+            return None
+        return image
 
     def depth(self) -> NDArray[np.uint16] | None:
         """Decode the depth image.
@@ -212,7 +227,11 @@ def frames(
     """
     for shot in shots(recording, topics):
         if stamps is None or shot.record.captured in stamps:
-            image = shot.image()
+            try:
+                image = shot.image()
+            except SourceError as error:
+                _log.warning("%s: skipped a picture on %s: %s", recording.path, shot.record.topic, error)
+                continue
             if image is not None:
                 yield Frame(shot.header, image, odometry=shot.odometry, depth=shot.depth())
 

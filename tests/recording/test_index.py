@@ -31,7 +31,7 @@ def test_loose_messages_are_gathered_into_blocks_of_about_a_megabyte(tmp_path: P
             (10, 30, {one, two}),
             (20, 20, {one}),
         ]
-        assert [len(load(file, block)) for block in blocks] == [2, 1]
+        assert [len(list(load(file, block))) for block in blocks] == [2, 1]
     with Recording.open(path) as recording:
         assert [it.stamp for it in recording.records()] == [0, 10, 20]
 

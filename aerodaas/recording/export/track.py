@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +11,7 @@ import numpy as np
 
 from aerodaas.recording.export.output import new_file
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.recorded_environment import recorded_home
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import RecordingError
 from aerodaas.types.geometry import GeodeticOrigin
@@ -144,10 +144,8 @@ def _globe(home: GeodeticOrigin, at: dict[str, float]) -> tuple[float, float, fl
 
 
 def _home(recording: Recording) -> GeodeticOrigin | None:
-    if "environment.json" not in recording.attachments:
-        return None
-    home = json.loads(recording.attachment("environment.json")).get("home")
-    return home and GeodeticOrigin(home["latitude"], home["longitude"], home["altitude"])
+    home = recorded_home(recording)
+    return home and GeodeticOrigin(home.latitude, home.longitude, home.altitude)
 
 
 def _gpx_point(parent: ET.Element, kind: str, place: _Place) -> None:
