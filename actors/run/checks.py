@@ -14,8 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 from aerodaas.analytics.base import Analytics
 from aerodaas.config.checked import checked, near
+from aerodaas.config.plugins import (
+    PluginKind,
+    is_built_in,
+    load_plugin,
+    require_plugin,
+    settings_model,
+)
 from aerodaas.config.secrets import SecretUrl, plain, shown_text
-from aerodaas.config.plugins import PluginKind, is_built_in, load_plugin, require_plugin, settings_model
 from aerodaas.dataflow.names import snake_case
 from aerodaas.types.errors import ConfigError, GraphError
 from aerodaas.types.identifiers import find_scoped

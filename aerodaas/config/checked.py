@@ -52,7 +52,11 @@ def _is_other_choice(problem: ErrorDetails) -> bool:
 
 def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> str:
     # Among several kinds that a setting may have, pydantic names the one that it tried.
-    place = tuple(one for one in problem["loc"] if not (isinstance(one, str) and "[" in one))
+    *kinds, last = problem["loc"] or ("file",)
+    # The last part may be a stranger's key of any form.
+    place = (*(one for one in kinds if not (isinstance(one, str) and "[" in one)), last)
+    if problem["type"] != "extra_forbidden" and isinstance(last, str) and "[" in last:
+        place = place[:-1]
     said = problem["msg"].removeprefix("Value error, ")
     text = ".".join(str(part) for part in place) or "file"
     whose = _whose(content, place)

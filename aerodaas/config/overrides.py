@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from aerodaas.config.model import EnvironmentConfig, SensorConfig, validated
 from aerodaas.config.json_text import parse_json
+from aerodaas.config.model import EnvironmentConfig, SensorConfig, validated
 from aerodaas.types.errors import AmbiguousIdError, ConfigError, UnknownIdError
 
 __all__ = ["located", "overridden", "parse_setting"]

@@ -74,7 +74,9 @@ def is_secret_name(name: str) -> bool:
 
 def plain(value: object) -> Any:  # noqa: ANN401 - of any type
     """Return the value of a secret; any other value as it is."""
-    return value.get_secret_value() if isinstance(value, Secret | SecretStr | SecretBytes) else value
+    return (
+        value.get_secret_value() if isinstance(value, Secret | SecretStr | SecretBytes) else value
+    )
 
 
 def shown(value: object, name: str = "") -> Any:  # noqa: ANN401 - as nested as its input

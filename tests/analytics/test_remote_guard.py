@@ -18,7 +18,9 @@ async def _reached(_scope: Scope, _receive: Receive, send: Send) -> None:
     await send({"type": "http.response.start", "status": 200, "headers": []})
 
 
-def _ask(app: Guard | HostGuard, peer: str = "10.0.0.9", **headers: str) -> tuple[int, dict[bytes, bytes]]:
+def _ask(
+    app: Guard | HostGuard, peer: str = "10.0.0.9", **headers: str
+) -> tuple[int, dict[bytes, bytes]]:
     sent: list[dict[str, Any]] = []
 
     async def receive() -> MutableMapping[str, Any]:

@@ -17,8 +17,8 @@ from aerodaas.cameras import live
 from aerodaas.cameras.base import Camera
 from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.video import VideoCamera
-from aerodaas.config.secrets import SecretUrl
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
+from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import ConfigError, SourceError
 
@@ -157,7 +157,9 @@ def test_a_live_source_gives_each_newest_frame_once_and_reconnects(stream: str) 
 def test_a_silent_address_is_refused_with_a_remedy() -> None:
     """Nobody answers: the user is told what to check."""
     source = LiveSource(SecretUrl("http://me:hidden@127.0.0.1:9/none?k=hidden"), timeout=0.5)
-    with pytest.raises(SourceError, match=r"no picture from http://127.0.0.1:9/none\?\*\*\* within"):
+    with pytest.raises(
+        SourceError, match=r"no picture from http://127.0.0.1:9/none\?\*\*\* within"
+    ):
         source.open()
 
 

@@ -119,15 +119,18 @@ def test_an_error_does_not_quote_a_secret(secret: str, place: str) -> None:
     wrong: dict[str, Any] = {
         "token": {"remote": {"token": secret[:10], "port": "x"}},
         "env": {"runtime_env": {"a": {"env_vars": {"RAY_X": secret, "HUB": [secret]}}}},
-        "url": {"compute": [{"id": "f", "kind": "http", "endpoint": {"url": f"ftp://a:{secret}@b"}}]},
+        "url": {
+            "compute": [{"id": "f", "kind": "http", "endpoint": {"url": f"ftp://a:{secret}@b"}}]
+        },
         "package": {"runtime_env": {"a": {"packages": [f"x @@ https://me:{secret}@h/x"]}}},
         "path": {"sensors": [{"id": "c", "settings": {"path": f"rtsp://a:{secret}@b"}, "rate": 0}]},
         "lamp": {},
     }[place]
+    lamp = {"pass_phrase": [1], "code_word": f"bad{secret}"}
     with pytest.raises(ConfigError) as refusal:
-        if place == "lamp":
-            checked(LampSettings, {"pass_phrase": [1], "code_word": f"bad{secret}"}, "lamp")
-        validated({"robots": [{"id": "drone"}], **wrong}, "here")
+        checked(LampSettings, lamp, "lamp") if place == "lamp" else validated(
+            {"robots": [{"id": "drone"}], **wrong}, "here"
+        )
     assert secret[:10] not in str(refusal.value)
 
 
