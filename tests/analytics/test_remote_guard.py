@@ -80,7 +80,7 @@ def test_the_page_is_served_under_its_own_names(host: str, origin: str | None, s
 
 def test_names_where_every_interface_is_listened_on() -> None:
     """Numeric addresses cannot be rebound."""
-    assert is_served("192.168.1.5", "0.0.0.0")
+    assert is_served("192.168.1.5", "::")
     assert not is_served("192.168.1.5", "127.0.0.1")
-    assert not is_served("evil.example", "0.0.0.0")
+    assert not is_served("evil.example", "::")
     assert is_served("drone.lan", "drone.lan")
