@@ -149,16 +149,14 @@ def _pixels(content: bytes) -> int:
     WebP has at most 16383 x 16383 by its format.
     """
     if content.startswith(b"\x89PNG"):
-        width, height = content[16:20], content[20:24]
-        return int.from_bytes(width, "big") * int.from_bytes(height, "big")
+        return int.from_bytes(content[16:20], "big") * int.from_bytes(content[20:24], "big")
     if content.startswith(b"BM"):
-        width, height = content[18:22], content[22:26]
-        sides = (int.from_bytes(side, "little", signed=True) for side in (width, height))
-        return abs(math.prod(sides))
+        sides = (content[18:22], content[22:26])
+        return abs(math.prod(int.from_bytes(one, "little", signed=True) for one in sides))
     if content.startswith(b"\xff\xd8"):
         frames = _JPEG_FRAME.finditer(content)
-        sides = [(int.from_bytes(one[1], "big"), int.from_bytes(one[2], "big")) for one in frames]
-        return max((height * width for height, width in sides), default=0)
+        areas = (int.from_bytes(one[1], "big") * int.from_bytes(one[2], "big") for one in frames)
+        return max(areas, default=0)
     return 0
 
 
