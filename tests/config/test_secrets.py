@@ -116,7 +116,7 @@ def test_a_secret_stays_in_the_configuration(
 @given(secret=SECRETS, place=st.sampled_from(["token", "env", "lamp", "url", "package", "path"]))
 def test_an_error_does_not_quote_a_secret(secret: str, place: str) -> None:
     """Whatever is wrong beside it, or with it."""
-    wrong: dict[str, Any] = {
+    places: dict[str, dict[str, Any]] = {
         "token": {"remote": {"token": secret[:10], "port": "x"}},
         "env": {"runtime_env": {"a": {"env_vars": {"RAY_X": secret, "HUB": [secret]}}}},
         "url": {
@@ -125,7 +125,8 @@ def test_an_error_does_not_quote_a_secret(secret: str, place: str) -> None:
         "package": {"runtime_env": {"a": {"packages": [f"x @@ https://me:{secret}@h/x"]}}},
         "path": {"sensors": [{"id": "c", "settings": {"path": f"rtsp://a:{secret}@b"}, "rate": 0}]},
         "lamp": {},
-    }[place]
+    }
+    wrong = places[place]
     lamp = {"pass_phrase": [1], "code_word": f"bad{secret}"}
     with pytest.raises(ConfigError) as refusal:
         checked(LampSettings, lamp, "lamp") if place == "lamp" else validated(
