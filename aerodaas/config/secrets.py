@@ -58,7 +58,10 @@ def shown_text(text: str) -> str:
     before = _cut(text[: start.start()])
     slashes = len(text[start.end() :]) - len(text[start.end() :].lstrip("/"))
     end = start.end() + slashes
-    return f"{before}{text[start.start() : end]}{_cut(text[end:].rpartition('@')[2])}"
+    login, at, address = text[end:].rpartition("@")
+    # An @ behind parameters may be a password's or a parameter's: what follows is either.
+    shown_address = "***" if at and _PARAMETERS.search(login) else _cut(address)
+    return f"{before}{text[start.start() : end]}{shown_address}"
 
 
 def _cut(text: str) -> str:

@@ -142,6 +142,7 @@ def test_an_error_does_not_quote_a_secret(secret: str, place: str) -> None:
         ("https://fn/x?code=abc", "https://fn/x?***"),
         ("rtsp://1.2.3.4:554/user=me&password=abc", "rtsp://1.2.3.4:554/user?***"),
         ("x @ https://me:pw@host/x.whl", "x @ https://host/x.whl"),
+        ("http://cam/x?code=abc@def", "http://***"),
         ("torch==2.4.1", "torch==2.4.1"),
         ("udpin:0.0.0.0:14540", "udpin:0.0.0.0:14540"),
         ("/videos/a=b.mp4", "/videos/a=b.mp4"),
