@@ -31,7 +31,7 @@ from typing_extensions import Self
 
 from aerodaas.config.checked import checked
 from aerodaas.config.json_text import check_plain, read_json
-from aerodaas.config.secrets import SecretUrl, shown, shown_text
+from aerodaas.config.secrets import HIDDEN, SecretUrl, shown, shown_text
 from aerodaas.types.identifiers import Identifier, ScopedName
 
 __all__ = [
@@ -97,7 +97,9 @@ class _Strict(BaseModel):
 
     def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
         for name, value in super().__repr_args__():
-            yield name, shown(value) if name == "settings" else _without_logins(value)
+            # Which settings of a plug-in are secrets, its own model alone knows.
+            hidden = dict.fromkeys(value, HIDDEN) if name == "settings" else value
+            yield name, _without_logins(hidden)
 
 
 class HomeConfig(_Strict):

@@ -29,7 +29,7 @@ _SCHEME = re.compile(r"[a-z][a-z0-9+.\-]*:/", re.IGNORECASE)
 _PARAMETERS = re.compile(r"[?#;=\s\"']")
 _NAME = re.compile(
     r"(?:^|[_\-.])(?:\w*(?:passw(?:or)?d|passphrase|secret|token|credential|bearer|cookie)s?|"
-    r"pass|pwd|auth|authorization|login|\w*key|pin|psk)(?:$|[_\-.])",
+    r"pass|pwd|auth|authorization|login|key|pin|psk)(?:$|[_\-.])",
     re.IGNORECASE,
 )
 _ABOUT = re.compile(r"[_\-.](?:env|file|header|id|name|path|timeout|type)$", re.IGNORECASE)
@@ -58,7 +58,10 @@ def shown_text(text: str) -> str:
     before = _cut(text[: start.start()])
     slashes = len(text[start.end() :]) - len(text[start.end() :].lstrip("/"))
     end = start.end() + slashes
-    return f"{before}{text[start.start() : end]}{_cut(text[end:].rpartition('@')[2])}"
+    login, at, address = text[end:].rpartition("@")
+    # An @ behind parameters may be a password's or a parameter's: what follows is either.
+    shown_address = "***" if at and _PARAMETERS.search(login) else _cut(address)
+    return f"{before}{text[start.start() : end]}{shown_address}"
 
 
 def _cut(text: str) -> str:
@@ -79,7 +82,7 @@ def plain(value: object) -> Any:  # noqa: ANN401 - of any type
     )
 
 
-def shown(value: object, name: str = "") -> Any:  # noqa: ANN401 - as nested as its input
+def shown(value: object, name: str = "") -> Any:  # noqa: ANN401, PLR0911 - as nested as its input
     """Return settings without their secrets, of the same form and of JSON's types.
 
     Args:
@@ -111,7 +114,7 @@ def _longer(name: str, key: str) -> str:
     return name if is_secret_name(name) else key
 
 
-def secret_texts(value: object, name: str = "") -> Iterator[str]:
+def secret_texts(value: object, name: str = "") -> Iterator[str]:  # noqa: C901 - one kind each
     """Yield the secrets in settings as texts, the parts of URLs that are not shown among them."""
     if isinstance(value, BaseModel):
         value = dict(value)

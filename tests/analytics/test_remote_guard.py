@@ -50,7 +50,7 @@ def test_wrong_tokens_are_slowed_and_told_once() -> None:
 
 def test_many_peers_are_limited_together_and_forgotten() -> None:
     """One alert for all of them; a minute later the counts begin anew."""
-    now, told = [0.0], []
+    now, told = [0.0], list[str]()
     wrong = WrongTokens(told.append, lambda: now[0])
     pauses = [wrong.count(f"fd00::{index}:1:2:3:4") for index in range(1)]
     pauses += [wrong.count(f"10.0.{index // 200}.{index % 200}") for index in range(5000)]
@@ -80,7 +80,7 @@ def test_the_page_is_served_under_its_own_names(host: str, origin: str | None, s
 
 def test_names_where_every_interface_is_listened_on() -> None:
     """Numeric addresses cannot be rebound."""
-    assert is_served("192.168.1.5", "0.0.0.0")
+    assert is_served("192.168.1.5", "::")
     assert not is_served("192.168.1.5", "127.0.0.1")
-    assert not is_served("evil.example", "0.0.0.0")
+    assert not is_served("evil.example", "::")
     assert is_served("drone.lan", "drone.lan")

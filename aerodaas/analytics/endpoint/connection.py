@@ -76,7 +76,10 @@ class Connection:
         """Failed attempts by kind."""
         self._config = config
         self._secret = _secret(config)
-        self._secrets = (self.url, *map(SecretStr, self._secret.values()))
+        self._secrets: tuple[SecretStr | SecretUrl, ...] = (
+            self.url,
+            *map(SecretStr, self._secret.values()),
+        )
         self._pool = urllib3.PoolManager(maxsize=executors, block=True, retries=False)
 
     def ask(
