@@ -34,7 +34,7 @@ def explained(error: ValidationError, model: type[BaseModel], content: object) -
     problems = [one for one in error.errors() if not _is_other_choice(one)] or error.errors()
     text = "; ".join(_problem(one, model, content) for one in problems)
     # A validator's own words may quote what it was given.
-    return cleaned(cleaned(text, content), list(_typed_secrets(model, content)))
+    return cleaned(text, [content, *_typed_secrets(model, content)])
 
 
 def near(name: str, known: Iterable[str]) -> str:

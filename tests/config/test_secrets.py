@@ -169,7 +169,6 @@ def test_a_library_quotes_an_address() -> None:
     text = cleaned("cannot open rtsp://me:hidden@cam/live?k=query (login me:hidden)", [url])
     assert "hidden" not in text
     assert "query" not in text
-    assert "rtsp://cam/live" in text
 
 
 def test_a_setting_of_the_command_line_is_not_quoted() -> None:
