@@ -6,6 +6,9 @@ __all__ = ["VARIABLES"]
 
 VARIABLES = {
     "RAY_USAGE_STATS_ENABLED": "0",
+    # Ray would keep the history of each call in the head, 3 kB of memory a call, for a dashboard
+    # that is not started.
+    "RAY_task_events_report_interval_ms": "0",
     # Otherwise Ray refuses a node whose Python differs in patch level, as on a Jetson.
     "RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL": "minor",
     # A frame is sent within its call: a reference costs round trips.
