@@ -50,6 +50,8 @@ def export(
         files += [track.write_gpx(opened, folder)] if gpx else []
         files += [track.write_kml(opened, folder)] if kml else []
         lines = [str(path) for path in files] or _channels(opened)
+        if opened.damaged:
+            lines.append(f"skipped {opened.damaged} broken messages or chunks")
     typer.echo("\n".join(lines))
 
 

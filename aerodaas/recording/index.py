@@ -46,6 +46,8 @@ _CHECKSUM = 4
 _FOOTER_END = 8 + 8 + _CHECKSUM + _MAGIC
 """Bytes from the footer's first field, the summary's offset, to the end of the file."""
 _READ_RECORDS = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE})
+_CHUNK_SIZE = struct.Struct("<QQQ")
+"""How a chunk begins: first time, last time, bytes once unpacked."""
 _NEVER = 1 << 64
 """Later than any log time."""
 _LOOSE = 1 << 20
@@ -148,13 +150,16 @@ def _bounded(index: FileIndex, size: int) -> FileIndex:
     """Return `index`; raise TooLargeError if the file would unpack to far more than it is."""
     if max(len(index.channels), len(index.schemas)) > MAX_CHANNELS:
         raise TooLargeError(f"has more than {MAX_CHANNELS} channels or schemas; it is not read")
-    whole = sum(block.size for block in index.blocks)
+    _check_unpacked(sum(block.size for block in index.blocks), size)
+    return index
+
+
+def _check_unpacked(whole: int, size: int) -> None:
     if whole > MAX_UNPACKED + MAX_RATIO * size:
         raise TooLargeError(
-            f"has {size} bytes and unpacks to {whole}, as no recording of a flight does; it is "
-            "not read"
+            f"has {size} bytes and would unpack to {whole} or more, as no recording of a flight "
+            "does; it is not read"
         )
-    return index
 
 
 def _tells_all(summary: Summary) -> bool:
@@ -210,6 +215,7 @@ def _scan(file: BinaryIO, size: int) -> FileIndex:
     index = FileIndex(complete=False)
     offset = _MAGIC
     over = False
+    whole = 0
     while offset + _RECORD_HEAD <= size:
         file.seek(offset)
         opcode, length = struct.unpack("<BQ", file.read(_RECORD_HEAD))
@@ -220,6 +226,11 @@ def _scan(file: BinaryIO, size: int) -> FileIndex:
             break
         # The records after the end of the data, the index, only repeat earlier ones.
         over = over or opcode == Opcode.DATA_END
+        if opcode == Opcode.CHUNK and length >= _CHUNK_SIZE.size:
+            # Before it is unpacked, and outside of what passes for damage.
+            whole += _CHUNK_SIZE.unpack(file.read(_CHUNK_SIZE.size))[2]
+            _check_unpacked(whole, size)
+            file.seek(offset + _RECORD_HEAD)
         try:
             if not over:
                 _enter(index, file, opcode, offset, end)
@@ -232,7 +243,7 @@ def _scan(file: BinaryIO, size: int) -> FileIndex:
 def _enter(index: FileIndex, file: BinaryIO, opcode: int, offset: int, end: int) -> None:
     if opcode == Opcode.CHUNK:
         block = Block(offset, end - offset, chunked=True)
-        _, _, block.size = struct.unpack("<QQQ", file.read(24))
+        _, _, block.size = _CHUNK_SIZE.unpack(file.read(_CHUNK_SIZE.size))
         _enter_messages(index, block, load(file, block))
     elif opcode == Opcode.METADATA:
         _enter_metadata(index, file, end - offset - _RECORD_HEAD)

@@ -11,6 +11,8 @@ import re
 from collections.abc import Callable
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
+from google.protobuf.json_format import MessageToDict
+from google.protobuf.message import Message
 from mcap.records import Channel, Schema
 from mcap_protobuf.decoder import DecoderFactory
 from pydantic import ConfigDict, Field, TypeAdapter, with_config
@@ -22,7 +24,7 @@ from aerodaas.recording.limits import MAX_DEPTH, MAX_JSON
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.vehicle import FlightEnd, VehicleMode
 
-__all__ = ["BrokenMessageError", "MessageDecoder", "decode_json"]
+__all__ = ["BrokenMessageError", "MessageDecoder", "decode_json", "plain_fields"]
 
 _LONGEST_NS = 10**18
 """Nanoseconds of a mission: thirty years, far within what dates and plots can show."""
@@ -31,7 +33,7 @@ _FARTHEST = 1e9
 
 Stamp = Annotated[int, Field(strict=True, ge=-_LONGEST_NS, le=_LONGEST_NS)]
 Count = Annotated[int, Field(strict=True, ge=0, le=2**63 - 1)]
-Pixels = Annotated[int, Field(strict=True, ge=0, le=1 << 20)]
+Pixels = Annotated[int, Field(strict=True, ge=1, le=1 << 20)]
 Number = Annotated[float, Field(strict=True, ge=-_FARTHEST, le=_FARTHEST)]
 Gap = Number | None
 """A number, or null in the place of one that is not finite."""
@@ -365,6 +367,28 @@ def decode_json(data: bytes) -> Any:  # noqa: ANN401 - any JSON value
     if _ESCAPED_SURROGATE.search(data):
         json.dumps(value, ensure_ascii=False).encode()
     return value
+
+
+def plain_fields(message: Message) -> dict[str, Any]:
+    """A protobuf message as a dictionary; bytes as their length instead of Base64.
+
+    Raises:
+        BrokenMessageError: If the schema in the file is none that can be read so.
+    """
+    try:
+        lengths = {
+            field.name: f"<{len(value)} bytes>"
+            for field, value in message.ListFields()
+            if isinstance(value, bytes)
+        }
+        for name in lengths:
+            message.ClearField(name)
+        fields: dict[str, Any] = MessageToDict(message, preserving_proto_field_name=True)
+        json.dumps(fields, ensure_ascii=False).encode()
+    except Exception as error:
+        # As in `MessageDecoder.decode`: a stranger's schema may misuse well-known names.
+        raise BrokenMessageError(f"not a message with plain fields: {error}") from error
+    return fields | lengths
 
 
 def _depth(value: object) -> int:

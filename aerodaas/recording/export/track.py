@@ -133,10 +133,14 @@ def _tracks(recording: Recording) -> dict[str, _Track]:
 def _position(
     state: dict[str, Any], home: GeodeticOrigin | None
 ) -> tuple[float, float, float] | None:
+    at = state["odometry"]["position"]
     if home is not None:
-        return _globe(home, state["odometry"]["position"])
-    gps = state.get("gps")
-    return (gps["latitude"], gps["longitude"], gps["altitude"]) if gps else None
+        # Null stands for a number that was not finite.
+        return None if None in at.values() else _globe(home, at)
+    gps = state.get("gps") or {}
+    latitude, longitude, altitude = (gps.get(name) for name in _Place._fields[:3])
+    known = latitude is not None and longitude is not None and altitude is not None
+    return (latitude, longitude, altitude) if known else None
 
 
 def _globe(home: GeodeticOrigin, at: dict[str, float]) -> tuple[float, float, float]:
