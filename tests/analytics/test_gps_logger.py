@@ -114,12 +114,20 @@ def test_an_endless_field_costs_itself_only() -> None:
     assert track.malformed == 1
 
 
-@pytest.mark.parametrize("time", ["{}", "[]", "[" * 5000, '{"a": [1]}'])
-def test_json_of_another_shape_is_refused_or_malformed(time: str) -> None:
+def test_a_heading_of_brackets_takes_no_time() -> None:
+    """Units in brackets are looked for in one pass, not anew from each bracket."""
+    begun = time.process_time()
+    with pytest.raises(SourceError, match="no latitude"):
+        parse_track("x" + "[" * 200_000 + ",lat\n1,2\n", "log")
+    assert time.process_time() - begun < 2.0
+
+
+@pytest.mark.parametrize("told", ["{}", "[]", "[" * 5000, '{"a": [1]}'])
+def test_json_of_another_shape_is_refused_or_malformed(told: str) -> None:
     """A time that is no number or text, and nesting without an end."""
     with suppress(SourceError):
         track = parse_track(
-            f'[{{"lat": 1, "lon": 2, "time": {time}}}, {{"lat": 1, "lon": 2}}]', "x"
+            f'[{{"lat": 1, "lon": 2, "time": {told}}}, {{"lat": 1, "lon": 2}}]', "x"
         )
         assert (len(track.rows), track.malformed) == (1, 1)
 

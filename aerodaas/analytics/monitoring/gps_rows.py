@@ -32,7 +32,7 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "time": ("time", "timestamp", "datetime", "utctime", "timeutc", "utc", "dateandtime"),
     "date": ("date", "utcdate", "dateutc"),
 }
-_UNITS = re.compile(r"\((m|metres|meters|deg|degrees|utc)\)|\[.*?\]", re.IGNORECASE)
+_UNITS = re.compile(r"\((m|metres|meters|deg|degrees|utc)\)|\[[^][]*\]", re.IGNORECASE)
 _MILLISECONDS = 1e11
 """Larger numbers are milliseconds: seconds since 1970 stay below this until the year 5138."""
 _POLE, _DATE_LINE = 90.0, 180.0
