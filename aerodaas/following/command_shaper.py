@@ -47,10 +47,12 @@ class CommandShaper:
             self.reset()
             return VelocityCommand(priority=priority)
         flat, climb = wanted[:2], _clip(float(wanted[2]), limits.climb)
-        speed = float(np.hypot(*flat))
-        fastest = limits.forward if flat[0] >= 0 else limits.backward
-        if speed > fastest:
-            flat = flat * fastest / speed
+        # Half a circle ahead and half an ellipse behind: convex, so that each velocity between two
+        # within the limits is within them, too.
+        along = limits.forward if flat[0] >= 0 else limits.backward
+        share = float(np.hypot(flat[0] / along, flat[1] / limits.forward))
+        if share > 1.0:
+            flat = flat / share
         change = np.array([*flat, climb]) - self._velocity
         largest = (limits.stopping if braking else limits.acceleration) * dt
         if (size := float(np.linalg.norm(change))) > largest:

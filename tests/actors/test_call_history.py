@@ -13,7 +13,6 @@ _MOST_GROWTH = 8_000_000
 """Bytes; with Ray's history of calls it is 30 million."""
 
 
-@ray.remote(num_cpus=0)
 class _Drone:
     def report(self) -> None:
         """Answer a poll."""
@@ -34,7 +33,7 @@ def _head() -> psutil.Process:
 
 def test_the_head_does_not_grow_with_each_call(runtime: None) -> None:  # noqa: ARG001 - needs Ray
     """The memory of the head after 10,000 calls is what it was."""
-    drone = _Drone.remote()
+    drone = ray.remote(num_cpus=0)(_Drone).remote()
     ray.get([drone.report.remote() for _ in range(1000)])
     head = _head()
     before = head.memory_info().rss

@@ -7,10 +7,11 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from aerodaas.following.command_shaper import CommandShaper
 from aerodaas.following.follow_controller import FollowController, FollowPhase, Observation
 from aerodaas.following.follow_settings import FollowLimits, LostPolicy
 from aerodaas.following.relative_target import RelativeTarget
@@ -167,6 +168,23 @@ def test_whatever_it_sees_the_commands_stay_finite_and_within_limits(
             not command.velocity.any()
         )
         last = command.velocity
+
+
+@given(
+    st.lists(st.tuples(st.floats(-4, 4), st.floats(-4, 4), st.floats(0.0, 0.3)), max_size=20),
+)
+@example([(-0.2, -4.0, 0.3)] * 9 + [(4.0, 0.0, 0.01)] * 9)
+def test_no_velocity_on_the_way_to_another_is_too_fast(
+    steps: list[tuple[float, float, float]],
+) -> None:
+    """Backing off may be faster than anything else; what follows it is not."""
+    shaper = CommandShaper(LIMITS)
+    for forward, left, dt in steps:
+        command = shaper.shape(np.array([forward, left, 0.0]), 0.0, dt, 0)
+        assert abs(command.left) <= LIMITS.forward + 1e-9
+        assert command.forward >= -LIMITS.backward - 1e-9
+        if command.forward >= 0:
+            assert np.hypot(command.forward, command.left) <= LIMITS.forward + 1e-9
 
 
 def test_it_travels_to_its_actor() -> None:
