@@ -57,10 +57,10 @@ def rebuilt(
             channels[channel.id] = writer.register_channel(
                 channel.topic, channel.message_encoding, number
             )
-        data = change(channel.topic, message.data)
-        if data is not None:
+        new = change(channel.topic, message.data)
+        if new is not None:
             writer.add_message(
-                channels[channel.id], message.log_time, data, message.publish_time, message.sequence
+                channels[channel.id], message.log_time, new, message.publish_time, message.sequence
             )
     writer.finish()
     return file.getvalue()

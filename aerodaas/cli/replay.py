@@ -99,4 +99,7 @@ def replay(
     if not found.agrees and lossy:
         typer.echo("the pictures were recorded with loss, so that a detector sees a little else;")
         typer.echo('record with "images": "png" for a replay that is exact')
-    typer.echo(f"replayed {duration:.1f} s in {took:.1f} s, start included; compared:\n{printable(str(found))}")
+    typer.echo(
+        f"replayed {duration:.1f} s in {took:.1f} s, start included; compared:\n"
+        + printable(str(found))
+    )

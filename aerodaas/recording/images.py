@@ -70,7 +70,8 @@ _LAYOUTS = {
 def decode_image(schema: str, value: Any) -> NDArray[np.uint8] | None:  # noqa: ANN401 - by schema
     """Decode a message of one of `IMAGE_SCHEMAS` to height x width x 3 of BGR.
 
-    Returns None for an image that is broken or larger than `MAX_PIXELS`; raises SourceError for an unknown pixel format.
+    Returns None for an image that is broken or larger than `MAX_PIXELS`; raises SourceError for
+    an unknown pixel format.
     """
     encoded = picture_bytes(value)
     data = np.frombuffer(encoded, np.uint8)
@@ -95,18 +96,18 @@ def decode_depth(value: Any) -> NDArray[np.uint16] | None:  # noqa: ANN401 - by 
 
 
 def check_picture(value: Any, *, video: bool) -> None:  # noqa: ANN401 - by schema
-    """Raise ValueError unless the fields of a message of a picture have the types of one."""
+    """Raise TypeError or ValueError unless a message has the fields of a picture."""
     data = picture_field(value, "data")
     if isinstance(data, str):
         base64.b64decode(data, validate=True)
     elif isinstance(data, int | float) or not isinstance(data, Iterable):
-        raise ValueError(f"its data are no bytes but {type(data).__name__}")
+        raise TypeError(f"its data are no bytes but {type(data).__name__}")
     else:
         memoryview(bytes(data))
     text = ("format",) if video else ("format", "encoding")
     for name in text:
         if not isinstance(picture_field(value, name, ""), str):
-            raise ValueError(f"its {name} is no text")
+            raise TypeError(f"its {name} is no text")
     for name in ("width", "height", "step", "is_bigendian"):
         number = picture_field(value, name, 0)
         if not isinstance(number, int) or number < 0:

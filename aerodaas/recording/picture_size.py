@@ -11,6 +11,7 @@ __all__ = ["picture_size"]
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8"
 _SCAN = b"\xff\xda"
+_FILL = 0xFF
 _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 """JPEG's markers of a frame's header, which holds the size."""
 _BARE = frozenset({0x01, *range(0xD0, 0xD8)})
@@ -47,7 +48,7 @@ def _jpeg(data: bytes) -> tuple[int, int] | None:
         place = data.find(b"\xff", place)
         if place < 0:
             return None
-        while data[place] == 0xFF:
+        while data[place] == _FILL:
             place += 1
         marker = data[place]
         place += 1

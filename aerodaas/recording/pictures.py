@@ -230,7 +230,9 @@ def frames(
             try:
                 image = shot.image()
             except SourceError as error:
-                _log.warning("%s: skipped a picture on %s: %s", recording.path, shot.record.topic, error)
+                _log.warning(
+                    "%s: skipped a picture on %s: %s", recording.path, shot.record.topic, error
+                )
                 continue
             if image is not None:
                 yield Frame(shot.header, image, odometry=shot.odometry, depth=shot.depth())

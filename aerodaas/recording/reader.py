@@ -62,7 +62,7 @@ class Record:
     """Mission time of the described measurement, nanoseconds."""
     sequence: int
     value: Any
-    """A dictionary for JSON, an object with fields for protobuf and ROS 2's pictures, else bytes."""
+    """A dictionary for JSON, an object for protobuf and ROS 2's pictures, else bytes."""
 
 
 class Recording:

@@ -6,7 +6,7 @@ import json
 import threading
 import types
 import typing
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from aerodaas.recording.recorded_environment import allowed_content, left_out
 from aerodaas.recording.replay.environment import replay_environment
 from aerodaas.types.errors import AeroDaaSError, ConfigError, RecordingError
 
-GOOD = {
+GOOD: dict[str, Any] = {
     "home": {"latitude": 12.97, "longitude": 77.59, "altitude": 900},
     "robots": [
         {
@@ -191,9 +191,9 @@ def test_what_describes_the_flight_is_taken(flown: Path, tmp_path: Path) -> None
 def test_packages_variables_and_images_are_left_out(flown: Path, tmp_path: Path) -> None:
     """What an analysis has for itself is the local side's to say."""
     env = {
-        "one": {"packages": ["x @ file:///tmp/x"]},
+        "one": {"packages": ["x @ file:///nowhere/x"]},
         "two": {"image_uri": "evil/image"},
-        "three": {"env_vars": {"LD_PRELOAD": "/tmp/x.so"}},
+        "three": {"env_vars": {"LD_PRELOAD": "/nowhere/x.so"}},
     }
     content = {**GOOD, "runtime_env": env}
     assert replay_environment(foreign(flown, tmp_path, content)).runtime_env == {}
@@ -247,14 +247,18 @@ def test_an_endpoint_hears_nothing(flown: Path, tmp_path: Path) -> None:
         content = {**GOOD, "compute": [{"id": "edge"}, fn]}
         path = foreign(flown, tmp_path, content)
         config = replay_environment(path)
-        assert [one.id for one in config.compute if one != "auto"] == ["edge"]
+        assert config.compute != "auto"
+        assert [one.id for one in config.compute] == ["edge"]
         assert str(server.server_port) not in config.model_dump_json()
         server.shutdown()
         thread.join()
     assert heard == []
     assert "compute.fn.endpoint" in left_out(content)
     mine = {"url": "http://127.0.0.1:9/mine", "models": {}}
-    local = {"robots": [{"id": "other"}], "compute": [{"id": "fn", "kind": "http", "endpoint": mine}]}
+    local = {
+        "robots": [{"id": "other"}],
+        "compute": [{"id": "fn", "kind": "http", "endpoint": mine}],
+    }
     given = tmp_path / "local.json"
     given.write_text(json.dumps(local))
     resources = replay_environment(path, given).compute
@@ -331,10 +335,17 @@ def test_an_environment_of_odd_shape_is_refused_in_words(
         lambda: write_gpx_of(path, tmp_path),
         lambda: Flown.read(path),
     ):
-        try:
-            use()
-        except AeroDaaSError as error:
-            assert str(path) in str(error)  # noqa: PT017 - it may also do without
+        said = refusal_of(use)
+        assert not said or str(path) in said
+
+
+def refusal_of(use: Callable[[], object]) -> str:
+    """The project's own error that a use raises; empty where it does without."""
+    try:
+        use()
+    except AeroDaaSError as error:
+        return str(error)
+    return ""
 
 
 def write_gpx_of(path: Path, folder: Path) -> None:
@@ -347,7 +358,12 @@ def write_gpx_of(path: Path, folder: Path) -> None:
 
 def test_deep_or_broken_json_is_refused(flown: Path, tmp_path: Path) -> None:
     """Nesting does not overflow the stack."""
-    for data in (b"[" * 100_000, b'{"a":' * 500 + b"1" + b"}" * 500, b"\xff", b'{"name": "\\ud800"}'):
+    for data in (
+        b"[" * 100_000,
+        b'{"a":' * 500 + b"1" + b"}" * 500,
+        b"\xff",
+        b'{"name": "\\ud800"}',
+    ):
         path = rewritten(flown, tmp_path / "deep.mcap", environment=data)
         with pytest.raises((RecordingError, ConfigError)):
             replay_environment(path)

@@ -191,7 +191,9 @@ def test_channels_have_a_bound(tmp_path: Path) -> None:
 
 def png(width: int, height: int) -> bytes:
     """The beginning of a PNG of that size."""
-    return b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sIIBBBBB", 13, b"IHDR", width, height, 8, 2, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + struct.pack(
+        ">I4sIIBBBBB", 13, b"IHDR", width, height, 8, 2, 0, 0, 0
+    )
 
 
 def jpeg(width: int, height: int, scans: int = 1) -> bytes:

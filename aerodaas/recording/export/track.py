@@ -137,10 +137,10 @@ def _position(
     if home is not None:
         # Null stands for a number that was not finite.
         return None if None in at.values() else _globe(home, at)
-    gps = state.get("gps") or {}
-    latitude, longitude, altitude = (gps.get(name) for name in _Place._fields[:3])
-    known = latitude is not None and longitude is not None and altitude is not None
-    return (latitude, longitude, altitude) if known else None
+    gps = state.get("gps")
+    if not gps or None in (gps["latitude"], gps["longitude"], gps["altitude"]):
+        return None
+    return gps["latitude"], gps["longitude"], gps["altitude"]
 
 
 def _globe(home: GeodeticOrigin, at: dict[str, float]) -> tuple[float, float, float]:
@@ -149,7 +149,7 @@ def _globe(home: GeodeticOrigin, at: dict[str, float]) -> tuple[float, float, fl
 
 def _home(recording: Recording) -> GeodeticOrigin | None:
     home = recorded_home(recording)
-    return home and GeodeticOrigin(home.latitude, home.longitude, home.altitude)
+    return GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
 
 
 def _gpx_point(parent: ET.Element, kind: str, place: _Place) -> None:

@@ -192,13 +192,16 @@ class RecordedFlight:
         """Read an open recording in one pass; fields without recorded data stay empty."""
         flight = cls()
         for record in recording.records(schemas=_READERS):
-            try:
-                _READERS[record.schema](flight, record)
-            except _FullError:
-                flight.untold += 1
+            flight._enter(record)
         for robot in flight.robots.values():
             robot.bands = list(_closed(robot))
         return flight
+
+    def _enter(self, record: Record) -> None:
+        try:
+            _READERS[record.schema](self, record)
+        except _FullError:
+            self.untold += 1
 
 
 def _closed(robot: RobotFlight) -> Iterator[Band]:

@@ -47,7 +47,16 @@ from aerodaas.recording.report.page.flight import flight_page
 from aerodaas.recording.report.report import Report
 from aerodaas.recording.report.sheet import contact_sheet
 from aerodaas.recording.report.summary import FlightSummary
-from aerodaas.types.data import Alert, Battery, Detection, Detections, Frame, GpsFix, Header, Odometry
+from aerodaas.types.data import (
+    Alert,
+    Battery,
+    Detection,
+    Detections,
+    Frame,
+    GpsFix,
+    Header,
+    Odometry,
+)
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.geometry import CameraModel, GeodeticOrigin
 from aerodaas.types.status import (
@@ -58,8 +67,9 @@ from aerodaas.types.status import (
     SetpointRecord,
     TraceSpan,
 )
+from aerodaas.types.gpu import GpuLoad
 from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.types.vitals import GpuLoad, Vitals
+from aerodaas.types.vitals import Vitals
 from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 
 __all__ = ["mutate", "run", "seeds"]
@@ -68,6 +78,8 @@ _PLOTTED = 64
 """One input of so many is drawn, too: plots take a hundred times as long as all the rest."""
 _TABLES = 5
 """Channels of one input that are written as CSV."""
+_WITH_DEPTH = 3
+_WITH_ALERT = 4
 _STEP = 500_000_000
 _ENVIRONMENT = {
     "name": "field",
@@ -115,10 +127,8 @@ def run(data: bytes) -> None:
         check = zlib.crc32(data)
         plotted = check % _PLOTTED == 0
         for use in (_report, _exports, _replay, _lab):
-            try:
+            with suppress(AeroDaaSError):
                 use(path, folder, plotted)
-            except AeroDaaSError:
-                continue
         with suppress(AeroDaaSError):
             pair = (path, whole) if check % 2 else (whole, path)
             json.dumps(difference(*pair).as_dict())
@@ -126,7 +136,7 @@ def run(data: bytes) -> None:
 
 def mutate(data: bytes, rng: random.Random) -> bytes:
     """Change the inside of a container and close it again; now and then its bytes."""
-    if rng.random() < 0.1:
+    if _chance(rng, 0.1):
         return _flipped(data, rng)
     try:
         return _rebuilt(data, rng)
@@ -152,17 +162,13 @@ def _report(path: Path, _folder: Path, plotted: bool) -> None:  # noqa: FBT001
 def _exports(path: Path, folder: Path, plotted: bool) -> None:  # noqa: FBT001
     with Recording.open(path) as recording:
         for write in (write_gpx, write_kml):
-            try:
+            with suppress(AeroDaaSError):
                 write(recording, folder)
-            except AeroDaaSError:
-                continue
         topics = list(recording.topics)
         chosen = random.Random(path.stat().st_size).sample(topics, min(len(topics), _TABLES))
         for topic in chosen:
-            try:
+            with suppress(AeroDaaSError):
                 write_csv(recording, topic, folder)
-            except AeroDaaSError:
-                continue
         if plotted:
             write_videos(recording, folder / "videos")
 
@@ -172,10 +178,8 @@ def _replay(path: Path, _folder: Path, _plotted: bool) -> None:  # noqa: FBT001
     with Recording.open(path) as recording:
         topics = picture_topics(recording)
         for name in recording.attachments:
-            try:
+            with suppress(AeroDaaSError):
                 recording.attachment(name)
-            except AeroDaaSError:
-                continue
     for topic in topics:
         settings = {"path": str(path), "topic": topic}
         sensor = SensorConfig(id="camera", driver="mcap", settings=settings)
@@ -209,12 +213,16 @@ def _lab(path: Path, _folder: Path, _plotted: bool) -> None:  # noqa: FBT001
     flown_trace(flown, workload.tasks(0, random.Random(0)))
 
 
+def _chance(rng: random.Random, share: float) -> bool:
+    return rng.random() < share
+
+
 def _flipped(data: bytes, rng: random.Random) -> bytes:
     changed = bytearray(data)
     for _ in range(rng.randint(1, 8)):
         if changed:
             changed[rng.randrange(len(changed))] = rng.randrange(256)
-    if rng.random() < 0.2:
+    if _chance(rng, 0.2):
         del changed[rng.randrange(len(changed) + 1) :]
     return bytes(changed)
 
@@ -225,33 +233,32 @@ def _changed(data: bytes, rng: random.Random) -> bytes:
         value = json.loads(data)
     except ValueError:
         return _flipped(data, rng)
-    if rng.random() < 0.1:
+    if _chance(rng, 0.1):
         return _flipped(data, rng)
     return json.dumps(_twisted(value, rng)).encode()
 
 
 def _twisted(value: Any, rng: random.Random) -> Any:  # noqa: ANN401 - any JSON
-    if not value or not isinstance(value, dict | list) or rng.random() < 0.15:
+    if not value or not isinstance(value, dict | list) or _chance(rng, 0.15):
         return rng.choice(_ODD)
     key = rng.choice(list(value)) if isinstance(value, dict) else rng.randrange(len(value))
     copy: Any = value.copy()
-    act = rng.random()
-    if act < 0.15:
+    if _chance(rng, 0.15):
         del copy[key]
-    elif act < 0.25 and isinstance(copy, list):
+    elif _chance(rng, 0.12) and isinstance(copy, list):
         copy = copy * rng.choice((2, 30))
-    elif act < 0.3 and isinstance(copy, dict):
+    elif _chance(rng, 0.06) and isinstance(copy, dict):
         copy[rng.choice(("stamp", "robot", "x", "brand_new", ""))] = rng.choice(_ODD)
     else:
         copy[key] = _twisted(copy[key], rng)
     return copy
 
 
-def _rebuilt(data: bytes, rng: random.Random) -> bytes:
+def _rebuilt(data: bytes, rng: random.Random) -> bytes:  # noqa: C901 - a container's parts in order
     reader = make_reader(BytesIO(data))
     found = list(reader.iter_messages())
     chosen = set(rng.sample(range(len(found)), min(len(found), rng.choice((1, 1, 2, 5, 40)))))
-    if rng.random() < 0.15:
+    if _chance(rng, 0.15):
         chosen = set()
     file = BytesIO()
     kind = rng.choice((CompressionType.ZSTD, CompressionType.LZ4, CompressionType.NONE))
@@ -259,34 +266,36 @@ def _rebuilt(data: bytes, rng: random.Random) -> bytes:
     writer.start()
     for metadata in reader.iter_metadata():
         fields = dict(metadata.metadata)
-        if fields and rng.random() < 0.1:
-            fields[rng.choice(list(fields))] = rng.choice(("", "-1", "9" * 40, "\x1b[2J", "x" * 999))
+        if fields and _chance(rng, 0.1):
+            fields[rng.choice(list(fields))] = rng.choice(
+                ("", "-1", "9" * 40, "\x1b[2J", "x" * 999)
+            )
         writer.add_metadata(metadata.name, fields)
     for attachment in reader.iter_attachments():
-        body = attachment.data if rng.random() < 0.8 else _changed(attachment.data, rng)
+        body = attachment.data if _chance(rng, 0.8) else _changed(attachment.data, rng)
         writer.add_attachment(1, 1, attachment.name, attachment.media_type, body)
     schemas: dict[int, int] = {}
     channels: dict[int, int] = {}
-    bad_schema = rng.random() < 0.1
+    bad_schema = _chance(rng, 0.1)
     for number, (schema, channel, message) in enumerate(found):
         if channel.id not in channels:
             known = 0
             if schema is not None:
                 if schema.id not in schemas:
-                    spoil = bad_schema and rng.random() < 0.3
+                    spoil = bad_schema and _chance(rng, 0.3)
                     body = _flipped(schema.data, rng) if spoil else schema.data
-                    name = rng.choice(found)[0] if spoil and rng.random() < 0.3 else schema
+                    name = rng.choice(found)[0] if spoil and _chance(rng, 0.3) else schema
                     schemas[schema.id] = writer.register_schema(
                         (name or schema).name, schema.encoding, body
                     )
                 known = schemas[schema.id]
             encoding = channel.message_encoding
-            if rng.random() < 0.005:
+            if _chance(rng, 0.005):
                 encoding = rng.choice(("json", "protobuf", "cdr", ""))
             channels[channel.id] = writer.register_channel(channel.topic, encoding, known)
         body = _changed(message.data, rng) if number in chosen else message.data
         times = [message.log_time, message.publish_time]
-        if number in chosen and rng.random() < 0.1:
+        if number in chosen and _chance(rng, 0.1):
             times[rng.randrange(2)] = rng.choice((0, 1, (1 << 63) - 1, (1 << 64) - 1))
         writer.add_message(channels[channel.id], times[0], body, times[1], message.sequence)
     writer.finish()
@@ -339,10 +348,13 @@ def _messages() -> Iterator[Message[Any]]:
         record = SetpointRecord(stamp, asked, sent, ("max_speed",))
         yield _message("drone/@setpoints", turn, stamp, record)
         begun = 10**12 + stamp
-        spans = (TraceSpan("camera", begun + 10, begun + 20), TraceSpan("finder", begun + 30, begun + 90))
+        spans = (
+            TraceSpan("camera", begun + 10, begun + 20),
+            TraceSpan("finder", begun + 30, begun + 90),
+        )
         header = Header(turn, stamp, "drone/camera")
         frame = Frame(header, np.full((24, 32, 3), 40 * turn, np.uint8), camera, odometry)
-        if turn == 3:
+        if turn == _WITH_DEPTH:
             frame = replace(frame, depth=np.full((24, 32), 900, np.uint16))
         yield _message("drone/camera", turn, stamp, frame, spans[:1], begun)
         points = np.full((3, 3), 8.0, np.float32)
@@ -358,7 +370,7 @@ def _messages() -> Iterator[Message[Any]]:
         yield _message("dispatcher", turn, stamp + 9, done)
         vitals = Vitals(begun, float(turn), 10**8, 0.4, 0.5, (GpuLoad(0.1, 0.2),))
         yield Message("vitals/drone", turn, stamp, Header(turn, stamp, "drone@here"), 0, (), vitals)
-        if turn == 4:
+        if turn == _WITH_ALERT:
             alert = Alert(header, "low", "the battery is low", {"fraction": 0.2})
             yield _message("drone/monitor", turn, stamp, alert)
 
