@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import psutil
 import ray
@@ -33,7 +34,8 @@ def _head() -> psutil.Process:
 
 def test_the_head_does_not_grow_with_each_call(runtime: None) -> None:  # noqa: ARG001 - needs Ray
     """The memory of the head after 10,000 calls is what it was."""
-    drone = ray.remote(num_cpus=0)(_Drone).remote()
+    actor_class: Any = ray.remote(num_cpus=0)(_Drone)
+    drone = actor_class.remote()
     ray.get([drone.report.remote() for _ in range(1000)])
     head = _head()
     before = head.memory_info().rss
