@@ -260,8 +260,8 @@ def test_states_of_the_tello_and_of_nobody_else(
     """From its address and the port of the first; counted, with the second in which they came."""
     caplog.set_level("DEBUG")
     senders = (("192.168.10.1", 8889), ("192.168.10.9", 8889), ("192.168.10.1", 5000), TELLO)
-    for battery, sender in enumerate(senders, 81):
-        wire.statuses.inbox.append((STATE % battery, *sender))
+    for battery, (host, port) in enumerate(senders, 81):
+        wire.statuses.inbox.append((STATE % battery, host, port))
     wire.statuses.inbox.insert(1, (b"nonsense" * 11, *TELLO))
     wire.run(0.05)
     counts = wire.link.counts
