@@ -300,7 +300,7 @@ def test_the_local_file_gives_what_is_missing(flown: Path, tmp_path: Path) -> No
     given.write_text(json.dumps(local))
     config = replay_environment(foreign(flown, tmp_path, content), given)
     (robot,) = config.robots
-    assert robot.start == (1, 2, 0)
+    assert list(robot.start) == [1, 2, 0]
     assert robot.settings["driver"] == "tello"
     assert config.runtime_env["one"].packages == ["numpy==1.26"]
     assert config.schedulers.analytics == "dems"

@@ -59,6 +59,7 @@ from aerodaas.types.data import (
 )
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.geometry import CameraModel, GeodeticOrigin
+from aerodaas.types.gpu import GpuLoad
 from aerodaas.types.status import (
     Decision,
     Message,
@@ -67,7 +68,6 @@ from aerodaas.types.status import (
     SetpointRecord,
     TraceSpan,
 )
-from aerodaas.types.gpu import GpuLoad
 from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.types.vitals import Vitals
 from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
