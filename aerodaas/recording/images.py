@@ -13,8 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.recording.limits import MAX_PIXELS, MAX_SIDE
-from aerodaas.recording.picture_size import picture_size
+from aerodaas.recording.decoding.limits import MAX_PIXELS, MAX_SIDE
+from aerodaas.recording.decoding.picture_size import picture_size
 from aerodaas.types.errors import SourceError
 
 __all__ = [

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.recording.decoding.limits import MAX_VIDEO_GROUP
 from aerodaas.recording.h264 import H264Decoder, is_key_frame
 from aerodaas.recording.images import (
     IMAGE_SCHEMAS,
@@ -22,7 +23,6 @@ from aerodaas.recording.images import (
     picture_bytes,
     picture_field,
 )
-from aerodaas.recording.limits import MAX_VIDEO_GROUP
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.recording.states import odometry_of
 from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry

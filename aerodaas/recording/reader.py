@@ -15,7 +15,7 @@ from mcap.data_stream import ReadDataStream
 from mcap.records import Attachment, Channel, Message
 from typing_extensions import Self
 
-from aerodaas.recording.index import (
+from aerodaas.recording.decoding.index import (
     BROKEN,
     Block,
     FileIndex,
@@ -23,8 +23,8 @@ from aerodaas.recording.index import (
     load,
     read_index,
 )
-from aerodaas.recording.limits import MAX_ATTACHMENT, MAX_HELD
-from aerodaas.recording.messages import BrokenMessageError, MessageDecoder
+from aerodaas.recording.decoding.limits import MAX_ATTACHMENT, MAX_HELD
+from aerodaas.recording.decoding.messages import BrokenMessageError, MessageDecoder
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import RecordingError
 

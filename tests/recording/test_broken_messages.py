@@ -15,9 +15,9 @@ from typer.testing import CliRunner
 from aerodaas.cli.app import app
 from aerodaas.cli.printable import printable
 from aerodaas.config.model import RecordingConfig
+from aerodaas.recording.decoding.messages import decode_json
 from aerodaas.recording.export.tabular import table_of
 from aerodaas.recording.export.track import write_gpx, write_kml
-from aerodaas.recording.messages import decode_json
 from aerodaas.recording.pictures import detections_by_frame, frames
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.replay.timetables import read_timetables

@@ -8,7 +8,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 from mcap_files import END, Said, write_file
 
-from aerodaas.recording.index import load, read_index
+from aerodaas.recording.decoding.index import load, read_index
 from aerodaas.recording.reader import Recording, Topic
 
 FLIGHT = [Said("/a", 1_100, 0), Said("/b", 1_200, 1), Said("/a", 1_300, 2), Said("/a", 1_400, 3)]

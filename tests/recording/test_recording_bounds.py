@@ -18,16 +18,16 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 from mcap_files import Said, write_file
 
-from aerodaas.recording.h264 import H264Decoder, H264Encoder
-from aerodaas.recording.images import check_picture, decode_image
-from aerodaas.recording.limits import (
+from aerodaas.recording.decoding.limits import (
     MAX_ATTACHMENT,
     MAX_CHANNELS,
     MAX_CHUNK,
     MAX_METADATA,
     MAX_PIXELS,
 )
-from aerodaas.recording.picture_size import picture_size
+from aerodaas.recording.decoding.picture_size import picture_size
+from aerodaas.recording.h264 import H264Decoder, H264Encoder
+from aerodaas.recording.images import check_picture, decode_image
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.report import write_report
 from aerodaas.types.errors import RecordingError

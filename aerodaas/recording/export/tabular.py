@@ -11,8 +11,8 @@ from typing import Any
 
 from google.protobuf.message import Message
 
+from aerodaas.recording.decoding.messages import BrokenMessageError, plain_fields
 from aerodaas.recording.export.output import file_name, new_file
-from aerodaas.recording.messages import BrokenMessageError, plain_fields
 from aerodaas.recording.reader import Recording
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import RecordingError

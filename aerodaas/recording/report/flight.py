@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.recording.limits import MAX_KEYS
+from aerodaas.recording.decoding.limits import MAX_KEYS
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.types.clock import seconds
 

@@ -23,8 +23,8 @@ from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import read_magic
 from mcap.summary import Summary
 
-from aerodaas.recording.limits import MAX_CHANNELS, MAX_METADATA, MAX_RATIO, MAX_UNPACKED
-from aerodaas.recording.unpacking import TooLargeError, unpacked
+from aerodaas.recording.decoding.limits import MAX_CHANNELS, MAX_METADATA, MAX_RATIO, MAX_UNPACKED
+from aerodaas.recording.decoding.unpacking import TooLargeError, unpacked
 
 __all__ = ["BROKEN", "Block", "FileIndex", "TooLargeError", "load", "read_index"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from aerodaas.recording.limits import MAX_SCANS
+from aerodaas.recording.decoding.limits import MAX_SCANS
 
 __all__ = ["picture_size"]
 

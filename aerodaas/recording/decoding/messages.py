@@ -19,8 +19,8 @@ from pydantic import ConfigDict, Field, TypeAdapter, with_config
 from typing_extensions import NotRequired, TypedDict
 
 from aerodaas.config.extras import require_extra
+from aerodaas.recording.decoding.limits import MAX_DEPTH, MAX_JSON
 from aerodaas.recording.images import IMAGE_SCHEMAS, VIDEO_SCHEMAS, check_picture
-from aerodaas.recording.limits import MAX_DEPTH, MAX_JSON
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.vehicle import FlightEnd, VehicleMode
 

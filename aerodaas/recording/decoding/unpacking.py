@@ -8,7 +8,7 @@ import zstandard
 from lz4.frame import LZ4FrameDecompressor
 from mcap.records import Chunk
 
-from aerodaas.recording.limits import MAX_CHUNK
+from aerodaas.recording.decoding.limits import MAX_CHUNK
 
 __all__ = ["TooLargeError", "unpacked"]
 
