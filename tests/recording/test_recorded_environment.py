@@ -61,6 +61,7 @@ LOCAL_ALONE = {
     "compute.endpoint.token_header",
     "compute.settings",
     "runtime_env",
+    "recording.application_source",
     "recording.enabled",
     "recording.path",
     "recording.images",
