@@ -188,7 +188,7 @@ def _turn(rig: _Rig, flight: FuzzedFlight) -> None:
 def _hear(rig: _Rig, kind: int, _: int, body: bytes) -> None:
     sender = ("192.168.10.66", 8889) if kind & 2 else _OWN
     inbox = rig.states if kind & 1 == _STATE else rig.commands
-    inbox.append((body, *sender))
+    inbox.append((body, sender[0], sender[1]))
 
 
 def _state(**fields: object) -> bytes:
