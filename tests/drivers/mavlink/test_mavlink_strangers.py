@@ -108,7 +108,7 @@ def test_a_jammed_vehicle_is_not_taken_in_flight(monkeypatch: pytest.MonkeyPatch
     assert world.vehicle._stands()
     world.fly()
     assert not world.vehicle._stands()
-    world.speaks = False
+    world.speaks, world.result = False, None
     attacker = ("127.0.0.1", 6666)
     for _ in range(200):
         world._inbox.append((_armed(), attacker))
