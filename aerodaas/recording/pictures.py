@@ -201,12 +201,17 @@ def decoded_ahead(found: Iterator[Shot]) -> Iterator[Shot]:
     # The frames of a video depend on each other, still images do not.
     threads = 1 if first.video is not None else 2
     waiting: deque[Shot] = deque()
-    with ThreadPoolExecutor(threads, "decoder") as pool:
+    pool = ThreadPoolExecutor(threads, "decoder")
+    try:
         for shot in chain([first], found):
             waiting.append(replace(shot, decoded=pool.submit(shot.image).result))
             if len(waiting) > _AHEAD:
                 yield waiting.popleft()
         yield from waiting
+    finally:
+        # Without waiting: an iterator that is given up may be collected in any thread, at a
+        # moment at which joining another one would wait forever.
+        pool.shutdown(wait=False)
 
 
 def frames(
