@@ -1,80 +1,63 @@
-"""A replayed camera's pictures come at the mission times at which they were recorded."""
+"""A camera of a replayed flight: its pictures come when they came, with the stamps that they had."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from aerodaas.cameras.base import Camera, Picture
 from aerodaas.config.model import EnvironmentConfig, RecordingConfig, SensorConfig
-from aerodaas.config.plugins import load_plugin
 from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
-from aerodaas.types.data import Frame, Header, Odometry
+from aerodaas.recording.replay.mcap_camera import ReplayedCamera
+from aerodaas.types.data import Frame, Header
 from aerodaas.types.status import Message
 
 ENVIRONMENT = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
-SECOND = 1_000_000_000
-STAMPS = [2_000_000_000, 2_470_000_000, 3_010_000_000]
-"""Mission time at which each picture was taken; it was published 40 ms later."""
-PROVENANCE = Provenance(0, "flight", 0, "{}", app="app.py")
+MS = 1_000_000
+STAMPS = (1234 * MS, 1334 * MS + 1, 1800 * MS)
 
 
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A flight with one camera."""
-    path = tmp_path_factory.mktemp("replayed") / "flight.mcap"
-    with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
+@pytest.fixture
+def recording(tmp_path: Path) -> Path:
+    """Three pictures, at odd times of the mission; each was published 7 ms after its capture."""
+    path = tmp_path / "a.mcap"
+    with FlightRecorder(path, config=RecordingConfig(), provenance=Provenance(0)) as recorder:
         for number, stamp in enumerate(STAMPS):
             header = Header(number, stamp, "drone/cam")
-            image = np.full((24, 32, 3), 60 * number, np.uint8)
-            odometry = Odometry(np.array([number, 0.0, 2.0]), np.zeros(3), yaw=0.0)
-            frame = Frame(header, image, None, odometry)
-            published = stamp + 40_000_000
-            recorder.write(Message("drone/cam", number, published, header, 0, (), frame))
+            frame = Frame(header, np.full((24, 32, 3), 40 * number, np.uint8))
+            recorder.write(Message("drone/cam", number, stamp + 7 * MS, header, 0, (), frame))
     return path
 
 
-@pytest.fixture(params=[False, True], ids=["once", "loop"])
-def camera(recorded: Path, request: pytest.FixtureRequest) -> Iterator[Camera]:
-    """An open camera that replays it."""
-    settings = {"path": str(recorded), "topic": "/drone/cam/image", "loop": request.param}
-    sensor = SensorConfig(id="cam", driver="replayed", settings=settings)
-    made: Camera = load_plugin("cameras", "replayed")(sensor, ENVIRONMENT)
+def camera(path: Path, **settings: object) -> ReplayedCamera:
+    """An open camera."""
+    sensor = SensorConfig(id="cam", driver="replayed", settings={"path": str(path), **settings})
+    made = ReplayedCamera(sensor, ENVIRONMENT)
     made.open()
-    yield made
-    made.close()
+    return made
 
 
-def shown(picture: Picture | None) -> int | None:
-    """Which picture it is, by its brightness."""
-    return None if picture is None else round(float(picture.image.mean()) / 60)
+def test_pictures_come_at_their_recorded_mission_times(recording: Path) -> None:
+    """The first not at once, each at its own nanosecond, and with that stamp however late asked."""
+    source = camera(recording)
+    asked = (0, STAMPS[0] - 1, STAMPS[0], STAMPS[1] - 1, STAMPS[1] + 9 * MS, STAMPS[2] + 80 * MS)
+    found = [source.capture(stamp, None) for stamp in asked]
+    stamps = [None if picture is None else picture.stamp for picture in found]
+    assert stamps == [None, None, STAMPS[0], None, STAMPS[1], STAMPS[2]]
+    shades = [round(float(picture.image.mean()) / 40) for picture in found if picture is not None]
+    assert shades == [0, 1, 2]
+    source.close()
 
 
-def test_pictures_come_at_their_own_times(camera: Camera) -> None:
-    """Not before, whenever the first was asked for; each bears its own stamp and odometry."""
-    asked = [0, SECOND, *(stamp + late for stamp in STAMPS for late in (-1, 0)), 9 * SECOND]
-    found = [camera.capture(stamp, None) for stamp in asked]
-    assert [shown(one) for one in found] == [None, None, None, 0, None, 1, None, 2, None]
-    pictures = [one for one in found if one is not None]
-    assert [one.stamp for one in pictures] == STAMPS
-    places = [one.odometry.position[0] for one in pictures if one.odometry is not None]
-    assert places == [0.0, 1.0, 2.0]
-
-
-def test_asked_late_it_shows_the_newest_that_is_due_with_its_own_stamp(camera: Camera) -> None:
-    """What was taken at 2.47 s is of 2.47 s, though it is asked for at 2.9 s."""
-    late = camera.capture(2_900_000_000, None)
-    assert late is not None
-    assert (shown(late), late.stamp) == (1, STAMPS[1])
-
-
-@pytest.mark.timeout(20)  # one that began again would never be done
-def test_mission_time_does_not_begin_again(camera: Camera, request: pytest.FixtureRequest) -> None:
-    """After the last picture there is none; one that looped in flight never says so."""
-    assert shown(camera.capture(3 * SECOND + SECOND // 2, None)) == 2
-    assert [camera.capture(number * SECOND, None) for number in range(4, 20)] == [None] * 16
-    assert camera.finished == ("once" in request.node.name)
+@pytest.mark.parametrize("endless", [False, True])
+def test_a_replay_does_not_begin_again(recording: Path, endless: bool) -> None:  # noqa: FBT001
+    """It has finished after the last picture, unless the recorded camera never did."""
+    source = camera(recording, loop=endless)
+    last = source.capture(STAMPS[-1], None)
+    assert last is not None
+    assert last.stamp == STAMPS[-1]
+    assert source.finished is not endless
+    assert source.capture(10 * STAMPS[-1], None) is None
+    source.close()

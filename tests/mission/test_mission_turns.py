@@ -21,6 +21,7 @@ from aerodaas.mission.commands import (
     StreamItem,
 )
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
+from aerodaas.types.errors import VehicleError
 from aerodaas.types.status import MissionState as S
 from aerodaas.types.vehicle import PositionSetpoint, VehicleMode, VelocitySetpoint
 from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
@@ -225,6 +226,9 @@ def test_a_take_off_that_takes_too_long_ends_in_a_landing() -> None:
     """Beyond its time, not at it."""
     limits = LimitsConfig(takeoff_height=10.0, takeoff_timeout=4.0)
     one = flight(add(*square(height=10.0)), limits=limits)
+    one.vehicle.objections = ["not yet"]
+    one.run(2.0)
+    one.vehicle.objections = []
     one.run_to(S.TAKING_OFF)
     began = one.now - PERIOD
     one.run_to(S.LANDING)
@@ -433,3 +437,74 @@ def test_a_drone_over_home_need_not_stand_still_in_height_to_land() -> None:
     one.turn()
     one.expect(S.LANDING)
     assert one.status.reason == "enough"
+
+
+class Refusing(KinematicVehicle):
+    """Takes no order to take off."""
+
+    def take_off(self, height: float) -> None:
+        """Refuse it."""
+        raise VehicleError(f"no {height:g} m today")
+
+
+def test_a_refused_take_off_ends_the_mission_and_a_refusal_in_the_air_does_not() -> None:
+    """People are told of both, with the vehicle's own words."""
+    one = flight(add(*square()), vehicle=Refusing())
+    one.turn()
+    one.expect(S.ABORTED)
+    assert one.status.reason == "the vehicle refused to take off: no 1.5 m today"
+    assert [(a.kind, a.text) for a in one.mission.alerts] == [("refused", "no 1.5 m today")]
+    flying = flight(add(*square()))
+    flying.run(10.0)
+    flying.mission.vehicle_refused("too windy")
+    flying.expect(S.ENROUTE)
+    assert [(a.kind, a.text) for a in flying.mission.alerts] == [("refused", "too windy")]
+
+
+class Skipping(TrajectoryScheduler):
+    """Leaves the last waypoint out."""
+
+    isolated = False
+
+    def plan(
+        self,
+        pending: Sequence[Waypoint],
+        situation: PlanningContext,  # noqa: ARG002
+    ) -> Sequence[Waypoint]:
+        """Plan the others."""
+        return pending[:-1]
+
+
+def test_what_a_plan_leaves_out_is_given_up_and_told() -> None:
+    """By its name and when it was decided; the others are flown."""
+    one = flight(add(*square()[:2], ordered=False), scheduler=Skipping())
+    one.run_to(S.LANDED)
+    assert one.status.visited == ("wp1",)
+    assert one.status.given_up == ("wp2",)
+    (alert,) = one.mission.alerts
+    assert (alert.kind, alert.text) == ("given_up", "the scheduler left wp2 out of its plan")
+    assert alert.header.stamp == 0
+
+
+def test_a_forecast_in_the_air_is_told_after_ten_seconds() -> None:
+    """At ten seconds, not before; with what is needed and what is there, never less than none."""
+    limits = LimitsConfig(endurance=600.0, battery_return=0.15, battery_land=0.12)
+    one = flight(live(), limits=limits, vehicle=KinematicVehicle(charge=0.32))
+    one.run(10.0)
+    one.tell(add(Waypoint("far", 90, 0, 1.5)))
+    short: float | None = None
+    while not one.mission.alerts:
+        one.turn()
+        if short is None and any("at this rate" in fault for fault in one.status.faults):
+            short = one.seconds
+        assert one.seconds < 60.0
+    assert short is not None
+    assert one.seconds - short == pytest.approx(10.0)
+    (alert,) = one.mission.alerts
+    assert alert.kind == "unreachable_plan"
+    assert "and 20% is there to spend" in alert.text
+    empty = flight(
+        add(Waypoint("far", 90, 0, 1.5)), limits=limits, vehicle=KinematicVehicle(charge=0.1)
+    )
+    empty.turn()
+    assert "and 0% is there to spend" in empty.mission.alerts[0].text

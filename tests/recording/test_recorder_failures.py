@@ -280,3 +280,23 @@ def test_video_that_cannot_be_encoded_is_refused_before_there_is_a_file(
         FlightRecorder(tmp_path / "a.mcap", config=video, provenance=PROVENANCE)
     assert list(tmp_path.iterdir()) == []
     recorder(tmp_path / "a.mcap").close()
+
+
+def test_a_sync_that_fails_in_flight_is_told_by_a_message_that_follows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A memory card that is pulled out is no secret until the landing."""
+    monkeypatch.setattr(module, "FLUSH_SECONDS", 0.01)
+    failed = threading.Event()
+
+    def broken(_number: int) -> None:
+        failed.set()
+        raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+    monkeypatch.setattr(os, "fsync", broken)
+    made = recorder(tmp_path / "a.mcap")
+    assert failed.wait(20.0)
+    made._flusher.join(20.0)
+    with pytest.raises(RecordingError, match="Input/output error"):
+        made.write(text("refused"))
+    assert "Input/output error" in made.close().stopped

@@ -190,8 +190,8 @@ def test_a_serial_line_is_raw_at_its_speed(baud: int) -> None:
 
 
 def test_a_serial_device_that_is_pulled_out_is_opened_again(clock: Clock, tmp_path: Path) -> None:
-    """A second after the cut and each second from then on, once the device is back."""
-    device = tmp_path / "ttyUSB0"
+    """A second after the cut and each second from then on; colons in its name are its own."""
+    device = tmp_path / "pci-0000:00:14.0-usb-0:1.2"
     master, slave = os.openpty()
     device.symlink_to(os.ttyname(slave))
     wire = open_transport(f"serial:{device}:57600", "a")

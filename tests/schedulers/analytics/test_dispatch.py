@@ -36,6 +36,7 @@ class _RecordingHost:
         self.asked: list[tuple[str, int, int]] = []
         self.results: list[Result] = []
         self.decisions: list[Decision] = []
+        self.decided_at: list[int] = []
 
     def run_edge(self, task: Task, now: int) -> None:
         self.asked.append(("edge", task.id, now))
@@ -46,8 +47,9 @@ class _RecordingHost:
     def wake_at(self, at: int) -> None:
         self.asked.append(("wake", -1, at))
 
-    def decided(self, decision: Decision, now: int) -> None:  # noqa: ARG002 - the host protocol
+    def decided(self, decision: Decision, now: int) -> None:
         self.decisions.append(decision)
+        self.decided_at.append(now)
 
     def closed(self, result: Result) -> None:
         self.results.append(result)
@@ -404,7 +406,28 @@ def test_the_time_of_a_start_and_of_a_change_of_resources_is_told() -> None:
     assert scheduler.told == [("start", 3), ("arrived", 4), ("idle", 4), ("resources", 5)]
     assert host.asked == [("wake", -1, 5)]
     assert [(end.task.id, end.finished) for end in host.results] == [(0, 5)]
+    assert host.decided_at == [5]
     assert not dispatch.undecided
+
+
+def test_an_idle_executor_is_offered_when_the_resources_or_the_scheduler_change() -> None:
+    """For what is undecided, at that time; a new scheduler is told of its start before."""
+    scheduler = _Noting()
+    dispatch, host = _dispatch_of(scheduler)
+    dispatch.arrived(_task(0), 4)
+    dispatch.change_resources(Resources(cloud_slots=2), 5)
+    assert scheduler.told == [("arrived", 4), ("idle", 4), ("idle", 5)]
+    another = _Timed(lambda t, _: SendToCloud(t))
+    dispatch.replace(another, 6)
+    assert another.told == [("start", 6), ("arrived", 6)]
+    assert host.decided_at == [6]
+
+
+def test_a_wake_up_in_the_past_is_refused_with_its_time() -> None:
+    """As it was decided."""
+    dispatch, _ = _dispatch_of(_Scripted(lambda _, __: WakeAt(9)))
+    with pytest.raises(SchedulerError, match=r"_Scripted decided WakeAt\(at=9.*now is 10"):
+        dispatch.arrived(_task(0, 10), 10)
 
 
 def test_a_scheduler_that_answers_nothing_is_named() -> None:

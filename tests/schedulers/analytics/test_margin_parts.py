@@ -9,10 +9,12 @@ import pytest
 
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
+    STOLEN,
     Profile,
     QoeGoal,
     Resources,
     Result,
+    RunOnEdge,
     Task,
     TaskOutcome,
     TaskPlace,
@@ -374,3 +376,16 @@ def test_margin_keeps_the_edge_free_for_what_is_about_to_come() -> None:
     assert [end.outcome for end in ends] == ["done"] * 6
     assert ends[5].started == 1200
     assert ends[4].started >= 1300
+
+
+@pytest.mark.parametrize("cloud_cost", [20, 100])
+def test_margin_says_what_it_takes_from_the_cloud(cloud_cost: int) -> None:
+    """A task that pays there is stolen; one that does not is simply the best there is."""
+    scheduler = Margin()
+    scheduler.start(Resources(), 0)
+    task = Task(0, Profile("m", 100, 1000 * MS, 200 * MS, 200 * MS, 1, cloud_cost), 0, 1000 * MS)
+    list(scheduler.task_arrived(task, 0))
+    (decision,) = scheduler.executor_idle(0)
+    expected = STOLEN if cloud_cost == 20 else "most valuable plan"
+    assert isinstance(decision, RunOnEdge)
+    assert decision.reason == expected
