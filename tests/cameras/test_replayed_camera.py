@@ -1,4 +1,4 @@
-"""A camera of a replayed flight: its pictures come when they came, with the stamps that they had."""
+"""A camera of a replayed flight: its pictures come when they came, with their own stamps."""
 
 from __future__ import annotations
 
