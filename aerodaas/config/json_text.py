@@ -66,8 +66,6 @@ def parse_json(text: str, place: str) -> Any:  # noqa: ANN401 - any JSON
         content = json.loads(
             text,
             object_pairs_hook=_distinct,
-            parse_constant=_refuse_constant,
-            parse_float=_finite,
             parse_int=_bounded,
         )
     except json.JSONDecodeError as error:
@@ -135,17 +133,6 @@ def _distinct(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         twice = next(key for key, count in counts.items() if count > 1)
         raise _OddityError(f"the key {twice[:_SHOWN]!r} stands twice in one object; keep one")
     return content
-
-
-def _refuse_constant(text: str) -> Any:  # noqa: ANN401 - never returns
-    raise _OddityError(f"{text} is no number in JSON; write a finite one")
-
-
-def _finite(text: str) -> float:
-    number = float(text)
-    if not math.isfinite(number):
-        raise _OddityError(f"the number {text[:_SHOWN]} is too large")
-    return number
 
 
 def _bounded(text: str) -> int:

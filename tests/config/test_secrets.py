@@ -24,7 +24,10 @@ from aerodaas.recording.provenance import Provenance
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.types.errors import ConfigError
 
-SECRETS = st.text(string.ascii_letters + string.digits + "/:@?&=+%-_~", min_size=16, max_size=40)
+SECRETS = st.text(
+    string.ascii_letters + string.digits + "/:@?&=+%-_~", min_size=16, max_size=40
+).map("9Q{}".format)
+"""No word of the configuration's own begins like that."""
 
 
 class LampSettings(BaseModel):

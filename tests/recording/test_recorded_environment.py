@@ -266,7 +266,7 @@ def test_an_endpoint_hears_nothing(flown: Path, tmp_path: Path) -> None:
     assert resources != "auto"
     (found,) = [one for one in resources if one.id == "fn"]
     assert found.endpoint is not None
-    assert found.endpoint.url == "http://127.0.0.1:9/mine"
+    assert found.endpoint.url.get_secret_value() == "http://127.0.0.1:9/mine"
 
 
 def test_addresses_and_paths_are_left_out(flown: Path, tmp_path: Path) -> None:
