@@ -1,4 +1,4 @@
-"""A camera of a replayed flight: its pictures come when they came, with their own stamps."""
+"""A camera of a replayed flight: its pictures come when they came, with the stamps they had."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from flights import PERIOD, KinematicVehicle, add, flight, live, square
 
-from aerodaas.config.model import GeofenceConfig, LimitsConfig, MissionConfig
+from aerodaas.config.model import GeofenceConfig, LimitsConfig, MissionConfig, RobotConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.mission.commands import (
     Answer,
@@ -20,6 +20,8 @@ from aerodaas.mission.commands import (
     Start,
     StreamItem,
 )
+from aerodaas.mission.mission import Mission
+from aerodaas.mission.planner import InlinePlanner
 from aerodaas.schedulers.trajectory.base import PlanningContext, TrajectoryScheduler
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.status import MissionState as S
@@ -508,3 +510,16 @@ def test_a_forecast_in_the_air_is_told_after_ten_seconds() -> None:
     )
     empty.turn()
     assert "and 0% is there to spend" in empty.mission.alerts[0].text
+
+
+def test_the_wind_is_reckoned_with() -> None:
+    """By the scheduler, for the way against it costs more."""
+    asked, wind = Asked(), np.array([3.0, -1.0, 0.0])
+    robot = RobotConfig(id="drone")
+    mission = Mission(robot, InlinePlanner(asked), takeoff=np.zeros(3), wind=wind)
+    for order in (add(*square()), Start()):
+        assert mission.handle(order, 0).accepted
+    mission.update(KinematicVehicle().read(), 0)
+    energy = asked.situations[0].energy
+    assert energy is not None
+    assert energy.wind.tolist() == wind.tolist()

@@ -265,3 +265,8 @@ def test_a_port_that_there_is_not_is_no_other_port(kind: str) -> None:
     """65536 and more is refused: the system would take it for one less by so much."""
     with pytest.raises(ConfigError, match="99999 is too large, 65535 is the largest"):
         open_transport(f"{kind}:{HOST}:99999", "a")
+
+
+def test_the_last_port_is_one() -> None:
+    """65535 can be spoken to."""
+    open_transport(f"udpout:{HOST}:65535", "a").close()
