@@ -4,8 +4,9 @@
     python benchmarks/endurance.py --simulated-hours 8
 
 flies one simulated drone with a small camera, an analysis and a recorder, and samples all
-processes of the run. Memory is the proportional set size (PSS), in which pages that processes
-share are counted once.
+processes of the run. "memory" is the proportional set size (PSS), in which pages that processes
+share are counted once; growth is told of what a process has for itself (USS), because the former
+falls with each new process on the machine that loads the same libraries.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ UNITS = {
     "memory": "MB (PSS)",
     "slope": "MB/h",
     "change": "%",
-    "rss slope": "MB/h",
+    "RSS slope": "MB/h",
     "threads": "last",
     "more threads": "",
     "files": "last",
@@ -41,6 +42,9 @@ UNITS = {
 }
 _SHARE = 0.25
 """Share of the samples at each end whose medians are compared."""
+_FEWEST = 4
+"""Fewest samples of a process that is told."""
+_SHARED = Path("/dev/shm")  # noqa: S108 - where shared memory is
 _PAIRS = 400
 """Most samples in the fit, which looks at all pairs of them."""
 
@@ -51,6 +55,7 @@ class Sample:
 
     moment: float
     pss: float
+    own: float
     rss: float
     threads: int
     files: int
@@ -109,13 +114,14 @@ class Watch:
                 reading = Sample(
                     moment,
                     memory.pss / 1e6,
+                    memory.uss / 1e6,
                     memory.rss / 1e6,
                     process.num_threads(),
                     process.num_fds(),
                 )
                 self.samples[name].append(reading)
         used = 0
-        for path in Path("/dev/shm").rglob("*"):  # noqa: S108 - where shared memory is
+        for path in _SHARED.rglob("*"):
             with contextlib.suppress(OSError):
                 used += path.stat().st_blocks * 512
         self.shared.append((moment, used / 1e6))
@@ -171,17 +177,17 @@ def show(watch: Watch, warm_up: float, report: Report) -> None:
     """Fill the report with the samples after the warm-up."""
     for name, samples in sorted(watch.samples.items()):
         late = [one for one in samples if one.moment >= warm_up]
-        if len(late) < 4 or late[-1].moment < samples[-1].moment:
+        if len(late) < _FEWEST or late[-1].moment < samples[-1].moment:
             continue
-        first, last = change([one.pss for one in late])
+        first, last = change([one.own for one in late])
         moments = [one.moment for one in late]
         report.row(
             name,
             {
-                "memory": last,
-                "slope": slope(moments, (one.pss for one in late)),
+                "memory": late[-1].pss,
+                "slope": slope(moments, (one.own for one in late)),
                 "change": 100 * (last - first) / first if first else math.nan,
-                "rss slope": slope(moments, (one.rss for one in late)),
+                "RSS slope": slope(moments, (one.rss for one in late)),
                 "threads": late[-1].threads,
                 "more threads": late[-1].threads - late[0].threads,
                 "files": late[-1].files,
@@ -191,7 +197,7 @@ def show(watch: Watch, warm_up: float, report: Report) -> None:
     late_shared = [used for moment, used in watch.shared if moment >= warm_up]
     if late_shared:
         first, last = change(late_shared)
-        report.note(f"/dev/shm, the whole machine's: {first:.1f} MB, then {last:.1f} MB")
+        report.note(f"Shared memory, the whole machine's: {first:.1f} MB, then {last:.1f} MB")
     tasks = [(moment, count) for moment, count in watch.tasks if moment >= warm_up]
     if len(tasks) > 1:
         rate = (tasks[-1][1] - tasks[0][1]) / (tasks[-1][0] - tasks[0][0])

@@ -246,6 +246,8 @@ def options_for(place: Placement, *, restarts: int) -> dict[str, Any]:
         "num_cpus": 0,
         "resources": {place.kind: _SHARE},
         "max_restarts": restarts,
+        # Ray's head would keep a record of each call, a kilobyte, for its dashboard.
+        "enable_task_events": False,
     }
     if place.node is not None:
         address = nodes[0]["NodeManagerAddress"]

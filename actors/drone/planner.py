@@ -53,6 +53,7 @@ class PlannerExecutor(Executor):
         self._actor = remote.options(
             num_cpus=0,
             max_restarts=-1,
+            enable_task_events=False,
             scheduling_strategy=NodeAffinitySchedulingStrategy(here, soft=False),
         ).remote(application)
         self._patience = patience
