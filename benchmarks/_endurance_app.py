@@ -7,11 +7,14 @@ import json
 from pathlib import Path
 from typing import Any, ClassVar
 
+import ray
+
 from aerodaas import AeroNavigation, Analytics, Environment, Frame, NavigationType, Waypoint
 from aerodaas.analytics.base import Context
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.clock import seconds
 
+TASKS = "Events of tasks kept by Ray's head"
 SIZE = (320, 180)
 RATE = 5.0
 _ROUND = ((8.0, 0.0), (8.0, 8.0), (0.0, 8.0), (0.0, 0.0))
@@ -81,7 +84,10 @@ def main() -> None:
     frames = drone.get_sensor_by_id("camera").get_data_stream()
     drone.get_sensor_by_id("odometry").get_data_stream()
     drone.navigate(Patrol(words.seconds).analyse(frames))
-    drone.start_mission()
+    try:
+        drone.start_mission()
+    finally:
+        print(f"{TASKS}: {len(ray.timeline() or ())}", flush=True)  # noqa: T201 - for the benchmark
 
 
 if __name__ == "__main__":

@@ -27,6 +27,7 @@ from typing import Annotated
 import numpy as np
 import psutil
 import typer
+from _endurance_app import TASKS
 from _report import Report
 
 APPLICATION = Path(__file__).with_name("_endurance_app.py")
@@ -99,8 +100,6 @@ class Watch:
         self.samples: dict[str, list[Sample]] = defaultdict(list)
         self.shared: list[tuple[float, float]] = []
         """MB below /dev/shm, by moment."""
-        self.tasks: list[tuple[float, int]] = []
-        """Tasks that Ray's GCS keeps, by moment, as its debug log says."""
         self._root = psutil.Process(application)
         self._names: dict[psutil.Process, str] = {}
 
@@ -125,24 +124,6 @@ class Watch:
             with contextlib.suppress(OSError):
                 used += path.stat().st_blocks * 512
         self.shared.append((moment, used / 1e6))
-        if (kept := self._kept_tasks()) is not None:
-            self.tasks.append((moment, kept))
-
-    def _kept_tasks(self) -> int | None:
-        for folder in Path(tempfile.gettempdir()).glob("aerodaas-ray-*"):
-            log = folder / "ray" / "session_latest" / "logs" / "debug_state_gcs.txt"
-            with contextlib.suppress(OSError):
-                supervisors = [one.pid for one, name in self._names.items() if "ray_pro" in name]
-                mine = f"{folder}/" in " ".join(
-                    word
-                    for process, name in self._names.items()
-                    if name == "gcs_server"
-                    for word in process.cmdline()
-                )
-                found = re.search(r"num task events stored: (\d+)", log.read_text())
-                if supervisors and mine and found:
-                    return int(found[1])
-        return None
 
 
 def fly(folder: Path, seconds: float, every: float, limit: float, *, lockstep: bool) -> Watch:
@@ -198,10 +179,6 @@ def show(watch: Watch, warm_up: float, report: Report) -> None:
     if late_shared:
         first, last = change(late_shared)
         report.note(f"Shared memory, the whole machine's: {first:.1f} MB, then {last:.1f} MB")
-    tasks = [(moment, count) for moment, count in watch.tasks if moment >= warm_up]
-    if len(tasks) > 1:
-        rate = (tasks[-1][1] - tasks[0][1]) / (tasks[-1][0] - tasks[0][0])
-        report.note(f"Ray tasks kept by its GCS: {tasks[-1][1]}, {rate:.2f} more each second")
 
 
 def main(
@@ -231,8 +208,9 @@ def main(
     show(watch, warm_up, report)
     last = watch.shared[-1][0] if watch.shared else 0.0
     report.note(f"{title}, {last:.0f} s by the wall; the recording has {size:.0f} MB")
-    if said.strip():
-        report.note("The application said: " + said.strip().splitlines()[-1])
+    for line in said.splitlines():
+        if line.startswith(TASKS):
+            report.note(line)
     report.show()
     if json is not None:
         report.write(json)

@@ -1,4 +1,4 @@
-"""A recorder keeps nothing of what it has written, and its file has its whole index all the same."""
+"""A recorder keeps nothing of what it has written, and its file has its whole index."""
 
 from __future__ import annotations
 
