@@ -87,7 +87,7 @@ def main() -> None:
     try:
         drone.start_mission()
     finally:
-        print(f"{TASKS}: {len(ray.timeline() or ())}", flush=True)  # noqa: T201 - for the benchmark
+        print(f"{TASKS}: {len(ray.timeline() or ())}", flush=True)
 
 
 if __name__ == "__main__":
