@@ -47,7 +47,7 @@ class Patrol(Analytics[AeroNavigation]):
 
 
 def environment() -> dict[str, Any]:
-    """The environment file's content: a battery for a day, and patience between two rounds."""
+    """The environment file's content: a battery for days, and patience between two rounds."""
     width, height = SIZE
     camera = {"id": "camera", "rate": RATE, "settings": {"width": width, "height": height}}
     odometry = {"id": "odometry", "type": "odometry", "rate": 10}
@@ -56,6 +56,7 @@ def environment() -> dict[str, Any]:
         "robots": [
             {
                 "id": "drone",
+                "settings": {"capacity": 1e4},
                 "limits": {"endurance": 1e6, "silence_return": 2 * _EVERY},
                 "sensors": [camera, odometry],
             }
