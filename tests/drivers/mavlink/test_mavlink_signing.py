@@ -64,7 +64,7 @@ def test_a_key_in_the_environment_takes_the_files_place(
     assert load_key(MavlinkSettings(), "d") == KEY
     monkeypatch.setenv(KEY_VARIABLE, "")
     assert load_key(MavlinkSettings(), "d") is None
-    with pytest.raises(ConfigError, match=r"d: cannot read the file that signing_key names"):
+    with pytest.raises(ConfigError, match=r"d: cannot read the signing key"):
         load_key(settings, "d")
 
 
