@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: fly test lint docs training clean
+.PHONY: fly test lint docs training lock audit licences matrix clean
 
 fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
@@ -35,13 +35,32 @@ $(VENV)/.installed: pyproject.toml | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[all]'
 	@touch $@
 
-$(VENV)/.installed-dev: pyproject.toml $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
-	@touch $@
+# Exactly what requirements-dev.txt names, each file of which has one of the hashes there.
+$(VENV)/.installed-dev: pyproject.toml requirements-dev.txt | $(VENV)/bin/python
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements-dev.txt
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation -e .
+	@touch $@ $(VENV)/.installed
 
 # PyTorch's own CPU build where there is one; only the tests of training need it.
 training: $(VENV)/.installed-dev
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check 'torch==2.13.0' -e '.[dev,training]'
+
+# The newest versions that pyproject.toml allows, for all platforms and Pythons.
+lock: $(VENV)/.installed-dev
+	$(BIN)/uv pip compile pyproject.toml --extra dev --universal --python-version 3.10 --upgrade --quiet \
+	  --generate-hashes --no-emit-index-url --no-annotate \
+	  --custom-compile-command "make lock" --output-file requirements-dev.txt
+
+# Known holes of what is locked; asks a service on the network.
+audit: $(VENV)/.installed-dev
+	$(BIN)/uv tool run pip-audit --requirement requirements-dev.txt --disable-pip --strict
+
+licences: $(VENV)/.installed-dev
+	$(BIN)/python -m tools.licences
+
+# Installs the wheel for each Python from 3.10 to 3.13 that is found, and tests it.
+matrix: $(VENV)/.installed-dev
+	$(BIN)/python -m tools.matrix
 
 clean:
 	rm -rf $(VENV) runs site

@@ -22,6 +22,7 @@ from ray.exceptions import GetTimeoutError, RayError
 
 from aerodaas.actors.cluster.ray_cluster import Placement, nodes_at, pinned
 from aerodaas.config.model import RuntimeEnvConfig
+from aerodaas.config.secrets import cleaned
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["isolation_options"]
@@ -46,7 +47,10 @@ def isolation_options(env: RuntimeEnvConfig | None, place: Placement, name: str)
     """
     if env is None:
         return {}
-    runtime_env: dict[str, Any] = {"env_vars": dict(env.env_vars)} if env.env_vars else {}
+    runtime_env: dict[str, Any] = {}
+    if env.env_vars:
+        variables = {key: value.get_secret_value() for key, value in env.env_vars.items()}
+        runtime_env["env_vars"] = variables
     if env.image_uri is not None:
         _ask_all(place, name, _find_engine, ())
         runtime_env["image_uri"] = env.image_uri
@@ -110,7 +114,8 @@ def _install(packages: list[str]) -> _Installed:
     except subprocess.TimeoutExpired:
         return _Installed(problem=f"not installed within {_INSTALL_TIMEOUT:.0f} s")
     if done.returncode:
-        return _Installed(problem=f"cannot install: {' '.join(done.stderr.split())[-500:]}")
+        reason = cleaned(" ".join(done.stderr.split()), packages)
+        return _Installed(problem=f"cannot install: {reason[-500:]}")
     return _Installed(command)
 
 

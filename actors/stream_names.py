@@ -10,6 +10,8 @@ __all__ = [
     "alert_stream",
     "done_stream",
     "end_stream",
+    "guest_actor",
+    "is_guest_actor",
     "reply_stream",
     "request_stream",
     "setpoint_stream",
@@ -24,6 +26,7 @@ ACKS = f"{INTERNAL}acks"
 """Prefix of the streams on which the last readers of a path acknowledge processed items."""
 DECISIONS = f"{INTERNAL}decisions"
 """Stream of the analytics scheduler's decisions and their outcomes."""
+_GUESTS = "guest/"
 
 
 def state_stream(robot: str) -> str:
@@ -74,6 +77,16 @@ def done_stream(node: str) -> str:
 def alert_stream(actor: str) -> str:
     """Name of the stream of an actor's alerts."""
     return f"{INTERNAL}alerts/{actor}"
+
+
+def guest_actor(guest: str) -> str:
+    """Name of the actor of a guest's analyses."""
+    return f"{_GUESTS}{guest}"
+
+
+def is_guest_actor(actor: str) -> bool:
+    """Whether an actor of this name runs a guest's analyses."""
+    return actor.startswith(_GUESTS)
 
 
 def vitals_stream(actor: str) -> str:

@@ -1,6 +1,6 @@
 """Crowd Watch: how many people are where a drone flies; a guest of the application that flies it.
 
-aerodaas run apps/disaster_survey.py --guest apps/crowd_watch.py
+aerodaas run apps/disaster_survey.py --guest apps/crowd_watch.py --grant crowd_watch=sense,compute
 """
 
 from aerodaas import Environment

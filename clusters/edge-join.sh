@@ -10,7 +10,7 @@
 # From the environment, or /etc/aerodaas/edge.env under aerodaas-edge.service:
 #   AERODAAS_VENV        Python environment with aerodaas   (default: ~/aerodaas)
 #   AERODAAS_RESOURCES   what this node offers              (default: {"edge":1})
-#   RAY_AUTH_TOKEN_PATH  the cluster's token                (default: ~/.ray/auth_token)
+#   RAY_AUTH_TOKEN_PATH  the cluster's token, mode 0600     (default: ~/.ray/auth_token)
 #   RAY_USE_TLS and the paths of certificates (docs/cluster.md), if the cluster speaks TLS
 set -eu
 
@@ -42,7 +42,9 @@ export RAY_DEFAULT_PYTHON_VERSION_MATCH_LEVEL=minor
 export RAY_max_direct_call_object_size=4194304
 # The death of an actor is told a second earlier than Ray would.
 export RAY_timeout_ms_task_wait_for_death_info=100
-export RAY_AUTH_MODE="${RAY_AUTH_MODE:-token}"
+# No other mode but by AERODAAS_UNAUTHENTICATED=1, of which the greeting below warns.
+export RAY_AUTH_MODE=token
+[ "${AERODAAS_UNAUTHENTICATED:-}" != 1 ] || export RAY_AUTH_MODE=disabled
 export RAY_USAGE_STATS_ENABLED=0
 
 # Says in one line what Ray would say in a screenful: no answer, wrong token, other versions.

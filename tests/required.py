@@ -40,7 +40,7 @@ class Peer:
 
 PEERS = {
     "AERODAAS_SITL_PX4": Peer(
-        "a PX4 in simulation, by a URL such as udpin:0.0.0.0:14540 or `start command => URL`"
+        "a PX4 in simulation, by a URL such as udpin:127.0.0.1:14540 or `start command => URL`"
     ),
     "AERODAAS_SITL_ARDUPILOT": Peer(
         "an ArduCopter in simulation, by a URL such as tcp:127.0.0.1:5760 or `start command => URL`"

@@ -145,7 +145,7 @@ BAD_FILES = {
     ),
     "a number that is none": (
         '{"robots": [{"id": "d", "limits": {"max_speed": NaN}}]}',
-        "robots.0.limits.max_speed: Input should be a finite number",
+        "environment.json: robots.0.limits.max_speed: must be a finite number, not nan",
     ),
 }
 
@@ -159,7 +159,7 @@ def test_a_malformed_environment_names_file_and_place(aerodaas: Commands, case: 
     ended = aerodaas.run(HOP + FLY)
     assert message in ended.said
     assert ended.code == 2
-    if text.startswith(("[", '{"')):
+    if text.startswith(("[", '{"')) and "finite" not in message:
         assert "aerodaas schema" in ended.said
 
 

@@ -143,3 +143,11 @@ def test_links_between_pages_lead_somewhere() -> None:
         text = page.read_text(encoding="utf-8")
         for target in re.findall(r"\]\((?!https?://|#)([^)#]+)", text):
             assert (page.parent / target).exists(), f"{page.name}: {target}"
+
+
+def test_tests_that_pages_name_are_there() -> None:
+    """Every `tests/…` that a page names is a file, a folder or a pattern of files."""
+    for page in [ROOT / "README.md", *DOCS.glob("*.md")]:
+        text = page.read_text(encoding="utf-8")
+        for target in re.findall(r"`(tests/[^`\sA-Z:]+)`", text):
+            assert list(ROOT.glob(target.rstrip("/"))), f"{page.name}: {target}"

@@ -64,7 +64,7 @@ def test_the_disaster_survey_builds_as_printed(
         names = runpy.run_path(str(application), run_name="__main__")
         env = names["env"]
         assert started == [names["drone"]]
-        env._place_entries()
+        env.place_entries()
         plan = Run(env)._plan()
     nodes = {node.stream: tuple(node.inputs) for actor in plan.analyses for node in actor.nodes}
     assert nodes == {

@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import hashlib
+import shutil
 import zipfile
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
+import pytest
 from hatchling.builders.wheel import WheelBuilder
 
 _ROOT = Path(__file__).resolve().parents[1]
 
 
-def test_the_wheel_holds_the_package_its_links_and_its_data(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel of this checkout."""
+    return _build(_ROOT, tmp_path_factory.mktemp("wheel"))
+
+
+def _build(root: Path, folder: Path) -> Path:
+    (built,) = WheelBuilder(str(root)).build(directory=str(folder), versions=["standard"])
+    return Path(built)
+
+
+def test_the_wheel_holds_the_package_its_links_and_its_data(built: Path) -> None:
     """Code behind links once, models, worlds, types and the report's looks."""
-    (built,) = WheelBuilder(str(_ROOT)).build(directory=str(tmp_path), versions=["standard"])
     names = zipfile.ZipFile(built).namelist()
     assert len(names) == len(set(names))
     package = _ROOT / "aerodaas"
@@ -25,3 +38,32 @@ def test_the_wheel_holds_the_package_its_links_and_its_data(tmp_path: Path) -> N
     }
     assert any(name.endswith(".onnx") for name in wanted)
     assert wanted <= set(names)
+
+
+def test_the_wheel_holds_nothing_else(built: Path) -> None:
+    """No tests, no workshop, nothing that was left lying about."""
+    paths = [PurePosixPath(name) for name in zipfile.ZipFile(built).namelist()]
+    assert {path.parts[0].partition("-")[0] for path in paths} == {"aerodaas"}
+    package = [path for path in paths if path.parts[0] == "aerodaas"]
+    kinds = {path.suffix for path in package if path.name != "py.typed"}
+    assert kinds <= {".py", ".pyi", ".json", ".onnx", ".css", ".js", ".html", ".md"}
+    assert not [path for path in package if path.name.startswith((".", "test_", "conftest"))]
+
+
+def test_the_same_sources_make_the_same_wheel(built: Path, tmp_path: Path) -> None:
+    """To the last byte, from another folder whose files have other times and permissions."""
+    copy = tmp_path / "copy"
+    copy.mkdir()
+    for name in ("pyproject.toml", "README.md", "LICENSE", ".gitignore"):
+        shutil.copyfile(_ROOT / name, copy / name)
+    for name in ("actors", "schedulers", "aerodaas"):
+        shutil.copytree(
+            _ROOT / name,
+            copy / name,
+            symlinks=True,
+            copy_function=shutil.copyfile,
+            ignore=shutil.ignore_patterns("__pycache__"),
+        )
+    again = _build(copy, tmp_path)
+    first, second = (hashlib.sha256(path.read_bytes()).hexdigest() for path in (built, again))
+    assert first == second

@@ -16,17 +16,18 @@ from typing import Any
 import ray
 from ray.exceptions import RayError, RpcError
 
+from aerodaas.actors.cluster.authentication import (
+    refusal,
+    require_authentication,
+    require_token,
+)
 from aerodaas.actors.cluster.encryption import require_same_encryption
-from aerodaas.actors.cluster.ray_internals import cluster_metadata, take_up_token
+from aerodaas.actors.cluster.ray_internals import cluster_metadata
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["greet", "hushed", "listener_of"]
 
 _PROBE_SECONDS = 5.0
-_TOKEN_ADVICE = (
-    "copy the head's token (`ray get-auth-token` there) to ~/.ray/auth_token here, or set "  # noqa: S105 - advice
-    "RAY_AUTH_TOKEN_PATH to its file, and set RAY_AUTH_MODE=token"
-)
 
 
 def greet(address: str) -> None:
@@ -35,6 +36,7 @@ def greet(address: str) -> None:
     Also checks that both ends use TLS and trust each other, or neither does. Raises
     AeroDaaSError with the remedy.
     """
+    authenticated = require_authentication()
     listener = listener_of(address)
     if listener is None:
         return
@@ -48,7 +50,8 @@ def greet(address: str) -> None:
     if address.startswith("ray://"):
         return
     require_same_encryption(address, listener)
-    take_up_token()
+    if authenticated:
+        require_token(address)
     _compare(address, _metadata(address))
 
 
@@ -66,9 +69,7 @@ def _metadata(address: str) -> dict[str, Any]:
     except (RayError, RpcError) as error:
         reason = str(error).strip().splitlines()[0]
         if "token" in reason.lower():
-            raise AeroDaaSError(
-                f"the cluster at {address} refuses our token: {_TOKEN_ADVICE}"
-            ) from None
+            raise refusal(address) from None
         raise AeroDaaSError(
             f"what listens at {address} is not the head of a Ray cluster: {reason}"
         ) from None

@@ -9,23 +9,31 @@ from __future__ import annotations
 
 import json
 import os
-import secrets
 import subprocess
 import sys
 import threading
+import warnings
 from collections.abc import Mapping
+from importlib.metadata import version
 from pathlib import Path
 from queue import Empty, Queue
 
+from aerodaas.actors.cluster.authentication import make_token, require_authentication
+from aerodaas.actors.private_folder import shared_memory_names
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["LocalRay"]
 
 _STORE_BYTES = 128 * 2**20
 """Bytes of Ray's object store; streams use shared memory of their own."""
-_ADDRESS = "127.0.0.2"
-"""Loopback address, so that a lost Wi-Fi breaks no connection. Ray replaces 127.0.0.1 by an
-address of the machine's network."""
+_ADDRESS = "127.0.0.1"
+"""Loopback address: no other machine reaches it, and a lost Wi-Fi breaks no connection."""
+_SPELLED = "[::ffff:127.0.0.1]"
+"""The same address, in the form that Ray does not replace by one of the machine's network."""
+_LOOPBACK = {
+    # Ray's processes then take 127.0.0.1 for the address of the machine, and listen there only.
+    "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
+}
 _START_SECONDS = 400.0
 _END_SECONDS = 20.0
 _KEEPER = Path(__file__).with_name("ray_process.py")
@@ -39,19 +47,18 @@ _OPTIONS = (
 class LocalRay:
     """Local Ray that starts in the background; `address` waits until it is ready."""
 
-    node_address = _ADDRESS
-
     def __init__(self, variables: Mapping[str, str]) -> None:
         """Start Ray with `variables` as defaults of the environment; returns at once."""
-        make_token()
-        command = [sys.executable, "-I", "-S", str(_KEEPER), str(os.getpid()), *_OPTIONS]
+        if require_authentication():
+            make_token()
+        command = [sys.executable, "-I", "-S", str(_KEEPER), str(os.getpid()), *_streams()]
         self._process = subprocess.Popen(  # noqa: S603 - our own file
-            [*command, f"--num-cpus={os.cpu_count()}"],
+            [*command, *_OPTIONS, f"--num-cpus={os.cpu_count()}"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            env={**variables, **os.environ},
+            env={**variables, **os.environ, **_LOOPBACK},
             start_new_session=True,
         )
         self._lines: Queue[str] = Queue()
@@ -66,7 +73,14 @@ class LocalRay:
             if "address" not in told:
                 self.end()
                 raise AeroDaaSError(_failure(str(told.get("error", ""))))
-            self._address = str(told["address"])
+            host, _, port = str(told["address"]).rpartition(":")
+            if host != _ADDRESS:
+                warnings.warn(
+                    f"Ray {version('ray')} listens on all interfaces of this machine, at {host}: "
+                    "it does not take the loopback address; its token keeps others out",
+                    stacklevel=2,
+                )
+            self._address = f"{_SPELLED if host == _ADDRESS else host}:{port}"
         return self._address
 
     def end(self) -> None:
@@ -90,6 +104,15 @@ class LocalRay:
             return {"flying": True}
 
 
+def _streams() -> tuple[str, str]:
+    """Folder and prefix of this user's streams; empty where shared memory cannot be used."""
+    try:
+        folder, prefix = shared_memory_names()
+    except AeroDaaSError:
+        return "", ""
+    return str(folder), prefix
+
+
 def _failure(reason: str) -> str:
     if "timed out" not in reason:
         return f"Ray does not start on this machine: {reason or 'its supervisor ended'}"
@@ -98,22 +121,3 @@ def _failure(reason: str) -> str:
         "Ray did not start within half a minute, twice: this machine is too busy "
         f"(load {load}); end other work and try again"
     )
-
-
-def make_token() -> None:
-    """Create the user's Ray token if missing, so that other users cannot use the local Ray."""
-    named = {"RAY_AUTH_MODE", "RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"}
-    path = Path.home() / ".ray" / "auth_token"
-    if named & set(os.environ) or path.exists():
-        return
-    path.parent.mkdir(exist_ok=True)
-    # Written to a file of its own and linked: two applications may start at the same time.
-    own = path.with_name(f"auth_token.{os.getpid()}")
-    with os.fdopen(os.open(own, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
-        file.write(secrets.token_hex(32))
-    try:
-        os.link(own, path)
-    except FileExistsError:
-        pass
-    finally:
-        own.unlink()

@@ -16,7 +16,7 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from aerodaas.actors.cluster.handshake import greet, hushed
 from aerodaas.actors.cluster.local_ray import LocalRay
-from aerodaas.actors.cluster.ray_internals import silence_nodes, take_up_token
+from aerodaas.actors.cluster.ray_internals import silence_nodes
 from aerodaas.actors.cluster.ray_variables import VARIABLES
 from aerodaas.config.model import ComputeConfig
 from aerodaas.types.errors import AeroDaaSError, ConfigError
@@ -82,10 +82,8 @@ def connect(address: str | None) -> None:
         return
     begin(None)
     assert _local is not None  # noqa: S101 - begun
-    address = _local.address
     _set_variables()
-    take_up_token()
-    _init(address, _node_ip_address=_local.node_address)
+    _init(_local.address)
 
 
 def join(address: str) -> None:
@@ -105,11 +103,11 @@ def _set_variables() -> None:
     os.environ.setdefault("RAY_IGNORE_UNHANDLED_ERRORS", "1")
 
 
-def _init(address: str, **more: Any) -> None:  # noqa: ANN401 - as Ray takes them
+def _init(address: str) -> None:
     quiet: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
     try:
         with hushed(), _fatal_only():
-            ray.init(address=address, namespace=_NAMESPACE, **quiet, **more)
+            ray.init(address=address, namespace=_NAMESPACE, **quiet)
     except (ConnectionError, RuntimeError, ValueError) as error:
         reason = str(error).strip().splitlines()[0]
         raise _unreachable(address, reason) from None

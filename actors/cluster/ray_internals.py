@@ -4,8 +4,8 @@ Where a release of Ray has changed one of them, nothing fails, but a message get
 
 - `cluster_metadata`: Ray reports a wrong token only after half a minute of log lines, and another
   version of itself with a traceback. Without it, that is what the user sees.
-- `take_up_token`: Ray takes up the user's token only for a cluster that it starts itself. Without
-  it, RAY_AUTH_MODE=token has to be set by hand.
+- `reread_variables`: Ray reads its environment variables once, when it is imported. Without it,
+  RAY_AUTH_MODE=token has to be set before an application starts.
 - `silence_nodes`: Ray prints its nodes' messages about dead processes, which the run reports by
   name. Neither `log_to_driver` nor another option covers them.
 """
@@ -15,11 +15,9 @@ from __future__ import annotations
 import contextlib
 import importlib
 import json
-import logging
-from collections.abc import Iterator
 from typing import Any
 
-__all__ = ["cluster_metadata", "silence_nodes", "take_up_token"]
+__all__ = ["cluster_metadata", "reread_variables", "silence_nodes"]
 
 _CHANGED = (ImportError, AttributeError, TypeError)
 """Errors of a use of internals that have changed."""
@@ -39,13 +37,10 @@ def cluster_metadata(address: str, timeout: float) -> dict[str, Any]:
     return dict(json.loads(found)) if found else {}
 
 
-def take_up_token() -> None:
-    """Enable the user's token for joining a cluster."""
-    name = "ray._private.authentication.authentication_token_setup"
+def reread_variables() -> None:
+    """Make Ray in this process read its environment variables again."""
     with contextlib.suppress(*_CHANGED):
-        tokens = importlib.import_module(name)
-        with _level(logging.getLogger(name), logging.ERROR):
-            tokens.maybe_enable_token_auth_if_token_available(warn_if_disabled=False)
+        importlib.import_module("ray._raylet").Config.initialize("")
 
 
 def silence_nodes() -> None:
@@ -54,13 +49,3 @@ def silence_nodes() -> None:
         worker = importlib.import_module("ray._private.worker")
         if hasattr(worker, _PRINTS):
             setattr(worker, _PRINTS, lambda *_, **__: None)
-
-
-@contextlib.contextmanager
-def _level(logger: logging.Logger, level: int) -> Iterator[None]:
-    before = logger.level
-    logger.setLevel(level)
-    try:
-        yield
-    finally:
-        logger.setLevel(before)

@@ -18,6 +18,7 @@ import os
 import select
 import shutil
 import signal
+import stat
 import subprocess
 import sys
 import tempfile
@@ -42,6 +43,8 @@ _START_SECONDS = 180.0
 _GRACE_SECONDS = 3.0
 """Wait for actors that were told to end and still hold their locks."""
 _DYING_SECONDS = 10.0
+_SETTING_UP_SECONDS = 60.0
+"""Age from which a folder without its supervisor's lock is one whose supervisor was killed."""
 _LOOK_SECONDS = 0.2
 _LONGEST = 40
 """Most characters of a temporary folder; a socket's path below it may have 107."""
@@ -54,9 +57,21 @@ _RAY = (
     "from ray.scripts.scripts import main; main()"
 )
 
+_NEW_NODE = """
+import sys
+import iceoryx2 as i
+config = i.config.default()
+config.global_cfg.root_path = i.Path.new(sys.argv[1])
+config.global_cfg.prefix = i.FileName.new(sys.argv[2])
+i.NodeBuilder.new().config(config).create(i.ServiceType.Ipc)
+"""
 
-def main(application: int, words: list[str]) -> None:
-    """Run Ray, started by `ray start` with the arguments `words`, for process `application`."""
+
+def main(application: int, streams: list[str], words: list[str]) -> None:
+    """Run Ray, started by `ray start` with the arguments `words`, for process `application`.
+
+    `streams` are the folder and the prefix of its streams in shared memory; empty without.
+    """
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
     # Orphans of this Ray's processes become children of this process.
@@ -75,7 +90,7 @@ def main(application: int, words: list[str]) -> None:
             _keep(client, folder, words)
     finally:
         _end_all()
-        _free_streams()
+        _free_streams(streams)
         shutil.rmtree(folder, ignore_errors=True)
 
 
@@ -213,7 +228,7 @@ def _command(pid: int) -> str:
 def _prune(base: Path) -> None:
     """Remove processes and folders of killed supervisors, unless a drone still flies."""
     for folder in base.glob(f"{PREFIX}*"):
-        if _orphaned(folder):
+        if _ours(folder) and _orphaned(folder):
             for pid, _ in list(_processes()):
                 if _belongs(pid, folder):
                     with contextlib.suppress(OSError):
@@ -221,11 +236,23 @@ def _prune(base: Path) -> None:
             shutil.rmtree(folder, ignore_errors=True)
 
 
+def _ours(folder: Path) -> bool:
+    """Whether it is a folder made by this user, not a link or what another user has put there."""
+    with contextlib.suppress(OSError):
+        found = folder.lstat()
+        return stat.S_ISDIR(found.st_mode) and found.st_uid == os.geteuid()
+    return False
+
+
 def _orphaned(folder: Path) -> bool:
+    """Whether neither its supervisor nor a run of it lives."""
     with contextlib.suppress(OSError):
         own = folder / _OWN_LOCK
-        return own.exists() and not _held(own) and not _under_way(folder)
-    return False  # another user's
+        if not own.exists() and time.time() - folder.stat().st_mtime < _SETTING_UP_SECONDS:
+            return False  # its supervisor may be about to lock it
+        locks = folder / LOCKS
+        return not _held(own) and not (locks.exists() and _under_way(folder))
+    return False
 
 
 def _belongs(pid: int, folder: Path) -> bool:
@@ -236,12 +263,13 @@ def _belongs(pid: int, folder: Path) -> bool:
     return False
 
 
-def _free_streams() -> None:
+def _free_streams(streams: list[str]) -> None:
     """Make iceoryx2 remove the shared memory of dead processes, as it does for each new node."""
-    code = "import iceoryx2 as i; i.NodeBuilder.new().create(i.ServiceType.Ipc)"
+    if not all(streams):
+        return
     with contextlib.suppress(OSError, subprocess.TimeoutExpired):
         subprocess.run(  # noqa: S603 - fixed arguments
-            [sys.executable, "-c", code],
+            [sys.executable, "-c", _NEW_NODE, *streams],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
@@ -251,4 +279,4 @@ def _free_streams() -> None:
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), sys.argv[2:])
+    main(int(sys.argv[1]), sys.argv[2:4], sys.argv[4:])

@@ -12,11 +12,16 @@ from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel
-
 from aerodaas.analytics.base import Analytics
 from aerodaas.config.checked import checked, near
-from aerodaas.config.plugins import PluginKind, is_built_in, load_plugin, require_plugin
+from aerodaas.config.plugins import (
+    PluginKind,
+    is_built_in,
+    load_plugin,
+    require_plugin,
+    settings_model,
+)
+from aerodaas.config.secrets import SecretUrl, plain, shown_text
 from aerodaas.dataflow.names import snake_case
 from aerodaas.types.errors import ConfigError, GraphError
 from aerodaas.types.identifiers import find_scoped
@@ -151,15 +156,9 @@ def _check_names(section: str, told: Iterable[str], graph: Graph) -> None:
 
 
 def _check_settings(kind: PluginKind, name: str, settings: dict[str, Any], place: str) -> None:
-    model = _settings_model(kind, name)
+    model = settings_model(kind, name)
     if model is not None:
         checked(model, settings, f"{place}: settings")
-
-
-def _settings_model(kind: PluginKind, name: str) -> type[BaseModel] | None:
-    """The pydantic model of a plug-in's settings, if it has one."""
-    model = getattr(load_plugin(kind, name), "settings_model", None)
-    return model if isinstance(model, type) and issubclass(model, BaseModel) else None
 
 
 def sensor_properties(config: EnvironmentConfig, sensor: SensorConfig) -> dict[str, Any]:
@@ -170,12 +169,18 @@ def sensor_properties(config: EnvironmentConfig, sensor: SensorConfig) -> dict[s
     driver, settings = sensor.driver or "", sensor.settings
     if sensor.type == "camera":
         driver = config.camera_driver(sensor)
-        model = _settings_model("cameras", driver)
+        model = settings_model("cameras", driver)
         if model is not None:
             place = f"sensor {sensor.full_id}: settings"
-            settings = checked(model, settings, place).model_dump()
+            settings = dict(checked(model, settings, place).model_dump())
+    settings = {name: _told(value) for name, value in settings.items()}
     own = {"id": sensor.id, "type": sensor.type, "rate": sensor.rate, "robot": sensor.robot or ""}
     return {**own, "driver": driver, **settings}
+
+
+def _told(value: object) -> object:
+    """A property; a path or URL without its secrets."""
+    return str(value) if isinstance(value, SecretUrl) else value
 
 
 def _require_methods(
@@ -193,13 +198,13 @@ def _require_methods(
 
 
 def _check_path(sensor: SensorConfig) -> None:
-    path = str(sensor.settings.get("path") or "")
+    path = str(plain(sensor.settings.get("path") or ""))
     if "://" in path or Path(path).exists():
         return
     beside = Path(path).parent
     names = [one.name for one in beside.iterdir()] if beside.is_dir() else []
     raise ConfigError(
-        f"sensor {sensor.full_id}: settings.path: there is no {path}"
+        f"sensor {sensor.full_id}: settings.path: there is no {shown_text(path)}"
         f"{near(Path(path).name, names[:_NAMED])}"
     )
 

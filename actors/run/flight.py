@@ -150,7 +150,7 @@ class Flight:
         self._pulse.beat()
         self._origin = host_time_ns()
         self._start(list(self._members.values()))
-        self._head = HeadWatch(ray.get_runtime_context().gcs_address, self._note)
+        self._head = HeadWatch(ray.get_runtime_context().gcs_address, self.note)
 
     def _start(self, members: list[Member]) -> None:
         # Pure readers start first, so that no message is published without its readers.
@@ -510,7 +510,7 @@ class Flight:
         error = MissionError(f"the actor {member.name} died")
         if member.lost_at is None:
             member.lost_at = time.monotonic()
-            self._note("actor_lost", str(error))
+            self.note("actor_lost", str(error))
             self._wait_no_longer()
         member.report = ActorReport("failed", error)
 
@@ -520,14 +520,15 @@ class Flight:
             member.lost_at = None
             member.report = ActorReport("running")
             self._wait_no_longer()
-            self._note("actor_back", f"{member.name} is back after {absence:.1f} s")
+            self.note("actor_back", f"{member.name} is back after {absence:.1f} s")
 
     def _wait_no_longer(self) -> None:
         if self.plan.conduct is not None:
             for name in self._ids():
                 self._members[name].handle.wait_no_longer.remote()
 
-    def _note(self, kind: str, text: str) -> None:
+    def note(self, kind: str, text: str) -> None:
+        """Publish an alert of the application's process."""
         for name in self._ids():
             self._members[name].handle.note.remote(kind, text)
 
@@ -546,7 +547,7 @@ class Flight:
             except ActorUnavailableError:
                 pass  # it has not restarted yet, or died again
             except RayTaskError as error:
-                self._note("actor_failed", f"{member.name} cannot start again: {error.cause}")
+                self.note("actor_failed", f"{member.name} cannot start again: {error.cause}")
                 return
             except RayActorError:
                 return

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from aerodaas.actors.cluster.ray_cluster import Placement
@@ -25,6 +25,7 @@ from aerodaas.actors.stream_names import (
     alert_stream,
     done_stream,
     end_stream,
+    guest_actor,
     state_stream,
     task_stream,
     trigger_stream,
@@ -34,6 +35,7 @@ from aerodaas.actors.worker import NodeSpec, Wake
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.analytics.endpoint.analysis import endpoint_analysis
+from aerodaas.analytics.guests.analysis import GuestAnalysis
 from aerodaas.config.model import (
     ComputeConfig,
     RobotConfig,
@@ -294,15 +296,22 @@ class _Planner:
 
     def analyses_by_actor(self) -> tuple[AnalyticsActorPlan, ...]:
         shared: dict[Placement, list[NodeSpec]] = {}
+        guests: dict[str, list[Node]] = {}
         actors = []
         for node in self.analyses():
             env = self.runtime_env_of(node)
-            if node.work.isolated or env is not None:
+            if isinstance(node.work, GuestAnalysis):
+                guests.setdefault(node.work.guest, []).append(node)
+            elif node.work.isolated or env is not None:
                 name = f"analytics/{node.id}"
                 spec = self.node_spec(node)
                 actors.append(AnalyticsActorPlan(name, self.place_of(node), (spec,), env))
             else:
                 shared.setdefault(self.place_of(node), []).append(self.node_spec(node))
+        for guest, mine in guests.items():
+            # Never beside the owner's or another guest's: one's end is that of its actor.
+            specs = tuple(self.node_spec(node) for node in mine)
+            actors.append(AnalyticsActorPlan(guest_actor(guest), self.edge_of(None), specs))
         for place, nodes in shared.items():
             name = f"analytics/{place.node or place.kind}"
             actors.append(AnalyticsActorPlan(name, place, tuple(nodes)))
@@ -407,7 +416,7 @@ def make_plan(
     names += ["dispatcher"] if dispatch is not None else []
     streams += [alert_stream(name) for name in names]
     return FlightPlan(
-        session=session,
+        session=replace(session, environment=session.environment.for_actors()),
         drones=drones,
         edges=tuple(planner.edge_of(group[0].robot.id) for group in drones),
         cameras=cameras,

@@ -10,7 +10,11 @@ from aerodaas.actors.streams.codec import decode as decode_message
 from aerodaas.actors.streams.codec import encode as encode_message
 from aerodaas.actors.streams.publisher import Publisher, RemoteReader
 from aerodaas.actors.streams.remote import UNDER_WAY
-from aerodaas.actors.streams.shared_memory import MAX_DEPTH, shared_memory_available
+from aerodaas.actors.streams.shared_memory import (
+    MAX_DEPTH,
+    shared_memory_available,
+    shared_memory_obstacle,
+)
 from aerodaas.actors.streams.subscriber import Subscriber
 
 __all__ = [
@@ -23,4 +27,5 @@ __all__ = [
     "decode_message",
     "encode_message",
     "shared_memory_available",
+    "shared_memory_obstacle",
 ]

@@ -3,6 +3,9 @@
 Only this module uses iceoryx2, whose Python API is young; the version is pinned in
 pyproject.toml. A publisher writes a message once into shared memory, a reader maps it without a
 copy, and a full reader loses its oldest message (safe overflow), never the newest.
+
+Each user of the machine has a folder and names of their own for it: the folder that iceoryx2 makes
+in `/tmp` by itself locks all users out but the first.
 """
 
 from __future__ import annotations
@@ -10,13 +13,23 @@ from __future__ import annotations
 import ctypes
 import functools
 import importlib
+import os
 import weakref
+from pathlib import Path
 from typing import Any
 
+from aerodaas.actors.private_folder import shared_memory_names
 from aerodaas.actors.streams.codec import Encoded, decode
+from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.status import Message
 
-__all__ = ["SharedPublisher", "SharedSubscriber", "SharedWaiter", "shared_memory_available"]
+__all__ = [
+    "SharedPublisher",
+    "SharedSubscriber",
+    "SharedWaiter",
+    "shared_memory_available",
+    "shared_memory_obstacle",
+]
 
 MAX_READERS = 16
 MAX_DEPTH = 32
@@ -35,22 +48,57 @@ def _iceoryx() -> Any:  # noqa: ANN401 - the library ships no types
     return iceoryx2
 
 
-@functools.cache
 def shared_memory_available() -> bool:
-    """Return whether this host supports streams in shared memory."""
+    """Return whether this process can use streams in shared memory."""
+    return not shared_memory_obstacle()
+
+
+@functools.cache
+def shared_memory_obstacle() -> str:
+    """Return why this process cannot use streams in shared memory; empty if it can."""
     try:
         _node()
-    except Exception:  # noqa: BLE001 - any exception of the library means unavailable
-        return False
-    return True
+    except ImportError:
+        return (
+            "iceoryx2 is missing: pip install 'iceoryx2==0.10.*', which builds it with Rust where "
+            "it has no wheel"
+        )
+    except AeroDaaSError as error:
+        return str(error)
+    except Exception as error:  # noqa: BLE001 - the library's errors have no common base
+        return f"iceoryx2 does not start: {type(error).__name__} {error}"
+    return ""
 
 
 @functools.cache
 def _node() -> Any:  # noqa: ANN401
     """One iceoryx2 node for each process."""
     iox = _iceoryx()
-    builder = iox.NodeBuilder.new().signal_handling_mode(iox.SignalHandlingMode.Disabled)
-    return builder.create(iox.ServiceType.Ipc)
+    config = iox.config.default()
+    folder, prefix = shared_memory_names()
+    config.global_cfg.root_path = iox.Path.new(str(folder))
+    config.global_cfg.prefix = iox.FileName.new(prefix)
+    builder = iox.NodeBuilder.new().config(config)
+    builder = builder.signal_handling_mode(iox.SignalHandlingMode.Disabled)
+    node = builder.create(iox.ServiceType.Ipc)
+    _close_counter(prefix)
+    return node
+
+
+def _close_counter(prefix: str) -> None:
+    """Close iceoryx2's counter of nodes to other users, to whom it opens it.
+
+    A user who may write to it can end our processes: they map it, and it could be cut short.
+    Raises AeroDaaSError if another user made it.
+    """
+    for path in Path("/dev/shm").glob(f"{prefix}*.global_mgmt"):  # noqa: S108 - where the kernel has it
+        owner = path.stat().st_uid
+        if owner != os.geteuid():
+            raise AeroDaaSError(
+                f"{path} is a file of user {owner}, not of our own, and is not used; remove it: "
+                f"sudo rm {path}"
+            )
+        path.chmod(0o600)
 
 
 @functools.lru_cache(maxsize=512)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import re
 from pathlib import Path
 
@@ -21,6 +22,13 @@ from aerodaas.types.geometry import CameraModel
 __all__ = ["FolderCamera"]
 
 _log = logging.getLogger(__name__)
+_JPEG_FRAME = re.compile(
+    rb"\xff[\xc0-\xc3\xc5-\xc7\xc9-\xcb\xcd-\xcf]\x00[\x0b\x11\x14].(..)(..)[\x01\x03\x04]",
+    re.DOTALL,
+)
+"""Start of a frame: length, precision, height, width, components."""
+_MOST_PIXELS = 100_000_000
+"""Pixels of the largest picture: a small file may claim gigabytes of them."""
 _KINDS = {".jpg", ".jpeg", ".png", ".bmp", ".webp"}
 
 
@@ -126,13 +134,30 @@ def _decode(path: Path) -> NDArray[np.uint8] | None:
         content = path.read_bytes()
     except OSError:
         return None
-    if not content or _is_cut_short(content):
+    if not content or _is_cut_short(content) or _pixels(content) > _MOST_PIXELS:
         return None
     try:
         image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_COLOR)
     except cv2.error:
         return None
     return None if image is None else np.asarray(image, np.uint8)
+
+
+def _pixels(content: bytes) -> int:
+    """Pixels that the header of a PNG, JPEG or BMP claims; 0 if it claims none.
+
+    WebP has at most 16383 x 16383 by its format.
+    """
+    if content.startswith(b"\x89PNG"):
+        return int.from_bytes(content[16:20], "big") * int.from_bytes(content[20:24], "big")
+    if content.startswith(b"BM"):
+        sides = (content[18:22], content[22:26])
+        return abs(math.prod(int.from_bytes(one, "little", signed=True) for one in sides))
+    if content.startswith(b"\xff\xd8"):
+        frames = _JPEG_FRAME.finditer(content)
+        areas = (int.from_bytes(one[1], "big") * int.from_bytes(one[2], "big") for one in frames)
+        return max(areas, default=0)
+    return 0
 
 
 def _is_cut_short(content: bytes) -> bool:

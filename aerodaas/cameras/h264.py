@@ -19,6 +19,9 @@ start code instead, as FFmpeg's own parser must, would add a frame interval of l
 _START_CODE = b"\x00\x00\x00\x01"
 _UNIT = re.compile(rb"\x00\x00\x01(.)", re.DOTALL)
 _SLICES = frozenset({1, 2, 5})
+_MOST_PIXELS = 1 << 25
+"""Pixels of the largest picture that is decoded: 8K has 33.2 million. A stream may claim any size,
+and FFmpeg allocates several pictures of it before the first is decoded."""
 _LARGEST_FRAME = 1 << 20
 """Size in bytes above which the content is discarded as invalid."""
 
@@ -76,9 +79,13 @@ class FrameAssembler:
 class FrameDecoder:
     """Decodes one image per frame, from the first key frame on."""
 
-    def __init__(self, *, only_whole: bool = False) -> None:
-        """With `only_whole`, omit images that depend on a damaged frame."""
+    def __init__(self, *, only_whole: bool = False, most_pixels: int = _MOST_PIXELS) -> None:
+        """With `only_whole`, omit images that depend on a damaged frame.
+
+        A stream of pictures with more than `most_pixels` is not decoded.
+        """
         self._only_whole = only_whole
+        self._most_pixels = most_pixels
         self._codec = self._fresh()
         self._started = False
         self._tainted = True
@@ -87,12 +94,12 @@ class FrameDecoder:
         self.waiting = 0
         """Number of frames omitted before a key frame: the first, or with `only_whole` the next."""
 
-    @staticmethod
-    def _fresh() -> VideoCodecContext:
+    def _fresh(self) -> VideoCodecContext:
         codec = av.CodecContext.create("h264", "r")
         # Frame threading would delay frames, as does reordering for B frames.
         codec.thread_count = 1
         codec.flags |= Flags.low_delay
+        codec.options = {"max_pixels": str(self._most_pixels)}
         return codec
 
     def decode(self, frame: WholeFrame) -> VideoFrame | None:

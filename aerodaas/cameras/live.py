@@ -16,6 +16,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.errors import SourceError
 
@@ -27,13 +28,15 @@ _READ_TIMEOUT_MS = 3000
 _SHORTEST_WAIT = 0.5
 _LONGEST_WAIT = 8.0
 _OPTIONS = "OPENCV_FFMPEG_CAPTURE_OPTIONS"
+_MOST_PIXELS = 4096 * 4096
+"""Pixels of the largest picture that is handed on: a stream may claim any size."""
 _OPENING = threading.Lock()
 
 
 class LiveSource:
     """Source of the newest frame of a URL (rtsp, udp, http, …) or device (/dev/video0)."""
 
-    def __init__(self, address: str, *, timeout: float = _FIRST_FRAME_TIMEOUT) -> None:
+    def __init__(self, address: SecretUrl, *, timeout: float = _FIRST_FRAME_TIMEOUT) -> None:
         """Read from `address`; `open` waits up to `timeout` seconds for the first frame."""
         self._address = address
         self._timeout = timeout
@@ -82,7 +85,7 @@ class LiveSource:
     def _decode(self) -> None:
         wait = _SHORTEST_WAIT
         while not self._closing.is_set():
-            capture = _connect(self._address)
+            capture = _connect(self._address.get_secret_value())
             if self._drain(capture):
                 wait = _SHORTEST_WAIT
             capture.release()
@@ -97,7 +100,10 @@ class LiveSource:
         any_frame = False
         while not self._closing.is_set() and capture.grab():
             grabbed = host_time_ns()
-            readable, image = capture.retrieve()
+            width, height = map(capture.get, (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
+            readable, image = (
+                capture.retrieve() if width * height <= _MOST_PIXELS else (False, None)
+            )
             if not readable:
                 self.skipped += 1
                 continue

@@ -16,7 +16,8 @@ __all__ = ["recorded_camera"]
 def recorded_camera(sensor: SensorConfig, environment: EnvironmentConfig) -> Camera:
     """Create the camera for the setting `path`; raises ConfigError for invalid settings."""
     path = camera_settings(sensor).path
-    kind = FolderCamera if path is None or Path(path).is_dir() else VideoCamera
+    is_folder = path is None or Path(path.get_secret_value()).is_dir()
+    kind = FolderCamera if is_folder else VideoCamera
     return kind(sensor, environment)
 
 

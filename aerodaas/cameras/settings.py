@@ -19,10 +19,11 @@ def camera_settings(sensor: SensorConfig) -> CameraConfig:
 
 def required_path(sensor: SensorConfig, settings: CameraConfig, what: str) -> str:
     """Return the path among the settings; raises ConfigError if it is missing."""
-    if not settings.path:
+    path = "" if settings.path is None else settings.path.get_secret_value()
+    if not path:
         message = f'sensor {sensor.full_id}: settings: give the {what} as "path"'
         raise ConfigError(message)
-    return settings.path
+    return path
 
 
 def camera_model(settings: CameraConfig, width: int, height: int) -> CameraModel:

@@ -9,6 +9,7 @@ from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.settings import camera_model, camera_settings, required_path
 from aerodaas.cameras.video_file import VideoFile
 from aerodaas.config.model import CameraConfig, EnvironmentConfig, SensorConfig
+from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import CameraModel
 
@@ -30,11 +31,12 @@ class VideoCamera:
         """Validate the settings of `sensor`; raises ConfigError."""
         del environment
         self._settings = camera_settings(sensor)
-        self._address = required_path(sensor, self._settings, "video file, URL or device")
+        path = SecretUrl(required_path(sensor, self._settings, "video file, URL or device"))
+        self._label = str(path)
         self._source: VideoFile | LiveSource = (
-            LiveSource(self._address)
-            if _LIVE.match(self._address)
-            else VideoFile(self._address, sensor.rate, loop=self._settings.loop)
+            LiveSource(path)
+            if _LIVE.match(path.get_secret_value())
+            else VideoFile(path, sensor.rate, loop=self._settings.loop)
         )
         self._model: CameraModel | None = None
 
@@ -66,7 +68,7 @@ class VideoCamera:
             return None
         image, taken = found
         self._model = camera_model(self._settings, image.shape[1], image.shape[0])
-        return Picture(image, taken, self._address)
+        return Picture(image, taken, self._label)
 
     def close(self) -> None:
         """Release the source."""

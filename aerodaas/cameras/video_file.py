@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import SourceError
 
@@ -22,7 +23,7 @@ _ROUNDING = 1e-4
 class VideoFile:
     """Plays a video at its own frame rate, by mission time."""
 
-    def __init__(self, path: str, fallback_rate: float, *, loop: bool) -> None:
+    def __init__(self, path: SecretUrl, fallback_rate: float, *, loop: bool) -> None:
         """Play `path`; `fallback_rate` in Hz is for files without a frame rate."""
         self._path = path
         self._rate = fallback_rate
@@ -36,7 +37,7 @@ class VideoFile:
 
     def open(self) -> NDArray[np.uint8]:
         """Open the file and return its first frame; raises SourceError."""
-        self._capture = cv2.VideoCapture(self._path)
+        self._capture = cv2.VideoCapture(self._path.get_secret_value())
         rate = self._capture.get(cv2.CAP_PROP_FPS) if self._capture.isOpened() else 0.0
         readable, image = self._capture.read()
         if not readable:
@@ -89,7 +90,7 @@ class VideoFile:
                 self.finished = True
                 return False
             self._capture.release()
-            self._capture = cv2.VideoCapture(self._path)
+            self._capture = cv2.VideoCapture(self._path.get_secret_value())
             if not self._capture.grab():
                 self.finished = True
                 return False

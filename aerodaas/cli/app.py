@@ -14,6 +14,7 @@ from aerodaas.cli.application import run_application, speed_option
 from aerodaas.cli.export import export
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
+from aerodaas.config.grants import parse_words
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.config.overrides import parse_setting
 from aerodaas.types.errors import AeroDaaSError, GraphError, InvalidWaypointError, UnknownIdError
@@ -66,7 +67,17 @@ def run(
     guest: Annotated[
         list[Path] | None,
         typer.Option(
-            help="Another application that shares the sensors and compute, but may not navigate."
+            help="Another's application, in a process of its own, that shares what --grant gives."
+        ),
+    ] = None,
+    grant: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="GUEST=RIGHT,…",
+            help="What a guest, named after its file, may have: `sense`, `compute` and `fly`, "
+            "each alone or as `sense:SENSOR`, `sense:ROBOT`, `compute:ID`, `fly:ROBOT`; and how "
+            "much: `analyses:4`, `memory:2048` (MB), `rate:20` (Hz of a source of its own). "
+            "Without it, nothing.",
         ),
     ] = None,
     setting: Annotated[
@@ -98,7 +109,7 @@ def run(
         aerodaas run apps/farm_survey.py
         aerodaas run apps/farm_survey.py --speed 5 --seed 7 --record /tmp/farm
         aerodaas run apps/farm_survey.py --set quadrotor_base.limits.cruise_speed=1
-        aerodaas run apps/disaster_survey.py --guest apps/crowd_watch.py
+        aerodaas run mine.py --guest theirs.py --grant theirs=sense:cam1,compute:edge
         aerodaas run apps/watch_frames.py -- pictures/ yolov8n.onnx --rate 5
     """
     factor, lockstep = speed_option(speed)
@@ -114,6 +125,7 @@ def run(
         live=live_address if live else None,
         page=view_address if view else None,
         guests=tuple(path.resolve() for path in guest or ()),
+        grants=parse_words(grant or ()),
         application=application.resolve(),
     )
     if view:

@@ -1,4 +1,4 @@
-"""`aerodaas cluster`: the examination of a cluster."""
+"""`aerodaas cluster`: the examination of a cluster, and its token."""
 
 from __future__ import annotations
 
@@ -49,3 +49,21 @@ def greet(address: Annotated[str, typer.Argument(help="The head's `host:port`.")
     from aerodaas.actors.cluster.handshake import greet as ask  # noqa: PLC0415 - loads ray
 
     ask(address)
+
+
+@app.command()
+def token() -> None:
+    """Make the token of this user's clusters, if there is none, and tell its file.
+
+    Copy it to each node and to each machine where applications start, as `~/.ray/auth_token` with
+    mode 0600: who has it runs code on all nodes.
+
+        scp -p "$(aerodaas cluster token)" edge:.ray/auth_token
+    """
+    from aerodaas.actors.cluster.authentication import (  # noqa: PLC0415 - loads ray
+        make_token,
+        require_authentication,
+    )
+
+    require_authentication()
+    typer.echo(make_token() or "in RAY_AUTH_TOKEN")

@@ -149,13 +149,14 @@ def _providers() -> Iterator[Finding]:
 
 
 def _streams() -> Iterator[Finding]:
-    from aerodaas.actors.streams import shared_memory_available  # noqa: PLC0415 - loads ray
+    from aerodaas.actors.streams import shared_memory_obstacle  # noqa: PLC0415 - loads ray
 
-    if shared_memory_available():
+    obstacle = shared_memory_obstacle()
+    if not obstacle:
         yield Finding("streams", "zero-copy in shared memory between actors of this host")
     else:
         text = "shared memory not available; frames go through Ray's object store"
-        yield Finding("streams", text, ok=False, remedy=_REMEDIES["iceoryx2"])
+        yield Finding("streams", text, ok=False, remedy=obstacle)
 
 
 def _renderer() -> Iterator[Finding]:

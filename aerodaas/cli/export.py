@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from aerodaas.cli.printable import printable
 from aerodaas.cli.report import Recorded
 
 if TYPE_CHECKING:
@@ -49,9 +50,11 @@ def export(
         files += [track.write_gpx(opened, folder)] if gpx else []
         files += [track.write_kml(opened, folder)] if kml else []
         lines = [str(path) for path in files] or _channels(opened)
+        if opened.damaged:
+            lines.append(f"skipped {opened.damaged} broken messages or chunks")
     typer.echo("\n".join(lines))
 
 
 def _channels(recording: Recording) -> list[str]:
     topics = sorted(recording.topics.values(), key=lambda topic: topic.name)
-    return [f"{topic.count:>9}  {topic.name}  {topic.schema}" for topic in topics]
+    return [printable(f"{topic.count:>9}  {topic.name}  {topic.schema}") for topic in topics]

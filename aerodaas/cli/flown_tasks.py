@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from aerodaas.config.model import EnvironmentConfig, validated
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.recorded_environment import allowed_content, merged, recorded_content
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     Profile,
@@ -92,11 +92,7 @@ class Flown:
                     f"{path} holds no decisions of an analytics scheduler; fly with one, such as "
                     '"schedulers": {"analytics": "dems"} in the environment file'
                 )
-            if "environment.json" not in recording.attachments:
-                raise RecordingError(
-                    f"{path} holds no environment, so no run of ours has written it"
-                )
-            content = json.loads(recording.attachment("environment.json"))
+            content = merged(allowed_content(recorded_content(recording)), {})
         environment = validated(content, f"the environment in {path}")
         told = environment.schedulers.tasks
         models = {name: told_profile(name, told) for name in sorted({t.model for t in tasks})}

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli.application import run_application, speed_option
+from aerodaas.cli.printable import printable
 from aerodaas.cli.report import Recorded
 from aerodaas.config.options import RunOptions
 from aerodaas.types.errors import MissionError
@@ -31,6 +32,13 @@ def replay(
     model: Annotated[
         Path | None, typer.Option(help="ONNX model for every detector, instead of its own.")
     ] = None,
+    env: Annotated[
+        Path | None,
+        typer.Option(
+            help="Environment file for what no recording may bring: plug-ins, packages, "
+            "endpoints, nodes."
+        ),
+    ] = None,
     speed: Annotated[str, typer.Option(help="Mission seconds per wall second, or `max`.")] = "max",
     out: Annotated[
         Path | None, typer.Option(help="Folder for the new recording. Default: one in runs/.")
@@ -40,7 +48,8 @@ def replay(
 ) -> None:
     """Feed a recording's sensors through an application, and say how its decisions differ.
 
-    No vehicle is touched. Words after `--` are the application's own.
+    No vehicle is touched. Of the recorded environment only geometry, ids, rates and calibration
+    are taken. Words after `--` are the application's own.
 
         aerodaas replay flight.mcap --app apps/farm_survey.py
         aerodaas replay flight.mcap --app follow.py --model other.onnx
@@ -48,15 +57,26 @@ def replay(
     """
     from aerodaas.recording.pictures import shots  # noqa: PLC0415
     from aerodaas.recording.reader import Recording  # noqa: PLC0415
+    from aerodaas.recording.recorded_environment import (  # noqa: PLC0415
+        left_out,
+        recorded_content,
+    )
     from aerodaas.recording.report.difference import difference  # noqa: PLC0415 - slow to load
 
     with Recording.open(recording) as opened:
+        missing = left_out(recorded_content(opened))
         duration = opened.duration
         lossy = any(shot.format in _LOSSY for shot in islice(shots(opened), 1))
+    if missing:
+        typer.echo(
+            f"not taken from the recording: {printable(', '.join(missing))}; "
+            + (f"{env} says what is taken instead" if env else "give them with --env FILE")
+        )
     now = datetime.now().astimezone()
     folder = out or Path("runs") / f"replay-{app.stem}-{now:%Y%m%d-%H%M%S}"
     factor, lockstep = speed_option(speed)
     options = RunOptions(
+        environment=env,
         replay=recording.resolve(),
         scheduler=scheduler,
         model=model.resolve() if model else None,
@@ -79,4 +99,7 @@ def replay(
     if not found.agrees and lossy:
         typer.echo("the pictures were recorded with loss, so that a detector sees a little else;")
         typer.echo('record with "images": "png" for a replay that is exact')
-    typer.echo(f"replayed {duration:.1f} s in {took:.1f} s, start included; compared:\n{found}")
+    typer.echo(
+        f"replayed {duration:.1f} s in {took:.1f} s, start included; compared:\n"
+        + printable(str(found))
+    )

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from aerodaas.cli.printable import printable
+
 __all__ = ["compare", "report"]
 
 Recorded = Annotated[Path, typer.Argument(help="The .mcap file of a run.", show_default=False)]
@@ -27,7 +29,7 @@ def report(
     )
 
     files = write_report(recording, out or recording.parent)
-    typer.echo(f"{files.summary}\n{files.page}")
+    typer.echo(f"{printable(str(files.summary))}\n{files.page}")
 
 
 def compare(

@@ -6,18 +6,18 @@ import difflib
 import re
 import types
 import typing
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Secret, SecretBytes, SecretStr, ValidationError
 from pydantic_core import ErrorDetails
 
+from aerodaas.config.secrets import SecretUrl, cleaned, is_secret_name
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["checked", "explained", "near"]
 
 M = TypeVar("M", bound=BaseModel)
-_SECRET = "token"  # noqa: S105 - a setting's name
 _WORD = re.compile(r"[\w .\-]{0,40}")
 
 
@@ -30,9 +30,11 @@ def checked(model: type[M], content: object, place: str, hint: str = "") -> M:
 
 
 def explained(error: ValidationError, model: type[BaseModel], content: object) -> str:
-    """The errors, setting by setting, each with its value and the allowed ones."""
+    """The errors, setting by setting, each with its value and the allowed ones; no secrets."""
     problems = [one for one in error.errors() if not _is_other_choice(one)] or error.errors()
-    return "; ".join(_problem(one, model, content) for one in problems)
+    text = "; ".join(_problem(one, model, content) for one in problems)
+    # A validator's own words may quote what it was given.
+    return cleaned(text, [content, *_typed_secrets(model, content)])
 
 
 def near(name: str, known: Iterable[str]) -> str:
@@ -50,7 +52,11 @@ def _is_other_choice(problem: ErrorDetails) -> bool:
 
 def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> str:
     # Among several kinds that a setting may have, pydantic names the one that it tried.
-    place = tuple(one for one in problem["loc"] if not (isinstance(one, str) and "[" in one))
+    *kinds, last = problem["loc"] or ("file",)
+    # The last part may be a stranger's key of any form.
+    place = (*(one for one in kinds if not (isinstance(one, str) and "[" in one)), last)
+    if problem["type"] != "extra_forbidden" and isinstance(last, str) and "[" in last:
+        place = place[:-1]
     said = problem["msg"].removeprefix("Value error, ")
     text = ".".join(str(part) for part in place) or "file"
     whose = _whose(content, place)
@@ -60,11 +66,41 @@ def _problem(problem: ErrorDetails, model: type[BaseModel], content: object) -> 
     value = problem["input"]
     number = value is None or isinstance(value, bool | int | float)
     # A word may be printed, but no address, which may hold a password, and no secret.
-    word = isinstance(value, str) and _WORD.fullmatch(value) and _SECRET not in text
+    word = isinstance(value, str) and _WORD.fullmatch(value)
     shown = repr(value) if number or word else ""
-    if problem["type"] == "missing" or not shown:
+    if problem["type"] == "missing" or not shown or _is_secret(model, place):
         return f"{text}: {said}{whose}"
     return f"{text}: {said}, not {shown}{whose}"
+
+
+def _is_secret(model: type[BaseModel], place: Sequence[int | str]) -> bool:
+    """Whether the setting at `place` holds a secret, by its name or by its type."""
+    kinds: list[Any] = [model]
+    for part in place:
+        kinds = [inner for kind in kinds for inner in _inside(kind, part)]
+        if (isinstance(part, str) and is_secret_name(part)) or any(map(_hides, kinds)):
+            return True
+    return False
+
+
+def _hides(kind: Any) -> bool:  # noqa: ANN401 - an annotation
+    return isinstance(kind, type) and issubclass(kind, Secret | SecretStr | SecretBytes)
+
+
+def _typed_secrets(kind: Any, content: object) -> Iterator[SecretStr]:  # noqa: ANN401
+    """The texts in `content` where an annotation has a secret type."""
+    for one in _alternatives(kind):
+        if _hides(one) and not issubclass(one, SecretUrl):
+            if isinstance(content, str | int | float):
+                yield SecretStr(str(content))
+        elif isinstance(content, dict):
+            for name, value in content.items():
+                for inner in _inside(one, name) if one is not Any else ():
+                    yield from _typed_secrets(inner, value)
+        elif isinstance(content, list) and typing.get_origin(one) in {list, tuple}:
+            for inner in typing.get_args(one)[-1:]:
+                for value in content:
+                    yield from _typed_secrets(inner, value)
 
 
 def _whose(content: object, place: Sequence[int | str]) -> str:

@@ -7,16 +7,31 @@ rates Hz, times seconds.
 
 from __future__ import annotations
 
-import json
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from packaging.requirements import InvalidRequirement, Requirement
-from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, SecretStr, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    PrivateAttr,
+    SecretStr,
+    SerializationInfo,
+    SerializerFunctionWrapHandler,
+    field_serializer,
+    model_serializer,
+    model_validator,
+)
 from typing_extensions import Self
 
 from aerodaas.config.checked import checked
-from aerodaas.types.errors import ConfigError
+from aerodaas.config.json_text import check_plain, read_json
+from aerodaas.config.secrets import HIDDEN, SecretUrl, shown, shown_text
 from aerodaas.types.identifiers import Identifier, ScopedName
 
 __all__ = [
@@ -45,11 +60,46 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
+def _shown_settings(settings: dict[str, Any]) -> dict[str, Any]:
+    return dict(shown(settings))
+
+
+Settings = Annotated[dict[str, Any], PlainSerializer(_shown_settings, when_used="json")]
+"""Settings of a plug-in, which may hold secrets."""
+
+
+def _without_logins(value: Any) -> Any:  # noqa: ANN401 - as nested as its input
+    """URLs in texts without user, password and parameters, in any setting."""
+    if isinstance(value, str):
+        return shown_text(value)
+    if isinstance(value, list):
+        return [_without_logins(one) for one in value]
+    if isinstance(value, dict):
+        return {key: _without_logins(one) for key, one in value.items()}
+    return value
+
+
 class _Strict(BaseModel):
-    """Unknown keys are mistakes, not wishes."""
+    """Unknown keys are mistakes, not wishes.
+
+    Neither `repr` nor JSON holds a secret; `model_dump()` keeps them, for a copy.
+    """
 
     # The docstrings of settings become descriptions in the JSON schema.
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+
+    @model_serializer(mode="wrap")
+    def _serialized(
+        self, dump: SerializerFunctionWrapHandler, info: SerializationInfo
+    ) -> dict[str, Any]:
+        content: dict[str, Any] = dump(self)
+        return _without_logins(content) if info.mode == "json" else content
+
+    def __repr_args__(self) -> Iterator[tuple[str | None, Any]]:
+        for name, value in super().__repr_args__():
+            # Which settings of a plug-in are secrets, its own model alone knows.
+            hidden = dict.fromkeys(value, HIDDEN) if name == "settings" else value
+            yield name, _without_logins(hidden)
 
 
 class HomeConfig(_Strict):
@@ -166,7 +216,7 @@ class SensorConfig(_Strict):
     """None: a camera of its robot's own kind (see `EnvironmentConfig.camera_driver`)."""
     rate: Positive = Field(default=15.0, le=1000.0)
     """Items per second."""
-    settings: dict[str, Any] = Field(default_factory=dict)
+    settings: Settings = Field(default_factory=dict)
     _robot: str | None = PrivateAttr(default=None)
 
     @property
@@ -201,8 +251,9 @@ class CameraConfig(_Strict):
     """Degrees to the left."""
     depth_range: Annotated[float, Field(ge=3, le=60)] | None = None
     """Metres up to which a simulated camera measures depth as well; None: it measures none."""
-    path: str | None = None
-    """Folder of pictures, video file or URL, for the drivers that read one."""
+    path: SecretUrl | None = None
+    """Folder of pictures, video file or URL, for the drivers that read one. User, password and
+    parameters of a URL are shown, logged and recorded nowhere."""
     topic: str | None = None
     """Channel of the recording at `path`; None where it holds one camera's pictures only."""
     loop: bool = False
@@ -213,7 +264,7 @@ class RobotConfig(_Strict):
 
     id: Identifier
     driver: str = "simulated"
-    settings: dict[str, Any] = Field(default_factory=dict)
+    settings: Settings = Field(default_factory=dict)
     """Settings of the driver, such as `url` for MAVLink."""
     sensors: list[SensorConfig] = Field(default_factory=list)
     limits: LimitsConfig = LimitsConfig()
@@ -231,10 +282,22 @@ class RobotConfig(_Strict):
         return self
 
 
+_HTTP = re.compile(r"^https?://[^\s@]+$")
+
+
+def _plain_http(url: SecretUrl) -> SecretUrl:
+    if not _HTTP.match(url.get_secret_value()):
+        message = "must be http://… or https://…, without spaces and without user and password"
+        raise ValueError(message)
+    return url
+
+
 class EndpointConfig(_Strict):
     """How an inference endpoint is called; the calls come from the edge node."""
 
-    url: Annotated[str, Field(pattern=r"^https?://[^\s@]+$")]
+    url: Annotated[
+        SecretUrl, AfterValidator(_plain_http), Field(json_schema_extra={"pattern": _HTTP.pattern})
+    ]
     """Without a password: a secret belongs into `token_env`."""
     protocol: Literal["v2", "function"] = "v2"
     """`v2`: the Open Inference Protocol; `function`: JPEG in, JSON detections out."""
@@ -257,7 +320,8 @@ class RuntimeEnvConfig(_Strict):
 
     packages: list[str] = Field(default_factory=list)
     """Requirements such as `torch==2.4.1`, or paths of wheels, laid over the node's own."""
-    env_vars: dict[str, str] = Field(default_factory=dict)
+    env_vars: dict[str, SecretStr] = Field(default_factory=dict)
+    """Environment variables of its process. Their values are shown, logged and recorded nowhere."""
     image_uri: str | None = None
     """Container image, for nodes that have podman; it brings its own packages."""
 
@@ -281,7 +345,8 @@ def _check_requirement(package: str) -> None:
     try:
         Requirement(package)
     except InvalidRequirement as error:
-        reason = str(error).splitlines()[0]
+        reason = shown_text(str(error).splitlines()[0])
+        package = shown_text(package)
         message = f"{package!r} is neither a requirement such as name==1.0 nor a wheel: {reason}"
         raise ValueError(message) from None
 
@@ -300,7 +365,7 @@ class ComputeConfig(_Strict):
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 90
     endpoint: EndpointConfig | None = None
     """Of the kind `http`."""
-    settings: dict[str, Any] = Field(default_factory=dict)
+    settings: Settings = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _endpoint_of_http(self) -> Self:
@@ -361,6 +426,8 @@ class RecordingConfig(_Strict):
     jpeg_quality: Annotated[int, Field(ge=1, le=100)] = 85
     h264_quality: Annotated[int, Field(ge=1, le=51)] = 23
     """x264's constant rate factor: 18 looks like the original, 28 takes half of 23's space."""
+    application_source: bool = False
+    """Record the application's source as well; by default its file's name and SHA-256 only."""
 
 
 class RemoteConfig(_Strict):
@@ -372,6 +439,10 @@ class RemoteConfig(_Strict):
     token: Annotated[SecretStr, Field(min_length=16)] | None = None
     """Secret that every request must carry; the environment variable AERODAAS_REMOTE_TOKEN takes
     its place. It is shown, logged and recorded nowhere."""
+
+    @field_serializer("token", when_used="json")
+    def _left_out(self, token: object) -> None:
+        """Leave it out: asterisks in its place would be a token that everybody knows."""
 
 
 class SimulationConfig(_Strict):
@@ -435,6 +506,15 @@ class EnvironmentConfig(_Strict):
                 raise ValueError(message)
         return self
 
+    def for_actors(self) -> Self:
+        """The environment as a run's actors have it, without the secrets that are not for them.
+
+        The token of the remote control and environment variables reach the analysis concerned
+        alone.
+        """
+        remote = self.remote.model_copy(update={"token": None})
+        return self.model_copy(update={"remote": remote, "runtime_env": {}, "compute": "auto"})
+
     def camera_driver(self, sensor: SensorConfig) -> str:
         """The driver of a camera: its own, else its robot's, else the simulated one.
 
@@ -460,19 +540,12 @@ class EnvironmentConfig(_Strict):
     @classmethod
     def load(cls, path: str | Path) -> EnvironmentConfig:
         """Read an environment file; raises ConfigError that names the file and the place."""
-        try:
-            content = json.loads(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            message = f"cannot read the environment file {path}: {error.strerror}"
-            raise ConfigError(message) from None
-        except (json.JSONDecodeError, UnicodeDecodeError) as error:
-            message = f"{path} is not JSON: {error}"
-            raise ConfigError(message) from None
-        return validated(content, str(path))
+        return validated(read_json(path, "the environment file"), str(path))
 
 
 def validated(content: object, place: str) -> EnvironmentConfig:
     """Check the content of an environment file; raises ConfigError that names `place`."""
+    check_plain(content, place)
     return checked(EnvironmentConfig, content, place, " (see `aerodaas schema`)")
 
 

@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from aerodaas.config.grants import Catalogue
+
 __all__ = ["RunOptions", "current_options"]
 
 
@@ -40,7 +42,11 @@ class RunOptions:
     model: Path | None = None
     """ONNX model for every detector, instead of its own."""
     guests: tuple[Path, ...] = ()
-    """Applications that share the drone's sensors and compute, but not its navigation."""
+    """Applications of others, in processes of their own."""
+    grants: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    """Rights by guest, such as `sense:cam1`; a guest without any has none."""
+    catalogue: Catalogue | None = None
+    """In a guest's process: what it was granted, in the place of an environment file."""
     application: Path | None = None
     """The application's file, for relative paths and the recording's provenance."""
 

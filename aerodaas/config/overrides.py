@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from aerodaas.config.json_text import parse_json
 from aerodaas.config.model import EnvironmentConfig, SensorConfig, validated
 from aerodaas.types.errors import AmbiguousIdError, ConfigError, UnknownIdError
 
@@ -18,11 +19,13 @@ def parse_setting(text: str) -> tuple[str, Any]:
     """Split `id.setting=value`; the value is JSON, or else a string. Raises ConfigError."""
     name, equals, value = text.partition("=")
     if not equals or "." not in name:
-        raise ConfigError(f"a setting is written id.setting=value, not {text!r}")
+        # The value may be a secret.
+        raise ConfigError(f"a setting is written id.setting=value, not {name + equals!r}…")
     try:
-        return name, json.loads(value)
-    except json.JSONDecodeError:
+        json.loads(value)
+    except (ValueError, RecursionError):
         return name, value
+    return name, parse_json(value, name)
 
 
 def overridden(config: EnvironmentConfig, settings: Mapping[str, Any]) -> EnvironmentConfig:

@@ -14,6 +14,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, Literal
 
+from pydantic import BaseModel
+
 from aerodaas.types.errors import AeroDaaSError, ConfigError, UnknownIdError
 
 __all__ = [
@@ -23,6 +25,7 @@ __all__ = [
     "main_name",
     "plugin_names",
     "require_plugin",
+    "settings_model",
 ]
 
 PluginKind = Literal["drivers", "cameras", "trajectory_schedulers", "analytics_schedulers"]
@@ -103,6 +106,12 @@ def load_plugin(kind: PluginKind, name: str) -> Any:  # noqa: ANN401 - a class o
         raise
     except (ImportError, AttributeError) as error:
         raise ConfigError(f"cannot load {name!r} ({target}): {error}") from error
+
+
+def settings_model(kind: PluginKind, name: str) -> type[BaseModel] | None:
+    """The pydantic model of a plug-in's settings, if it has one; raises like `load_plugin`."""
+    model = getattr(load_plugin(kind, name), "settings_model", None)
+    return model if isinstance(model, type) and issubclass(model, BaseModel) else None
 
 
 def main_name(namespace: Mapping[str, Any]) -> str | None:

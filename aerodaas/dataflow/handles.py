@@ -131,5 +131,5 @@ class Compute(PaperNames, ICompute):
             AeroDaaSError: If the cluster cannot be reached.
             ConfigError: If no node of the cluster fits the resource.
         """
-        properties = self.config.model_dump()
+        properties = self.config.model_dump(mode="json")
         return {**properties.pop("settings"), **properties, **self._hardware()}

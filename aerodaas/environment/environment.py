@@ -18,7 +18,7 @@ from aerodaas.dataflow.handles import Compute, Sensor
 from aerodaas.dataflow.interfaces import IAeroData, IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.environment import sharing
+from aerodaas.environment import guest_process
 from aerodaas.environment.run import Run
 from aerodaas.mission.commands import AddNavigation, Command, End, Pause, Resume, initial_commands
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
@@ -49,15 +49,20 @@ class Environment(PaperNames, IEnvironment):
         settings = {**(overrides or {}), **options.overrides}
         if options.seed is not None:
             settings["simulation.seed"] = options.seed
-        if options.replay is None:
+        if options.catalogue is not None:
+            config = options.catalogue.config
+        elif options.replay is None:
             config = overridden(EnvironmentConfig.load(self.path), settings)
         else:
             from aerodaas.recording.replay.environment import (  # noqa: PLC0415 - only for a replay
                 replay_environment,
             )
 
-            config = overridden(replay_environment(options.replay), options.overrides)
+            local = self.path if options.environment is not None else None
+            config = overridden(replay_environment(options.replay, local), options.overrides)
         self.config: EnvironmentConfig = located(config, self.path.parent)
+        self.refused_guests: list[str] = []
+        """Reasons of the guests that do not take part."""
         check_environment(self.config, str(options.replay or self.path))
         self.env_data = self.config.model_dump(by_alias=True)
         """The environment file's content, for analyses that want it."""
@@ -165,7 +170,7 @@ class Environment(PaperNames, IEnvironment):
             each()
         if hook is not None:
             hook()
-        if sharing.offer(self):
+        if guest_process.offer(self):
             return
         run = self.launch_again()
         run.on_end += [one for robot in robots for one in robot.end_hooks if one not in run.on_end]
@@ -283,6 +288,7 @@ class Environment(PaperNames, IEnvironment):
         refuses.
         """
         graph = self.graph
+        self._require_granted(edge.robot)
         self._require_flying(edge.robot)
         graph.navigation.append(edge)
         if graph.on_growth is None:
@@ -294,6 +300,24 @@ class Environment(PaperNames, IEnvironment):
         except BaseException:
             graph.navigation.remove(edge)
             raise
+
+    def _admit(self) -> None:
+        options = current_options.get()
+        if options.guests:
+            from aerodaas.environment.guests import admit_guests  # noqa: PLC0415 - only with guests
+
+            self.refused_guests = admit_guests(options, self)
+
+    def _require_granted(self, robot: str, line: str = "") -> None:
+        """Raise GraphError, with the line, if a guest would navigate what it was not granted."""
+        catalogue = current_options.get().catalogue
+        if catalogue is None or robot in catalogue.grants.fly:
+            return
+        message = (
+            f"{catalogue.guest} is a guest and may not command {robot}, which its owner navigates "
+            f"(--grant {catalogue.guest}=fly:{robot} would allow it)"
+        )
+        raise GraphError(f"{message}\n  at {line}") if line else refusal(message)
 
     def _require_flying(self, robot: str) -> None:
         graph = self.graph
@@ -314,8 +338,7 @@ class Environment(PaperNames, IEnvironment):
     def launch(self) -> Run:
         """Start the mission of every robot that navigates; once."""
         if self.run is None:
-            for guest in current_options.get().guests:
-                sharing.welcome(guest, self)
+            self._admit()
             self._start()
         assert self.run is not None  # noqa: S101 - started just now
         return self.run
@@ -337,7 +360,7 @@ class Environment(PaperNames, IEnvironment):
         return self.run
 
     def _start(self) -> None:
-        self._place_entries()
+        self.place_entries()
         self._flights += 1
         run = self.run = Run(self, self._flights)
         run.on_end.append(self._note_flown)
@@ -350,7 +373,7 @@ class Environment(PaperNames, IEnvironment):
     def _note_flown(self) -> None:
         self._flown = len(self.graph.navigation)
 
-    def _place_entries(self) -> None:
+    def place_entries(self) -> None:
         """Assign the scheduler's navigation to its robots.
 
         Raises GraphError if several fly and none is named.
@@ -359,7 +382,12 @@ class Environment(PaperNames, IEnvironment):
         named = [edge.robot for edge in self.graph.navigation]
         named += [entry.robot for entry in entries if entry.robot is not None]
         robots = list(dict.fromkeys(named))
+        if not robots and current_options.get().catalogue is not None:
+            # A guest need not name the only robot that there is.
+            robots = list(self._robots)
         if robots:
+            for one in entries:
+                self._require_granted(_addressee(one, robots), one.line)
             self.graph.navigation += [_edge(_addressee(one, robots), one) for one in entries]
             entries.clear()
 

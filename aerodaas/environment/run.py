@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerodaas.actors.run.checks import check_served
+from aerodaas.actors.stream_names import is_guest_actor
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import EnvironmentConfig, TaskConfig
 from aerodaas.config.options import RunOptions, current_options
@@ -129,6 +130,8 @@ class Run:
                 )
             return LiveReader(session, stream, *publisher, lambda: self._over)
 
+        for refused in self._environment.refused_guests:
+            flight.note("guest_refused", refused)
         self.graph.reader = read
         self.graph.on_growth = self.grow
         for callback in self.graph.on_launch:
@@ -347,7 +350,8 @@ class Run:
         show_speed(
             self.options, seconds(max(stamps, default=0)), flown, self._launched - self._began
         )
-        show_results(self.options, self._flight.recording)
+        source = self.config.recording.application_source
+        show_results(self.options, self._flight.recording, source_recorded=source)
         if self._flight.headless:
             show_headless(self._flight.headless, self._flight.recording)
 
@@ -359,10 +363,16 @@ class Run:
 
     def _raise_problems(self) -> None:
         assert self._flight is not None  # noqa: S101 - launched
-        problems = [str(report.error) for report in self._flight.reports().values() if report.error]
+        # A guest's failures are its own: they are alerts, and do not fail its owner's run.
+        problems = [
+            str(report.error)
+            for name, report in self._flight.reports().items()
+            if report.error and not is_guest_actor(name)
+        ]
         problems += [
             line
-            for report in self._flight.reports().values()
+            for name, report in self._flight.reports().items()
+            if not is_guest_actor(name)
             for line in (*report.values.get("last_errors", ()), *report.problems)
         ]
         robots = self.state.robots if self.state else {}

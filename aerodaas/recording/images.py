@@ -6,17 +6,21 @@ Also decodes the depth images that this project records (raw, 16UC1).
 from __future__ import annotations
 
 import base64
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.recording.decoding.limits import MAX_PIXELS, MAX_SIDE
+from aerodaas.recording.decoding.picture_size import picture_size
 from aerodaas.types.errors import SourceError
 
 __all__ = [
     "IMAGE_SCHEMAS",
     "VIDEO_SCHEMAS",
+    "check_picture",
     "decode_depth",
     "decode_image",
     "picture_bytes",
@@ -66,13 +70,21 @@ _LAYOUTS = {
 def decode_image(schema: str, value: Any) -> NDArray[np.uint8] | None:  # noqa: ANN401 - by schema
     """Decode a message of one of `IMAGE_SCHEMAS` to height x width x 3 of BGR.
 
-    Returns None for a broken image; raises SourceError for an unknown pixel format.
+    Returns None for an image that is broken or larger than `MAX_PIXELS`; raises SourceError for
+    an unknown pixel format.
     """
-    data = np.frombuffer(picture_bytes(value), np.uint8)
-    if schema in _COMPRESSED:
-        image = cv2.imdecode(data, cv2.IMREAD_COLOR) if data.size else None
-        return None if image is None else np.asarray(image, np.uint8)
-    return _decode_raw(value, data)
+    encoded = picture_bytes(value)
+    data = np.frombuffer(encoded, np.uint8)
+    try:
+        if schema not in _COMPRESSED:
+            return _decode_raw(value, data)
+        size = picture_size(encoded)
+        if size is None or not _fits(*size):
+            return None
+        image = cv2.imdecode(data, cv2.IMREAD_COLOR)
+    except cv2.error:
+        return None
+    return None if image is None else np.asarray(image, np.uint8)
 
 
 def decode_depth(value: Any) -> NDArray[np.uint16] | None:  # noqa: ANN401 - by schema
@@ -81,6 +93,29 @@ def decode_depth(value: Any) -> NDArray[np.uint16] | None:  # noqa: ANN401 - by 
         return None
     pixels = _pixels(value, np.frombuffer(picture_bytes(value), np.uint8), _LAYOUTS["16UC1"])
     return None if pixels is None else pixels[..., 0].astype(np.uint16)
+
+
+def check_picture(value: Any, *, video: bool) -> None:  # noqa: ANN401 - by schema
+    """Raise TypeError or ValueError unless a message has the fields of a picture."""
+    data = picture_field(value, "data")
+    if isinstance(data, str):
+        base64.b64decode(data, validate=True)
+    elif isinstance(data, int | float) or not isinstance(data, Iterable):
+        raise TypeError(f"its data are no bytes but {type(data).__name__}")
+    else:
+        memoryview(bytes(data))
+    text = ("format",) if video else ("format", "encoding")
+    for name in text:
+        if not isinstance(picture_field(value, name, ""), str):
+            raise TypeError(f"its {name} is no text")
+    for name in ("width", "height", "step", "is_bigendian"):
+        number = picture_field(value, name, 0)
+        if not isinstance(number, int) or number < 0:
+            raise ValueError(f"its {name} is no natural number")
+
+
+def _fits(width: int, height: int) -> bool:
+    return 0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE and width * height <= MAX_PIXELS
 
 
 def _decode_raw(value: Any, data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:  # noqa: ANN401
@@ -107,10 +142,10 @@ def _pixels(
     layout: _Layout,
 ) -> NDArray[Any] | None:
     """Pixels as stored, height x width x channels; None if bytes are missing."""
-    width, height = int(picture_field(value, "width")), int(picture_field(value, "height"))
+    width, height = (int(picture_field(value, side, 0)) for side in ("width", "height"))
     pixel = layout.channels * np.dtype(layout.kind).itemsize
-    step = int(picture_field(value, "step")) or width * pixel
-    if not width or not height or step < width * pixel or data.size < step * height:
+    step = int(picture_field(value, "step", 0)) or width * pixel
+    if not _fits(width, height) or step < width * pixel or data.size < step * height:
         return None
     rows = data[: step * height].reshape(height, step)[:, : width * pixel]
     order = ">" if picture_field(value, "is_bigendian", default=0) else "<"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 import threading
 
 import foxglove
@@ -11,6 +12,7 @@ from typing_extensions import Self
 
 from aerodaas.recording.encoding import Entry
 from aerodaas.recording.images import VIDEO_SCHEMAS
+from aerodaas.recording.web_gate import WebGate
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["LiveServer"]
@@ -43,20 +45,28 @@ class LiveServer(ServerListener):
         self._channels: dict[str, Channel] = {}
         self._last: dict[str, tuple[bytes, int]] = {}
         self._lock = threading.Lock()
+        parts = (1 + secrets.randbelow(254) for _ in range(3))
+        inner = ".".join(map(str, (127, *parts)))
         try:
             self._server = foxglove.start_server(
                 name=name or "AeroDaaS",
-                host=host.strip("[]"),
-                port=int(port),
+                # Behind the gate, at an address that no web page can guess.
+                host=inner,
+                port=0,
                 server_listener=self,
                 context=self._context,
                 message_backlog_size=_BACKLOG,
             )
+            try:
+                self._gate = WebGate(host.strip("[]"), int(port), (inner, self._server.port))
+            except BaseException:
+                self._server.stop()
+                raise
         except (RuntimeError, OSError, OverflowError, ValueError) as error:
             raise ConfigError(
                 f"cannot serve a live view at {address}: {error}; give another --live-address"
             ) from None
-        self.port = self._server.port
+        self.port = self._gate.port
         """Port that the server listens on."""
 
     def put(self, entry: Entry, log_time: int) -> None:
@@ -80,6 +90,7 @@ class LiveServer(ServerListener):
 
     def close(self) -> None:
         """Stop the server and disconnect all clients."""
+        self._gate.close()
         self._server.stop()
 
     def __enter__(self) -> Self:

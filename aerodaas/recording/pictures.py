@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import defaultdict, deque
 from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.recording.decoding.limits import MAX_VIDEO_GROUP
 from aerodaas.recording.h264 import H264Decoder, is_key_frame
 from aerodaas.recording.images import (
     IMAGE_SCHEMAS,
@@ -36,6 +38,7 @@ __all__ = [
     "shots",
 ]
 
+_log = logging.getLogger(__name__)
 _PICTURE_SCHEMAS = IMAGE_SCHEMAS | VIDEO_SCHEMAS
 _DEPTH = "/aligned_depth"
 """End of the topic of a frame's depth image, next to the topic of its header."""
@@ -49,11 +52,17 @@ class _Video:
 
     decoder: H264Decoder = field(default_factory=H264Decoder)
     group: list[bytes] = field(default_factory=list)
+    size: int = 0
+    """Bytes of the frames since the last key frame."""
 
     def add(self, value: Any) -> _VideoFrame:  # noqa: ANN401 - by the schema
         data = picture_bytes(value)
         if is_key_frame(data):
-            self.group = []
+            self.group, self.size = [], 0
+        self.size += len(data)
+        if self.size > MAX_VIDEO_GROUP:
+            # It cannot be decoded, nor can those after it until the next key frame.
+            return _VideoFrame(self.decoder, self.group, -1)
         self.group.append(data)
         return _VideoFrame(self.decoder, self.group, len(self.group) - 1)
 
@@ -67,7 +76,7 @@ class _VideoFrame:
     place: int
 
     def image(self) -> NDArray[np.uint8] | None:
-        return self.decoder.decode(self.group, self.place)
+        return None if self.place < 0 else self.decoder.decode(self.group, self.place)
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +112,7 @@ class Shot:
         if self.decoded is not None:
             return self.decoded()
         if self.video is None:
-            return decode_image(self.record.schema, self.record.value)
+            return self._of_size(decode_image(self.record.schema, self.record.value))
         if self.format != "h264":
             raise SourceError(
                 f"videos in {self.format!r} cannot be decoded; record them in h264, or as images"
@@ -112,7 +121,13 @@ class Shot:
         if image is None or self.size is None:
             return image
         width, height = self.size
-        return image[:height, :width]
+        return self._of_size(image[:height, :width])
+
+    def _of_size(self, image: NDArray[np.uint8] | None) -> NDArray[np.uint8] | None:
+        """The image, or None if it has not the recorded size."""
+        if image is None or (self.size is not None and image.shape[1::-1] != self.size):
+            return None
+        return image
 
     def depth(self) -> NDArray[np.uint16] | None:
         """Decode the depth image.
@@ -186,12 +201,17 @@ def decoded_ahead(found: Iterator[Shot]) -> Iterator[Shot]:
     # The frames of a video depend on each other, still images do not.
     threads = 1 if first.video is not None else 2
     waiting: deque[Shot] = deque()
-    with ThreadPoolExecutor(threads, "decoder") as pool:
+    pool = ThreadPoolExecutor(threads, "decoder")
+    try:
         for shot in chain([first], found):
             waiting.append(replace(shot, decoded=pool.submit(shot.image).result))
             if len(waiting) > _AHEAD:
                 yield waiting.popleft()
         yield from waiting
+    finally:
+        # Without waiting: an iterator that is given up may be collected in any thread, at a
+        # moment at which joining another one would wait forever.
+        pool.shutdown(wait=False)
 
 
 def frames(
@@ -212,7 +232,13 @@ def frames(
     """
     for shot in shots(recording, topics):
         if stamps is None or shot.record.captured in stamps:
-            image = shot.image()
+            try:
+                image = shot.image()
+            except SourceError as error:
+                _log.warning(
+                    "%s: skipped a picture on %s: %s", recording.path, shot.record.topic, error
+                )
+                continue
             if image is not None:
                 yield Frame(shot.header, image, odometry=shot.odometry, depth=shot.depth())
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
-import re
 import subprocess
 import time
 from collections.abc import Mapping
@@ -13,12 +13,12 @@ from pathlib import Path
 
 from typing_extensions import Self
 
+from aerodaas.config.document import public_document
 from aerodaas.config.model import EnvironmentConfig
 
 __all__ = ["Provenance"]
 
 _PACKAGES = ("aerodaas", "ray", "numpy", "opencv-python-headless", "onnxruntime", "panda3d")
-_PASSWORD = re.compile(r"(?<=://)[^/@\s\"']+@")
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +33,13 @@ class Provenance:
     speed: str = ""
     """`--speed` as given."""
     config: str = ""
-    """The environment configuration, JSON."""
+    """The environment configuration without its secrets, JSON."""
     app: str = ""
     """File name of the application."""
+    app_sha256: str = ""
+    """SHA-256 of the application's file, hexadecimal."""
     app_source: str = ""
+    """Source of the application, if the environment says that it is recorded."""
     revision: str = ""
     """Git commit of the application's repository, with `+` if it had changes; or empty."""
     versions: Mapping[str, str] = field(default_factory=dict)
@@ -53,7 +56,8 @@ class Provenance:
     ) -> Self:
         """Collect the provenance of a run.
 
-        Passwords in URLs of the configuration are masked.
+        The configuration's secrets are left out, and the application's source is, unless
+        `recording.application_source` asks for it.
 
         Args:
             app: File of the application; None for none.
@@ -61,14 +65,16 @@ class Provenance:
             seed: Random seed; None takes the simulation's from `config`.
             speed: `--speed` as given.
         """
-        environment = config.model_dump_json(indent=2, by_alias=True) if config else ""
+        content = app.read_bytes() if app else b""
+        source = config is not None and config.recording.application_source
         return cls(
             name=app.stem if app else "",
             seed=seed if seed is not None or config is None else config.simulation.seed,
             speed=speed,
-            config=_PASSWORD.sub("***@", environment),
+            config=public_document(config) if config else "",
             app=app.name if app else "",
-            app_source=app.read_text(encoding="utf-8", errors="replace") if app else "",
+            app_sha256=hashlib.sha256(content).hexdigest() if app else "",
+            app_source=content.decode("utf-8", "replace") if source else "",
             revision=_revision(app.parent if app else Path.cwd()),
             versions=_versions(),
         )
@@ -81,6 +87,7 @@ class Provenance:
             "seed": "" if self.seed is None else str(self.seed),
             "speed": self.speed,
             "app": self.app,
+            "app_sha256": self.app_sha256,
             "revision": self.revision,
         }
         return figures | dict(self.versions)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import heapq
-import json
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections import Counter
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -13,17 +13,28 @@ from typing import Any, BinaryIO
 
 from mcap.data_stream import ReadDataStream
 from mcap.records import Attachment, Channel, Message
-from mcap_protobuf.decoder import DecoderFactory
 from typing_extensions import Self
 
-from aerodaas.config.extras import require_extra
-from aerodaas.recording.index import BROKEN, Block, FileIndex, load, read_index
+from aerodaas.recording.decoding.index import (
+    BROKEN,
+    Block,
+    FileIndex,
+    TooLargeError,
+    load,
+    read_index,
+)
+from aerodaas.recording.decoding.limits import MAX_ATTACHMENT, MAX_HELD
+from aerodaas.recording.decoding.messages import BrokenMessageError, MessageDecoder
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import RecordingError
 
 __all__ = ["Record", "Recording", "Topic"]
 
 _RECORD_HEAD = 9
+_LATEST = 1 << 63
+"""Nanoseconds since 1970 that a date can show: until the year 2262."""
+_OVERHEAD = 256
+"""Bytes in memory of a message, beside its data."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +62,7 @@ class Record:
     """Mission time of the described measurement, nanoseconds."""
     sequence: int
     value: Any
-    """A dictionary for JSON, an object with fields for protobuf and ROS 2, else bytes."""
+    """A dictionary for JSON, an object for protobuf and ROS 2's pictures, else bytes."""
 
 
 class Recording:
@@ -62,8 +73,9 @@ class Recording:
         self.path = path
         self._file = file
         self._index = index
-        self._protobuf = DecoderFactory()
-        self._decoders: dict[int, Callable[[bytes], Any]] = {}
+        self._decoder = MessageDecoder()
+        self.skipped: Counter[str] = Counter()
+        """Broken messages that were skipped so far, by topic; counted at each reading."""
         starts = [block.start for block in index.blocks]
         self.metadata: dict[str, dict[str, str]] = {
             record.name: record.metadata for record in index.metadata
@@ -72,6 +84,8 @@ class Recording:
         try:
             self.epoch_ns = int(self.provenance["epoch_ns"])
         except (KeyError, ValueError):
+            self.epoch_ns = -1
+        if not 0 <= self.epoch_ns < _LATEST:
             self.epoch_ns = min(starts, default=0)
 
     @classmethod
@@ -101,6 +115,8 @@ class Recording:
                 raise RecordingError(f"{path} is empty: nothing was recorded") from None
             if isinstance(error, OSError):
                 raise RecordingError(f"cannot read {path}: {error.strerror}") from None
+            if isinstance(error, TooLargeError):
+                raise RecordingError(f"{path} {error}") from None
             raise RecordingError(
                 f"{path} is not an MCAP recording; give the .mcap file that a run has written"
             ) from None
@@ -113,7 +129,7 @@ class Recording:
     @property
     def damaged(self) -> int:
         """Number of chunks and messages that could not be read so far."""
-        return self._index.damaged
+        return self._index.damaged + self.skipped.total()
 
     @property
     def provenance(self) -> Mapping[str, str]:
@@ -160,6 +176,11 @@ class Recording:
             known = ", ".join(self._index.attachments) or "none"
             raise RecordingError(f"{self.path} has no attachment {name!r}; it has: {known}")
         offset, length = self._index.attachments[name]
+        if length > MAX_ATTACHMENT:
+            raise RecordingError(
+                f"the attachment {name!r} of {self.path} has {length} bytes, more than the "
+                f"{MAX_ATTACHMENT} that are read"
+            )
         self._file.seek(offset + _RECORD_HEAD)
         body = BytesIO(self._file.read(length - _RECORD_HEAD))
         try:
@@ -176,12 +197,15 @@ class Recording:
     ) -> Iterator[Record]:
         """Iterate over messages in the order of log times.
 
+        Chunks that overlap in time are put in order as far as `limits.MAX_HELD` allows.
+
         Args:
             schemas: Names of the schemas to read; None for all.
             topics: Topics to read; None for all.
 
         Yields:
-            Messages; a damaged chunk or message is skipped and counted in `damaged`.
+            Messages, checked by `messages.MessageDecoder`; a damaged chunk or a broken message is
+            skipped and counted in `damaged`.
         """
         wanted = {
             number
@@ -191,10 +215,11 @@ class Recording:
         }
         for message in self._messages(wanted):
             channel = self._index.channels[message.channel_id]
+            schema = self._index.schemas.get(channel.schema_id)
             try:
-                value = self._decode(channel, message.data)
-            except BROKEN:
-                self._index.damaged += 1
+                value = self._decoder.decode(channel, schema, message.data)
+            except BrokenMessageError:
+                self.skipped[channel.topic] += 1
                 continue
             yield Record(
                 channel.topic,
@@ -231,36 +256,26 @@ class Recording:
         )
         # Chunks may overlap in time: hold messages back until no later chunk can precede them.
         held: list[tuple[int, int, Message]] = []
-        order = 0
+        order = size = 0
         for position, block in enumerate(blocks):
             for message in self._load(block):
                 if message.channel_id in wanted:
                     heapq.heappush(held, (message.log_time, order, message))
                     order += 1
+                    size += len(message.data) + _OVERHEAD
+                    while size > MAX_HELD and held:
+                        size -= len(held[0][2].data) + _OVERHEAD
+                        yield heapq.heappop(held)[2]
             following = blocks[position + 1].start if position + 1 < len(blocks) else None
             while held and (following is None or held[0][0] < following):
+                size -= len(held[0][2].data) + _OVERHEAD
                 yield heapq.heappop(held)[2]
 
     def _load(self, block: Block) -> Iterator[Message]:
         try:
-            records = load(self._file, block)
+            for record in load(self._file, block):
+                if isinstance(record, Message):
+                    yield record
         except BROKEN:
             self._index.damaged += not block.damaged
             block.damaged = True
-            return
-        yield from (record for record in records if isinstance(record, Message))
-
-    def _decode(self, channel: Channel, data: bytes) -> Any:  # noqa: ANN401 - by the channel
-        decoder = self._decoders.get(channel.id)
-        if decoder is None:
-            schema = self._index.schemas.get(channel.schema_id)
-            decoder = self._protobuf.decoder_for(channel.message_encoding, schema)
-            if decoder is None and channel.message_encoding == "cdr":
-                require_extra("ros", "a ROS 2 message")
-                from mcap_ros2.decoder import DecoderFactory as Ros  # noqa: PLC0415 - rarely met
-
-                decoder = Ros().decoder_for(channel.message_encoding, schema)
-            if decoder is None:
-                decoder = json.loads if channel.message_encoding == "json" else bytes
-            self._decoders[channel.id] = decoder
-        return decoder(data)

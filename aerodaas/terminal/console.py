@@ -202,7 +202,9 @@ def show_headless(head: str, recording: Path | None) -> None:
     Console(highlight=False, soft_wrap=True, stderr=True).print(line, markup=False)
 
 
-def show_results(options: RunOptions, recording: Path | None) -> None:
+def show_results(
+    options: RunOptions, recording: Path | None, *, source_recorded: bool = False
+) -> None:
     """Write plots and summary of a closed recording, and print the places of all files."""
     if recording is None:
         return
@@ -222,6 +224,13 @@ def show_results(options: RunOptions, recording: Path | None) -> None:
     width = max(map(len, places))
     for name, path in places.items():
         console.print(f"{name:>{width}}  {_shown(path)}", markup=False)
+    if options.application is not None:
+        said = (
+            "recorded (recording.application_source)"
+            if source_recorded
+            else "not recorded but for its name and SHA-256; see recording.application_source"
+        )
+        console.print(f"{'source':>{width}}  {said}", markup=False)
     if not has_extra("plots"):
         console.print(f"{'plots':>{width}}  pip install 'aerodaas[plots]'", markup=False)
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from flying import Flyer, hop, robot
 from inference_server import Serving, serving
+from pydantic import SecretStr
 
 from aerodaas import Analytics, Environment, Frame
 from aerodaas.actors.dispatch.offload import allowed, cloud_processes, priced
@@ -95,7 +96,7 @@ def test_analyses_share_a_process_but_those_with_their_own_packages() -> None:
     """One process for the plain ones at each resource, one for each of the others."""
     known = compute({"id": "one", "kind": "cloud", "executors": 2}, {"id": "edge"})
     nodes = [node("a"), node("b"), node("c")]
-    env = RuntimeEnvConfig(env_vars={"A": "1"})
+    env = RuntimeEnvConfig(env_vars={"A": SecretStr("1")})
     processes = cloud_processes(nodes, known, {n.id: env if n is nodes[2] else None for n in nodes})
     assert [sorted(process.works) for process in processes] == [["drone/a", "drone/b"], ["drone/c"]]
     assert [process.runtime_env for process in processes] == [None, env]

@@ -106,6 +106,32 @@ def test_a_malformed_row_is_counted_or_empty(row: str) -> None:
     assert len(track.rows) + track.malformed == (2 if not row else 3) or row == '"1'
 
 
+def test_an_endless_field_costs_itself_only() -> None:
+    """A quote that is never closed, and more behind it than a field may hold."""
+    endless = "\n".join(['"', *["7,8,9"] * 40_000])
+    track = parse_track(f"lat,lon,alt\n1,2,3\n{endless}", "log")
+    assert track.rows[0].fix.latitude == 1.0
+    assert track.malformed == 1
+
+
+def test_a_heading_of_brackets_takes_no_time() -> None:
+    """Units in brackets are looked for in one pass, not anew from each bracket."""
+    begun = time.process_time()
+    with pytest.raises(SourceError, match="no latitude"):
+        parse_track("x" + "[" * 200_000 + ",lat\n1,2\n", "log")
+    assert time.process_time() - begun < 2.0
+
+
+@pytest.mark.parametrize("told", ["{}", "[]", "[" * 5000, '{"a": [1]}'])
+def test_json_of_another_shape_is_refused_or_malformed(told: str) -> None:
+    """A time that is no number or text, and nesting without an end."""
+    with suppress(SourceError):
+        track = parse_track(
+            f'[{{"lat": 1, "lon": 2, "time": {told}}}, {{"lat": 1, "lon": 2}}]', "x"
+        )
+        assert (len(track.rows), track.malformed) == (1, 1)
+
+
 def test_a_file_cut_short_is_used_up_to_there() -> None:
     """As when the logger's battery ran out."""
     track = parse_track(GPX[: GPX.index('<trkpt lat="13.0168"') + 30], "log")

@@ -200,6 +200,66 @@ def test_video_that_stops_comes_again_and_strangers_are_left_out() -> None:
     camera.close()
 
 
+def test_video_from_another_port_is_left_out() -> None:
+    """Even from the Tello's own address: another program of that host sends no picture."""
+    camera = _camera(port := _free_port())
+    camera.open()
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as tello,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as stranger,
+    ):
+        for packet in _packets(FRAMES[:5]):
+            tello.sendto(packet, (ADDRESS, port))
+        _wait(camera, 5)
+        for packet in _packets(FRAMES[:5]):
+            stranger.sendto(packet, (ADDRESS, port))
+        for packet in _packets(FRAMES[PERIOD : PERIOD + 2]):
+            tello.sendto(packet, (ADDRESS, port))
+        _wait(camera, 7)
+    assert camera.counts.strangers == len(_packets(FRAMES[:5]))
+    assert camera.counts.frames == 7
+    camera.close()
+
+
+def _one(width: int, height: int, kind: str) -> bytes:
+    """A black picture, coded."""
+    encoder = av.CodecContext.create("libx264", "w")
+    encoder.width, encoder.height, encoder.pix_fmt = width, height, kind
+    encoder.time_base, encoder.thread_count = Fraction(1, 30), 1
+    encoder.options = {
+        "preset": "ultrafast",
+        "tune": "zerolatency",
+        "x264-params": "sliced-threads=0:slices=1",
+    }
+    grey = np.zeros((height, width), np.uint8)
+    frame = av.VideoFrame.from_ndarray(grey, format="gray").reformat(format=kind)
+    return b"".join(bytes(packet) for packet in encoder.encode(frame))
+
+
+@pytest.mark.parametrize(
+    ("width", "height", "shown"), [(1920, 1088, True), (1936, 1088, False), (4096, 4096, False)]
+)
+def test_a_picture_larger_than_any_tellos_is_not_decoded(
+    width: int, height: int, *, shown: bool
+) -> None:
+    """A stream may claim any size, and takes no memory for it."""
+    camera = _camera(_free_port())
+    for packet in packets(_one(width, height, "yuv420p")):
+        camera.take(packet, 0)
+    assert (camera.capture(10**10, None) is not None) is shown
+    assert (camera.counts.waiting > 0) is not shown
+
+
+def test_a_picture_of_an_odd_size_is_a_picture() -> None:
+    """No Tello sends one; its camera goes on."""
+    camera = _camera(_free_port())
+    for packet in packets(_one(33, 31, "gray")):
+        camera.take(packet, 0)
+    picture = camera.capture(10**10, None)
+    assert picture is not None
+    assert picture.image.shape == (31, 33, 3)
+
+
 def test_a_taken_port_and_a_camera_without_a_tello_are_told() -> None:
     """What is wrong, and where."""
     port = _free_port()

@@ -13,10 +13,12 @@ import cv2
 import numpy as np
 import pytest
 
+from aerodaas.cameras import live
 from aerodaas.cameras.base import Camera
 from aerodaas.cameras.live import LiveSource
 from aerodaas.cameras.video import VideoCamera
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
+from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import ConfigError, SourceError
 
@@ -135,15 +137,17 @@ def test_a_live_source_gives_each_newest_frame_once_and_reconnects(stream: str) 
     assert source.model.width == 64
     began = time.monotonic_ns()
     stamps: list[int] = []
-    live = source._source
-    assert isinstance(live, LiveSource)
-    while live.reconnections < 1 or len(stamps) < 8:
+    source_of = source._source
+    assert isinstance(source_of, LiveSource)
+    while source_of.reconnections < 1 or len(stamps) < 8:
         now = time.monotonic_ns() - began + NANOSECONDS
         picture = source.capture(now, None)
         if picture is not None:
             assert picture.stamp <= now
             stamps.append(picture.stamp)
-        assert now < 40 * NANOSECONDS, f"{len(stamps)} frames, {live.reconnections} reconnections"
+        assert now < 40 * NANOSECONDS, (
+            f"{len(stamps)} frames, {source_of.reconnections} reconnections"
+        )
         time.sleep(0.05)
     assert stamps == sorted(set(stamps))
     assert not source.finished
@@ -152,6 +156,20 @@ def test_a_live_source_gives_each_newest_frame_once_and_reconnects(stream: str) 
 
 def test_a_silent_address_is_refused_with_a_remedy() -> None:
     """Nobody answers: the user is told what to check."""
-    source = LiveSource("http://127.0.0.1:9/none", timeout=0.5)
-    with pytest.raises(SourceError, match=r"no picture from http://127.0.0.1:9/none within 0.5 s"):
+    source = LiveSource(SecretUrl("http://me:hidden@127.0.0.1:9/none?k=hidden"), timeout=0.5)
+    with pytest.raises(
+        SourceError, match=r"no picture from http://127.0.0.1:9/none\?\*\*\* within"
+    ):
         source.open()
+
+
+def test_a_stream_of_huge_pictures_is_refused(video: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It may claim any size; what is larger than the largest is counted and not handed on."""
+    fits = LiveSource(SecretUrl(str(video)))
+    height, width, _ = fits.open().shape
+    fits.close()
+    monkeypatch.setattr(live, "_MOST_PIXELS", width * height - 1)
+    source = LiveSource(SecretUrl(str(video)), timeout=1.0)
+    with pytest.raises(SourceError, match="no picture from"):
+        source.open()
+    assert source.skipped >= 10

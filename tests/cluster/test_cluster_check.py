@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import shutil
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import psutil
 import pytest
 from required import needs, needs_root
 
+from aerodaas.actors.cluster.authentication import UNAUTHENTICATED
 from aerodaas.actors.cluster.probe import clock_offset
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.types.errors import ConfigError
@@ -146,19 +148,46 @@ class TestBad:
     def test_wrong_token(self, tmp_path: Path) -> None:
         """Says where the right one is to be found, within seconds."""
         token = tmp_path / "token"
+        token.touch(0o600)
         token.write_text("the-clusters-own-token-the-clusters-own-token")
         variables = {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN_PATH": str(token)}
         with EdgeCloud(0, variables=variables) as cluster:
-            for env in (
-                {**variables, "RAY_AUTH_TOKEN": "another-token"},
-                {"RAY_AUTH_MODE": "disabled"},
+            nowhere = {"HOME": str(tmp_path), "RAY_AUTH_TOKEN_PATH": "", "RAY_AUTH_TOKEN": ""}
+            for env, reason in (
+                ({**variables, "RAY_AUTH_TOKEN": "another-token"}, "refuses our token"),
+                (nowhere, "no token for the cluster at"),
+                ({"RAY_AUTH_MODE": "disabled"}, "RAY_AUTH_MODE=disabled would let all"),
             ):
                 told = aerodaas("cluster", "check", cluster.address, **env)
-                assert told.returncode == 1
-                assert "refuses our token" in told.stderr
-                assert "ray get-auth-token" in told.stderr
+                assert told.returncode in {1, 2}
+                assert reason in told.stderr
                 assert len(told.stderr.splitlines()) == 1
+            assert not (tmp_path / ".ray").exists()
+            off = {"RAY_AUTH_MODE": "disabled", UNAUTHENTICATED: "1"}
+            told = aerodaas("cluster", "greet", cluster.address, **off)
+            assert told.returncode == 1
+            assert "asks for no token" in told.stderr
+            assert "refuses our token" in told.stderr
             assert aerodaas("cluster", "greet", cluster.address, **variables).returncode == 0
+
+    def test_a_fresh_host_asks_for_a_token(self, tmp_path: Path) -> None:
+        """Without a token's file one is made, and a stranger without it is refused."""
+        fresh = {"HOME": str(tmp_path), "PYTHONPATH": str(ROOT), "COLUMNS": "240"}
+        script = (
+            f"{sys.executable} -c {shlex.quote(_STRANGER)} $RAY_ADDRESS; "
+            f"{sys.executable} -m aerodaas cluster greet $RAY_ADDRESS && echo greeted"
+        )
+        inherited = {key: value for key, value in os.environ.items() if not key.startswith("RAY_")}
+        told = subprocess.run(
+            [sys.executable, "-m", "tools.namespaces", "--cloud", "1", "--", "sh", "-c", script],
+            env={**inherited, **fresh},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert "stranger: refused" in told.stdout, told.stdout + told.stderr
+        assert "greeted" in told.stdout
+        assert (tmp_path / ".ray" / "auth_token").stat().st_mode & 0o777 == 0o600
 
     def test_other_versions(self) -> None:
         """A head that says it runs another Ray, or another Python."""
@@ -280,11 +309,22 @@ def _devices() -> set[str]:
     return {path.name for path in Path("/sys/class/net").iterdir()}
 
 
+_STRANGER = """
+import os, sys
+os.environ["RAY_AUTH_MODE"] = "disabled"
+from ray._raylet import GcsClient
+try:
+    GcsClient(address=sys.argv[1]).internal_kv_put(b"k", b"v", True, b"n", timeout=5)
+    print("stranger: written")
+except Exception as error:
+    refused = "InvalidAuthToken" in str(error)
+    print("stranger: refused" if refused else f"stranger: {error}")
+"""
 _PRETEND = """
 import json, sys
-from aerodaas.actors.cluster import ray_internals
+from aerodaas.actors.cluster.authentication import require_authentication
+require_authentication()
 from ray._raylet import GcsClient
-ray_internals.take_up_token()
 client = GcsClient(address=sys.argv[1])
 told = json.loads(client.internal_kv_get(b"CLUSTER_METADATA", b"cluster"))
 import platform, ray

@@ -120,6 +120,9 @@ def test_workers_start_as_well_as_the_head(hosts: list[RemoteMachine], tmp_path:
         found = run(sys.executable, "-c", _NODES, address, env=env)
     kinds = dict(line.split() for line in found.splitlines())
     assert kinds == {h.address: "edge" if h.name == "head" else "cloud" for h in hosts}
+    for host in hosts:
+        own = tmp_path / host.name / ".ray" / "auth_token"
+        assert own.stat().st_mode & 0o777 == 0o600
     greeting = [sys.executable, "-m", "aerodaas", "cluster", "greet", address]
     wrong = {**env, "RAY_AUTH_TOKEN": "another-token", "PYTHONPATH": str(ROOT)}
     refused = subprocess.run(greeting, env=wrong, capture_output=True, text=True, check=False)

@@ -14,7 +14,6 @@ from aerodaas.actors.cluster import ray_internals
 
 MODULES = (
     "ray._raylet",
-    "ray._private.authentication.authentication_token_setup",
     "ray._private.worker",
 )
 
@@ -33,8 +32,7 @@ def emptied(name: str) -> types.ModuleType:
 def changed(name: str) -> types.ModuleType:
     """Its functions take other arguments."""
     module = types.ModuleType(name)
-    for attribute in ("GcsClient", "maybe_enable_token_auth_if_token_available"):
-        setattr(module, attribute, lambda _other, _arguments: None)
+    vars(module)["GcsClient"] = lambda _other, _arguments: None
     return module
 
 
@@ -47,7 +45,7 @@ def test_a_ray_that_has_changed_fails_nothing(
         importlib.import_module(name)
         monkeypatch.setitem(sys.modules, name, become(name))
     assert ray_internals.cluster_metadata("127.0.0.1:1", 0.1) == {}
-    ray_internals.take_up_token()
+    ray_internals.reread_variables()
     ray_internals.silence_nodes()
 
 

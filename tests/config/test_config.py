@@ -21,9 +21,13 @@ limits = st.fixed_dictionaries(
     {"max_speed": st.floats(1.0, 1e4)},
     optional={"cruise_speed": st.floats(0.01, 1.0), "arrival_radius": numbers},
 )
+integers = st.integers(-(2**63) + 1, 2**63 - 1)
 sensors = st.fixed_dictionaries(
     {"type": st.sampled_from(["camera", "odometry", "gps", "battery", "status"])},
-    optional={"rate": st.floats(0.01, 1000.0), "settings": st.dictionaries(names, st.integers())},
+    optional={
+        "rate": st.floats(0.01, 1000.0),
+        "settings": st.dictionaries(names, integers),
+    },
 )
 
 
@@ -68,7 +72,11 @@ def test_a_setting_changes_what_it_names_and_nothing_else(
     assert overridden(config, {}) is config
 
 
-@given(names, names, st.integers() | st.booleans() | st.lists(st.integers()) | st.none())
+@given(
+    names,
+    names,
+    integers | st.booleans() | st.lists(integers) | st.none(),
+)
 def test_settings_are_json(owner: str, key: str, value: object) -> None:
     """`id.setting=value` comes apart as it was put together; what is no JSON is text."""
     assert parse_setting(f"{owner}.{key}={json.dumps(value)}") == (f"{owner}.{key}", value)

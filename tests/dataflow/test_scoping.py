@@ -52,7 +52,7 @@ def described(fleet: dict[str, list[str]], own: list[str], compute: list[str]) -
 
 def planned(env: Environment, analytics: str | None = None) -> FlightPlan:
     """The plan of what was built, without Ray."""
-    env._place_entries()
+    env.place_entries()
     dispatch = load_scheduler(analytics) if analytics else None
     scheduler = env.trajectory_scheduler()
     return make_plan(Session(env.config, 1.0), env.graph, env.compute(), scheduler, dispatch)
@@ -262,21 +262,3 @@ def test_a_fleet_flies_by_addresses(flyer: Flyer) -> None:
     flight = recorded(run)
     assert flight.robots["left"].visited == ("wp0",)
     assert set(flight.robots["right"].visited) == {"wp0", "extra"}
-
-
-def test_a_guest_adds_no_navigation(tmp_path: Path) -> None:
-    """It is refused with the line, rather than forgotten."""
-    folder = Flyer(tmp_path)
-    path = folder.write({**FLAT, "robots": [robot()]})
-    guest = folder.folder / "guest.py"
-    guest.write_text(
-        "from aerodaas import AeroListData, Environment, Waypoint\n"
-        f"env = Environment({str(path)!r})\n"
-        "env.trajectory_scheduler().add_navigation(AeroListData([Waypoint('a', 1, 0, 2)]))\n"
-        "env.get_robot_by_id('drone').start_mission()\n"
-    )
-    with folder.options(guests=(guest,)):
-        env = Environment(path)
-        env.get_robot_by_id("drone").navigate(hop((1, 0)))
-        with pytest.raises(GraphError, match=r"guest(.|\n)*add_navigation.*guest\.py:3"):
-            env.launch()

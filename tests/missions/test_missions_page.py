@@ -64,5 +64,5 @@ def test_examples_build(example: str, started: list[Robot]) -> None:
     env = names["env"]
     assert isinstance(env, Environment)
     assert started == [names["drone"]]
-    env._place_entries()
+    env.place_entries()
     assert Run(env)._plan().drones

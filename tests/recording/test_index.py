@@ -8,7 +8,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 from mcap_files import END, Said, write_file
 
-from aerodaas.recording.index import load, read_index
+from aerodaas.recording.decoding.index import load, read_index
 from aerodaas.recording.reader import Recording, Topic
 
 FLIGHT = [Said("/a", 1_100, 0), Said("/b", 1_200, 1), Said("/a", 1_300, 2), Said("/a", 1_400, 3)]
@@ -31,7 +31,7 @@ def test_loose_messages_are_gathered_into_blocks_of_about_a_megabyte(tmp_path: P
             (10, 30, {one, two}),
             (20, 20, {one}),
         ]
-        assert [len(load(file, block)) for block in blocks] == [2, 1]
+        assert [len(list(load(file, block))) for block in blocks] == [2, 1]
     with Recording.open(path) as recording:
         assert [it.stamp for it in recording.records()] == [0, 10, 20]
 

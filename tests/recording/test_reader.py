@@ -16,7 +16,7 @@ from mcap.writer import Writer
 from mcap_files import END, KINDS, Said, write_file
 
 from aerodaas.recording import reader
-from aerodaas.recording.index import read_index
+from aerodaas.recording.decoding.index import read_index
 from aerodaas.recording.reader import Record, Recording, Topic
 from aerodaas.types.errors import RecordingError
 

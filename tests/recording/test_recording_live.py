@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import socket
 import struct
 from pathlib import Path
 from typing import Any
@@ -89,3 +90,28 @@ def test_a_port_in_use_is_refused() -> None:
     """With the remedy."""
     with LiveServer("127.0.0.1:0") as live, pytest.raises(ConfigError, match="--live-address"):
         LiveServer(f"127.0.0.1:{live.port}")
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "admitted"),
+    [
+        ("127.0.0.1", None, True),
+        ("localhost", "http://localhost:3000", True),
+        ("127.0.0.1", "https://app.foxglove.dev", True),
+        ("127.0.0.1", "https://evil.example", False),
+        ("127.0.0.1", "null", False),
+        ("rebound.example", None, False),
+        ("rebound.example", "http://rebound.example", False),
+    ],
+)
+def test_a_strangers_page_does_not_watch(host: str, origin: str | None, admitted: bool) -> None:  # noqa: FBT001
+    """By the origin that a browser tells, and by the name under which it came."""
+    with LiveServer("127.0.0.1:0") as live:
+        lines = ["GET / HTTP/1.1", f"Host: {host}", "Upgrade: websocket", "Connection: Upgrade"]
+        lines += ["Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==", "Sec-WebSocket-Version: 13"]
+        lines += ["Sec-WebSocket-Protocol: foxglove.sdk.v1"]
+        lines += [] if origin is None else [f"Origin: {origin}"]
+        with socket.create_connection(("127.0.0.1", live.port), timeout=5) as client:
+            client.sendall("\r\n".join([*lines, "", ""]).encode())
+            answer = client.recv(100)
+    assert answer.split()[1] == (b"101" if admitted else b"403")

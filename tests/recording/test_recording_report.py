@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -108,15 +109,20 @@ def test_folder_that_cannot_be_written(recorded: Path, tmp_path: Path) -> None:
 
 
 def test_provenance_is_collected_without_passwords(tmp_path: Path) -> None:
-    """The application's source is kept, the password of its camera is not."""
+    """Of the application's source its SHA-256 is kept, of the camera's address no password."""
     app = tmp_path / "watch.py"
     app.write_text("print('hello')\n")
     camera = {"id": "cam", "driver": "video", "settings": {"path": "rtsp://me:secret@cam/live"}}
     config = EnvironmentConfig.model_validate({"robots": [{"id": "tello", "sensors": [camera]}]})
     found = Provenance.collect(app=app, config=config, seed=9)
-    assert found.app_source == app.read_text()
+    assert found.app_source == ""
+    assert found.app_sha256 == hashlib.sha256(app.read_bytes()).hexdigest()
+    assert found.as_metadata()["app_sha256"] == found.app_sha256
     assert (found.name, found.seed) == ("watch", 9)
     assert "secret" not in found.config
-    assert "rtsp://***@cam/live" in found.config
+    assert "rtsp://cam/live" in found.config
     assert found.revision == ""
     assert "python" in found.as_metadata()
+    asked = config.recording.model_copy(update={"application_source": True})
+    found = Provenance.collect(app=app, config=config.model_copy(update={"recording": asked}))
+    assert found.app_source == app.read_text()

@@ -160,7 +160,8 @@ def flown(tmp_path_factory: pytest.TempPathFactory) -> Flown:
         environment(driver="all_of_them:Stripes", settings={"light": 120}),
     )
     write(guests, {"guest.py": HEAD + GUEST})
-    return fly(folder, "all_of_them.py", "--guest", "elsewhere/guest.py")
+    granted = ("--grant", "guest=sense:camera,compute")
+    return fly(folder, "all_of_them.py", "--guest", "elsewhere/guest.py", *granted)
 
 
 def test_all_of_them_fly(flown: Flown) -> None:

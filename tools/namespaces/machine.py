@@ -8,6 +8,7 @@ one process, as `power_off` does, takes a machine away as a power cut would.
 from __future__ import annotations
 
 import shlex
+import stat
 import subprocess
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -53,7 +54,7 @@ class Machine:
         self.name = name
         kinds = ["--pid", "--mount", *(["--net"] if network else [])]
         self._enter = [*kinds, "--"]
-        commands = [f"mount -t tmpfs tmpfs {shlex.quote(str(folder))}" for folder in scratch]
+        commands = [_mount(folder) for folder in scratch]
         commands += ["ip link set lo up"] if network else []
         script = "; ".join(["set -e", *commands, _INIT])
         words = ["setpriv", "--pdeathsig", "KILL", "unshare", *kinds, "--fork", "--kill-child"]
@@ -126,6 +127,12 @@ class Machine:
         """Let a frozen machine go on."""
         for process in self.processes():
             process.resume()
+
+
+def _mount(folder: Path) -> str:
+    """The command that hides what is in a folder, with the rights that it has."""
+    rights = stat.S_IMODE(folder.stat().st_mode)
+    return f"mount -t tmpfs -o mode={rights:o} tmpfs {shlex.quote(str(folder))}"
 
 
 def _namespace(pid: int) -> Path | None:

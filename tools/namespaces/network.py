@@ -18,6 +18,7 @@ from pathlib import Path
 
 from typing_extensions import Self
 
+from aerodaas.actors.private_folder import shared_memory_names
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 from tools.namespaces.links import BRIDGE, NetemLink, RelayLink, ShapedLink, has_netem, plug
 from tools.namespaces.machine import Machine, run
@@ -26,7 +27,7 @@ from tools.namespaces.shape import Shape
 __all__ = ["LocalNetwork", "RemoteMachine"]
 
 _NETWORKS = tuple(ipaddress.IPv4Network(f"10.{second}.0.0/24") for second in range(77, 97))
-_OWN_FOLDERS = (Path("/dev/shm"), Path("/tmp/iceoryx2"))  # noqa: S108 - each machine has its own
+_SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - each machine has its own
 
 
 @dataclass
@@ -91,10 +92,8 @@ class LocalNetwork:
 
         It has the folders in `scratch` to itself, too.
         """
-        for folder in _OWN_FOLDERS:
-            folder.mkdir(exist_ok=True)
         address = str(next(self._hosts))
-        machine = Machine(name, scratch=[*_OWN_FOLDERS, *scratch])
+        machine = Machine(name, scratch=[_SHARED_MEMORY, shared_memory_names()[0], *scratch])
         self._stack.callback(machine.power_off)
         label = f"ad{self._id}{len(self.far)}"
         link: ShapedLink = self._link(label, self._switch, machine, f"{address}/24")

@@ -11,6 +11,7 @@ from pathlib import Path
 import psutil
 
 import aerodaas
+from aerodaas.actors.cluster.authentication import make_token, require_authentication
 from aerodaas.actors.cluster.ray_variables import VARIABLES
 from aerodaas.types.errors import AeroDaaSError
 from tools.namespaces.machine import Machine
@@ -21,7 +22,6 @@ _RETRIES = 2
 _TOO_SLOW = "timed out during startup"
 """Ray gives a node half a minute to start, which a busy machine may not have to give."""
 STORE_BYTES = 128 * 2**20
-_TOKEN = Path.home() / ".ray" / "auth_token"
 _SLIM = {
     **VARIABLES,
     # Workers started in advance take 80 MB each.
@@ -31,18 +31,16 @@ _SLIM = {
 
 
 def environment(**more: str) -> dict[str, str]:
-    """The environment of Ray's processes: the project's own modules can be imported there."""
+    """The environment of Ray's processes: the project's own modules and the token are there.
+
+    Makes the token if it is missing; raises AeroDaaSError if its file cannot be used.
+    """
+    if require_authentication():
+        make_token()
     root = str(Path(aerodaas.__file__).parents[1])
     paths = [root, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
-    own = {"PYTHONPATH": os.pathsep.join(dict.fromkeys(paths)), "RAY_AUTH_MODE": _authentication()}
-    return {**_SLIM, **own, **os.environ, "PYTHONPATH": own["PYTHONPATH"], **more}
-
-
-def _authentication() -> str:
-    """On where there is a token: a head finds that out by itself, nodes that join do not."""
-    variables = ("RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH")
-    known = any(os.environ.get(name) for name in variables) or _TOKEN.exists()
-    return "token" if known else "disabled"
+    own = {"PYTHONPATH": os.pathsep.join(dict.fromkeys(paths))}
+    return {**_SLIM, **os.environ, **own, **more}
 
 
 def start_head(

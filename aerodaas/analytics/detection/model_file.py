@@ -123,8 +123,13 @@ def read_model(path: str | Path, size: int | None = None) -> ModelFile:
     except Exception as error:  # noqa: BLE001 - onnxruntime has no common base class
         problem = f"cannot be loaded as an ONNX model ({_first_line(error)})"
         raise _refusal(path, problem, _REMEDY) from None
-    metadata = dict(session.get_modelmeta().custom_metadata_map)
-    inputs = _tensors(session.get_inputs())
+    try:
+        metadata = dict(session.get_modelmeta().custom_metadata_map)
+        inputs, outputs = _tensors(session.get_inputs()), _tensors(session.get_outputs())
+    except UnicodeDecodeError:
+        raise _refusal(path, "has names or metadata that are no text", _REMEDY) from None
+    if not outputs:
+        raise _refusal(path, "has no output", _REMEDY)
     if len(inputs) != 1:
         names = ", ".join(tensor.name for tensor in inputs) or "none"
         raise _refusal(path, f"must have one input, the picture, but has {names}", _REMEDY)
@@ -133,7 +138,7 @@ def read_model(path: str | Path, size: int | None = None) -> ModelFile:
         path=path,
         content=content,
         input=inputs[0],
-        outputs=_tensors(session.get_outputs()),
+        outputs=outputs,
         metadata=metadata,
         size=_input_size(path, inputs[0], metadata, size),
         session=session,

@@ -10,10 +10,12 @@ from dataclasses import dataclass
 from http import HTTPStatus
 
 import urllib3
+from pydantic import SecretStr
 from urllib3.exceptions import HTTPError, NewConnectionError, ProtocolError
 from urllib3.exceptions import TimeoutError as NoTimeLeft
 
 from aerodaas.config.model import EndpointConfig
+from aerodaas.config.secrets import SecretUrl, cleaned
 from aerodaas.types.errors import ConfigError, EndpointError
 
 __all__ = ["Connection", "Reply"]
@@ -31,6 +33,7 @@ _BUSY = {
     HTTPStatus.SERVICE_UNAVAILABLE,
     HTTPStatus.GATEWAY_TIMEOUT,
 }
+_TEXT_READ = 4096
 _TEXT_SHOWN = 200
 
 
@@ -41,12 +44,14 @@ class Reply:
     status: int
     headers: Mapping[str, str]
     body: bytes
+    secrets: tuple[SecretStr | SecretUrl, ...] = ()
+    """What the request held, which a server may repeat."""
 
     @property
     def text(self) -> str:
         """Beginning of the body, for error messages."""
-        shown = " ".join(self.body[:_TEXT_SHOWN].decode("utf-8", "replace").split())
-        return shown or "an empty reply"
+        said = " ".join(self.body[:_TEXT_READ].decode("utf-8", "replace").split())
+        return cleaned(said, self.secrets)[:_TEXT_SHOWN] or "an empty reply"
 
 
 class _AttemptError(Exception):
@@ -66,11 +71,15 @@ class Connection:
 
         Raises ConfigError if the environment variable named by `token_env` is not set.
         """
-        self.url = config.url.rstrip("/")
+        self.url = SecretUrl(config.url.get_secret_value().rstrip("/"))
         self.failures: Counter[str] = Counter()
         """Failed attempts by kind."""
         self._config = config
         self._secret = _secret(config)
+        self._secrets: tuple[SecretStr | SecretUrl, ...] = (
+            self.url,
+            *map(SecretStr, self._secret.values()),
+        )
         self._pool = urllib3.PoolManager(maxsize=executors, block=True, retries=False)
 
     def ask(
@@ -104,6 +113,10 @@ class Connection:
             pause *= 2
         raise AssertionError  # the last attempt returns or raises
 
+    def cleaned(self, text: str) -> str:
+        """Return a text, such as a library's error message, without what must stay secret."""
+        return cleaned(text, self._secrets)
+
     def close(self) -> None:
         """Close all connections."""
         self._pool.clear()
@@ -119,7 +132,8 @@ class Connection:
                 method,
                 url,
                 body=body,
-                headers=dict(headers),
+                # A compressed reply could unpack to any size.
+                headers={**headers, "Accept-Encoding": "identity"},
                 timeout=urllib3.Timeout(left),
                 pool_timeout=left,
                 redirect=False,
@@ -133,25 +147,30 @@ class Connection:
                 raise
             response.release_conn()
         except NewConnectionError as error:
-            reason = str(error).rpartition(": ")[2]
+            reason = self.cleaned(str(error).rpartition(": ")[2])
             raise _AttemptError("refused", f"cannot be reached: {reason}", again=True) from None
         except NoTimeLeft:
             raise _AttemptError("timeout", "did not answer in time", again=False) from None
         except ProtocolError as error:
-            raise _AttemptError("broken", f"broke off: {error.args[0]}", again=True) from None
+            text = self.cleaned(f"broke off: {error.args[0]}")
+            raise _AttemptError("broken", text, again=True) from None
         except HTTPError as error:
-            raise _AttemptError("broken", f"does not speak HTTP: {error}", again=False) from None
+            text = self.cleaned(f"does not speak HTTP: {error}")
+            raise _AttemptError("broken", text, again=False) from None
         if response.status in _BUSY:
             raise _AttemptError("busy", f"is busy (status {response.status})", again=True)
         if response.get_redirect_location():
             text = "redirects elsewhere; give the address that it redirects to as endpoint.url"
             raise _AttemptError("redirect", text, again=False)
-        return Reply(response.status, response.headers, content)
+        return Reply(response.status, response.headers, content, self._secrets)
 
 
 def _read(response: urllib3.BaseHTTPResponse, until: float) -> bytes:
+    if response.headers.get("Content-Encoding", "identity").lower() != "identity":
+        text = "sent a compressed reply, which was not asked for; switch compression off there"
+        raise _AttemptError("compressed", text, again=False)
     content = bytearray()
-    while chunk := response.read1(_CHUNK):
+    while chunk := response.read1(_CHUNK, decode_content=False):
         content += chunk
         if len(content) > _MOST_BYTES:
             text = f"sent more than {_MOST_BYTES >> 20} MiB; is this the address of a model?"

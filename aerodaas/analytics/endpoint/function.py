@@ -103,7 +103,7 @@ class FunctionUrl:
         written, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
         if not written:
             raise EndpointError(f"a frame of {image.shape} cannot be written as JPEG")
-        url, headers = self._connection.url, self._headers
+        url, headers = self._connection.url.get_secret_value(), self._headers
         return self._connection.ask(
             "POST", url, body=jpeg.tobytes(), headers=headers, budget=budget
         )

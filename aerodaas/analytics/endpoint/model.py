@@ -17,14 +17,16 @@ from aerodaas.analytics.endpoint.tensors import (
     decode_reply,
     encode_request,
 )
+from aerodaas.config.secrets import SecretUrl
 from aerodaas.types.errors import ConfigError, EndpointError, ModelError
 
 __all__ = ["EndpointModel", "refuse_denied"]
 
+_TEXT_SHOWN = 200
 _DENIED = {HTTPStatus.UNAUTHORIZED, HTTPStatus.FORBIDDEN}
 
 
-def refuse_denied(reply: Reply, url: str) -> None:
+def refuse_denied(reply: Reply, url: SecretUrl) -> None:
     """Raise ConfigError if the endpoint rejects the secret."""
     if reply.status in _DENIED:
         raise ConfigError(
@@ -39,7 +41,7 @@ class EndpointModel:
     def __init__(self, connection: Connection, name: str) -> None:
         self.name = name
         self._connection = connection
-        self._path = f"{connection.url}/v2/models/{quote(name, safe='/')}"
+        self._path = f"{connection.url.get_secret_value()}/v2/models/{quote(name, safe='/')}"
         self._binary = True
 
     def check(self, inputs: Sequence[TensorSpec], outputs: Sequence[TensorSpec]) -> None:
@@ -54,7 +56,7 @@ class EndpointModel:
                 f"{self._connection.url} has no model {self.name!r} (status {reply.status}: "
                 f"{reply.text}); name the one it has in endpoint.models"
             )
-        told = _metadata(reply, self._path)
+        told = _metadata(reply, self._connection)
         for kind, wanted in (("inputs", inputs), ("outputs", outputs)):
             known = {spec.name: spec for spec in told[kind]}
             for spec in wanted:
@@ -114,7 +116,8 @@ class EndpointModel:
             return [_picked(found, spec) for spec in wanted]
         except EndpointError as error:
             self._connection.failures["garbage"] += 1
-            raise EndpointError(f"{self._connection.url}: {error}") from None
+            text = self._connection.cleaned(f"{self._connection.url}: {error}")
+            raise EndpointError(text) from None
 
     def _misfit(self, problem: str, told: Sequence[TensorSpec]) -> ModelError:
         return ModelError(
@@ -132,7 +135,7 @@ def _picked(found: Mapping[str, NDArray[Any]], spec: TensorSpec) -> NDArray[Any]
     return found[spec.name]
 
 
-def _metadata(reply: Reply, place: str) -> dict[str, list[TensorSpec]]:
+def _metadata(reply: Reply, connection: Connection) -> dict[str, list[TensorSpec]]:
     try:
         content = json.loads(reply.body)
         return {
@@ -146,8 +149,16 @@ def _metadata(reply: Reply, place: str) -> dict[str, list[TensorSpec]]:
             ]
             for key in ("inputs", "outputs")
         }
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        RecursionError,
+        OverflowError,
+    ) as error:
+        reason = connection.cleaned(repr(error))[:_TEXT_SHOWN]
         raise ModelError(
-            f"{place} is no model of the Open Inference Protocol ({error!r}); "
+            f"{connection.url} tells of no model of the Open Inference Protocol ({reason}); "
             'check endpoint.url, or set endpoint.protocol to "function"'
         ) from None

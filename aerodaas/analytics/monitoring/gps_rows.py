@@ -32,7 +32,7 @@ _NAMES: Mapping[str, tuple[str, ...]] = {
     "time": ("time", "timestamp", "datetime", "utctime", "timeutc", "utc", "dateandtime"),
     "date": ("date", "utcdate", "dateutc"),
 }
-_UNITS = re.compile(r"\((m|metres|meters|deg|degrees|utc)\)|\[.*?\]", re.IGNORECASE)
+_UNITS = re.compile(r"\((m|metres|meters|deg|degrees|utc)\)|\[[^][]*\]", re.IGNORECASE)
 _MILLISECONDS = 1e11
 """Larger numbers are milliseconds: seconds since 1970 stay below this until the year 5138."""
 _POLE, _DATE_LINE = 90.0, 180.0
@@ -120,6 +120,8 @@ def _json(text: str, name: str) -> Iterator[Mapping[str, object] | None]:
         content = json.loads(text)
     except json.JSONDecodeError as error:
         raise SourceError(f"{name} is not JSON: {error}") from None
+    except RecursionError:
+        raise SourceError(f"{name} is no GPS track: its JSON is nested too deeply") from None
     for row in content if isinstance(content, list) else [content]:
         yield {str(key): row[key] for key in row} if isinstance(row, dict) else None
 
@@ -135,8 +137,17 @@ def _csv(text: str, name: str) -> Iterator[Mapping[str, object] | None]:
             "file with columns such as time,lat,lon,elevation"
         )
     body = "\n".join(line for line in lines[lines.index(header) + 1 :] if line[0] != "#")
-    for cells in csv.reader(io.StringIO(body.replace("\0", "")), delimiter=delimiter):
-        yield dict(zip(names, cells, strict=False)) if len(cells) >= len(names) - 1 else None
+    reader = csv.reader(io.StringIO(body.replace("\0", "")), delimiter=delimiter)
+    while True:
+        try:
+            cells = next(reader)
+        except StopIteration:  # noqa: PERF203 - reading goes on after an error
+            return
+        except csv.Error:
+            # A quote that is never closed would take in the rest; reading goes on after it.
+            yield None
+        else:
+            yield dict(zip(names, cells, strict=False)) if len(cells) >= len(names) - 1 else None
 
 
 def _canonical(column: str) -> str:
@@ -155,8 +166,9 @@ def _fix(row: Mapping[str, object]) -> TimedFix | None:
     told = values.get("time")
     if values.get("date") and told is not None:
         told = f"{values['date']} {told}"
-    time = None if told in {None, ""} else _time(told)
-    if time is None and told not in {None, ""}:
+    untimed = told is None or told == ""
+    time = None if untimed else _time(told)
+    if time is None and not untimed:
         return None
     fix = GpsFix(
         latitude,

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import socket
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +17,7 @@ from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
 from aerodaas.analytics.remote.guard import Guard, is_loopback
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import RemoteConfig
-from aerodaas.types.data import Frame
+from aerodaas.types.data import Alert, Frame, Header
 from aerodaas.types.errors import ConfigError, SourceError
 
 if TYPE_CHECKING:
@@ -26,6 +27,21 @@ __all__ = ["TOKEN_VARIABLE", "RemoteAnalytics"]
 
 TOKEN_VARIABLE = "AERODAAS_REMOTE_TOKEN"  # noqa: S105 - a name, not a secret
 _STOPPING = 5.0
+_MOST_CONNECTIONS = 200
+_MOST_BYTES_SENT = 4096
+"""Bytes of a WebSocket message; clients of the status have nothing to say."""
+
+
+def _alerting(mission: MissionLink) -> Callable[[str], None]:
+    """What tells people of a text by the mission's alerts."""
+    numbers = itertools.count()
+
+    def tell(text: str) -> None:
+        status = mission.status()
+        header = Header(next(numbers), status.stamp if status else 0, "remote")
+        mission.alert(Alert(header, "remote_wrong_tokens", text))
+
+    return tell
 
 
 class RemoteAnalytics(CommandingAnalytics):
@@ -103,9 +119,15 @@ class RemoteAnalytics(CommandingAnalytics):
 
         assert self._socket is not None  # noqa: S101 - open came first
         token = self._settings.token.get_secret_value() if self._settings.token else None
-        app = Guard(build_app(mission, lambda: self._frame), token)
+        app = Guard(build_app(mission, lambda: self._frame), token, _alerting(mission))
         config = uvicorn.Config(
-            app, log_config=None, access_log=False, lifespan="off", timeout_graceful_shutdown=1
+            app,
+            log_config=None,
+            access_log=False,
+            lifespan="off",
+            timeout_graceful_shutdown=1,
+            limit_concurrency=_MOST_CONNECTIONS,
+            ws_max_size=_MOST_BYTES_SENT,
         )
         self._server = uvicorn.Server(config)
         self._thread = threading.Thread(

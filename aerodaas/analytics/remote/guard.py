@@ -5,10 +5,14 @@ from __future__ import annotations
 import hmac
 import ipaddress
 import json
+import socket
 from collections.abc import Awaitable, Callable, MutableMapping
+from http import HTTPStatus
 from typing import Any, TypeAlias
 
-__all__ = ["Guard", "is_loopback"]
+from aerodaas.analytics.remote.attempts import WrongTokens
+
+__all__ = ["Guard", "HostGuard", "host_name", "is_loopback", "is_served"]
 
 Scope: TypeAlias = MutableMapping[str, Any]
 Receive: TypeAlias = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -34,10 +38,13 @@ class Guard:
     not: a browser sends the page's origin, or a host name other than this machine's.
     """
 
-    def __init__(self, app: App, token: str | None) -> None:
-        """Protect `app` with `token`."""
+    def __init__(
+        self, app: App, token: str | None, tell: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """Protect `app` with `token`; `tell` tells people of many wrong ones."""
         self._app = app
         self._token = None if token is None else token.encode()
+        self._wrong = WrongTokens(tell)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request, or refuse it with the reason."""
@@ -46,19 +53,22 @@ class Guard:
             return
         headers = dict(scope["headers"])
         status, text = self._objection(headers)
+        pause = self._wrong.count(_address(scope)) if status == HTTPStatus.UNAUTHORIZED else 0
+        if pause:
+            status, text = HTTPStatus.TOO_MANY_REQUESTS, "too many wrong tokens"
         if not status:
             await self._app(scope, receive, send)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": _POLICY_VIOLATION, "reason": text})
         else:
-            await _refuse(send, status, text)
+            await _refuse(send, status, text, pause)
 
     def _objection(self, headers: dict[bytes, bytes]) -> tuple[int, str]:
         if self._token is not None:
             scheme, _, given = headers.get(b"authorization", b"").partition(b" ")
             if scheme.lower() != b"bearer" or not hmac.compare_digest(given.strip(), self._token):
                 return 401, "wrong or missing token: send it as `Authorization: Bearer …`"
-        elif b"origin" in headers or not _names_this_machine(headers.get(b"host", b"")):
+        elif b"origin" in headers or not is_loopback(host_name(headers.get(b"host", b""))):
             text = "without a token only programs of this machine may command: set remote.token"
             return 403, text
         if headers.get(b"transfer-encoding"):
@@ -69,16 +79,74 @@ class Guard:
         return 0, ""
 
 
-def _names_this_machine(host: bytes) -> bool:
+class HostGuard:
+    """ASGI middleware that admits browsers only at the names under which a page is served.
+
+    A page of a stranger's name that resolves to this machine (DNS rebinding) sends that name as
+    its host, and a request of another page's script that page as its origin.
+    """
+
+    def __init__(self, app: App, served: str) -> None:
+        """Protect `app`, served at the host `served`."""
+        self._app = app
+        self._served = served
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Forward a request, or refuse it with the reason."""
+        if scope["type"] in {"http", "websocket"}:
+            headers = dict(scope["headers"])
+            host, origin = headers.get(b"host", b""), headers.get(b"origin")
+            same = origin is None or origin.partition(b"://")[2] == host
+            if not same or not is_served(host_name(host), self._served):
+                text = "this page is served under other names only: open it by the address told"
+                if scope["type"] == "websocket":
+                    await send({"type": "websocket.close", "code": _POLICY_VIOLATION})
+                else:
+                    await _refuse(send, HTTPStatus.FORBIDDEN, text)
+                return
+        await self._app(scope, receive, send)
+
+
+def is_served(name: str, served: str) -> bool:
+    """Whether what is served at the host `served` may be addressed by `name`.
+
+    By the loopback names, by `served` itself, and, where every interface is listened on, by any
+    numeric address and by this machine's own name: none of these can be a stranger's name.
+    """
+    name = name.lower().rstrip(".")
+    if is_loopback(name) or name == served.strip("[]").lower():
+        return True
+    if served.strip("[]") not in {"0.0.0.0", "::", ""}:  # noqa: S104 - compared, not bound
+        return False
+    own = socket.gethostname().lower()
+    return _is_numeric(name) or name in {own, own.partition(".")[0], f"{own}.local"}
+
+
+def _is_numeric(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return False
+    return True
+
+
+def _address(scope: Scope) -> str:
+    client = scope.get("client")
+    return str(client[0]) if client else "an unknown address"
+
+
+def host_name(host: bytes) -> str:
+    """The name in a `Host` header, without its port."""
     name = host.decode("latin-1")
-    name = name.partition("]")[0].lstrip("[") if name.startswith("[") else name.partition(":")[0]
-    return is_loopback(name)
+    return name.partition("]")[0].lstrip("[") if name.startswith("[") else name.partition(":")[0]
 
 
-async def _refuse(send: Send, status: int, text: str) -> None:
+async def _refuse(send: Send, status: int, text: str, pause: int = 0) -> None:
     body = json.dumps({"accepted": False, "text": text, "refused": {}}).encode()
     headers = [(b"content-type", b"application/json"), (b"content-length", b"%d" % len(body))]
     if status == 401:  # noqa: PLR2004 - HTTP's own number
         headers.append((b"www-authenticate", b"Bearer"))
+    if pause:
+        headers.append((b"retry-after", b"%d" % pause))
     await send({"type": "http.response.start", "status": status, "headers": headers})
     await send({"type": "http.response.body", "body": body})

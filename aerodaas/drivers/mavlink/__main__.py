@@ -1,4 +1,4 @@
-"""Vehicle check: `python -m aerodaas.drivers.mavlink udpin:0.0.0.0:14540`."""
+"""Vehicle check: `python -m aerodaas.drivers.mavlink udpin:127.0.0.1:14540`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ _SETTLING = 2.0
 
 
 def main(
-    url: Annotated[str, typer.Argument(help="As in the environment file.")] = "udpin:0.0.0.0:14540",
+    url: Annotated[
+        str, typer.Argument(help="As in the environment file.")
+    ] = "udpin:127.0.0.1:14540",
     system: Annotated[int | None, typer.Option(help="The vehicle's system id.")] = None,
     timeout: Annotated[float, typer.Option(help="Seconds to wait for its HEARTBEAT.")] = 10.0,
     *,

@@ -49,7 +49,9 @@ def read_plan(path: str | Path, home: GeodeticOrigin) -> AeroNavigation:
         )
     except OSError as error:
         raise ConfigError(f"cannot read the plan {place}: {error.strerror}") from None
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError) as error:
+    except RecursionError:
+        raise ConfigError(f"{place} is no plan of QGroundControl: nested too deeply") from None
+    except (ValueError, LookupError, TypeError, AttributeError, OverflowError) as error:
         text = error if isinstance(error, ConfigError) else f"{type(error).__name__}: {error}"
         raise ConfigError(f"{place} is no plan of QGroundControl: {text}") from None
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, SecretStr, model_validator
 
 from aerodaas.config.checked import checked
 from aerodaas.config.model import RobotConfig
@@ -26,9 +26,9 @@ class MavlinkSettings(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    url: str = "udpin:0.0.0.0:14540"
-    """`udpin:HOST:PORT` (wait for packets there), `udpout:HOST:PORT` (send there first),
-    `tcp:HOST:PORT` or `serial:DEVICE:BAUD`."""
+    url: str = "udpin:127.0.0.1:14540"
+    """`udpin:HOST:PORT` (wait for packets there; HOST is this host's own address, 0.0.0.0 for all
+    of them), `udpout:HOST:PORT` (send there first), `tcp:HOST:PORT` or `serial:DEVICE:BAUD`."""
     system: Identity | None = None
     """The vehicle's system id; None takes the first multicopter that is heard."""
     own_system: Identity = 245
@@ -51,7 +51,7 @@ class MavlinkSettings(BaseModel):
     forward: str | None = None
     """Pass everything on to a ground station or another program and back, such as
     `udpout:127.0.0.1:14550`."""
-    signing_key: str | None = None
+    signing_key: SecretStr | None = None
     """File with the key of MAVLink 2 signing: 32 bytes, or 64 hexadecimal digits. The environment
     variable AERODAAS_MAVLINK_KEY takes its place."""
     max_speed: Positive = 10.0

@@ -29,6 +29,7 @@ from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.finder import Finder, FoundVehicle
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
 from aerodaas.drivers.mavlink.wire.rates import RateKeeper
+from aerodaas.drivers.pin import Peer
 from aerodaas.drivers.setpoints import require_finite
 from aerodaas.types.clock import Clock, ScaledClock
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
@@ -121,13 +122,14 @@ class MavlinkVehicle:
             on_message=self._take,
             on_turn=self._turned,
             healthy=self._watchdog.healthy,
+            stands=self._stands,
         )
         link.open()
         self._link = link
         try:
             found = self._find(link, time.monotonic() + timeout)
             target = (found.system, found.component)
-            link.adopt(*target)
+            link.adopt(target, found.peer, time.monotonic())
             with self._lock:
                 commander = Commander(link.send, target, self._settings.own_system)
                 self._rates = RateKeeper(found.autopilot, commander)
@@ -201,12 +203,19 @@ class MavlinkVehicle:
         landing = phase.wish in {FlightMode.RETURN, FlightMode.LAND}
         return phase.armed and phase.taken is None and phase.wish is not None and not landing
 
+    def _stands(self) -> bool:
+        """Whether it stands with still motors, and no take-off is under way; by its last word."""
+        with self._lock:
+            departure = self._departure
+            leaves = departure is not None and (departure.climbs or departure.withdrawing)
+            return not (self._phase.armed or self._touchdown.falling or leaves)
+
     def read(self) -> VehicleState:
         """Return the newest state; raise VehicleError if not connected."""
         self._watchdog.feed()
         with self._lock:
-            counts = self._connected().link.counts
-            return self._report.state(self._clock.now(), time.monotonic(), counts)
+            link, now = self._connected().link, time.monotonic()
+            return self._report.state(self._clock.now(), now, link.counts, link.reports(now))
 
     def preflight(self) -> list[str]:
         """Reasons against a take-off now; empty when ready."""
@@ -379,13 +388,13 @@ class MavlinkVehicle:
         connection = self._connected()
         return Parameters(connection.link, connection.autopilot)
 
-    def _take(self, message: Message, now: float) -> None:
+    def _take(self, message: Message, now: float, peer: Peer) -> None:
         """Process a message of the vehicle; in the link's thread."""
         kind = message.get_type()
         with self._lock:
             if self._commander is None:
                 if kind == "HEARTBEAT":
-                    self._finder.take(message)
+                    self._finder.take(message, peer)
                 return
             reboots = self._telemetry.reboots
             self._telemetry.take(message, now)

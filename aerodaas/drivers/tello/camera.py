@@ -17,6 +17,7 @@ from aerodaas.cameras.base import Picture
 from aerodaas.cameras.h264 import FrameAssembler, FrameDecoder
 from aerodaas.cameras.settings import camera_model
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig
+from aerodaas.drivers.pin import Pin
 from aerodaas.drivers.tello.settings import (
     TelloCameraSettings,
     tello_camera_settings,
@@ -36,6 +37,8 @@ _BUFFER = 1 << 20
 """Bytes of the socket's receive buffer: two seconds of video, to lose none while stalled."""
 _LISTEN = 0.2
 """Seconds between checks for the end."""
+_LARGEST_PICTURE = 1920 * 1088
+"""Pixels: a Tello's pictures have 960 x 720 or 1280 x 720."""
 _QUIET = 3.0
 """Seconds without video after which an alert is due."""
 
@@ -56,7 +59,7 @@ class VideoCounts:
     dropped: int = 0
     """Packets that belong to no frame."""
     strangers: int = 0
-    """Packets of other senders."""
+    """Packets of other addresses and ports."""
 
 
 class TelloCamera:
@@ -79,6 +82,11 @@ class TelloCamera:
         self._robot = tello_settings(_carrier(sensor, environment))
         self.counts = VideoCounts()
         self._model: CameraModel | None = None
+        self._pin = Pin("the Tello", lambda: True)
+        self._assembler = FrameAssembler()
+        self._decoder = FrameDecoder(
+            only_whole=self._settings.only_whole, most_pixels=_LARGEST_PICTURE
+        )
         self._lock = threading.Lock()
         self._newest: tuple[VideoFrame, int] | None = None
         self._closing = threading.Event()
@@ -139,8 +147,6 @@ class TelloCamera:
             self._socket.close()
 
     def _run(self) -> None:
-        assembler = FrameAssembler()
-        decoder = FrameDecoder(only_whole=self._settings.only_whole)
         quiet_since, told = host_time_ns(), False
         while not self._closing.is_set():
             select.select([self._socket], [], [], _LISTEN)
@@ -152,18 +158,24 @@ class TelloCamera:
                 told = True
                 _log.warning("%s", self._why_quiet())
             for packet in arrived:
-                for whole in assembler.take(packet, now):
-                    picture = decoder.decode(whole)
-                    if picture is not None:
-                        self._show(picture, whole.arrived)
-            counts = self.counts
-            counts.broken, counts.waiting = decoder.broken, decoder.waiting
-            counts.dropped = assembler.dropped
+                self.take(packet, now)
+
+    def take(self, packet: bytes, now: int) -> None:
+        """Process a video packet of the Tello, received at `now` (host nanoseconds)."""
+        decoder = self._decoder
+        for whole in self._assembler.take(packet, now):
+            picture = decoder.decode(whole)
+            if picture is not None:
+                self._show(picture, whole.arrived)
+        counts = self.counts
+        counts.broken, counts.waiting = decoder.broken, decoder.waiting
+        counts.dropped = self._assembler.dropped
 
     def _from_tello(self, source: socket.socket) -> list[bytes]:
         packets = []
-        for content, address, _ in datagrams(source):
-            if address == self._robot.address:
+        now = host_time_ns() / 1e9
+        for content, address, port in datagrams(source):
+            if address == self._robot.address and self._pin.admits((address, port), now):
                 packets.append(content)
             else:
                 self.counts.strangers += 1
@@ -200,7 +212,7 @@ def _carrier(sensor: SensorConfig, environment: EnvironmentConfig) -> RobotConfi
 
 def _bgr(frame: VideoFrame) -> NDArray[np.uint8]:
     """Height x width x 3; OpenCV converts the usual format three times as fast as FFmpeg."""
-    planar = "yuv420p"
-    if frame.format.name == planar:
+    planar, even = "yuv420p", not (frame.width % 2 or frame.height % 2)
+    if frame.format.name == planar and even:
         return np.asarray(cv2.cvtColor(frame.to_ndarray(), cv2.COLOR_YUV2BGR_I420), np.uint8)
     return np.asarray(frame.to_ndarray(format="bgr24"), np.uint8)

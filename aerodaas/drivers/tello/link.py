@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import math
 import selectors
 import socket
 import threading
@@ -12,6 +13,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from aerodaas.drivers.pin import Pin
 from aerodaas.drivers.tello.commands import STILL, Command, Sticks
 from aerodaas.drivers.tello.dead_man import DeadMan
 from aerodaas.drivers.tello.settings import TelloSettings
@@ -44,7 +46,7 @@ class LinkCounts:
     malformed: int = 0
     """State packets and replies that could not be parsed."""
     strangers: int = 0
-    """Packets of other senders."""
+    """Packets of other addresses and ports."""
     stray_replies: int = 0
     """Late, duplicate and unexpected replies."""
     timeouts: int = 0
@@ -89,6 +91,7 @@ class TelloLink:
         self._name = name
         self._settings = settings
         self._peer = (settings.address, settings.command_port)
+        self._state_pin = Pin("the Tello", lambda: True)
         self._on_state = on_state
         self._on_turn = on_turn
         self._lock = threading.Lock()
@@ -98,7 +101,9 @@ class TelloLink:
         self._sticks: Sticks | None = None
         self._steered_at = 0.0
         self._centrings = 0
+        self._turn_due = -math.inf
         self._closing = threading.Event()
+        self._thread: threading.Thread | None = None
 
     def open(self) -> None:
         """Open the sockets and start the thread; raises VehicleError for a port that is taken."""
@@ -128,7 +133,10 @@ class TelloLink:
             self._guard = DeadMan(self._commands, self._peer)
             opened.callback(self._guard.close)
             self._resources = opened.pop_all()
-        self._thread = threading.Thread(target=self._run, name=f"{name}-link", daemon=True)
+        self._start()
+
+    def _start(self) -> None:
+        self._thread = threading.Thread(target=self._run, name=f"{self._name}-link", daemon=True)
         self._thread.start()
 
     def request(self, command: Command, done: Done, *, urgent: bool = False) -> None:
@@ -160,7 +168,8 @@ class TelloLink:
         """Send `last` without waiting for its reply, end the thread and free the ports."""
         self._closing.set()
         self._ring()
-        self._thread.join(timeout=2.0)
+        if self._thread is not None:
+            self._thread.join(timeout=2.0)
         if last is not None:
             self._transmit(last.text)
         self._resources.close()
@@ -173,18 +182,21 @@ class TelloLink:
         with selectors.DefaultSelector() as selector:
             for source in (self._commands, self._states, self._bell):
                 selector.register(source, selectors.EVENT_READ)
-            next_turn = time.monotonic()
             while not self._closing.is_set():
-                selector.select(max(0.0, min(_TICK, next_turn - time.monotonic())))
+                selector.select(max(0.0, min(_TICK, self._turn_due - time.monotonic())))
                 with contextlib.suppress(BlockingIOError):
                     self._bell.recv(4096)
-                self._hear()
-                now = time.monotonic()
-                self._speak(now)
-                self._fly(now)
-                if now >= next_turn:
-                    next_turn = now + _TICK
-                    self._on_turn(now)
+                self.turn()
+
+    def turn(self) -> None:
+        """Process received packets, and send what is due; called by the link's thread."""
+        self._hear()
+        now = time.monotonic()
+        self._speak(now)
+        self._fly(now)
+        if now >= self._turn_due:
+            self._turn_due = now + _TICK
+            self._on_turn(now)
 
     def _hear(self) -> None:
         for content, address, port in datagrams(self._commands):
@@ -192,8 +204,9 @@ class TelloLink:
                 self._take_reply(content)
             else:
                 self.counts.strangers += 1
-        for content, address, _ in datagrams(self._states):
-            if address != self._peer[0]:
+        for content, address, port in datagrams(self._states):
+            now = time.monotonic()
+            if address != self._peer[0] or not self._state_pin.admits((address, port), now):
                 self.counts.strangers += 1
                 continue
             state = parse_state(content)
@@ -202,7 +215,7 @@ class TelloLink:
                 _log.debug("%s: not a state packet: %r", self._name, content[:80])
                 continue
             self.counts.states += 1
-            self._on_state(state, time.monotonic())
+            self._on_state(state, now)
 
     def _take_reply(self, content: bytes) -> None:
         try:

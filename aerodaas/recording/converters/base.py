@@ -15,6 +15,7 @@ from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.rotation import Rotation
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.guest_item import GuestItem
 from aerodaas.types.status import Message
 
 __all__ = ["MAP_FRAME", "Session", "convert", "quaternion", "vector", "xyz"]
@@ -59,8 +60,8 @@ def convert(item: object, message: Message[Any], session: Session) -> Iterator[E
     value = {
         "stamp": message.header.stamp,
         "source": message.header.source,
-        "type": type(item).__name__,
-        "value": plain(item),
+        "type": item.kind if isinstance(item, GuestItem) else type(item).__name__,
+        "value": plain(item.value if isinstance(item, GuestItem) else item),
     }
     yield Entry(topic(message.stream, "value"), VALUE, json_bytes(value))
 

@@ -9,9 +9,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from google.protobuf.json_format import MessageToDict
 from google.protobuf.message import Message
 
+from aerodaas.recording.decoding.messages import BrokenMessageError, plain_fields
 from aerodaas.recording.export.output import file_name, new_file
 from aerodaas.recording.reader import Recording
 from aerodaas.types.clock import seconds
@@ -48,7 +48,11 @@ def table_of(recording: Recording, topic: str) -> list[Row]:
         }
         value = record.value
         if isinstance(value, Message):
-            value = _plain(value)
+            try:
+                value = plain_fields(value)
+            except BrokenMessageError:
+                recording.skipped[name] += 1
+                continue
         if not isinstance(value, Mapping):
             encoding = recording.topics[name].encoding or "no known encoding"
             raise RecordingError(f"the messages of {name} are in {encoding}, not in rows")
@@ -131,19 +135,6 @@ def _known(recording: Recording, topic: str) -> str:
     near = difflib.get_close_matches(topic, topics, n=3, cutoff=0.5)
     known = ", ".join(near or sorted(topics)) or "none"
     raise RecordingError(f"{recording.path} has no channel {topic!r}; it has: {known}")
-
-
-def _plain(message: Message) -> dict[str, Any]:
-    """A protobuf message as a dictionary; bytes as their length instead of Base64."""
-    lengths = {
-        field.name: f"<{len(value)} bytes>"
-        for field, value in message.ListFields()
-        if isinstance(value, bytes)
-    }
-    for name in lengths:
-        message.ClearField(name)
-    fields: dict[str, Any] = MessageToDict(message, preserving_proto_field_name=True)
-    return fields | lengths
 
 
 def _flatten(value: Mapping[str, Any], prefix: str, row: Row) -> None:

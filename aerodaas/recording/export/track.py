@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +11,7 @@ import numpy as np
 
 from aerodaas.recording.export.output import new_file
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.recorded_environment import recorded_home
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import RecordingError
 from aerodaas.types.geometry import GeodeticOrigin
@@ -133,10 +133,14 @@ def _tracks(recording: Recording) -> dict[str, _Track]:
 def _position(
     state: dict[str, Any], home: GeodeticOrigin | None
 ) -> tuple[float, float, float] | None:
+    at = state["odometry"]["position"]
     if home is not None:
-        return _globe(home, state["odometry"]["position"])
+        # Null stands for a number that was not finite.
+        return None if None in at.values() else _globe(home, at)
     gps = state.get("gps")
-    return (gps["latitude"], gps["longitude"], gps["altitude"]) if gps else None
+    if not gps or None in (gps["latitude"], gps["longitude"], gps["altitude"]):
+        return None
+    return gps["latitude"], gps["longitude"], gps["altitude"]
 
 
 def _globe(home: GeodeticOrigin, at: dict[str, float]) -> tuple[float, float, float]:
@@ -144,10 +148,8 @@ def _globe(home: GeodeticOrigin, at: dict[str, float]) -> tuple[float, float, fl
 
 
 def _home(recording: Recording) -> GeodeticOrigin | None:
-    if "environment.json" not in recording.attachments:
-        return None
-    home = json.loads(recording.attachment("environment.json")).get("home")
-    return home and GeodeticOrigin(home["latitude"], home["longitude"], home["altitude"])
+    home = recorded_home(recording)
+    return GeodeticOrigin(home.latitude, home.longitude, home.altitude) if home else None
 
 
 def _gpx_point(parent: ET.Element, kind: str, place: _Place) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,8 @@ __all__ = ["write_videos"]
 
 _TICKS = 90_000
 """Units of the video's clock per second, as in MPEG."""
+_LONGEST_GAP = (1 << 31) - 1
+"""Units between two images, six hours and a half: MP4 counts them in 32 bits."""
 _QUALITY = {"crf": "23", "preset": "veryfast"}
 
 
@@ -55,6 +57,8 @@ def write_videos(recording: Recording, folder: Path, *, overlays: bool = True) -
                 draw_detections(image, found.get((source, frame.header.stamp), ()))
                 draw_line(image, _caption(flight, frame))
             writers[source].add(image, frame.header.stamp)
+        for writer in writers.values():
+            writer.finish()
     finally:
         for writer in writers.values():
             writer.close()
@@ -75,8 +79,10 @@ class _Video:
 
     def __init__(self, path: Path, first: Frame) -> None:
         import av  # noqa: PLC0415 - 30 MB that reports do without
+        from av.error import FFmpegError  # noqa: PLC0415
 
         self.path = path
+        self._error = FFmpegError
         self._frame = av.VideoFrame
         self._container = av.open(str(path), "w", options={"movflags": "+faststart"})
         # H.264 halves the colours' resolution, hence sizes must be even.
@@ -90,20 +96,37 @@ class _Video:
         self._last = -1
 
     def add(self, image: NDArray[np.uint8], stamp: int) -> None:
-        """Add an image; one that is not later than the last is left out."""
+        """Add an image; one that is not later than the last is left out.
+
+        A gap of hours, as a false time makes, is shortened to a second.
+        """
         width, height = self._size
         ticks = (stamp - self._start) * _TICKS // NANOSECONDS
         if ticks <= self._last or image.shape[0] < height or image.shape[1] < width:
             return
+        if ticks - self._last > _LONGEST_GAP:
+            self._start += (ticks - self._last - _TICKS) * NANOSECONDS // _TICKS
+            ticks = self._last + _TICKS
         self._last = ticks
         frame = self._frame.from_ndarray(np.ascontiguousarray(image[:height, :width]), "bgr24")
         frame.pts, frame.time_base = ticks, self._stream.time_base
-        self._write(self._stream.encode(frame))
+        self._write(frame)
+
+    def finish(self) -> None:
+        """Write what the encoder still holds."""
+        self._write(None)
 
     def close(self) -> None:
-        self._write(self._stream.encode())
-        self._container.close()
+        """Close the file, whole or not."""
+        with suppress(self._error):
+            self._container.close()
 
-    def _write(self, packets: Iterator[Any]) -> None:
-        for packet in packets:
-            self._container.mux(packet)
+    def _write(self, frame: Any | None) -> None:  # noqa: ANN401 - PyAV is not loaded yet
+        try:
+            for packet in self._stream.encode(frame):
+                self._container.mux(packet)
+        except (self._error, ValueError) as error:
+            raise RecordingError(
+                f"cannot write {self.path}: the encoder refuses pictures of {self._size[0]} x "
+                f"{self._size[1]} pixels, or their times ({error})"
+            ) from None

@@ -92,7 +92,8 @@ class McapCamera:
         return self._picture(picture, due)
 
     def close(self) -> None:
-        """Close the recording."""
+        """Close the recording, and end the threads that decode ahead."""
+        self._shots = iter(())
         if self._recording is not None:
             self._recording.close()
             self._recording = None

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from aerodaas.recording.encoding import stream_of
@@ -67,7 +66,5 @@ def read_timetables(path: str | Path) -> dict[str, tuple[int, ...]]:
             "aerodaas.Latency": found.latency,
         }
         for record in recording.records(schemas=readers):
-            # A message of another version is skipped; the other timestamps remain useful.
-            with suppress(KeyError, TypeError, IndexError, AttributeError):
-                readers[record.schema](record)
+            readers[record.schema](record)
     return {stream: tuple(sorted(stamps)) for stream, stamps in found.stamps.items()}

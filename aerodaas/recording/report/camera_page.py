@@ -22,6 +22,7 @@ from fastapi.responses import HTMLResponse, StreamingResponse
 from numpy.typing import NDArray
 from typing_extensions import Self
 
+from aerodaas.analytics.remote.guard import HostGuard
 from aerodaas.recording.report.overlay import draw_detections, draw_line
 from aerodaas.types.data import Detection, Detections, Frame
 from aerodaas.types.errors import ConfigError
@@ -35,6 +36,7 @@ _RATE = 10.0
 """Most images per second and viewer."""
 _BOUNDARY = "picture"
 _STOPPING = 5.0
+_MOST_CONNECTIONS = 64
 
 
 @dataclass
@@ -72,7 +74,8 @@ class CameraPage:
         self._states: dict[str, str] = {}
         self._lock = threading.Lock()
         config = uvicorn.Config(
-            self._app(),
+            HostGuard(self._app(), host),
+            limit_concurrency=_MOST_CONNECTIONS,
             log_config=None,
             access_log=False,
             lifespan="off",

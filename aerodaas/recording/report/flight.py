@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.recording.decoding.limits import MAX_KEYS
 from aerodaas.recording.reader import Record, Recording
 from aerodaas.types.clock import seconds
 
@@ -25,6 +25,20 @@ __all__ = [
 ]
 
 Floats = NDArray[np.float64]
+V = TypeVar("V")
+
+
+class _FullError(Exception):
+    """More keys than a report tells apart."""
+
+
+class _Table(defaultdict[str, V]):
+    """A table that is filled by whatever a recording names, up to `MAX_KEYS` names."""
+
+    def __missing__(self, key: str) -> V:
+        if len(self) >= MAX_KEYS:
+            raise _FullError
+        return super().__missing__(key)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,9 +147,9 @@ class StreamLatency:
     """From capture to publishing."""
     overhead: list[float] = field(default_factory=list)
     """The part of `total` without computation: transport between actors and queueing."""
-    wait: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    wait: dict[str, list[float]] = field(default_factory=lambda: _Table(list))
     """From the previous actor's publishing to this one's receiving, by actor."""
-    work: dict[str, list[float]] = field(default_factory=lambda: defaultdict(list))
+    work: dict[str, list[float]] = field(default_factory=lambda: _Table(list))
     """From receiving to publishing, by actor."""
 
 
@@ -143,12 +157,12 @@ class StreamLatency:
 class RecordedFlight:
     """All flight data of a recording except the images."""
 
-    robots: dict[str, RobotFlight] = field(default_factory=lambda: defaultdict(RobotFlight))
-    latencies: dict[str, StreamLatency] = field(default_factory=lambda: defaultdict(StreamLatency))
+    robots: dict[str, RobotFlight] = field(default_factory=lambda: _Table(RobotFlight))
+    latencies: dict[str, StreamLatency] = field(default_factory=lambda: _Table(StreamLatency))
     """Latencies by stream."""
     frames: Counter[str] = field(default_factory=Counter)
     """Number of frames by camera."""
-    frame_stamps: dict[str, list[int]] = field(default_factory=lambda: defaultdict(list))
+    frame_stamps: dict[str, list[int]] = field(default_factory=lambda: _Table(list))
     """Capture times of the frames in mission nanoseconds, by camera."""
     sightings: list[RecordedDetection] = field(default_factory=list)
     detections: Counter[str] = field(default_factory=Counter)
@@ -160,28 +174,34 @@ class RecordedFlight:
     """Number of scheduler decisions and outcomes by action and reason."""
     utility: dict[str, float] = field(default_factory=dict)
     """Utility gained by the analytics scheduler: `QoS`, and `QoE`, the bonuses of its windows."""
-    loads: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
+    loads: dict[str, Load] = field(default_factory=lambda: _Table(Load))
     """Load by actor."""
-    machines: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
+    machines: dict[str, Load] = field(default_factory=lambda: _Table(Load))
     """Load by machine."""
-    gpus: dict[str, Load] = field(default_factory=lambda: defaultdict(Load))
+    gpus: dict[str, Load] = field(default_factory=lambda: _Table(Load))
     """Load of GPUs by machine and number, in the units of a machine's."""
     alerts: list[tuple[float, str, str]] = field(default_factory=list)
     """Mission seconds, kind, text."""
     drops: dict[str, int] = field(default_factory=dict)
     """Number of messages lost before the recorder, by stream."""
+    untold: int = 0
+    """Number of messages left out, because more than `MAX_KEYS` names were met."""
 
     @classmethod
     def read(cls, recording: Recording) -> RecordedFlight:
         """Read an open recording in one pass; fields without recorded data stay empty."""
         flight = cls()
         for record in recording.records(schemas=_READERS):
-            # A message of another version is skipped; the rest of the flight remains usable.
-            with suppress(KeyError, TypeError, ValueError, AttributeError):
-                _READERS[record.schema](flight, record)
+            flight._enter(record)
         for robot in flight.robots.values():
             robot.bands = list(_closed(robot))
         return flight
+
+    def _enter(self, record: Record) -> None:
+        try:
+            _READERS[record.schema](self, record)
+        except _FullError:
+            self.untold += 1
 
 
 def _closed(robot: RobotFlight) -> Iterator[Band]:
@@ -242,8 +262,8 @@ def _latency(flight: RecordedFlight, record: Record) -> None:
 
 
 def _frame(flight: RecordedFlight, record: Record) -> None:
-    flight.frames[record.value["source"]] += 1
     flight.frame_stamps[record.value["source"]].append(record.value["stamp"])
+    flight.frames[record.value["source"]] += 1
 
 
 def _detections(flight: RecordedFlight, record: Record) -> None:

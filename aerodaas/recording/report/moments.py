@@ -6,6 +6,7 @@ from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +19,8 @@ from aerodaas.types.clock import NANOSECONDS, seconds
 __all__ = ["Moment", "MomentPicture", "key_moments", "picture_moments"]
 
 _MOST = 12
+_WIDEST = 1920
+"""Pixels along a side of a moment's picture, more than page and sheet show."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +90,18 @@ def picture_moments(recording: Recording, moments: list[Moment]) -> list[MomentP
         if key in wanted:
             image = frame.image.copy()
             draw_detections(image, found.get(key, ()))
-            pictures.append(MomentPicture(wanted[key], image))
+            # Taken out, so that repeated frames cost one picture.
+            pictures.append(MomentPicture(wanted.pop(key), _shrunk(image)))
     return pictures
+
+
+def _shrunk(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The image at no more than `_WIDEST` pixels along a side: a dozen are kept at once."""
+    scale = _WIDEST / max(image.shape)
+    if scale >= 1:
+        return image
+    size = (max(1, round(image.shape[1] * scale)), max(1, round(image.shape[0] * scale)))
+    return np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
 
 
 def _candidates(flight: RecordedFlight, most: int) -> Iterator[tuple[int, str, str]]:

@@ -83,6 +83,8 @@ class FlightSummary:
     drops: dict[str, int] = field(default_factory=dict)
     """Number of messages that did not reach the recorder, by stream."""
     provenance: dict[str, str] = field(default_factory=dict)
+    skipped: int = 0
+    """Number of messages and chunks of the file that are broken and were left out."""
 
     @classmethod
     def of(cls, recording: Recording, flight: RecordedFlight) -> Self:
@@ -101,6 +103,7 @@ class FlightSummary:
             alerts=[{"time_s": at, "kind": kind, "text": t} for at, kind, t in flight.alerts],
             drops=dict(flight.drops),
             provenance=dict(recording.provenance),
+            skipped=recording.damaged + flight.untold,
         )
 
     @property
@@ -122,6 +125,8 @@ class FlightSummary:
         lines = [f"{self.title}: {self.duration_s:.1f} s recorded"]
         if not self.complete:
             lines[0] += " (cut off: the file was not closed or is damaged)"
+        if self.skipped:
+            lines.append(f"  skipped {self.skipped} messages or chunks that are broken")
         for name, robot in self.robots.items():
             lines.append(f"  {name}: {robot.outcome}; {robot.course}")
         for camera, count in self.frames.items():

@@ -19,11 +19,11 @@ def test_forwarding_is_bytes_as_they_are() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
         station.bind((LOOPBACK, 0))
         station.settimeout(5.0)
-        forwarder = Forwarder(f"udpout:{LOOPBACK}:{station.getsockname()[1]}", "a")
+        forwarder = Forwarder(f"udpout:{LOOPBACK}:{station.getsockname()[1]}", "a", lambda: True)
         forwarder.send(b"\xfd anything")
         content, ours = station.recvfrom(100)
         assert content == b"\xfd anything"
         station.sendto(b"back", ours)
         time.sleep(0.1)
-        assert forwarder.receive() == [b"back"]
+        assert forwarder.receive(0.0) == [b"back"]
         forwarder.close()

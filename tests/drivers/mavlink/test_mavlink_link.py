@@ -10,11 +10,12 @@ from typing import Any
 import pytest
 
 from aerodaas.drivers.mavlink.settings import KEY_VARIABLE, MavlinkSettings
+from aerodaas.drivers.mavlink.wire import forwarding
 from aerodaas.drivers.mavlink.wire import link as module
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.drivers.mavlink.wire.signing import sign_with
-from aerodaas.drivers.mavlink.wire.transport import Peer
+from aerodaas.drivers.pin import Peer
 
 KEY = bytes(range(32))
 HERE, THERE = ("10.0.0.1", 14550), ("10.0.0.2", 14550)
@@ -65,16 +66,17 @@ class World:
             return opened
 
         monkeypatch.setattr(module, "open_transport", opening(self.wire))
-        monkeypatch.setattr(module, "Forwarder", opening(self.station))
+        monkeypatch.setattr(forwarding, "open_transport", opening(self.station))
         self.heard: list[tuple[str, float]] = []
         self.turns: list[float] = []
-        self.healthy = True
+        self.healthy = self.stands = True
         self.link = MavlinkLink(
             "d",
             MavlinkSettings(**settings),
-            on_message=lambda message, now: self.heard.append((message.get_type(), now)),
+            on_message=lambda message, now, _: self.heard.append((message.get_type(), now)),
             on_turn=self.turns.append,
             healthy=lambda _: self.healthy,
+            stands=lambda: self.stands,
         )
         self.link.open()
         self._others: dict[tuple[int, int], Any] = {}
@@ -159,7 +161,7 @@ def test_before_it_knows_its_vehicle_it_hears_everybody(world: World) -> None:
     world.link.turn(100.0)
     assert world.heard == [("HEARTBEAT", 100.0)] * 2
     assert world.link.target is None
-    world.link.adopt(2, 5)
+    world.link.adopt((2, 5), HERE, 100.0)
     for system, component in ((1, 1), (2, 1), (1, 5), (2, 5)):
         world.says(LOOK, system, component)
     world.link.turn(101.0)
@@ -168,22 +170,20 @@ def test_before_it_knows_its_vehicle_it_hears_everybody(world: World) -> None:
 
 
 def test_it_answers_to_the_address_of_its_vehicle(world: World) -> None:
-    """To everybody's, each once, before it is known or heard; its latest one after that."""
+    """To everybody's, each once, before it is known; to its own alone after that."""
     world.link.send(BEAT)
     world.says(BEAT, 1, peer=HERE)
     world.says(BEAT, 2, peer=THERE)
     world.says(BEAT, 3, peer=THERE)
     world.link.turn(100.0)
     world.link.send(BEAT)
-    world.link.adopt(9, 1)
-    world.link.send(BEAT)
-    world.link.adopt(2, 1)
+    world.link.adopt((2, 1), THERE, 100.0)
     world.link.send(BEAT)
     world.says(BEAT, 2, peer=HERE)
     world.link.turn(100.1)
     world.link.send(BEAT)
     peers = [peers for _, peers in world.wire.sent]
-    assert peers == [(), (HERE, THERE), (HERE, THERE), (HERE, THERE), (THERE,), (HERE,)]
+    assert peers == [(), (HERE, THERE), (HERE, THERE), (THERE,), (THERE,)]
 
 
 def test_what_is_sent_is_numbered(world: World) -> None:
@@ -196,7 +196,7 @@ def test_what_is_sent_is_numbered(world: World) -> None:
 
 def test_who_waits_for_an_answer_gets_it(world: World) -> None:
     """By its name, of the vehicle only, for as long as it waits; several may."""
-    world.link.adopt(1, 1)
+    world.link.adopt((1, 1), HERE, 100.0)
     with (
         world.link.listen("ATTITUDE", "SYSTEM_TIME") as both,
         world.link.listen("HEARTBEAT") as one,
@@ -254,21 +254,16 @@ def test_messages_that_nobody_reads_are_passed_over(world: World) -> None:
 
 
 def test_a_crowd_on_one_port_is_forgotten(world: World) -> None:
-    """Sixteen systems' addresses are remembered, and theirs go on to be heard."""
-    for system in range(1, 31):
+    """64 senders' addresses are remembered, and all go on to be heard."""
+    for system in range(1, 81):
         world.says(BEAT, system, peer=(f"10.0.0.{system}", 1))
         world.link.turn(100.0 + system)
     world.wire.sent.clear()
     world.link.send(BEAT)
     ((_, peers),) = world.wire.sent
-    assert peers == tuple((f"10.0.0.{system}", 1) for system in range(1, 17))
-    assert len(world.heard) == 30
+    assert peers == tuple((f"10.0.0.{system}", 1) for system in range(1, 65))
+    assert len(world.heard) == 80
     assert len(world.link._framers) <= 17
-    world.says(BEAT, 3, peer=("10.0.0.99", 1))
-    world.link.turn(200.0)
-    world.link.adopt(3, 1)
-    world.link.send(BEAT)
-    assert world.wire.sent[-1][1] == (("10.0.0.99", 1),)
 
 
 def test_with_a_key_it_signs_and_hears_the_signed_alone(
@@ -297,14 +292,17 @@ def test_with_a_key_it_signs_and_hears_the_signed_alone(
 def test_everything_is_passed_on_both_ways(monkeypatch: pytest.MonkeyPatch) -> None:
     """Byte by byte, whoever says it and whatever it is; back to all that were heard."""
     world = World(monkeypatch, forward="udpout:127.0.0.1:14550")
-    assert world.opened == [(MavlinkSettings().url, "d"), ("udpout:127.0.0.1:14550", "d")]
+    assert world.opened == [
+        (MavlinkSettings().url, "d"),
+        ("udpout:127.0.0.1:14550", "d, forward"),
+    ]
     said = [world.says(BEAT, 1), world.says(SPEED, 2, peer=THERE)]
     world.wire.inbox.append((b"noise", THERE))
     world.says(BEAT, 3, peer=THERE)
     world.healthy = False
     world.link.turn(100.0)
     assert [packet for packet, _ in world.station.sent][:3] == [*said, b"noise"]
-    world.station.inbox = [b"one", b"two"]
+    world.station.inbox = [(b"one", None), (b"two", None)]
     world.link.turn(100.1)
     assert world.wire.sent == [(b"one", (HERE, THERE)), (b"two", (HERE, THERE))]
     world.link.close()

@@ -138,7 +138,7 @@ def test_any_message_of_anybody_is_survived(
             message = mav.decode(frame)
         except mavlink.MAVError:
             continue
-        vehicle._take(message, 1.0)
+        vehicle._take(message, 1.0, None)
         if vehicle._finder.found is not None:
             vehicle._telemetry.take(message, 1.0)
     assert vehicle._phase.wish is None

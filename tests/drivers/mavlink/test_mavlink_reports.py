@@ -67,6 +67,8 @@ def test_what_is_told_in_our_frame() -> None:
         "autopilot_clock": 1700.0,
         "damaged_packets": 3,
         "foreign_packets": 4,
+        "impostor_packets": 0,
+        "refused_packets": 0,
         "silence": 0.0,
     }
 

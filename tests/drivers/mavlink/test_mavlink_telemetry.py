@@ -225,6 +225,28 @@ def test_home_is_a_place_in_its_frame() -> None:
     assert told(home(1.0, 2.0, -3.0), home(1.0, math.nan, -3.0)).home is None
 
 
+@pytest.mark.parametrize(
+    ("latitude", "longitude", "known"),
+    [(900000000, -1800000000, True), (900000001, 0, False), (0, 1800000001, False)],
+)
+def test_a_place_beyond_the_earth_is_none(latitude: int, longitude: int, *, known: bool) -> None:
+    """Neither by the GPS nor by its own estimate."""
+    gps = mavlink.MAVLink_gps_raw_int_message(0, 3, latitude, longitude, 0, 0, 0, 0, 0, 9)
+    place = mavlink.MAVLink_global_position_int_message(1000, latitude, longitude, 0, 0, 0, 0, 0, 0)
+    telemetry = told(gps, place)
+    assert (telemetry.gps is not None) is known
+    assert (telemetry.place is not None) is known
+
+
+@pytest.mark.parametrize(
+    ("left", "charge"), [(100, 1.0), (0, 0.0), (101, math.nan), (-1, math.nan)]
+)
+def test_a_charge_beyond_a_full_battery_is_unknown(left: int, charge: float) -> None:
+    """As one that is not told."""
+    status = mavlink.MAVLink_sys_status_message(1, 1, 1, 0, 12000, 500, left, 0, 0, 0, 0, 0, 0)
+    assert told(status).battery.fraction == pytest.approx(charge, nan_ok=True)
+
+
 def test_its_clock_and_its_version() -> None:
     """Microseconds of the Unix epoch; bytes of the version from the highest on."""
     clock = mavlink.MAVLink_system_time_message(1_700_000_000_250_000, 4000)

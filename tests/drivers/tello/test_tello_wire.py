@@ -257,17 +257,30 @@ def test_which_replies_are_whose(wire: Wire) -> None:
 def test_states_of_the_tello_and_of_nobody_else(
     wire: Wire, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """From its address, whatever the port; counted, with the second in which they came."""
+    """From its address and the port of the first; counted, with the second in which they came."""
     caplog.set_level("DEBUG")
-    for battery, sender in ((81, "192.168.10.1"), (82, "192.168.10.9"), (83, "192.168.10.1")):
-        wire.statuses.inbox.append((STATE % battery, sender, 5000 + battery))
+    senders = (("192.168.10.1", 8889), ("192.168.10.9", 8889), ("192.168.10.1", 5000), TELLO)
+    for battery, (host, port) in enumerate(senders, 81):
+        wire.statuses.inbox.append((STATE % battery, host, port))
     wire.statuses.inbox.insert(1, (b"nonsense" * 11, *TELLO))
     wire.run(0.05)
     counts = wire.link.counts
-    assert (counts.states, counts.strangers, counts.malformed) == (2, 1, 1)
+    assert (counts.states, counts.strangers, counts.malformed) == (2, 2, 1)
     assert caplog.messages == [f"t: not a state packet: {b'nonsense' * 10!r}"]
-    assert [battery for battery, _ in wire.states] == [81, 83]
+    assert [battery for battery, _ in wire.states] == [81, 84]
     assert all(100.0 < now <= 100.05 for _, now in wire.states)
+
+
+def test_states_come_from_another_port_only_after_a_silence(wire: Wire) -> None:
+    """A Tello that was switched off and on may use another one; five seconds are waited."""
+    moved = ("192.168.10.1", 6000)
+    for second in range(11):
+        wire.statuses.inbox.append((STATE % 50, *moved) if second else (STATE % 80, *TELLO))
+        wire.run(0.5 * (second + 1))
+    assert wire.states[0][0] == 80
+    assert [battery for battery, _ in wire.states[1:]] == [50]
+    assert wire.states[1][1] > 105.0
+    assert wire.link.counts.strangers == 9
 
 
 def test_the_driver_gets_twenty_turns_a_second(wire: Wire) -> None:

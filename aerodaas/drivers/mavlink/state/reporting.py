@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -44,8 +45,13 @@ class VehicleReport:
         self._phase = phase
         self._touchdown = touchdown
 
-    def state(self, stamp: int, now: float, counts: LinkCounts) -> VehicleState:
-        """The newest state at `now`, which is `stamp` (nanoseconds) on the mission's clock."""
+    def state(
+        self, stamp: int, now: float, counts: LinkCounts, reports: Sequence[str] = ()
+    ) -> VehicleState:
+        """The newest state at `now`, which is `stamp` (nanoseconds) on the mission's clock.
+
+        `counts` and `reports` are the link's.
+        """
         telemetry, lost = self._telemetry, self.lost(now)
         # A silent link is no loss of the position: the last known one stays, with its age. Only a
         # vehicle that still sends messages can have lost it.
@@ -61,12 +67,14 @@ class VehicleReport:
             VehicleMode.LOST if lost else self.mode,
             telemetry.armed,
             telemetry.gps,
-            faults=tuple(self._faults(now)),
+            faults=(*self._faults(now), *reports),
             extra={
                 "autopilot_time": telemetry.boot_time,
                 "autopilot_clock": telemetry.clock,
                 "damaged_packets": counts.damaged,
                 "foreign_packets": counts.strangers,
+                "impostor_packets": counts.impostors,
+                "refused_packets": counts.refused,
                 "silence": telemetry.silence(now),
             },
             ended=self._touchdown.ended,

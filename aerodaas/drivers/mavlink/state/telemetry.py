@@ -24,6 +24,8 @@ _FIX = 2
 """GPS fix types from this one on are positions."""
 _FAR = 5.0
 """Seconds by which time stamps may go back, as packets overtake each other; more is a restart."""
+_FULL = 100
+"""Percent."""
 _UNKNOWN_SATELLITES = 255
 _UNKNOWN_VOLTAGE = 65535
 
@@ -151,15 +153,15 @@ class Telemetry:
             self.attitude, self.attitude_at = attitude_from_frd(*angles), now
 
     def _global_position(self, message: Any, _: float) -> None:  # noqa: ANN401
-        if message.lat == 0 and message.lon == 0:
-            # An autopilot's value for "unknown".
+        # Zero is an autopilot's value for "unknown".
+        if (message.lat == 0 and message.lon == 0) or not _on_earth(message):
             self.altitude = self.place = None
             return
         self.altitude = message.alt / 1e3
         self.place = message.lat / 1e7, message.lon / 1e7
 
     def _gps(self, message: Any, _: float) -> None:  # noqa: ANN401
-        if message.fix_type < _FIX:
+        if message.fix_type < _FIX or not _on_earth(message):
             self.gps = None
             return
         count = message.satellites_visible
@@ -176,7 +178,7 @@ class Telemetry:
         left = message.battery_remaining
         voltage = message.voltage_battery
         self.battery = Battery(
-            left / 100 if left >= 0 else math.nan,
+            left / 100 if 0 <= left <= _FULL else math.nan,
             voltage / 1e3 if voltage != _UNKNOWN_VOLTAGE else 0.0,
             max(0, message.current_battery) / 100,
         )
@@ -237,3 +239,8 @@ class Telemetry:
         said = self.events.take(message.event, message.log_levels, message.sequence)
         if said is not None:
             self.texts.add(said.text, said.severity, now)
+
+
+def _on_earth(message: Any) -> bool:  # noqa: ANN401
+    """Whether latitude and longitude (degrees times 10^7) are such."""
+    return bool(abs(message.lat) <= 90 * 10**7 and abs(message.lon) <= 180 * 10**7)

@@ -11,6 +11,7 @@ from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import LinkCounts
+from aerodaas.drivers.pin import Peer
 
 __all__ = ["Finder", "FoundVehicle"]
 
@@ -35,6 +36,8 @@ class FoundVehicle:
     system: int
     component: int
     autopilot: Autopilot
+    peer: Peer = None
+    """Where its HEARTBEAT came from."""
 
 
 class Finder:
@@ -45,12 +48,12 @@ class Finder:
         self._others: dict[tuple[int, int], str] = {}
         self.found: FoundVehicle | None = None
 
-    def take(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
-        """Process a HEARTBEAT of any sender."""
+    def take(self, message: Any, peer: Peer = None) -> None:  # noqa: ANN401 - pymavlink has no types
+        """Process a HEARTBEAT of any sender, from the address `peer`."""
         system, component = message.get_srcSystem(), message.get_srcComponent()
         objection, family = self._judge(message, system)
         if family is not None and not objection:
-            self.found = self.found or FoundVehicle(system, component, family())
+            self.found = self.found or FoundVehicle(system, component, family(), peer)
         elif len(self._others) < _MOST:
             self._others[system, component] = objection
 
@@ -74,7 +77,7 @@ class Finder:
             hint = f'; "system" is set to {wanted}' if wanted is not None else ""
             return f"no vehicle on {url}, but {heard}{hint}"
         if counts.damaged:
-            key = "; is the signing key the vehicle's?" if self._settings.signing_key else ""
+            key = "; is the signing key the vehicle's?" if counts.refused else ""
             return (
                 f"packets come on {url}, but none that can be read{key} "
                 "(signed while we have no key, another speed of the line, no MAVLink?)"

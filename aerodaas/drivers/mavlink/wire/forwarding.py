@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
-from aerodaas.drivers.mavlink.wire.transport import Peer, open_transport
+from collections.abc import Callable
+
+from aerodaas.drivers.mavlink.wire.transport import open_transport
+from aerodaas.drivers.pin import Pin
 
 __all__ = ["Forwarder"]
 
 
 class Forwarder:
-    """Forwarder of unchanged packets, signatures included."""
+    """Forwarder of unchanged packets, signatures included.
 
-    def __init__(self, url: str, name: str) -> None:
-        """Open `url` for robot `name`; raises ConfigError and VehicleError."""
+    The other program may command the vehicle, as a ground station does; where it is waited for
+    (`udpin`), the first one to send is it, and stays it.
+    """
+
+    def __init__(self, url: str, name: str, may_move: Callable[[], bool]) -> None:
+        """Open `url` for robot `name`; raises ConfigError and VehicleError.
+
+        `may_move` decides whether another program may take the first one's place.
+        """
         self._wire = open_transport(url, f"{name}, forward")
-        self._peer: Peer = None
+        self.pin = Pin("the ground station", may_move)
+        self.strangers = 0
+        """Datagrams of other programs."""
 
     def fileno(self) -> int:
         """File descriptor to wait for."""
@@ -21,14 +33,14 @@ class Forwarder:
 
     def send(self, content: bytes) -> None:
         """Forward a packet of the vehicle."""
-        self._wire.send(content, (self._peer,))
+        self._wire.send(content, (self.pin.address,))
 
-    def receive(self) -> list[bytes]:
-        """Packets of the other program for the vehicle; never blocks."""
+    def receive(self, now: float) -> list[bytes]:
+        """Packets of the other program for the vehicle at `now` (seconds); never blocks."""
         arrived = self._wire.receive()
-        if arrived:
-            self._peer = arrived[-1][1]
-        return [content for content, _ in arrived]
+        admitted = [content for content, peer in arrived if self.pin.admits(peer, now)]
+        self.strangers += len(arrived) - len(admitted)
+        return admitted
 
     def close(self) -> None:
         """Stop forwarding."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-__all__ = ["Framer", "signed"]
+__all__ = ["Framer", "senders", "signed"]
 
 _V1, _V2 = 0xFE, 0xFD
 _MARKS = (bytes([_V1]), bytes([_V2]))
@@ -23,6 +23,19 @@ _LARGEST = 4096
 def signed(frame: bytes | bytearray) -> bool:
     """Whether a whole packet carries a signature."""
     return frame[0] == _V2 and bool(frame[2] & _SIGNED)
+
+
+def senders(content: bytes) -> set[tuple[int, int]] | None:
+    """Systems and components whose packets a datagram holds; None if it holds anything else."""
+    found, rest = set(), bytearray(content)
+    while rest:
+        length = _length(rest) if rest[0] in _HEADER else None
+        if length is None or len(rest) < length:
+            return None
+        ids = 3 if rest[0] == _V1 else 5
+        found.add((rest[ids], rest[ids + 1]))
+        del rest[:length]
+    return found
 
 
 class Framer:

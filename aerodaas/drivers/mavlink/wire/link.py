@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import math
 import queue
 import select
@@ -18,19 +19,25 @@ from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import EventMessage, mavlink
 from aerodaas.drivers.mavlink.wire.forwarding import Forwarder
 from aerodaas.drivers.mavlink.wire.framing import Framer
-from aerodaas.drivers.mavlink.wire.signing import load_key, sign_with, signature_fits
-from aerodaas.drivers.mavlink.wire.transport import Peer, open_transport
+from aerodaas.drivers.mavlink.wire.senders import Sender, SenderPins
+from aerodaas.drivers.mavlink.wire.signing import SignedCodec, load_key, sign_with
+from aerodaas.drivers.mavlink.wire.transport import is_exposed, open_transport
+from aerodaas.drivers.pin import Peer
 
 __all__ = ["LinkCounts", "MavlinkLink", "Message"]
 
 Message: TypeAlias = Any
 """One of pymavlink's, which has no types."""
 
+_log = logging.getLogger(__name__)
+
 _TICK = 0.05
 """Longest time between two turns of the thread, seconds."""
 _HEARTBEAT = 1.0
-_PEERS = 16
-"""Senders remembered at most on one port."""
+_FRAMERS = 16
+"""Addresses from which packets are put together at the same time."""
+_TOLD = 10.0
+"""Seconds for which refused packets are reported."""
 
 _WANTED = frozenset(
     {
@@ -59,7 +66,11 @@ class LinkCounts:
     damaged: int = 0
     """Invalid bytes and packets, and those with an invalid signature."""
     strangers: int = 0
-    """Packets of other systems and components."""
+    """Packets of other systems and components, and to the forwarding port of other programs."""
+    impostors: int = 0
+    """Packets with the vehicle's ids from another address than its own."""
+    refused: int = 0
+    """Packets that were unsigned, wrongly signed or replayed, while a key is set."""
     sent: int = 0
 
 
@@ -68,7 +79,8 @@ class MavlinkLink:
 
     `on_message` and `on_turn` are called in the link's thread, the latter 20 times a second, and
     `healthy` before each heartbeat: no heartbeat without a working control loop. Every message
-    before `adopt` counts as the vehicle's.
+    before `adopt` counts as the vehicle's; from then on only those from its own address. After a
+    silence it may have another one, if it `stands` on the ground or if packets are signed.
     """
 
     def __init__(
@@ -76,25 +88,26 @@ class MavlinkLink:
         name: str,
         settings: MavlinkSettings,
         *,
-        on_message: Callable[[Message, float], None],
+        on_message: Callable[[Message, float, Peer], None],
         on_turn: Callable[[float], None],
         healthy: Callable[[float], bool],
+        stands: Callable[[], bool],
     ) -> None:
         """Prepare the link of robot `name`; raises ConfigError for a bad key. Opens nothing."""
         self.counts = LinkCounts()
-        self.target: tuple[int, int] | None = None
-        """System and component of the vehicle, once it is known."""
         self._name = name
         self._settings = settings
         self._on_message = on_message
         self._on_turn = on_turn
         self._healthy = healthy
         self._key = load_key(settings, name)
-        self._mav: Any = mavlink.MAVLink(None, settings.own_system, settings.own_component)
+        self._mav: Any = SignedCodec(None, settings.own_system, settings.own_component)
         if self._key is not None:
             sign_with(self._mav, self._key)
+        self._stands = stands
+        self._pins = SenderPins(lambda: self._key is not None or stands())
+        self._refused_at = -math.inf
         self._framers: dict[Peer, Framer] = {}
-        self._peers: dict[int, Peer] = {}
         self._lock = threading.Lock()
         self._listeners: list[tuple[frozenset[str], queue.SimpleQueue[Message]]] = []
         self._closing = threading.Event()
@@ -109,19 +122,47 @@ class MavlinkLink:
             self._wire = open_transport(settings.url, self._name)
             opened.callback(self._wire.close)
             if settings.forward is not None:
-                self._forwarder = Forwarder(settings.forward, self._name)
+                self._forwarder = Forwarder(settings.forward, self._name, self._stands)
                 opened.callback(self._forwarder.close)
             self._bell, self._rope = map(opened.enter_context, socket.socketpair())
             self._resources = opened.pop_all()
+        self._warn_if_exposed()
         self._start()
+
+    def _warn_if_exposed(self) -> None:
+        if self._key is not None:
+            return
+        for url in filter(None, (self._settings.url, self._settings.forward)):
+            if is_exposed(url):
+                _log.warning(
+                    "%s: %s is open to the network and nothing is signed: others there can fly the "
+                    "drone, or forge what it reports; set a signing_key (docs/mavlink.md), or use "
+                    "127.0.0.1",
+                    self._name,
+                    url,
+                )
 
     def _start(self) -> None:
         self._thread = threading.Thread(target=self._run, name=f"{self._name}-link", daemon=True)
         self._thread.start()
 
-    def adopt(self, system: int, component: int) -> None:
-        """Accept only this system's component as the vehicle."""
-        self.target = (system, component)
+    @property
+    def target(self) -> Sender | None:
+        """System and component of the vehicle, once it is known."""
+        return self._pins.target
+
+    def adopt(self, target: Sender, peer: Peer, now: float) -> None:
+        """Accept only this system's component as the vehicle, and only from the address `peer`."""
+        self._pins.adopt(target, peer, now)
+
+    def reports(self, now: float) -> list[str]:
+        """What the operator must know about strangers on the link, one sentence each."""
+        said = self._pins.pin.reports(now)
+        if self._forwarder is not None:
+            said += self._forwarder.pin.reports(now)
+        if now - self._refused_at <= _TOLD:
+            said.append("link: packets that are unsigned, wrongly signed or replayed are dropped")
+        return said
 
     def send(self, message: Message) -> None:
         """Send a message to the vehicle, at once."""
@@ -154,10 +195,9 @@ class MavlinkLink:
         self._resources.close()
 
     def _addressees(self) -> tuple[Peer, ...]:
-        target = self.target
-        if target is not None and target[0] in self._peers:
-            return (self._peers[target[0]],)
-        return tuple(dict.fromkeys(self._peers.values()))
+        if self.target is not None:
+            return (self._pins.pin.address,)
+        return self._pins.addresses
 
     def _run(self) -> None:
         while not self._closing.is_set():
@@ -168,9 +208,11 @@ class MavlinkLink:
         """Process received packets, and do the work due at `now`; called by the link's thread."""
         self._hear(now)
         if self._forwarder is not None:
-            for packet in self._forwarder.receive():
+            strangers = self._forwarder.strangers
+            for packet in self._forwarder.receive(now):
                 with self._lock:
-                    self._wire.send(packet, tuple(dict.fromkeys(self._peers.values())))
+                    self._wire.send(packet, self._pins.addresses)
+            self.counts.strangers += self._forwarder.strangers - strangers
         if now >= self._turn_due:
             self._turn_due = now + _TICK
             self._on_turn(now)
@@ -187,26 +229,26 @@ class MavlinkLink:
 
     def _hear(self, now: float) -> None:
         for content, peer in self._wire.receive():
-            if self._forwarder is not None:
-                self._forwarder.send(content)
             framer = self._framer(peer)
             for message in framer.feed(content):
                 self._take(message, peer, now)
             if peer is not None:
                 framer.flush()
+            if self._forwarder is not None and self._pins.may_pass(content, peer):
+                self._forwarder.send(content)
         self.counts.damaged = sum(framer.damaged for framer in self._framers.values())
+        if self._mav.refused != self.counts.refused:
+            self.counts.refused, self._refused_at = self._mav.refused, now
 
     def _framer(self, peer: Peer) -> Framer:
         if peer not in self._framers:
-            if len(self._framers) >= _PEERS:
-                known = set(self._peers.values())
+            if len(self._framers) >= _FRAMERS:
+                known = {self._pins.pin.address}
                 self._framers = {one: f for one, f in self._framers.items() if one in known}
             self._framers[peer] = Framer(_WANTED, self._decode)
         return self._framers[peer]
 
     def _decode(self, frame: bytearray) -> Message | None:
-        if self._key is not None and not signature_fits(self._key, frame):
-            return None
         try:
             with self._lock:
                 message = self._mav.decode(frame)
@@ -215,14 +257,19 @@ class MavlinkLink:
         return None if message.get_type().startswith("UNKNOWN") else message
 
     def _take(self, message: Message, peer: Peer, now: float) -> None:
-        system = message.get_srcSystem()
-        if system in self._peers or len(self._peers) < _PEERS:
-            self._peers[system] = peer
-        if self.target not in {None, (system, message.get_srcComponent())}:
-            self.counts.strangers += 1
-            return
+        sender: Sender = (message.get_srcSystem(), message.get_srcComponent())
+        if sender != self.target:
+            self._pins.meet(sender, peer)
+        if self.target is not None:
+            if sender != self.target:
+                self.counts.strangers += 1
+                return
+            beats = message.get_type() == "HEARTBEAT"
+            if not self._pins.pin.admits(peer, now, may_lead=beats):
+                self.counts.impostors += 1
+                return
         self.counts.received += 1
-        self._on_message(message, now)
+        self._on_message(message, now, peer)
         for names, inbox in self._listeners:
             if message.get_type() in names:
                 inbox.put(message)

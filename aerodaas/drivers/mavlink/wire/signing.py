@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.drivers.mavlink.settings import KEY_VARIABLE, MavlinkSettings
-from aerodaas.drivers.mavlink.wire.framing import signed
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import ConfigError
 
-__all__ = ["load_key", "sign_with", "signature_fits"]
+__all__ = ["SignedCodec", "load_key", "sign_with", "signature_fits"]
 
 _BYTES = 32
 _EPOCH = 1_420_070_400
@@ -34,13 +34,15 @@ def load_key(settings: MavlinkSettings, name: str) -> bytes | None:
         return _key(text.encode(), f"{name}: the variable {KEY_VARIABLE}")
     if settings.signing_key is None:
         return None
+    path = settings.signing_key.get_secret_value()
     try:
-        content = Path(settings.signing_key).read_bytes()
+        content = Path(path).read_bytes()
     except OSError as error:
+        # Not named: a path that is none may be the key itself.
         raise ConfigError(
-            f"{name}: cannot read the signing key {settings.signing_key}: {error.strerror}"
+            f"{name}: cannot read the file that signing_key names: {error.strerror}"
         ) from None
-    return _key(content, f"{name}: the signing key in {settings.signing_key}")
+    return _key(content, f"{name}: the signing key in {path}")
 
 
 def _key(content: bytes, place: str) -> bytes:
@@ -70,13 +72,26 @@ def _let_through(_: object, message_id: int) -> bool:
     return message_id == _RADIO_STATUS
 
 
-def signature_fits(key: bytes, frame: bytearray) -> bool:
-    """Check a packet's signature before its timestamp is used.
-
-    pymavlink stores the timestamp first, so that one forged packet from the future would lock the
-    true sender out. An unsigned packet passes here and is judged by `decode`.
-    """
-    if not signed(frame):
-        return True
+def signature_fits(key: bytes, frame: bytes | bytearray) -> bool:
+    """Whether the signature of a signed packet was made with `key`."""
     expected = hashlib.sha256(key + bytes(frame[:-6])).digest()[:6]
     return hmac.compare_digest(expected, bytes(frame[-6:]))
+
+
+class SignedCodec(mavlink.MAVLink):  # type: ignore[misc]
+    """Codec that checks a packet's signature before its timestamp is used.
+
+    pymavlink stores the timestamp first, so that one forged packet from the future would lock the
+    true sender out.
+    """
+
+    @property
+    def refused(self) -> int:
+        """Whole packets that were unsigned, wrongly signed or replayed."""
+        return int(self.signing.reject_count)
+
+    def check_signature(self, msgbuf: bytearray, srcSystem: int, srcComponent: int) -> bool:  # noqa: N803 - pymavlink's names
+        """Check the signature, then whether its timestamp is newer than all before."""
+        if not signature_fits(self.signing.secret_key, msgbuf):
+            return False
+        return bool(super().check_signature(msgbuf, srcSystem, srcComponent))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import ipaddress
 import os
 import socket
 import termios
@@ -11,12 +12,10 @@ import time
 import tty
 from typing import Protocol
 
+from aerodaas.drivers.pin import Peer
 from aerodaas.types.errors import ConfigError, VehicleError
 
-__all__ = ["Peer", "Transport", "open_transport"]
-
-Peer = tuple[str, int] | None
-"""Address of a sender; None for a wire with a single peer."""
+__all__ = ["Transport", "is_exposed", "open_transport"]
 
 _LARGEST = 65535
 _LARGEST_PORT = 65535
@@ -71,6 +70,19 @@ def open_transport(url: str, name: str) -> Transport:
         return _Udp(host, int(number), listens=kind == "udpin")
     except (OSError, ValueError) as error:
         raise VehicleError(f"{name}: {_explain(error, url, number)}") from None
+
+
+def is_exposed(url: str) -> bool:
+    """Whether `url` is on a network, where others can send: neither loopback nor a serial line."""
+    kind, _, rest = url.partition(":")
+    if kind == "serial":
+        return False
+    host = rest.rpartition(":")[0]
+    try:
+        found = {str(one[4][0]) for one in socket.getaddrinfo(host, None)}
+    except OSError:
+        return True
+    return not all(ipaddress.ip_address(one).is_loopback for one in found)
 
 
 def _explain(error: Exception, url: str, number: str) -> str:
@@ -137,7 +149,7 @@ class _Udp:
 
 class _Tcp:
     def __init__(self, host: str, port: int) -> None:
-        self._server = (host, port)
+        self._server: tuple[str, int] = (host, port)
         self._socket: socket.socket | None = self._connected()
         self._tried_at = time.monotonic()
 
@@ -145,6 +157,8 @@ class _Tcp:
         opened = socket.create_connection(self._server, timeout=_RETRY)
         opened.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         opened.settimeout(0.0)
+        # A name may resolve to another host later; it is not the vehicle's.
+        self._server = opened.getpeername()[:2]
         return opened
 
     def fileno(self) -> int:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from io import BytesIO
+from itertools import islice
+from typing import TypeVar
 
+import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from aerodaas.recording.report.flight import RecordedFlight
@@ -18,6 +22,10 @@ from aerodaas.recording.report.plots.trajectory import profile_figure, trajector
 __all__ = ["plots_of"]
 
 _DPI = 200
+_MOST = 24
+"""Robots, streams and analyses in one plot; more are too small to be told apart."""
+
+V = TypeVar("V")
 
 
 def plots_of(flight: RecordedFlight) -> list[Plot]:
@@ -67,11 +75,32 @@ def plots_of(flight: RecordedFlight) -> list[Plot]:
             bool(flight.loads),
         ),
     ]
-    return [
-        Plot(name, title, description, _png(make(flight)))
-        for name, title, description, make, wanted in makers
-        if wanted
-    ]
+    shown = _shown(flight)
+    # Names in a recording may hold a `$`, which would begin a formula.
+    with mpl.rc_context({"text.parse_math": False}):
+        return [
+            Plot(name, title, description, _png(make(shown)))
+            for name, title, description, make, wanted in makers
+            if wanted
+        ]
+
+
+def _shown(flight: RecordedFlight) -> RecordedFlight:
+    """The part of a flight that fits into its plots."""
+    analyses = dict.fromkeys(outcome.analysis for outcome in flight.outcomes)
+    kept = set(islice(analyses, _MOST))
+    return replace(
+        flight,
+        robots=_first(flight.robots),
+        latencies=_first(flight.latencies),
+        machines=_first(flight.machines),
+        gpus=_first(flight.gpus),
+        outcomes=[outcome for outcome in flight.outcomes if outcome.analysis in kept],
+    )
+
+
+def _first(table: dict[str, V]) -> dict[str, V]:
+    return dict(islice(table.items(), _MOST))
 
 
 def _png(figure: Figure) -> bytes:

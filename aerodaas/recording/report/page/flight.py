@@ -48,6 +48,9 @@ def _head(summary: FlightSummary) -> list[str]:
                 "Cut off: the recording was not closed, or parts of it are damaged.", "warning"
             )
         )
+    if summary.skipped:
+        text = f"{summary.skipped} broken messages or chunks were skipped."
+        head.append(paragraph(text, "warning"))
     if summary.drops:
         count = sum(summary.drops.values())
         head.append(paragraph(f"{count} messages were dropped; see below.", "warning"))

@@ -36,6 +36,8 @@ def figures(summary: FlightSummary) -> dict[str, object]:
     found |= {f"scheduler: {name} utility": gained for name, gained in summary.utility.items()}
     found["alerts"] = len(summary.alerts)
     found["dropped"] = sum(summary.drops.values())
+    if summary.skipped:
+        found["broken and skipped"] = summary.skipped
     return found
 
 

@@ -39,6 +39,8 @@ CYCLE: tuple[tuple[str, str], ...] = tuple(
 )
 """Colour and line style of the first, second, … line of a plot; no two alike."""
 
+_HIGHEST = 100.0
+"""Inches of the highest plot, which keeps it within the size of an image."""
 _NARROW = 0.11
 """Fraction of the time axis below which a state's band is too narrow for its name."""
 _DECADES = (1, 2, 5)
@@ -46,7 +48,7 @@ _DECADES = (1, 2, 5)
 
 def new_figure(height: float) -> Figure:
     """A figure of the common width, `height` inches high."""
-    return Figure(figsize=(WIDTH, height), layout="constrained")
+    return Figure(figsize=(WIDTH, min(height, _HIGHEST)), layout="constrained")
 
 
 def grid(axes: Axes, axis: str = "both") -> None:

@@ -9,21 +9,24 @@ from __future__ import annotations
 import struct
 import zlib
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
-from typing import BinaryIO
+from typing import BinaryIO, cast
 
 import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Attachment, Channel, Chunk, McapRecord, Message, Metadata, Schema
-from mcap.stream_reader import breakup_chunk, read_magic
+from mcap.records import Channel, Chunk, McapRecord, Message, Metadata, Schema
+from mcap.stream_reader import read_magic
 from mcap.summary import Summary
 
-__all__ = ["BROKEN", "Block", "FileIndex", "load", "read_index"]
+from aerodaas.recording.decoding.limits import MAX_CHANNELS, MAX_METADATA, MAX_RATIO, MAX_UNPACKED
+from aerodaas.recording.decoding.unpacking import TooLargeError, unpacked
+
+__all__ = ["BROKEN", "Block", "FileIndex", "TooLargeError", "load", "read_index"]
 
 BROKEN = (
     McapError,
@@ -42,6 +45,11 @@ _RECORD_HEAD = 9
 _CHECKSUM = 4
 _FOOTER_END = 8 + 8 + _CHECKSUM + _MAGIC
 """Bytes from the footer's first field, the summary's offset, to the end of the file."""
+_READ_RECORDS = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE})
+_CHUNK_SIZE = struct.Struct("<QQQ")
+"""How a chunk begins: first time, last time, bytes once unpacked."""
+_NEVER = 1 << 64
+"""Later than any log time."""
 _LOOSE = 1 << 20
 """Bytes up to which messages outside chunks are gathered into one block."""
 
@@ -59,6 +67,8 @@ class Block:
     """Latest log time."""
     channels: set[int] = field(default_factory=set)
     """Ids of the channels with messages in the block."""
+    size: int = 0
+    """Bytes once unpacked, as the file says; more are never unpacked."""
     damaged: bool = False
     """Whether reading the block has failed."""
 
@@ -81,35 +91,75 @@ class FileIndex:
     """Number of chunks that could not be read."""
 
 
+class _Clamped:
+    """A file that is never asked for more bytes than it has: a length in it may be a lie."""
+
+    def __init__(self, file: BinaryIO, size: int) -> None:
+        self._file = file
+        self._size = size
+        self.seek, self.tell, self.seekable = file.seek, file.tell, file.seekable
+
+    def read(self, length: int = -1) -> bytes:
+        rest = max(0, self._size - self._file.tell())
+        return self._file.read(rest if length < 0 else min(length, rest))
+
+
 def read_index(file: BinaryIO, size: int) -> FileIndex:
-    """Index a file of `size` bytes; raises one of `BROKEN` if it is not MCAP."""
+    """Index a file of `size` bytes; raises one of `BROKEN` if it is not MCAP, or is too large."""
     read_magic(ReadDataStream(file))
+    clamped = cast("BinaryIO", _Clamped(file, size))
     try:
-        file.seek(0)
-        summary = make_reader(file).get_summary()
-        if summary is not None and _tells_all(summary) and _intact(file, size):
-            return _from_summary(file, summary)
+        clamped.seek(0)
+        summary = make_reader(clamped).get_summary()
+        if summary is not None and _tells_all(summary) and _intact(clamped, size):
+            return _bounded(_from_summary(clamped, summary, size), size)
+    except TooLargeError:
+        raise
     except (*BROKEN, OSError):
         pass
-    return _scan(file, size)
+    return _bounded(_scan(clamped, size), size)
 
 
-def load(file: BinaryIO, block: Block) -> list[McapRecord]:
-    """Read the records of a block; raises one of `BROKEN` if it is damaged."""
+def load(file: BinaryIO, block: Block) -> Iterator[McapRecord]:
+    """Yield the records of a block; raises one of `BROKEN` if it is damaged or too large."""
     file.seek(block.offset)
     data = file.read(block.length)
     if block.chunked:
         chunk = Chunk.read(ReadDataStream(BytesIO(data[_RECORD_HEAD:])))
-    else:
-        chunk = Chunk(
-            compression="",
-            data=data,
-            message_start_time=block.start,
-            message_end_time=block.end,
-            uncompressed_crc=0,
-            uncompressed_size=len(data),
+        if chunk.uncompressed_size != block.size:
+            raise ValueError("a chunk and the file's index differ in its size")
+        data = unpacked(chunk)
+        if chunk.uncompressed_crc not in {0, zlib.crc32(data)}:
+            raise ValueError("the checksum of a chunk does not match")
+    offset = 0
+    while offset < len(data):
+        opcode, length = struct.unpack_from("<BQ", data, offset)
+        offset += _RECORD_HEAD
+        if offset + length > len(data):
+            raise ValueError("a record reaches beyond its chunk")
+        if opcode in _READ_RECORDS:
+            stream = ReadDataStream(BytesIO(data[offset : offset + length]))
+            if opcode == Opcode.MESSAGE:
+                yield Message.read(stream, length)
+            else:
+                yield (Schema if opcode == Opcode.SCHEMA else Channel).read(stream)
+        offset += length
+
+
+def _bounded(index: FileIndex, size: int) -> FileIndex:
+    """Return `index`; raise TooLargeError if the file would unpack to far more than it is."""
+    if max(len(index.channels), len(index.schemas)) > MAX_CHANNELS:
+        raise TooLargeError(f"has more than {MAX_CHANNELS} channels or schemas; it is not read")
+    _check_unpacked(sum(block.size for block in index.blocks), size)
+    return index
+
+
+def _check_unpacked(whole: int, size: int) -> None:
+    if whole > MAX_UNPACKED + MAX_RATIO * size:
+        raise TooLargeError(
+            f"has {size} bytes and would unpack to {whole} or more, as no recording of a flight "
+            "does; it is not read"
         )
-    return breakup_chunk(chunk, validate_crc=True)
 
 
 def _tells_all(summary: Summary) -> bool:
@@ -135,7 +185,7 @@ def _intact(file: BinaryIO, size: int) -> bool:
     return checksum in {0, zlib.crc32(file.read(size - _MAGIC - _CHECKSUM - start))}
 
 
-def _from_summary(file: BinaryIO, summary: Summary) -> FileIndex:
+def _from_summary(file: BinaryIO, summary: Summary, size: int) -> FileIndex:
     index = FileIndex(complete=True, schemas=summary.schemas, channels=summary.channels)
     index.blocks = [
         Block(
@@ -145,16 +195,18 @@ def _from_summary(file: BinaryIO, summary: Summary) -> FileIndex:
             start=chunk.message_start_time,
             end=chunk.message_end_time,
             channels=set(chunk.message_index_offsets),
+            size=chunk.uncompressed_size,
         )
         for chunk in summary.chunk_indexes
     ]
     if summary.statistics is not None:
         index.counts.update(summary.statistics.channel_message_counts)
     for place in summary.metadata_indexes:
-        file.seek(place.offset + _RECORD_HEAD)
-        index.metadata.append(Metadata.read(ReadDataStream(file)))
+        file.seek(place.offset)
+        _, length = struct.unpack("<BQ", file.read(_RECORD_HEAD))
+        _enter_metadata(index, file, length)
     index.attachments = {
-        place.name: (place.offset, place.length) for place in summary.attachment_indexes
+        place.name: (place.offset, min(place.length, size)) for place in summary.attachment_indexes
     }
     return index
 
@@ -163,6 +215,7 @@ def _scan(file: BinaryIO, size: int) -> FileIndex:
     index = FileIndex(complete=False)
     offset = _MAGIC
     over = False
+    whole = 0
     while offset + _RECORD_HEAD <= size:
         file.seek(offset)
         opcode, length = struct.unpack("<BQ", file.read(_RECORD_HEAD))
@@ -173,6 +226,11 @@ def _scan(file: BinaryIO, size: int) -> FileIndex:
             break
         # The records after the end of the data, the index, only repeat earlier ones.
         over = over or opcode == Opcode.DATA_END
+        if opcode == Opcode.CHUNK and length >= _CHUNK_SIZE.size:
+            # Before it is unpacked, and outside of what passes for damage.
+            whole += _CHUNK_SIZE.unpack(file.read(_CHUNK_SIZE.size))[2]
+            _check_unpacked(whole, size)
+            file.seek(offset + _RECORD_HEAD)
         try:
             if not over:
                 _enter(index, file, opcode, offset, end)
@@ -183,33 +241,48 @@ def _scan(file: BinaryIO, size: int) -> FileIndex:
 
 
 def _enter(index: FileIndex, file: BinaryIO, opcode: int, offset: int, end: int) -> None:
-    stream = ReadDataStream(file)
     if opcode == Opcode.CHUNK:
         block = Block(offset, end - offset, chunked=True)
+        _, _, block.size = _CHUNK_SIZE.unpack(file.read(_CHUNK_SIZE.size))
         _enter_messages(index, block, load(file, block))
     elif opcode == Opcode.METADATA:
-        index.metadata.append(Metadata.read(stream))
+        _enter_metadata(index, file, end - offset - _RECORD_HEAD)
     elif opcode == Opcode.ATTACHMENT:
-        index.attachments[Attachment.read(stream).name] = (offset, end - offset)
+        file.read(16)
+        name = ReadDataStream(file).read_prefixed_string()
+        index.attachments[name] = (offset, end - offset)
     elif opcode in {Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE}:
         block = Block(offset, end - offset, chunked=False)
         _enter_messages(index, block, load(file, block))
 
 
+def _enter_metadata(index: FileIndex, file: BinaryIO, length: int) -> None:
+    if length > MAX_METADATA:
+        index.damaged += 1
+        return
+    index.metadata.append(Metadata.read(ReadDataStream(BytesIO(file.read(length)))))
+
+
 def _enter_messages(index: FileIndex, block: Block, records: Iterable[McapRecord]) -> None:
-    times = []
+    # Entered once the whole block was read: half a chunk counts for nothing.
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    counts: Counter[int] = Counter()
+    start, end = _NEVER, 0
     for record in records:
         if isinstance(record, Schema):
-            index.schemas[record.id] = record
+            schemas[record.id] = record
         elif isinstance(record, Channel):
-            index.channels[record.id] = record
+            channels[record.id] = record
         elif isinstance(record, Message):
-            times.append(record.log_time)
-            block.channels.add(record.channel_id)
-            index.counts[record.channel_id] += 1
-    if not times:
+            start, end = min(start, record.log_time), max(end, record.log_time)
+            counts[record.channel_id] += 1
+    index.schemas |= schemas
+    index.channels |= channels
+    index.counts += counts
+    if not counts:
         return
-    block.start, block.end = min(times), max(times)
+    block.start, block.end, block.channels = start, end, set(counts)
     last = index.blocks[-1] if index.blocks else None
     if (
         last is not None

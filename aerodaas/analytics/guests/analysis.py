@@ -1,0 +1,148 @@
+"""GuestAnalysis: stands for an analysis of a guest in the owner's graph, and calls it.
+
+It runs in an actor of this guest alone, and its `process` asks the guest's process, which holds
+the guest's code. All analyses of a guest share that process and take turns in it.
+"""
+
+from __future__ import annotations
+
+import pickle
+import threading
+from dataclasses import dataclass
+from typing import Any
+
+from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.guests.channel import GuestError
+from aerodaas.analytics.guests.items import ItemError, decoded
+from aerodaas.analytics.guests.process import GuestProcess
+from aerodaas.config.grants import GuestQuota
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.types.data import Alert, Header
+from aerodaas.types.errors import ModelError
+
+__all__ = ["GuestAnalysis", "GuestCondition"]
+
+_OPENING = 40.0
+"""Wall seconds for a guest to open its analyses: models are large."""
+_ITEM = 4.0
+"""Wall seconds for a guest to process one item; shorter than the alert of a hung analysis."""
+_ALERTS = 100
+"""Most alerts of one analysis in a flight."""
+_TEXT = 500
+_processes: dict[str, GuestProcess] = {}
+"""Running guests of this actor."""
+_fired: dict[tuple[str, str], frozenset[int]] = {}
+"""Triggers whose condition the last result met, by guest and analysis."""
+_lock = threading.Lock()
+
+
+@dataclass(frozen=True)
+class GuestCondition:
+    """Condition of a trigger that the guest's process has evaluated."""
+
+    guest: str
+    key: str
+    number: int
+
+    def __call__(self, result: object) -> bool:
+        """Whether the newest result met it."""
+        del result
+        return self.number in _fired.get((self.guest, self.key), ())
+
+
+class GuestAnalysis(Analytics[Any]):
+    """One analysis of a guest."""
+
+    def __init__(
+        self,
+        guest: str,
+        key: str,
+        quota: GuestQuota,
+        *,
+        navigates: bool,
+        sees_vehicle: bool,
+        program: bytes = b"",
+    ) -> None:
+        """Call the analysis `key` of `guest`.
+
+        Args:
+            guest: Name of the guest.
+            key: Id of the analysis in the guest's own graph.
+            quota: Most of each thing that the guest may use.
+            navigates: Whether its results are navigation.
+            sees_vehicle: Whether it may ask for the vehicle's state.
+            program: The guest's code and objects, which only its process may decode; with the
+                first analysis of each guest.
+        """
+        self.guest = guest
+        self.key = key
+        self.quota = quota
+        self.navigates = navigates
+        self.sees_vehicle = sees_vehicle
+        self.program = program
+        self._alerts = 0
+        self._failed = ""
+
+    def open(self) -> None:
+        """Start the guest's process with its first analysis; one that fails stays silent."""
+        if not self.program:
+            return
+        # Told with the first item: a guest that fails here must not keep its owner from flying.
+        try:
+            process = GuestProcess(self.guest, self.quota.memory)
+            with _lock:
+                _processes[self.guest] = process
+            process.ask({"do": "open"}, self.program, _OPENING)
+        except GuestError as error:
+            self._failed = str(error)
+
+    def process(self, item: Any, context: Context) -> Any:  # noqa: ANN401 - any result
+        """Ask the guest's process; None, and an error once, if it has ended."""
+        _fired.pop((self.guest, self.key), None)
+        process = _processes.get(self.guest)
+        if process is None:
+            failed, self._failed = self._failed, ""
+            if failed:
+                raise ModelError(f"the guest {self.guest} did not start: {failed}")
+            return None
+        try:
+            vehicle = context.vehicle() if self.sees_vehicle else None
+            blob = pickle.dumps((item, vehicle), protocol=5)
+            request = {"do": "process", "key": self.key, "now": context.now(), "on": context.kind}
+            answer, _ = process.ask(request, blob, _ITEM)
+            return self._result(answer, context)
+        except GuestError as error:
+            if process.told:
+                return None
+            process.told = True
+            raise ModelError(f"the guest {self.guest} has been ended: {error}") from None
+
+    def close(self) -> None:
+        """End the guest's process."""
+        with _lock:
+            process = _processes.pop(self.guest, None) if self.program else None
+        if process is not None:
+            process.end()
+
+    def _result(self, answer: dict[str, Any], context: Context) -> Any:  # noqa: ANN401
+        for text in _texts(answer.get("alerts"))[: max(0, _ALERTS - self._alerts)]:
+            self._alerts += 1
+            header = Header(self._alerts, context.now(), self.guest)
+            context.alert(Alert(header, "guest", f"{self.guest}: {text}"))
+        failed = answer.get("failed")
+        if failed:
+            raise ModelError(f"guest {self.guest}: {str(failed)[:_TEXT]}")
+        result = decoded(answer.get("item"))
+        if self.navigates and not isinstance(result, AeroNavigation | None):
+            raise ItemError(
+                f"guest {self.guest}: {self.key} declares navigation and sent "
+                f"{type(result).__name__}"
+            )
+        fired = answer.get("fired")
+        numbers = fired if isinstance(fired, list) else []
+        _fired[self.guest, self.key] = frozenset(one for one in numbers if isinstance(one, int))
+        return result
+
+
+def _texts(found: object) -> list[str]:
+    return [str(one)[:_TEXT] for one in found] if isinstance(found, list) else []

@@ -1,0 +1,87 @@
+"""Channel of bounded messages between an owner's process and a guest's: JSON and one blob each."""
+
+from __future__ import annotations
+
+import json
+import socket
+import struct
+import time
+from typing import Any
+
+from aerodaas.types.errors import AeroDaaSError
+
+__all__ = ["LARGEST_BLOB", "LARGEST_TEXT", "Channel", "GuestError"]
+
+LARGEST_TEXT = 4 << 20
+"""Bytes of a message's JSON."""
+LARGEST_BLOB = 64 << 20
+"""Bytes of a message's blob: a program with its models, or a picture."""
+_HEAD = struct.Struct("<II")
+
+
+class GuestError(AeroDaaSError):
+    """A guest's process has ended, is silent, or sent what is no valid message."""
+
+
+class Channel:
+    """One end of a Unix socket pair."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        """Exchange messages over `connection`."""
+        self._socket = connection
+
+    def send(self, text: dict[str, Any], blob: bytes = b"", timeout: float | None = None) -> None:
+        """Send one message; raises GuestError if it is too large or not taken in time."""
+        data = json.dumps(text).encode()
+        if len(data) > LARGEST_TEXT or len(blob) > LARGEST_BLOB:
+            raise GuestError(f"a message of {len(data)} and {len(blob)} bytes is too large")
+        try:
+            self._socket.settimeout(timeout)
+            self._socket.sendall(_HEAD.pack(len(data), len(blob)) + data + blob)
+        except TimeoutError:
+            raise GuestError(f"took no message for {timeout:g} s") from None
+        except OSError as error:
+            raise GuestError(f"its process has ended ({error.strerror})") from None
+
+    def receive(self, timeout: float | None = None) -> tuple[dict[str, Any], bytes]:
+        """Receive one message; raises GuestError for none in time, and for a malformed one."""
+        until = None if timeout is None else time.monotonic() + timeout
+        text, blob = _HEAD.unpack(self._read(_HEAD.size, until))
+        if text > LARGEST_TEXT or blob > LARGEST_BLOB:
+            raise GuestError(
+                f"sent a message of {text} and {blob} bytes; the most are {LARGEST_TEXT} and "
+                f"{LARGEST_BLOB}"
+            )
+        data, rest = self._read(text, until), self._read(blob, until)
+        try:
+            found = json.loads(data)
+        except (ValueError, RecursionError):
+            raise GuestError("sent a message that is not JSON") from None
+        if not isinstance(found, dict):
+            raise GuestError("sent a message that is no JSON object")
+        return found, rest
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+    def _read(self, size: int, until: float | None) -> bytes:
+        data = bytearray()
+        while len(data) < size:
+            left = None if until is None else max(1e-3, until - time.monotonic())
+            try:
+                self._socket.settimeout(left)
+                part = self._socket.recv(min(1 << 20, size - len(data)))
+            except TimeoutError:
+                part = b""
+                if until is not None and time.monotonic() >= until:
+                    raise GuestError("did not answer in time") from None
+                continue
+            except OSError as error:
+                raise GuestError(f"its process has ended ({error.strerror})") from None
+            if not part:
+                raise GuestError("its process has ended")
+            data += part
+            if until is not None and time.monotonic() > until and len(data) < size:
+                raise GuestError("did not answer in time")
+        return bytes(data)

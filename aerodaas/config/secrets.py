@@ -1,0 +1,160 @@
+"""Secrets of a configuration: types that show themselves without it, and texts cleaned of it.
+
+A secret is a value of a secret type (`SecretStr`, `SecretUrl`), the value of a setting that is
+called like one (`password`, `token`, …), and what a URL holds beside its scheme, host and path.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from pydantic import BaseModel, Secret, SecretBytes, SecretStr
+
+__all__ = [
+    "HIDDEN",
+    "SecretUrl",
+    "cleaned",
+    "is_secret_name",
+    "plain",
+    "secret_texts",
+    "shown",
+    "shown_text",
+]
+
+HIDDEN = "**********"
+"""What stands in the place of a secret, as pydantic shows one."""
+_SCHEME = re.compile(r"[a-z][a-z0-9+.\-]*:/", re.IGNORECASE)
+_PARAMETERS = re.compile(r"[?#;=\s\"']")
+_NAME = re.compile(
+    r"(?:^|[_\-.])(?:\w*(?:passw(?:or)?d|passphrase|secret|token|credential|bearer|cookie)s?|"
+    r"pass|pwd|auth|authorization|login|key|pin|psk)(?:$|[_\-.])",
+    re.IGNORECASE,
+)
+_ABOUT = re.compile(r"[_\-.](?:env|file|header|id|name|path|timeout|type)$", re.IGNORECASE)
+"""Ends of names of settings that tell of a secret without holding it, such as `token_env`."""
+_SHORTEST = 4
+"""Characters below which a secret is not searched for in texts: it would be found everywhere."""
+
+
+class SecretUrl(Secret[str]):
+    """A path or URL that shows itself without user, password, query and fragment."""
+
+    def _display(self) -> str:
+        return shown_text(self.get_secret_value())
+
+
+def shown_text(text: str) -> str:
+    """Return `text` as it is, but a URL in it without user, password and parameters.
+
+    What stands before the last `@` is taken for user and password, for both may hold a `/`. What
+    follows the first `?`, `#`, `;` or `=` is left out, for some cameras have the password in the
+    path.
+    """
+    start = _SCHEME.search(text)
+    if start is None:
+        return text
+    before = _cut(text[: start.start()])
+    slashes = len(text[start.end() :]) - len(text[start.end() :].lstrip("/"))
+    end = start.end() + slashes
+    login, at, address = text[end:].rpartition("@")
+    # An @ behind parameters may be a password's or a parameter's: what follows is either.
+    shown_address = "***" if at and _PARAMETERS.search(login) else _cut(address)
+    return f"{before}{text[start.start() : end]}{shown_address}"
+
+
+def _cut(text: str) -> str:
+    found = _PARAMETERS.search(text.rstrip(" @"))
+    return text if found is None else f"{text[: found.start()]}?***"
+
+
+def is_secret_name(name: str) -> bool:
+    """Whether a setting of this name holds a secret: `password`, `api_key`, `mqtt_token`, …."""
+    words = re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name)
+    return _NAME.search(words) is not None and _ABOUT.search(words) is None
+
+
+def plain(value: object) -> Any:  # noqa: ANN401 - of any type
+    """Return the value of a secret; any other value as it is."""
+    return (
+        value.get_secret_value() if isinstance(value, Secret | SecretStr | SecretBytes) else value
+    )
+
+
+def shown(value: object, name: str = "") -> Any:  # noqa: ANN401, PLR0911 - as nested as its input
+    """Return settings without their secrets, of the same form and of JSON's types.
+
+    Args:
+        value: A setting, or settings in dicts and lists.
+        name: The setting's name; one that names a secret hides every value but None and "".
+
+    Returns:
+        The settings, with `HIDDEN` in the place of each secret and URLs as by `shown_text`.
+    """
+    if value is None or value == "" or isinstance(value, bool):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): shown(one, _longer(name, str(key))) for key, one in value.items()}
+    if isinstance(value, list | tuple | set | frozenset):
+        return [shown(one, name) for one in value]
+    if isinstance(value, SecretUrl):
+        return str(value)
+    if is_secret_name(name) or isinstance(value, Secret | SecretStr | SecretBytes):
+        return HIDDEN
+    if isinstance(value, BaseModel):
+        return shown(dict(value), name)
+    if isinstance(value, int | float):
+        return value
+    return shown_text(str(value))
+
+
+def _longer(name: str, key: str) -> str:
+    """The name by which a value is judged: what lies below a secret's name is secret, too."""
+    return name if is_secret_name(name) else key
+
+
+def secret_texts(value: object, name: str = "") -> Iterator[str]:  # noqa: C901 - one kind each
+    """Yield the secrets in settings as texts, the parts of URLs that are not shown among them."""
+    if isinstance(value, BaseModel):
+        value = dict(value)
+    if isinstance(value, Mapping):
+        for key, one in value.items():
+            yield from secret_texts(one, _longer(name, str(key)))
+    elif isinstance(value, list | tuple | set | frozenset):
+        for one in value:
+            yield from secret_texts(one, name)
+    elif isinstance(value, SecretBytes):
+        yield value.get_secret_value().decode("latin-1")
+    elif isinstance(value, SecretStr | Secret) and not isinstance(value, SecretUrl):
+        yield str(value.get_secret_value())
+    elif is_secret_name(name) and value is not None and not isinstance(value, bool):
+        yield str(value)
+    elif isinstance(value, str | SecretUrl):
+        text = str(plain(value))
+        if shown_text(text) != text:
+            yield from _parts(text)
+
+
+def _parts(url: str) -> Iterator[str]:
+    """A URL and its parts that are not shown, as a library's message may quote them singly."""
+    yield url
+    start = _SCHEME.search(url)
+    rest = url[start.end() :].lstrip("/") if start else url
+    login, at, address = rest.rpartition("@")
+    if at:
+        yield login
+        yield login.partition(":")[2]
+    found = _PARAMETERS.search(address)
+    if found is not None:
+        yield address[found.end() :]
+        for pair in re.split(r"[&;]", address[found.end() :]):
+            yield pair.partition("=")[2]
+
+
+def cleaned(text: str, value: object) -> str:
+    """Return `text`, such as a library's error message, without the secrets in `value`."""
+    for secret in sorted(set(secret_texts(value)), key=len, reverse=True):
+        if len(secret) >= _SHORTEST:
+            text = text.replace(secret, HIDDEN).replace(repr(secret)[1:-1], HIDDEN)
+    return text

@@ -1,0 +1,1 @@
+"""What a stranger wrote becomes checked values: chunks, index, messages, all within bounds."""

@@ -1,0 +1,54 @@
+"""Bounds of what is read from a recording, which may be a stranger's.
+
+A recording that keeps within them costs memory and time in proportion to its size on disk. What
+exceeds one is skipped and counted, or refused with the bound's name.
+"""
+
+from __future__ import annotations
+
+__all__ = [
+    "MAX_ATTACHMENT",
+    "MAX_CHANNELS",
+    "MAX_CHUNK",
+    "MAX_DEPTH",
+    "MAX_HELD",
+    "MAX_JSON",
+    "MAX_KEYS",
+    "MAX_METADATA",
+    "MAX_PIXELS",
+    "MAX_RATIO",
+    "MAX_SCANS",
+    "MAX_SIDE",
+    "MAX_UNPACKED",
+    "MAX_VIDEO_GROUP",
+]
+
+MAX_CHUNK = 128 << 20
+"""Bytes of a chunk once unpacked. Writers aim at 1 to 8 MB; a chunk with one raw 8K picture,
+which is larger than that, takes 100 MB."""
+MAX_RATIO = 200
+"""Bytes unpacked for each byte of the file. Flights' chunks reach 20, synthetic depth 100."""
+MAX_UNPACKED = 64 << 20
+"""Bytes that a file may unpack to beyond `MAX_RATIO`, so that a tiny one is not refused."""
+MAX_HELD = 256 << 20
+"""Bytes of messages held back to be put in order, where chunks overlap in time."""
+MAX_JSON = 32 << 20
+"""Bytes of a JSON message; objects take up to twenty times as many in memory."""
+MAX_DEPTH = 32
+"""Levels of nesting of a JSON message; ours have six, and Python's stack ends near 1000."""
+MAX_METADATA = 1 << 20
+"""Bytes of a metadata record; ours hold a few hundred."""
+MAX_ATTACHMENT = 64 << 20
+"""Bytes of an attachment: environments and sources take a few thousand, maps more."""
+MAX_CHANNELS = 4096
+"""Channels, and schemas, of a file; a flight has a few dozen for each robot."""
+MAX_PIXELS = 1 << 25
+"""Width times height of a picture, before it is decoded: 8K has 33.2 million, 100 MB as BGR."""
+MAX_SIDE = 1 << 14
+"""Pixels of a picture along one side, as many as H.264 allows."""
+MAX_SCANS = 100
+"""Passes of a progressive JPEG. Encoders make ten; each costs the time of a whole picture."""
+MAX_VIDEO_GROUP = 64 << 20
+"""Bytes of a video kept since its last key frame; a second of ours takes about one million."""
+MAX_KEYS = 256
+"""Robots, streams, cameras, actors and labels that a report tells apart, of each kind."""

@@ -1,0 +1,86 @@
+"""Wrong tokens and foreign names at the doors of the remote control and the camera's page."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import MutableMapping
+from typing import Any
+
+import pytest
+
+from aerodaas.analytics.remote.attempts import WrongTokens
+from aerodaas.analytics.remote.guard import Guard, HostGuard, Receive, Scope, Send, is_served
+
+TOKEN = "correct-horse-battery"  # noqa: S105 - this test's own
+
+
+async def _reached(_scope: Scope, _receive: Receive, send: Send) -> None:
+    await send({"type": "http.response.start", "status": 200, "headers": []})
+
+
+def _ask(
+    app: Guard | HostGuard, peer: str = "10.0.0.9", **headers: str
+) -> tuple[int, dict[bytes, bytes]]:
+    sent: list[dict[str, Any]] = []
+
+    async def receive() -> MutableMapping[str, Any]:
+        raise AssertionError("the body was read")
+
+    async def send(message: MutableMapping[str, Any]) -> None:
+        sent.append(dict(message))
+
+    pairs = [(name.encode(), value.encode()) for name, value in headers.items()]
+    scope = {"type": "http", "headers": pairs, "client": (peer, 1)}
+    asyncio.run(app(scope, receive, send))
+    return sent[0]["status"], dict(sent[0]["headers"])
+
+
+def test_wrong_tokens_are_slowed_and_told_once() -> None:
+    """From the eleventh on there is a pause to keep, and people hear of it; the right one works."""
+    told: list[str] = []
+    guard = Guard(_reached, TOKEN, told.append)
+    answers = [_ask(guard, authorization="Bearer wrong") for _ in range(60)]
+    assert [status for status, _ in answers[:10]] == [401] * 10
+    assert {status for status, _ in answers[10:]} == {429}
+    assert 1 <= int(answers[-1][1][b"retry-after"]) <= 60
+    assert told == ["remote control: 20 wrong tokens from 10.0.0.9"]
+    assert _ask(guard, authorization=f"Bearer {TOKEN}")[0] == 200
+    assert _ask(guard, "10.0.0.1", authorization=f"Bearer {TOKEN}")[0] == 200
+
+
+def test_many_peers_are_limited_together_and_forgotten() -> None:
+    """One alert for all of them; a minute later the counts begin anew."""
+    now, told = [0.0], list[str]()
+    wrong = WrongTokens(told.append, lambda: now[0])
+    pauses = [wrong.count(f"fd00::{index}:1:2:3:4") for index in range(1)]
+    pauses += [wrong.count(f"10.0.{index // 200}.{index % 200}") for index in range(5000)]
+    assert pauses[:100] == [0] * 100
+    assert min(pauses[101:]) >= 1
+    assert told == ["remote control: 100 wrong tokens from several addresses"]
+    now[0] = 61.0
+    assert wrong.count("10.0.0.1") == 0
+
+
+@pytest.mark.parametrize(
+    ("host", "origin", "status"),
+    [
+        ("127.0.0.1:8360", None, 200),
+        ("localhost:8360", "http://localhost:8360", 200),
+        ("rebound.example:8360", None, 403),
+        ("localhost:8360", "http://evil.example", 403),
+        ("localhost:8360", "null", 403),
+        ("", None, 403),
+    ],
+)
+def test_the_page_is_served_under_its_own_names(host: str, origin: str | None, status: int) -> None:
+    """A stranger's name that resolves to this machine is refused, and another page's script."""
+    headers = {"host": host} | ({} if origin is None else {"origin": origin})
+    assert _ask(HostGuard(_reached, "127.0.0.1"), **headers)[0] == status
+
+
+def test_names_where_every_interface_is_listened_on() -> None:
+    """Numeric addresses cannot be rebound."""
+    assert is_served("192.168.1.5", "::")
+    assert not is_served("192.168.1.5", "127.0.0.1")
+    assert not is_served("evil.example", "::")
+    assert is_served("drone.lan", "drone.lan")

@@ -1,0 +1,120 @@
+"""Feeds broken input to the project's readers: `python -m tools.fuzz TARGET...`."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from aerodaas.cli.app import run_typer
+from tools.fuzz.campaign import Result, fuzz, replay
+from tools.fuzz.limits import Limits
+from tools.fuzz.target import CORPUS, load_target, target_names
+
+app = typer.Typer(add_completion=False, rich_markup_mode="markdown", pretty_exceptions_enable=False)
+_DEFAULT = 10_000
+
+
+@app.command()
+def main(
+    targets: Annotated[list[str] | None, typer.Argument(help="`all` for each of them.")] = None,
+    *,
+    inputs: Annotated[
+        int | None, typer.Option(help="Inputs for each target; 10,000 without --seconds.", min=1)
+    ] = None,
+    seconds: Annotated[float | None, typer.Option(help="Seconds for each target.", min=0.1)] = None,
+    seed: Annotated[int, typer.Option(help="The same one makes the same inputs.", min=0)] = 0,
+    jobs: Annotated[int, typer.Option(help="Processes at once.", min=1)] = 1,
+    limit: Annotated[float, typer.Option(help="Processor's seconds of one input.")] = 2.0,
+    memory: Annotated[int, typer.Option(help="MiB of one input.")] = 512,
+    replay_: Annotated[
+        list[Path] | None, typer.Option("--replay", help="Run this input as it is; repeatable.")
+    ] = None,
+    list_: Annotated[bool, typer.Option("--list", help="Name the targets.")] = False,
+    output: Annotated[
+        Path, typer.Option(help="Folder of the findings, one below it for each target.")
+    ] = CORPUS,
+) -> None:
+    """Mutate valid inputs, and tell those that raise, hang, crash or exhaust memory.
+
+    Each finding is written below tests/fuzz/corpus, from where tests replay it. Ends with a JSON
+    summary, and with exit code 1 if anything was found.
+
+        python -m tools.fuzz plan gps_track --inputs 100000
+        nice -n 19 python -m tools.fuzz all --seconds 3600 --seed 7 --jobs 2
+    """
+    names = target_names() if targets == ["all"] else targets or []
+    if list_ or not names:
+        for name in target_names():
+            typer.echo(name)
+        return
+    for name in names:
+        load_target(name)  # a wrong name is told before an hour has passed
+    if inputs is None and seconds is None:
+        inputs = _DEFAULT
+    summary = {}
+    for name in names:
+        limits = Limits(limit, 5 * limit, memory * 2**20)
+        if replay_:
+            result = replay(name, [path.read_bytes() for path in replay_], limits)
+            summary[name] = _report(result, output / name)
+            continue
+        result = fuzz(
+            name,
+            inputs=inputs,
+            seconds=seconds,
+            seed=seed,
+            jobs=jobs,
+            limits=limits,
+            progress=_Line(),
+        )
+        summary[name] = _report(result, output / name)
+    typer.echo(json.dumps({"seed": seed, "targets": summary}, indent=2))
+    raise typer.Exit(any(one["findings"] for one in summary.values()))
+
+
+class _Line:
+    """A line of progress where somebody watches."""
+
+    _PERIOD = 0.5
+
+    def __init__(self) -> None:
+        self._shown = 0.0
+
+    def __call__(self, result: Result) -> None:
+        """Show it twice a second."""
+        now = time.monotonic()
+        if sys.stderr.isatty() and now - self._shown > self._PERIOD:
+            self._shown = now
+            sys.stderr.write(
+                f"\r{result.target}: {result.inputs} inputs in {result.seconds:.0f} s, "
+                f"{len(result.findings)} findings\x1b[K"
+            )
+            sys.stderr.flush()
+
+
+def _report(result: Result, folder: Path) -> dict[str, Any]:
+    """Write and print the findings; what the summary says of the target."""
+    if sys.stderr.isatty():
+        sys.stderr.write("\r\x1b[K")
+    told = []
+    for finding in result.findings:
+        path = finding.save(folder)
+        typer.echo(f"{result.target}: {finding.kind}: {path}\n{finding.trace}", err=True)
+        told.append({"kind": finding.kind, "error": finding.title, "file": str(path)})
+    return {
+        "inputs": result.inputs,
+        "seconds": round(result.seconds, 1),
+        "per_second": round(result.inputs / max(result.seconds, 1e-9)),
+        "findings": told,
+        "hangs": sum(finding.kind == "hang" for finding in result.findings),
+        "memory_growth_mib": round(result.growth / 2**20, 1),
+    }
+
+
+if __name__ == "__main__":
+    run_typer(app, "python -m tools.fuzz")

@@ -1,0 +1,126 @@
+"""What a guest's process sends its owner: messages of the channel, documents, and results."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import random
+import socket
+import struct
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.guests.document import (
+    GuestDocument,
+    GuestNavigation,
+    GuestNode,
+    GuestTrigger,
+    read_document,
+)
+from aerodaas.analytics.guests.items import ItemError, decoded, encoded
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.types.data import Detection, Detections, Header, Readings
+from aerodaas.types.errors import GraphError
+from aerodaas.types.guest_item import GuestItem
+from aerodaas.types.waypoints import VelocityCommand, Waypoint
+
+_HEAD = struct.Struct("<II")
+_VALUES: tuple[Any, ...] = (
+    None,
+    True,
+    -1,
+    10**30,
+    1e308,
+    float("nan"),
+    "",
+    "a" * 300,
+    [],
+    {},
+    {"is": "tuple"},
+)
+
+
+def seeds() -> Iterable[bytes]:
+    """Messages as a guest's process sends them."""
+    header = Header(1, 2, "drone/cam")
+    points = np.zeros((3, 3), np.float32)
+    people = (Detection((0.0, 1.0, 2.0, 3.0), "person", 0.5, keypoints=points),)
+    items: list[object] = [
+        Detections(header, people, 64, 48),
+        Readings(5, {"count": 1.0}),
+        AeroNavigation(data=[Waypoint("a", 1, 2, 3, yaw=0.5), VelocityCommand(1.0)]),
+        GuestItem,
+    ]
+    for item in items:
+        content = encoded(item, lambda _: GuestItem("Own", {"a": 1}, b"x"))
+        yield _message({"item": content, "fired": [0], "alerts": ["a"]})
+    node = GuestNode(
+        id="drone/a",
+        robot="drone",
+        inputs=["drone/cam"],
+        compute="edge",
+        navigation=True,
+        triggers=[GuestTrigger(target="drone", method="end_mission")],
+    )
+    flight = GuestNavigation(robot="drone", stream="drone/a", waypoints=[])
+    document = GuestDocument(version=1, nodes=[node], navigation=[flight])
+    yield _message({"document": document.model_dump(mode="json")})
+
+
+def run(data: bytes) -> None:
+    """Receive a message as the owner does, and read what it holds."""
+    ours, theirs = socket.socketpair()
+    with ours, theirs:
+        theirs.settimeout(0.0)
+        with contextlib.suppress(BlockingIOError):
+            theirs.send(data)
+        theirs.close()
+        try:
+            content, _ = Channel(ours).receive(1.0)
+        except GuestError:
+            return
+    with contextlib.suppress(ItemError):
+        decoded(content.get("item"))
+    with contextlib.suppress(GraphError):
+        read_document(content.get("document"))
+
+
+def mutate(data: bytes, rng: random.Random) -> bytes:
+    """Change one value of the JSON, and one byte now and then."""
+    size, _ = _HEAD.unpack_from(data) if len(data) >= _HEAD.size else (0, 0)
+    try:
+        content = json.loads(data[_HEAD.size : _HEAD.size + size])
+    except (ValueError, RecursionError):
+        return _flipped(data, rng)
+    places = list(_places(content))
+    if not places or rng.random() < 0.2:  # noqa: PLR2004 - a share
+        return _flipped(data, rng)
+    holder, key = rng.choice(places)
+    holder[key] = rng.choice([*_VALUES, holder[key], rng.choice(places)[0]])
+    try:
+        return _message(content)
+    except (ValueError, RecursionError):  # it holds itself
+        return _flipped(data, rng)
+
+
+def _message(content: Any) -> bytes:  # noqa: ANN401 - JSON
+    text = json.dumps(content).encode()
+    return _HEAD.pack(len(text), 0) + text
+
+
+def _flipped(data: bytes, rng: random.Random) -> bytes:
+    changed = bytearray(data)
+    if changed:
+        changed[rng.randrange(len(changed))] = rng.randrange(256)
+    return bytes(changed)
+
+
+def _places(content: Any) -> Iterable[tuple[Any, Any]]:  # noqa: ANN401 - JSON
+    if isinstance(content, dict | list):
+        keys = content if isinstance(content, dict) else range(len(content))
+        for key in keys:
+            yield content, key
+            yield from _places(content[key])

@@ -1,0 +1,137 @@
+"""Requests of a remote user to the service itself, which commands a flying mission.
+
+An input is a text of requests, one a line: a path, a space and a body.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Iterable
+from concurrent.futures import Future
+from typing import Any
+
+from aerodaas.analytics.remote.app import build_app
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.mission.commands import Answer, Command, OpenStream, StreamItem
+from aerodaas.types.data import Alert
+from aerodaas.types.status import MissionStatus
+from aerodaas.types.vehicle import VehicleState
+from tools.fuzz.flight import LIMITS, TURN, FuzzedFlight, require
+
+__all__ = ["run", "seeds"]
+
+_STREAM = "drone/remote"
+_REQUESTS = 8
+"""Most requests of one input that are made."""
+_TURNS = 12
+"""Turns of the setpoint loop after each request."""
+_CLIMB = 80
+"""Turns until the drone is on its way."""
+_OK = 200
+_SERVERS_FAULT = 500
+
+
+def seeds() -> Iterable[bytes]:
+    """Each kind of request, alone and after another."""
+    place = {"id": "a", "x": 3, "y": -2.5, "z": 2, "hover_duration": 1, "yaw": 0.5, "speed": 1}
+    far = {
+        "id": "b",
+        "x": 1,
+        "y": 1,
+        "z": 3,
+        "priority": 2,
+        "deadline": 100,
+        "waypoint_type": "local",
+    }
+    body = json.dumps({"waypoints": [place, far], "index": 1, "ordered": True})
+    yield f"/waypoints {body}\n/pause \n/resume ".encode()
+    yield f"/clear \n/waypoints {json.dumps({'waypoints': [place]})}\n/status ".encode()
+    yield b"/return-home \n/abort "
+    yield b"/frame.jpg \n/nothing {}"
+
+
+def run(data: bytes) -> None:
+    """Make the requests; the loop flies on, and what it sends stays within its limits."""
+    content = {"robots": [{"id": "drone", "limits": LIMITS}], "simulation": {"world": "empty"}}
+    config = EnvironmentConfig.model_validate(content)
+    robot = config.robots[0]
+    link = _Link(SimulatedVehicle(robot, config))
+    link.drone.connect()
+    link.flight = FuzzedFlight(link.drone, robot)
+    link.flight.mission.handle(OpenStream(_STREAM), 0)
+    link.turn(_CLIMB)
+    app = build_app(link, lambda: None)
+    for line in data.split(b"\n")[:_REQUESTS]:
+        path, _, body = line.partition(b" ")
+        method = "GET" if path in {b"/status", b"/frame.jpg"} else "POST"
+        code, answer = _ask(app, method, path, body)
+        require(code < _SERVERS_FAULT, f"an answer of code {code}")
+        if method == "POST":
+            require(answer["accepted"] == (code == _OK), "an answer that contradicts its code")
+        link.turn(_TURNS)
+    kinds = {alert.kind for alert in link.flight.mission.alerts}
+    require(not kinds & {"motors_stopped", "geofence", "turn_failed"}, f"alerts {kinds}")
+
+
+class _Link:
+    """Hands what the service asks to a mission of this process; see `MissionLink`."""
+
+    flight: FuzzedFlight
+
+    def __init__(self, vehicle: SimulatedVehicle) -> None:
+        self.drone = vehicle
+        self._now = 0
+
+    def turn(self, times: int) -> None:
+        for _ in range(times):
+            self._now += round(TURN * 1e9)
+            self.drone.advance_to(self._now)
+            self.flight.turn()
+
+    def status(self) -> MissionStatus | None:
+        return self.flight.mission.status
+
+    def vehicle(self) -> VehicleState | None:
+        return self.drone.read()
+
+    def command(self, command: Command) -> Future[Answer]:
+        future: Future[Answer] = Future()
+        future.set_result(self.flight.mission.handle(command, self._now))
+        return future
+
+    def fly(self, navigation: AeroNavigation, index: int | None = None) -> Future[Answer]:
+        return self.command(StreamItem(_STREAM, navigation, index=index, replaces=False))
+
+    def alert(self, alert: Alert) -> None:
+        require(alert.text.isprintable(), "an alert that cannot be printed")
+
+
+def _ask(app: Any, method: str, path: bytes, body: bytes) -> tuple[int, dict[str, Any]]:  # noqa: ANN401
+    """One request without a network: the status of the answer, and its JSON."""
+    sent: list[dict[str, Any]] = []
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.request", "body": body, "more_body": False}
+
+    async def send(message: dict[str, Any]) -> None:
+        sent.append(message)
+
+    scope = {
+        "type": "http",
+        "asgi": {"version": "3.0"},
+        "http_version": "1.1",
+        "method": method,
+        "path": path.decode("latin-1"),
+        "raw_path": path,
+        "root_path": "",
+        "scheme": "http",
+        "query_string": b"",
+        "headers": [(b"content-type", b"application/json")],
+    }
+    asyncio.run(app(scope, receive, send))
+    content = b"".join(message.get("body", b"") for message in sent)
+    answer = json.loads(content) if method == "POST" else {}
+    return sent[0]["status"], answer

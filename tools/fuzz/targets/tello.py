@@ -1,0 +1,272 @@
+"""Replies and state packets of a Tello, in flight, into the whole driver and its mission."""
+
+from __future__ import annotations
+
+import queue
+import random
+import re
+import struct
+from collections.abc import Callable, Iterable, Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from typing_extensions import Self
+
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.drivers.tello import handshake, link, vehicle
+from aerodaas.drivers.tello.link import TelloLink
+from aerodaas.drivers.tello.vehicle import TelloVehicle
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.status import MissionState
+from tools.fuzz.flight import (
+    LIMITS,
+    TURN,
+    FuzzedFlight,
+    ViolationError,
+    clock_of,
+    replaced,
+    require,
+)
+
+__all__ = ["mutate", "run", "seeds"]
+
+_ROBOT = RobotConfig.model_validate({"id": "t", "driver": "tello", "limits": LIMITS})
+_OWN = ("192.168.10.1", 8889)
+_STICKS = re.compile(r"rc (-?\d{1,3}) (-?\d{1,3}) (-?\d{1,3}) (-?\d{1,3})")
+_RECORD = struct.Struct(">BBH")
+"""What it is, turns until the next one, length of its body."""
+_REPLY, _STATE, _STRANGERS_REPLY, _STRANGERS_STATE = range(4)
+_QUIET = 0x80
+"""Bit of a record: the Tello itself sends no state until the next one."""
+_LONGEST_REST = 40
+_FULL = 100
+"""Percent."""
+_FIELDS = tuple("pitch roll yaw vgx vgy vgz templ temph tof h bat baro time".split())  # noqa: SIM905
+
+
+class _Rig:
+    """A Tello that rises at once and then says that it hovers; `now` is the clock."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+        self.quiet, self.height, self.motors = False, 0, 0.0
+        self.flies = False
+        self.commands: list[tuple[bytes, str, int]] = []
+        self.states: list[tuple[bytes, str, int]] = []
+        self.link: TelloLink | None = None
+        self.vehicle = TelloVehicle(_ROBOT, EnvironmentConfig(robots=[_ROBOT]))
+        self._turns = 0
+
+    def open(self, place: str, *_: object, **__: object) -> _Socket:
+        """As the system: one socket for commands, another one for states."""
+        return _Socket(self, self.states if place.endswith("state") else self.commands)
+
+    def obey(self, text: str) -> None:
+        """Obey what leaves the host, which must be safe."""
+        if text.startswith("rc "):
+            sticks = _STICKS.fullmatch(text)
+            if sticks is None:
+                raise ViolationError("sticks that are no four numbers")
+            require(all(abs(int(one)) <= _FULL for one in sticks.groups()), "sticks beyond 100 %")
+            return
+        require(text in {"command", "takeoff", "land", "sdk?"}, f"an unknown command: {text}")
+        if text == "takeoff":
+            self.flies, self.height = True, 100
+        elif text == "land":
+            self.flies, self.height = False, 0
+        self.commands.append((b"20" if text == "sdk?" else b"ok", *_OWN))
+
+    def advance(self, _: float = 0.0) -> None:
+        """Let a turn's time pass at both ends."""
+        self.now = round(self.now + TURN, 6)
+        self._turns += 1
+        self.motors += TURN * self.flies
+        if not self.quiet and self._turns % 2:
+            self.states.append((_state(h=self.height, time=int(self.motors)), *_OWN))
+        if self.link is not None:
+            self.link.turn()
+
+
+class _Socket:
+    """One of the host's sockets."""
+
+    def __init__(self, rig: _Rig, inbox: list[tuple[bytes, str, int]]) -> None:
+        self._rig = rig
+        self.inbox = inbox
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Stay open: nothing is held."""
+
+    def sendto(self, content: bytes, peer: tuple[str, int]) -> None:
+        """Send to the Tello, and to nobody else."""
+        require(peer == _OWN, "told a stranger")
+        self._rig.obey(content.decode("ascii"))
+
+
+class _Answers:
+    """A queue whose reader lets time pass."""
+
+    def __init__(self, rig: _Rig) -> None:
+        self._rig = rig
+        self._items: list[str | None] = []
+        self.put: Callable[[str | None], None] = self._items.append
+
+    def get(self, timeout: float) -> str | None:
+        """The next item, within `timeout` seconds of the clock."""
+        end = self._rig.now + timeout
+        while not self._items:
+            if self._rig.now >= end:
+                raise queue.Empty
+            self._rig.advance()
+        return self._items.pop(0)
+
+
+def _taken(source: _Socket) -> list[tuple[bytes, str, int]]:
+    arrived = source.inbox[:]
+    source.inbox.clear()
+    return arrived
+
+
+def run(data: bytes) -> None:
+    """Fly, hear what `data` says in flight, and check every setpoint and command."""
+    rig = _Rig()
+
+    def begin(started: TelloLink) -> None:
+        rig.link = started
+
+    def guard(*_: object) -> Any:  # noqa: ANN401
+        return SimpleNamespace(note=lambda **_: None, close=lambda: None)
+
+    queues = SimpleNamespace(SimpleQueue=lambda: _Answers(rig), Empty=queue.Empty)
+    clock = clock_of(rig, rig.advance)
+    with replaced(
+        *((module, "time", clock) for module in (handshake, link, vehicle)),
+        (handshake, "queue", queues),
+        (link, "bound_socket", rig.open),
+        (link, "datagrams", _taken),
+        (link, "DeadMan", guard),
+        (TelloLink, "_start", begin),
+    ):
+        records = list(_records(data))
+        if records and records[0][0] & _QUIET:
+            # Some inputs begin before the handshake.
+            _hear(rig, *records[0])
+        try:
+            rig.vehicle.connect(3.0)
+        except VehicleError:
+            return
+        try:
+            _fly(rig, records)
+        finally:
+            rig.quiet = False
+            rig.vehicle.close()
+
+
+def _fly(rig: _Rig, records: list[tuple[int, int, bytes]]) -> None:
+    flight = FuzzedFlight(rig.vehicle, _ROBOT)
+    for _ in range(60):
+        _turn(rig, flight)
+        if flight.state is MissionState.ENROUTE:
+            break
+    for kind, rest, body in records:
+        _hear(rig, kind, rest, body)
+        rig.quiet = bool(kind & _QUIET)
+        for _ in range(1 + rest % _LONGEST_REST):
+            _turn(rig, flight)
+
+
+def _turn(rig: _Rig, flight: FuzzedFlight) -> None:
+    rig.advance()
+    flight.turn()
+    require(np.isfinite(rig.vehicle.read().odometry.position).all(), "a position that is no number")
+
+
+def _hear(rig: _Rig, kind: int, _: int, body: bytes) -> None:
+    host, port = ("192.168.10.66", 8889) if kind & 2 else _OWN
+    inbox = rig.states if kind & 1 == _STATE else rig.commands
+    inbox.append((body, host, port))
+
+
+def _state(**fields: object) -> bytes:
+    known = {"templ": 60, "temph": 63, "tof": 10, "bat": 80, "baro": "100.5", **fields}
+    return "".join(f"{name}:{known.get(name, 0)};" for name in _FIELDS).encode() + b"\r\n"
+
+
+def _records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
+    place = 0
+    while len(data) - place >= _RECORD.size:
+        kind, rest, length = _RECORD.unpack_from(data, place)
+        place += _RECORD.size
+        yield kind, rest, data[place : place + length % 2000]
+        place += length
+
+
+def _record(kind: int, rest: int, body: bytes) -> bytes:
+    return _RECORD.pack(kind, rest, len(body)) + body
+
+
+def seeds() -> Iterable[bytes]:
+    """States and replies in flight, a stranger's, a silence, a fall, and a garbled packet."""
+    yield _record(_STATE, 3, _state(h=100, vgx=3, yaw=20)) + _record(_REPLY, 3, b"error Motor stop")
+    yield _record(_STRANGERS_STATE, 3, _state(bat=1)) + _record(_STRANGERS_REPLY, 3, b"ok")
+    yield _record(_STATE | _QUIET, 38, _state(h=100)) + _record(_STATE, 2, _state(h=90))
+    yield _record(_STATE, 1, _state(h=90, vgz=40)) + _record(_STATE, 30, _state(h=0))
+    yield _record(_STATE, 5, b"pitch:0;roll:0;bat:1e9;\xff\xfe") + _record(_REPLY, 1, b"\xff")
+    yield _record(_STATE, 2, _state(temph=90, bat=5)) + _record(_REPLY, 2, b"ok")
+
+
+_VALUES = (
+    "nan",
+    "-inf",
+    "1e309",
+    "-1",
+    "0",
+    "101",
+    "180",
+    "300",
+    "-300",
+    "-10000",
+    "1000",
+    "",
+    "٣",
+)
+_REPLIES = (b"ok", b"error", b"out of range", b"20", b"", b"ok\0", b"error Auto land", b"OK" * 700)
+
+
+_SENT = (_STATE, _STATE, _STATE, _STRANGERS_STATE, _REPLY, _STRANGERS_REPLY)
+
+
+def mutate(data: bytes, rng: random.Random) -> bytes:
+    """Insert packets of extreme values, drop records, change fields, waits and senders."""
+    found = list(_records(data))
+    for _ in range(rng.randint(1, 4)):
+        index = rng.randrange(len(found)) if found else 0
+        kind, rest, body = found[index] if found else (0, 0, b"")
+        match rng.randrange(5) if found else 0:
+            case 0 | 1:
+                kind = rng.choice(_SENT)
+                said = _values(rng) if kind & 1 == _STATE else rng.choice(_REPLIES)
+                found.insert(index, (kind, rng.randrange(6), said))
+            case 2:
+                del found[index]
+            case 3:
+                kind = rng.choice((kind, kind ^ _QUIET, kind & _QUIET | rng.randrange(4)))
+                found[index] = (kind, rng.choice((rest, 0, _LONGEST_REST - 1)), body)
+            case _:
+                place = rng.randrange(len(body) + 1)
+                found[index] = (kind, rest, body[:place] + _value(rng) + body[place + 1 :])
+    return b"".join(_record(*one) for one in found[:30])
+
+
+def _values(rng: random.Random) -> bytes:
+    names = rng.sample(_FIELDS, rng.randint(1, 5))
+    return _state(**{"h": 100, **{name: _value(rng).decode() for name in names}})
+
+
+def _value(rng: random.Random) -> bytes:
+    whole = str(rng.randint(-320, 320))
+    return rng.choice((whole, rng.choice(_VALUES))).encode()

@@ -1,0 +1,1 @@
+"""Tests the wheel on each Python that is found: `python -m tools.matrix`."""
