@@ -28,8 +28,6 @@ _STORE_BYTES = 128 * 2**20
 """Bytes of Ray's object store; streams use shared memory of their own."""
 _ADDRESS = "127.0.0.1"
 """Loopback address: no other machine reaches it, and a lost Wi-Fi breaks no connection."""
-_SPELLED = "[::ffff:127.0.0.1]"
-"""The same address, in the form that Ray does not replace by one of the machine's network."""
 _LOOPBACK = {
     # Ray's processes then take 127.0.0.1 for the address of the machine, and listen there only.
     "RAY_ENABLE_WINDOWS_OR_OSX_CLUSTER": "0",
@@ -80,7 +78,7 @@ class LocalRay:
                     "it does not take the loopback address; its token keeps others out",
                     stacklevel=2,
                 )
-            self._address = f"{_SPELLED if host == _ADDRESS else host}:{port}"
+            self._address = f"{host}:{port}"
         return self._address
 
     def end(self) -> None:

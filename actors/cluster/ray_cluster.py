@@ -42,6 +42,8 @@ _ACCELERATOR_TYPE = "accelerator_type:"
 """Prefix of the resource by which Ray tells an accelerator's product name."""
 _SHARE = 0.001
 """Amount of a node's `edge` or `cloud` resource per actor, for placement only."""
+_LOOPBACK = "[::ffff:127.0.0.1]"
+"""127.0.0.1, written as an IPv6 address."""
 _NAMESPACE = "aerodaas"
 """Ray namespace for the names of actors that outlive their application."""
 
@@ -107,11 +109,21 @@ def _init(address: str) -> None:
     quiet: dict[str, Any] = {"logging_level": logging.ERROR, "log_to_driver": False}
     try:
         with hushed(), _fatal_only():
-            ray.init(address=address, namespace=_NAMESPACE, **quiet)
+            ray.init(address=_as_it_is(address), namespace=_NAMESPACE, **quiet)
     except (ConnectionError, RuntimeError, ValueError) as error:
         reason = str(error).strip().splitlines()[0]
         raise _unreachable(address, reason) from None
     silence_nodes()
+
+
+def _as_it_is(address: str) -> str:
+    """`address` in a form that Ray keeps.
+
+    Ray replaces a loopback address by the machine's in its network, where a head that listens on
+    loopback only does not answer.
+    """
+    host, _, port = address.rpartition(":")
+    return f"{_LOOPBACK}:{port}" if host in {"127.0.0.1", "localhost"} else address
 
 
 @contextlib.contextmanager
