@@ -17,7 +17,7 @@ from aerodaas.actors.stream_names import is_guest_actor
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import EnvironmentConfig, TaskConfig
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.environment.signals import TerminatedError, raise_on_termination
+from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_termination
 from aerodaas.mission.commands import Answer, Command, End
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import (
@@ -358,7 +358,7 @@ class Run:
     def abandon(self) -> None:
         """Land and stop: the application has ended without waiting."""
         if not self._finished.is_set() and self._flight is not None and self._flight.reachable:
-            self._land("the application ended")
+            self._land(end_of_application())
             self._finish()
 
     def _raise_problems(self) -> None:

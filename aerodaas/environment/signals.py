@@ -9,7 +9,9 @@ import threading
 from pathlib import Path
 from types import FrameType
 
-__all__ = ["TerminatedError", "raise_on_termination"]
+__all__ = ["TerminatedError", "end_of_application", "raise_on_termination"]
+
+_received: TerminatedError | None = None
 
 
 class TerminatedError(SystemExit):
@@ -33,8 +35,15 @@ def raise_on_termination() -> None:
             signal.signal(number, _raise)
 
 
+def end_of_application() -> str:
+    """Reason of a flight's end for an application that has ended without waiting for it."""
+    return _received.reason if _received else "the application ended"
+
+
 def _raise(number: int, _: FrameType | None) -> None:
+    global _received  # noqa: PLW0603 - a signal is sent to the whole process
     if number == signal.SIGHUP:
         # Output has no reader from now on, and writing to a closed terminal fails.
         sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for good
-    raise TerminatedError(number)
+    _received = TerminatedError(number)
+    raise _received

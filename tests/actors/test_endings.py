@@ -124,6 +124,18 @@ def test_an_interrupted_run_lands(
     require_gone(processes, 20.0)
 
 
+def test_terminated_in_its_own_code(tmp_path: Path) -> None:
+    """A signal that comes before `wait()`, or without one, is the reason all the same."""
+    with running(tmp_path, "time.sleep(300)") as process:
+        airborne(process)
+        process.send_signal(signal.SIGTERM)
+        _, said = process.communicate(timeout=120)
+        assert process.returncode == 143, said
+    flight = landed(tmp_path)
+    reasons = [band.reason for band in flight.robots["drone"].bands if band.state == "landing"]
+    assert reasons == ["received SIGTERM"]
+
+
 def test_a_second_interrupt_leaves_the_drone_to_itself(tmp_path: Path) -> None:
     """The application returns at once and says so; the drone lands, and then nothing is left."""
     with running(tmp_path, "drone.wait()") as process:
