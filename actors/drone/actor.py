@@ -11,6 +11,7 @@ from typing import Any
 from aerodaas.actors.base import ActorInfo, StreamActor
 from aerodaas.actors.cluster.run_lock import RunLock
 from aerodaas.actors.drone.background_publisher import BackgroundPublisher
+from aerodaas.actors.drone.change_signal import ChangeSignal
 from aerodaas.actors.drone.loop_calls import LoopCalls, LoopOverError
 from aerodaas.actors.drone.robot_report import RobotReport
 from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
@@ -31,7 +32,7 @@ from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.status import Message
 from aerodaas.types.vehicle import VehicleState
 
-__all__ = ["ANSWER_TIMEOUT", "COMMANDS", "DroneActor"]
+__all__ = ["ANSWER_TIMEOUT", "CHANGES", "COMMANDS", "DroneActor"]
 
 _APPLICATION_TIMEOUT = 5.0
 """Seconds without a heartbeat of the application's process after which the drone returns home."""
@@ -39,6 +40,8 @@ ANSWER_TIMEOUT = 4.0
 """Wall seconds within which the loop must execute a command; less than the sender's timeout."""
 COMMANDS = "commands"
 """Concurrency group of an actor for commands only, which wait for the loop."""
+CHANGES = "changes"
+"""Concurrency group of an actor for the call of the application that waits for a change."""
 
 
 class DroneActor(StreamActor):
@@ -66,6 +69,7 @@ class DroneActor(StreamActor):
         self._controllers: dict[str, VehicleController] = {}
         self._reports: dict[str, RobotReport] = {}
         """Newest report of each robot: replaced by the loop, never mutated."""
+        self._changes = ChangeSignal()
         self._calls = LoopCalls(self._wake, self._publish_reports)
         self._publisher = BackgroundPublisher(self._unpublished)
         self._late = 0
@@ -161,12 +165,22 @@ class DroneActor(StreamActor):
             for name, report in self._reports.items()
         }
 
+    def await_change(self, known: int, timeout: float) -> int:
+        """Return the number of changes of the missions once it is not `known`.
+
+        Returns it after `timeout` wall seconds at the latest. A change is one of a mission's state,
+        its reason, waypoints or faults, an alert, and the end. The call is no heartbeat: it may
+        have been made before the application froze.
+        """
+        return self._changes.wait(known, timeout)
+
     def _publish_reports(self) -> None:
         """Replace the robots' reports; in the loop's thread only."""
         self._reports = {
             name: RobotReport(controller.status, controller.state, ())
             for name, controller in self._controllers.items()
         }
+        self._changes.note((self.alerts.sent, *map(_notable, self._reports.values())))
 
     def _wake(self) -> None:
         if self.subscriber is not None:
@@ -246,6 +260,10 @@ class DroneActor(StreamActor):
         text = f"{count} messages of the setpoint loop were not published: too many waited"
         self.alert("unpublished", text)
 
+    def _guard(self) -> None:
+        super()._guard()
+        self._changes.end()
+
     def _fail(self, error: AeroDaaSError) -> None:
         for controller in self._controllers.values():
             controller.abandon()
@@ -273,6 +291,12 @@ def _streams(robots: tuple[RobotSpec, ...]) -> list[str]:
     """Streams that the actor of these robots reads."""
     streams = [stream for robot in robots for stream in (*robot.navigation, *robot.commands)]
     return streams + [request_stream(node) for robot in robots for node in robot.requesters]
+
+
+def _notable(report: RobotReport) -> tuple[object, ...]:
+    """What of a report the application is told at once, rather than at its next look."""
+    status = report.status
+    return status.state, status.reason, len(status.visited), len(status.given_up), status.faults
 
 
 def _neighbour(state: VehicleState) -> Neighbour:

@@ -8,7 +8,10 @@ from dataclasses import dataclass
 from aerodaas.types.status import MissionStatus
 from aerodaas.types.vehicle import VehicleState
 
-__all__ = ["Latencies", "RobotReport"]
+__all__ = ["LATENCIES_KEPT", "Latencies", "RobotReport"]
+
+LATENCIES_KEPT = 20_000
+"""A quarter of an hour's at 20 Hz, or ten minutes' of a fast camera."""
 
 
 @dataclass(frozen=True)
@@ -22,14 +25,16 @@ class RobotReport:
 
 
 class Latencies:
-    """Append-only list of latencies, written by one thread and read by others."""
+    """The newest latencies, appended by one thread and read by others."""
 
     def __init__(self) -> None:
         self._values = array("d")
 
     def append(self, value: float) -> None:
-        """Append the newest value."""
+        """Append the newest value; of the others, at least the newest `LATENCIES_KEPT` stay."""
         self._values.append(value)
+        if len(self._values) > 2 * LATENCIES_KEPT:
+            del self._values[:-LATENCIES_KEPT]
 
     def newest(self, count: int) -> tuple[float, ...]:
         """The newest `count` values, newest last."""

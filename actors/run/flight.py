@@ -6,6 +6,8 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import FIRST_COMPLETED, Future
+from concurrent.futures import wait as wait_for
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, cast
@@ -22,7 +24,7 @@ from aerodaas.actors.cluster.ray_cluster import Placement, nodes_at, options_for
 from aerodaas.actors.dispatch.executor import CloudExecutor
 from aerodaas.actors.dispatch.offload import CloudProcess
 from aerodaas.actors.dispatch.remote_executor import Executor
-from aerodaas.actors.drone.actor import COMMANDS, DroneActor
+from aerodaas.actors.drone.actor import CHANGES, COMMANDS, DroneActor
 from aerodaas.actors.drone.robot_report import RobotReport
 from aerodaas.actors.isolation import isolation_options
 from aerodaas.actors.run.actor_classes import actor_classes
@@ -49,6 +51,8 @@ _GROWING = 10.0
 _SILENT_FOR = 30.0
 """Seconds without an answer of a drone's actor after which the run has failed; it flies on."""
 _REPORT_INTERVAL = 0.5
+_HELD = 10.0
+"""Wall seconds for which a drone's actor holds a call that waits for a change."""
 _RESTARTS = 3
 _LOOKS = 2
 """Concurrent calls of a cloud executor reserved for probes and pings."""
@@ -126,6 +130,10 @@ class Flight:
         self._answers: dict[str, tuple[float, dict[str, RobotReport]]] = {}
         """Time (monotonic seconds) and content of each drone actor's last answer."""
         self._next_reports = 0.0
+        self._changes: dict[str, int] = {}
+        """Changes of each drone's actor that are known."""
+        self._awaited: dict[str, Future[int]] = {}
+        """The pending call to each drone's actor that returns with the next one."""
         self._stopped = False
 
     def __enter__(self) -> Self:
@@ -176,6 +184,23 @@ class Flight:
             robots.update(self._robots_of(name, newest))
         over = all(self._members[name].report.phase in {"done", "failed"} for name in self._ids())
         return FlightState(robots, self.reports(), over)
+
+    def await_change(self, timeout: float) -> None:
+        """Return once a mission has changed, or after `timeout` seconds; for one thread only.
+
+        One call is pending in each drone's actor. That of an actor that has died returns at once:
+        the next `poll` raises the error.
+        """
+        for name in self._ids() - set(self._awaited):
+            method = self._members[name].handle.await_change.options(concurrency_group=CHANGES)
+            self._awaited[name] = method.remote(self._changes.get(name, 0), _HELD).future()
+        # An answer may be late, or never come, without delaying the application's heartbeat.
+        wait_for(self._awaited.values(), timeout, FIRST_COMPLETED)
+        for name, awaited in [one for one in self._awaited.items() if one[1].done()]:
+            del self._awaited[name]
+            if awaited.exception() is None and awaited.result() != self._changes.get(name, 0):
+                self._changes[name] = awaited.result()
+                self._next_reports = 0.0
 
     def _robots_of(self, name: str, newest: int) -> dict[str, RobotReport]:
         """Reports of a drone's actor; the last ones while it is too busy to answer."""
@@ -371,7 +396,7 @@ class Flight:
         remote: Any = ray.remote
         # Pending calls, of the liveness monitor or for the loop, must not block others.
         groups = {LIFE: LIFELINES} if restarts else {}
-        groups |= {COMMANDS: 1} if issubclass(kind, DroneActor) else {}
+        groups |= {COMMANDS: 1, CHANGES: 1} if issubclass(kind, DroneActor) else {}
         if groups:
             remote = remote(concurrency_groups=groups)
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}

@@ -40,8 +40,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Run"]
 
-_POLL_SECONDS = 0.1
+_LOOK_SECONDS = 1.0
+"""Wall seconds between two looks at missions in which nothing changes."""
+_VIEW_SECONDS = 0.25
+"""The same where a terminal shows them move."""
 _BEAT_SECONDS = 1.0
+_BEAT_AGE = 1.5
+"""Wall seconds after the last look at which a heartbeat needs one of its own."""
 _LANDING_SECONDS = 60.0
 """Wall seconds for the drones to land after an interruption."""
 _RECORDING = "flight.mcap"
@@ -67,6 +72,7 @@ class Run:
         self._polling = threading.Lock()
         self._began = time.monotonic()
         self._launched = self._began
+        self._looked = 0.0
 
     @property
     def lockstep(self) -> bool:
@@ -184,6 +190,7 @@ class Run:
         """Return the present state, with the `newest` latencies of each robot."""
         assert self._flight is not None  # noqa: S101 - launched
         with self._polling:
+            self._looked = time.monotonic()
             self.state = self._flight.poll(newest)
         self._over = self.state.over
         return self.state
@@ -191,6 +198,8 @@ class Run:
     def _keep_alive(self) -> None:
         """Send the drones heartbeats, also while the application is busy."""
         while not self._finished.wait(_BEAT_SECONDS):
+            if time.monotonic() - self._looked < _BEAT_AGE:
+                continue
             # The thread that waits for the run meets the same error and handles it.
             with contextlib.suppress(AeroDaaSError):
                 self.look()
@@ -312,7 +321,7 @@ class Run:
                 watching.update(state)
                 if state.over:
                     return
-                time.sleep(_POLL_SECONDS)
+                self._flight.await_change(_VIEW_SECONDS if watching.moves else _LOOK_SECONDS)
 
     def _land(self, reason: str) -> None:
         """Land every drone, and wait for a limited time."""

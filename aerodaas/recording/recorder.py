@@ -20,6 +20,7 @@ from mcap.writer import Writer
 from typing_extensions import Self
 
 from aerodaas.config.model import GeofenceConfig, RecordingConfig
+from aerodaas.recording.chunk_indexes import keep_chunk_indexes_on_disk
 from aerodaas.recording.converters import Session, convert
 from aerodaas.recording.converters.notes import log_entry
 from aerodaas.recording.converters.plan import fence_entries
@@ -92,6 +93,7 @@ class FlightRecorder:
         self._live = live
         self._output = Output(self.path)
         self._writer = Writer(self._output, chunk_size=_CHUNK)  # type: ignore[arg-type]
+        keep_chunk_indexes_on_disk(self._writer, self.path.parent)
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
         self._counts: Counter[str] = Counter()

@@ -61,7 +61,7 @@ class FlightView:
         self._view = MissionView() if options.view else None
         self._errors = Console(stderr=True, highlight=False, soft_wrap=True)
         self._printed: set[tuple[str, int, int]] = set()
-        """Alerts, by source, number and stamp."""
+        """The newest alerts, by source, number and stamp."""
         self._began = time.monotonic()
         self._before: tuple[float, dict[str, int]] = (0.0, {})
         self._rates: dict[str, float] = {}
@@ -79,6 +79,11 @@ class FlightView:
     ) -> None:
         if self._view is not None:
             self._view.__exit__(kind, error, traceback)
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is redrawn on a terminal, rather than printed line by line."""
+        return self._view is not None and self._view.live
 
     def update(self, state: FlightState) -> None:
         """Show the flight's present state."""
@@ -105,10 +110,11 @@ class FlightView:
 
     def _print_alerts(self, state: FlightState) -> None:
         """Without a view, a line for each alert as it comes."""
+        before, self._printed = self._printed, set()
         for alert in state.alerts:
             key = alert.header.source, alert.header.id, alert.header.stamp
-            if key not in self._printed:
-                self._printed.add(key)
+            self._printed.add(key)
+            if key not in before:
                 time_text = f"{seconds(alert.header.stamp):.1f} s"
                 self._errors.print(f"{time_text} {alert.header.source}: {alert.text}", markup=False)
 

@@ -64,6 +64,11 @@ class MissionView:
         elif self._last is not None:
             self._print(self._last)
 
+    @property
+    def live(self) -> bool:
+        """Whether it redraws itself in place, as on a terminal."""
+        return self._live is not None
+
     def update(self, snapshot: Snapshot) -> None:
         """Show `snapshot`."""
         self._last = snapshot

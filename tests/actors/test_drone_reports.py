@@ -13,8 +13,9 @@ from drone_by_hand import DroneByHand, drone_by_hand
 from flying import hop
 
 from aerodaas import AeroNavigation, NavigationType, Waypoint
+from aerodaas.actors.drone.change_signal import ChangeSignal
 from aerodaas.actors.drone.loop_calls import LoopCalls, LoopOverError
-from aerodaas.actors.drone.robot_report import Latencies
+from aerodaas.actors.drone.robot_report import LATENCIES_KEPT, Latencies
 from aerodaas.mission.commands import AddNavigation, ClearNavigation, End
 from aerodaas.types.errors import MissionError
 from aerodaas.types.status import MissionState
@@ -162,6 +163,52 @@ def test_the_newest_latencies_are_given_in_their_order() -> None:
     assert known.newest(2) == (2.0, 3.0)
     assert known.newest(9) == (1.0, 2.0, 3.0)
     assert known.newest(0) == ()
+
+
+def test_latencies_kept_do_not_grow_with_the_flight() -> None:
+    """The newest are kept, however many there were."""
+    known = Latencies()
+    for value in range(5 * LATENCIES_KEPT):
+        known.append(float(value))
+    kept = known.newest(10 * LATENCIES_KEPT)
+    assert LATENCIES_KEPT <= len(kept) <= 2 * LATENCIES_KEPT
+    assert kept[-1] == 5 * LATENCIES_KEPT - 1
+    assert kept == tuple(float(value) for value in range(int(kept[0]), 5 * LATENCIES_KEPT))
+
+
+def test_a_change_is_told_to_a_call_that_waits() -> None:
+    """A command's effect answers the call, which otherwise waits; the end answers it, too."""
+    actor = drone_by_hand(AddNavigation(hop((1, 0))), speed=1.0, mission=_HOLD)
+    actor.start(actor.session.origin_ns)
+    known = 0
+    while actor.robots()["drone"].status.state is not MissionState.TAKING_OFF:
+        known = actor.await_change(known, 60.0)
+    with ThreadPoolExecutor(1) as pool:
+        known = actor.await_change(-1, 60.0)
+        waiting = pool.submit(actor.await_change, known, 60.0)
+        assert actor.command("drone", End()).accepted
+        assert waiting.result() > known
+        while actor.report().phase == "running":
+            known = actor.await_change(known, 60.0)
+    # Landing is refused where the motors have not started yet.
+    ended = {MissionState.LANDED, MissionState.ABORTED}
+    assert actor.robots()["drone"].status.state in ended
+    assert actor.await_change(known, 60.0) >= known
+    actor.stop()
+
+
+def test_a_call_that_waits_for_a_change_returns_without_one() -> None:
+    """The same value is no change, and one that was missed answers at once."""
+    signal = ChangeSignal()
+    signal.note("here")
+    assert signal.wait(0, 60.0) == 1
+    signal.note("here")
+    assert signal.wait(1, 0.01) == 1
+    signal.note("there")
+    assert signal.wait(1, 60.0) == 2
+    signal.end()
+    assert signal.wait(2, 60.0) == 3
+    assert signal.wait(3, 60.0) == 3
 
 
 def test_an_alert_in_the_same_words_is_told_again_only_after_a_while() -> None:
