@@ -190,7 +190,7 @@ def test_a_change_is_told_to_a_call_that_waits() -> None:
         assert waiting.result() > known
         while actor.report().phase == "running":
             known = actor.await_change(known, 60.0)
-    # Landing is refused where the motors have not started yet.
+    # Aborted if it was asked to land before it had taken off.
     ended = {MissionState.LANDED, MissionState.ABORTED}
     assert actor.robots()["drone"].status.state in ended
     assert actor.await_change(known, 60.0) >= known
