@@ -58,7 +58,7 @@ def _model(output: np.ndarray, metadata: dict[str, str]) -> bytes:
     ]
     constants = [
         numpy_helper.from_array(output, "boxes"),
-        numpy_helper.from_array(np.float32(0), "nothing"),
+        numpy_helper.from_array(np.zeros((), np.float32), "nothing"),
     ]
     graph = helper.make_graph(
         nodes,
