@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from aerodaas.actors.run.checks import check_environment, sensor_properties
 from aerodaas.config.model import ComputeConfig, EnvironmentConfig, RobotConfig, SensorConfig
@@ -27,6 +27,9 @@ from aerodaas.schedulers.trajectory.base import NavigationEntry, TrajectorySched
 from aerodaas.types.errors import ConfigError, GraphError, MissionError, UnknownIdError
 from aerodaas.types.identifiers import find_scoped
 from aerodaas.types.waypoints import Waypoint
+
+if TYPE_CHECKING:
+    from aerodaas.environment.guests import GuestNote
 
 __all__ = ["Environment", "Robot"]
 
@@ -61,8 +64,8 @@ class Environment(PaperNames, IEnvironment):
             local = self.path if options.environment is not None else None
             config = overridden(replay_environment(options.replay, local), options.overrides)
         self.config: EnvironmentConfig = located(config, self.path.parent)
-        self.refused_guests: list[str] = []
-        """Reasons of the guests that do not take part."""
+        self.guest_notes: list[GuestNote] = []
+        """What the owner is to be told of guests once a recording is open."""
         check_environment(self.config, str(options.replay or self.path))
         self.env_data = self.config.model_dump(by_alias=True)
         """The environment file's content, for analyses that want it."""
@@ -306,7 +309,7 @@ class Environment(PaperNames, IEnvironment):
         if options.guests:
             from aerodaas.environment.guests import admit_guests  # noqa: PLC0415 - only with guests
 
-            self.refused_guests = admit_guests(options, self)
+            self.guest_notes = admit_guests(options, self)
 
     def _require_granted(self, robot: str, line: str = "") -> None:
         """Raise GraphError, with the line, if a guest would navigate what it was not granted."""

@@ -9,9 +9,9 @@ hangs is left out, and told by name.
 from __future__ import annotations
 
 import pickle
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from aerodaas.analytics.guests.analysis import GuestAnalysis, GuestCondition
 from aerodaas.analytics.guests.channel import GuestError
@@ -36,40 +36,52 @@ from aerodaas.types.waypoints import NavigationType, SchedulingType
 if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment
 
-__all__ = ["admit_guests"]
+__all__ = ["GuestNote", "admit_guests"]
 
 _BUILD_SECONDS = 60.0
 _BUILD_CPU = 60
+_UNCONFINED = (
+    "this machine grants no namespaces, so the guest {name} can use the network, read this user's "
+    "files and end this user's processes: strangers' code needs a user of its own "
+    "(docs/security.md)"
+)
 _REASON = 1000
 """Most characters of a refusal, which may hold a guest's words."""
 
 
-def admit_guests(options: RunOptions, host: Environment) -> list[str]:
-    """Let each guest's dataflow join the `host`'s; returns the reasons of those left out.
+class GuestNote(NamedTuple):
+    """What the owner is told of a guest: the kind of the alert, and its text."""
 
-    Raises ConfigError for what the owner has wrong: a missing file, an unknown guest or right.
+    kind: str
+    text: str
+
+
+def admit_guests(options: RunOptions, host: Environment) -> list[GuestNote]:
+    """Let each guest's dataflow join the `host`'s; returns what the owner is to be told of them.
+
+    That is the reason of each guest that is left out (`guest_refused`), and which ones this machine
+    could not confine (`guest_unconfined`). Raises ConfigError for what the owner has wrong: a
+    missing file, an unknown guest or right.
     """
     names = _names(options.guests)
     for wanted in options.grants:
         if wanted not in names:
             raise ConfigError(f"--grant {wanted}=…: there is no such guest{near(wanted, names)}")
     rights = {name: parse_grants(options.grants.get(name, ()), host.config, name) for name in names}
-    refused = []
-    for name, path in names.items():
-        reason = _admit(name, path, host, rights[name])
-        if reason:
-            refused.append(f"the guest {name} does not take part: {reason}"[:_REASON])
-    return refused
+    return [note for name, path in names.items() for note in _admit(name, path, host, rights[name])]
 
 
-def _admit(name: str, path: Path, host: Environment, grants: GuestGrants) -> str:
-    """Let one guest join; returns the reason if it cannot, else an empty text."""
+def _admit(name: str, path: Path, host: Environment, grants: GuestGrants) -> Iterator[GuestNote]:
+    """Let one guest join; yields what is to be told of it."""
     try:
-        document, program = _build(name, path, host, grants)
+        process = GuestProcess(name, grants.quota.memory, _BUILD_CPU, path.parent)
+        if not process.isolated:
+            yield GuestNote("guest_unconfined", _UNCONFINED.format(name=name))
+        document, program = _build(process, path, host, grants)
         _Admission(name, host, grants, document, program).join()
     except AeroDaaSError as error:
-        return str(error)
-    return ""
+        text = f"the guest {name} does not take part: {error}"[:_REASON]
+        yield GuestNote("guest_refused", text)
 
 
 def _names(guests: Sequence[Path]) -> dict[str, Path]:
@@ -85,11 +97,10 @@ def _names(guests: Sequence[Path]) -> dict[str, Path]:
 
 
 def _build(
-    name: str, path: Path, host: Environment, grants: GuestGrants
+    process: GuestProcess, path: Path, host: Environment, grants: GuestGrants
 ) -> tuple[GuestDocument, bytes]:
-    """Run the guest's file in a process of its own; raises GuestError or GraphError."""
-    catalogue = Catalogue(name, reduced(host.config, grants), grants)
-    process = GuestProcess(name, grants.quota.memory, _BUILD_CPU, path.parent)
+    """Run the guest's file in its process and end that; raises GuestError or GraphError."""
+    catalogue = Catalogue(process.guest, reduced(host.config, grants), grants)
     try:
         request = {"do": "build", "application": str(path)}
         answer, program = process.ask(request, pickle.dumps(catalogue), _BUILD_SECONDS)

@@ -136,8 +136,8 @@ class Run:
                 )
             return LiveReader(session, stream, *publisher, lambda: self._over)
 
-        for refused in self._environment.refused_guests:
-            flight.note("guest_refused", refused)
+        for note in self._environment.guest_notes:
+            flight.note(note.kind, note.text)
         self.graph.reader = read
         self.graph.on_growth = self.grow
         for callback in self.graph.on_launch:

@@ -8,6 +8,7 @@ import socket
 import tempfile
 import textwrap
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -15,6 +16,7 @@ from flying import FLAT, Flyer, hop, recorded, robot
 
 from aerodaas import Analytics, Environment, Odometry
 from aerodaas.analytics.base import Context
+from aerodaas.analytics.guests.process import GuestProcess
 from aerodaas.config.grants import parse_words
 from aerodaas.config.options import current_options
 from aerodaas.environment.guests import admit_guests
@@ -74,7 +76,8 @@ def admitted(flyer: Flyer, guest: Path, text: str, *rights: str) -> tuple[Enviro
     with flyer.options(guests=(guest,), grants={"theirs": rights}):
         env = Environment(flyer.write(CONTENT))
         owner(env)
-        return env, admit_guests(current_options.get(), env)
+        notes = admit_guests(current_options.get(), env)
+        return env, [note.text for note in notes if note.kind == "guest_refused"]
 
 
 def refusal(flyer: Flyer, guest: Path, text: str, *rights: str) -> str:
@@ -224,6 +227,27 @@ def test_a_refused_guest_is_told_and_the_owner_flies(flyer: Flyer, guest: Path, 
     (told,) = alerts(run, "guest_refused")
     assert "theirs does not take part" in told
     assert poses(run) == poses(alone)
+
+
+@pytest.mark.parametrize("granted", [True, False], ids=["namespaces", "none"])
+def test_the_owner_is_told_of_a_guest_that_is_not_confined(
+    flyer: Flyer, guest: Path, monkeypatch: pytest.MonkeyPatch, *, granted: bool
+) -> None:
+    """Where the machine grants no namespaces, and only there."""
+
+    class Started(GuestProcess):
+        def __init__(self, *how: Any) -> None:  # noqa: ANN401 - as its base
+            super().__init__(*how)
+            self.isolated = granted
+
+    monkeypatch.setattr("aerodaas.environment.guests.GuestProcess", Started)
+    guest.write_text(GUEST + READY)
+    with flyer.options(guests=(guest,), grants={"theirs": RIGHTS}):
+        env = Environment(flyer.write(CONTENT))
+        owner(env)
+        notes = admit_guests(current_options.get(), env)
+    assert [note.kind for note in notes] == ([] if granted else ["guest_unconfined"])
+    assert all("the guest theirs can use the network" in note.text for note in notes)
 
 
 NAVIGATOR = (

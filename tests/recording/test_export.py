@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -11,6 +12,7 @@ import cv2
 import numpy as np
 import pyarrow.parquet
 import pytest
+from mcap.writer import Writer
 from synthetic_flight import HOME, PLAN, SyntheticFlight, record
 
 from aerodaas.config.model import RecordingConfig
@@ -44,6 +46,29 @@ def test_csv_holds_every_message(recorded: Path, tmp_path: Path) -> None:
     ]
     assert rows[3]["mode"] == "guided"
     assert float(rows[-1]["recorded_s"]) == pytest.approx(states[-1]["stamp"] / 1e9)
+
+
+@pytest.mark.parametrize("text", ["=1+1", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1"])
+def test_a_text_of_a_stranger_is_no_formula(tmp_path: Path, text: str) -> None:
+    """Neither as a value nor as a column's name; numbers below zero stay numbers."""
+    path = tmp_path / "odd.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("odd", "jsonschema", b"{}")
+        channel = writer.register_channel("/odd", "json", schema)
+        content = {"said": text, "depth": -1.5, text: 1, "plain": "a=b"}
+        writer.add_message(channel, 1, json.dumps(content).encode(), 1)
+        writer.finish()
+    with Recording.open(path) as recording:
+        table = write_csv(recording, "/odd", tmp_path)
+    with table.open(newline="") as file:
+        header, row = csv.reader(file)
+    named = dict(zip(header, row, strict=True))
+    assert named["said"] == f"'{text}"
+    assert named[f"'{text}"] == "1"
+    assert float(named["depth"]) == -1.5
+    assert named["plain"] == "a=b"
 
 
 def test_binary_channels_have_rows_too(recorded: Path) -> None:

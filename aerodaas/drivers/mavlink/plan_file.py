@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from aerodaas.config.json_text import read_json
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import ConfigError
@@ -39,18 +39,14 @@ def read_plan(path: str | Path, home: GeodeticOrigin) -> AeroNavigation:
     is no plan, and for items that cannot be flown as waypoints.
     """
     place = str(path)
+    content = read_json(path, "the plan")
     try:
-        content = json.loads(Path(path).read_text(encoding="utf-8"))
         mission = content["mission"]
         items = list(_simple(mission["items"]))
         sea_level = float(mission["plannedHomePosition"][2])
         return AeroNavigation(
             NavigationType.DISTANCE_DRIVEN, list(_waypoints(items, home, sea_level, place))
         )
-    except OSError as error:
-        raise ConfigError(f"cannot read the plan {place}: {error.strerror}") from None
-    except RecursionError:
-        raise ConfigError(f"{place} is no plan of QGroundControl: nested too deeply") from None
     except (ValueError, LookupError, TypeError, AttributeError, OverflowError) as error:
         text = error if isinstance(error, ConfigError) else f"{type(error).__name__}: {error}"
         raise ConfigError(f"{place} is no plan of QGroundControl: {text}") from None

@@ -21,6 +21,9 @@ __all__ = ["table_of", "write_csv", "write_parquet"]
 
 Row = dict[str, Any]
 
+_FORMULAS = ("=", "+", "-", "@", "\t", "\r")
+"""Beginnings of formulas, by OWASP's "CSV Injection"."""
+
 
 def table_of(recording: Recording, topic: str) -> list[Row]:
     """All messages of a channel as flat rows with the same columns.
@@ -63,7 +66,7 @@ def table_of(recording: Recording, topic: str) -> list[Row]:
 
 
 def write_csv(recording: Recording, topic: str, folder: Path) -> Path:
-    """Write a channel as CSV.
+    """Write a channel as CSV; spreadsheets do not take its texts for formulas.
 
     Args:
         recording: An open recording.
@@ -80,9 +83,9 @@ def write_csv(recording: Recording, topic: str, folder: Path) -> Path:
     path = new_file(folder / f"{file_name(topic)}.csv")
     try:
         with path.open("x", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]) if rows else [])
-            writer.writeheader()
-            writer.writerows(rows)
+            writer = csv.writer(file)
+            writer.writerow(map(_harmless, rows[0] if rows else ()))
+            writer.writerows(map(_harmless, row.values()) for row in rows)
     except OSError as error:
         raise RecordingError(f"cannot write {path}: {error.strerror}") from None
     return path
@@ -125,6 +128,11 @@ def write_parquet(recording: Recording, topic: str, folder: Path) -> Path:
     except OSError as error:
         raise RecordingError(f"cannot write {path}: {error}") from None
     return path
+
+
+def _harmless(cell: object) -> object:
+    """A cell; a text that a spreadsheet would compute is led by an apostrophe (OWASP)."""
+    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULAS) else cell
 
 
 def _known(recording: Recording, topic: str) -> str:

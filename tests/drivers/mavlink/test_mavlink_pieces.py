@@ -460,3 +460,16 @@ def test_what_is_no_plan_is_refused(tmp_path_factory: pytest.TempPathFactory, co
     path.write_text(json.dumps(content))
     with contextlib.suppress(ConfigError):
         assert not read_plan(path, GeodeticOrigin(0.0, 0.0)).waypoints
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [("[" * 100_000, "nested more than"), (" " * (5 << 20), "larger than 4 MiB")],
+    ids=["deep", "large"],
+)
+def test_a_plan_has_bounds(tmp_path: Path, content: str, told: str) -> None:
+    """A stranger's file is not read whole, nor followed as deep as it likes."""
+    path = tmp_path / "huge.plan"
+    path.write_text(content)
+    with pytest.raises(ConfigError, match=told):
+        read_plan(path, GeodeticOrigin(0.0, 0.0))
