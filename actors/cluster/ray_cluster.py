@@ -16,7 +16,7 @@ from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
 from aerodaas.actors.cluster.handshake import greet, hushed
 from aerodaas.actors.cluster.local_ray import LocalRay
-from aerodaas.actors.cluster.ray_internals import silence_nodes
+from aerodaas.actors.cluster.ray_internals import forbid_start, silence_nodes
 from aerodaas.actors.cluster.ray_variables import VARIABLES
 from aerodaas.config.model import ComputeConfig
 from aerodaas.types.errors import AeroDaaSError, ConfigError
@@ -114,6 +114,7 @@ def _init(address: str) -> None:
         reason = str(error).strip().splitlines()[0]
         raise _unreachable(address, reason) from None
     silence_nodes()
+    forbid_start()
 
 
 def _as_it_is(address: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import subprocess
 import sys
 import types
 from collections.abc import Callable
@@ -13,6 +14,7 @@ import ray
 from aerodaas.actors.cluster import ray_internals
 
 MODULES = (
+    "ray._private.auto_init_hook",
     "ray._raylet",
     "ray._private.worker",
 )
@@ -45,6 +47,7 @@ def test_a_ray_that_has_changed_fails_nothing(
         importlib.import_module(name)
         monkeypatch.setitem(sys.modules, name, become(name))
     assert ray_internals.cluster_metadata("127.0.0.1:1", 0.1) == {}
+    ray_internals.forbid_start()
     ray_internals.reread_variables()
     ray_internals.silence_nodes()
 
@@ -63,3 +66,19 @@ def test_nodes_are_silent(capfd: pytest.CaptureFixture[str]) -> None:
     data = {"lines": ["a worker died"], "pid": "raylet", "is_err": False}
     worker.print_to_stdstream(data, ignore_prefix=False)
     assert capfd.readouterr() == ("", "")
+
+
+def test_ray_does_not_start_by_itself() -> None:
+    """A late call of an application that has left its cluster fails; Ray would start another."""
+    late = (
+        "import ray\n"
+        "from aerodaas.actors.cluster.ray_internals import forbid_start\n"
+        "forbid_start()\n"
+        "try: ray.nodes()\n"
+        "except Exception as error: print(type(error).__name__)\n"
+        "print(ray.is_initialized())"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", late], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert said.stdout.split() == ["RaySystemError", "False"]
