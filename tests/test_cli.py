@@ -404,3 +404,15 @@ def test_help_teaches_by_example(aerodaas: Commands) -> None:
         ended = aerodaas(command, "--help")
         assert ended.code == 0
         assert f"aerodaas {command}" in ended.out
+
+
+def test_help_loads_no_library_that_flies() -> None:
+    """It is there at once: arrays, models of data, Ray and plots take several times as long."""
+    code = (
+        "import sys, aerodaas.cli.app\n"
+        "print(*{'numpy', 'pydantic', 'ray', 'matplotlib', 'cv2', 'mcap'} & set(sys.modules))"
+    )
+    said = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
+    )
+    assert said.stdout.strip() == ""

@@ -14,9 +14,7 @@ from aerodaas.cli.application import run_application, speed_option
 from aerodaas.cli.export import export
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
-from aerodaas.config.grants import parse_words
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.config.overrides import parse_setting
 from aerodaas.types.errors import AeroDaaSError, GraphError, InvalidWaypointError, UnknownIdError
 
 __all__ = ["app", "main", "run_typer"]
@@ -112,6 +110,9 @@ def run(
         aerodaas run mine.py --guest theirs.py --grant theirs=sense:cam1,compute:edge
         aerodaas run apps/watch_frames.py -- pictures/ yolov8n.onnx --rate 5
     """
+    from aerodaas.config.grants import parse_words  # noqa: PLC0415 - slow to load
+    from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - as above
+
     factor, lockstep = speed_option(speed)
     options = RunOptions(
         environment=env,

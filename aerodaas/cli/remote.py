@@ -9,9 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from aerodaas.analytics.remote.analytics import TOKEN_VARIABLE
-from aerodaas.analytics.remote.client import RemoteClient
-from aerodaas.config.model import EnvironmentConfig, RemoteConfig
+from aerodaas.analytics.remote.client import TOKEN_VARIABLE, RemoteClient
 
 __all__ = ["app"]
 
@@ -45,6 +43,8 @@ def connect(
     ] = None,
 ) -> None:
     """Know whom to speak to."""
+    from aerodaas.config.model import EnvironmentConfig, RemoteConfig  # noqa: PLC0415 - slow to load
+
     settings = EnvironmentConfig.load(env).remote if env else RemoteConfig()
     secret = settings.token.get_secret_value() if settings.token else None
     host = f"[{settings.host}]" if ":" in settings.host else settings.host

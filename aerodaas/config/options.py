@@ -5,9 +5,10 @@ from __future__ import annotations
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from aerodaas.config.grants import Catalogue
+if TYPE_CHECKING:
+    from aerodaas.config.grants import Catalogue
 
 __all__ = ["RunOptions", "current_options"]
 

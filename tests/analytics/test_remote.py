@@ -18,8 +18,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from typer.testing import CliRunner
 
-from aerodaas.analytics.remote.analytics import TOKEN_VARIABLE, RemoteAnalytics
-from aerodaas.analytics.remote.client import RemoteClient
+from aerodaas.analytics.remote.analytics import RemoteAnalytics
+from aerodaas.analytics.remote.client import TOKEN_VARIABLE, RemoteClient
 from aerodaas.analytics.remote.guard import is_loopback
 from aerodaas.cli.app import app as cli
 from aerodaas.config.model import EnvironmentConfig, LimitsConfig

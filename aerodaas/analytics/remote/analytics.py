@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
+from aerodaas.analytics.remote.client import TOKEN_VARIABLE
 from aerodaas.analytics.remote.guard import Guard, is_loopback
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import RemoteConfig
@@ -23,9 +24,8 @@ from aerodaas.types.errors import ConfigError, SourceError
 if TYPE_CHECKING:
     import uvicorn
 
-__all__ = ["TOKEN_VARIABLE", "RemoteAnalytics"]
+__all__ = ["RemoteAnalytics"]
 
-TOKEN_VARIABLE = "AERODAAS_REMOTE_TOKEN"  # noqa: S105 - a name, not a secret
 _STOPPING = 5.0
 _MOST_CONNECTIONS = 200
 _MOST_BYTES_SENT = 4096

@@ -11,8 +11,10 @@ from urllib.parse import urlsplit
 from aerodaas.config.extras import require_extra
 from aerodaas.types.errors import ConfigError, MissionError, SourceError
 
-__all__ = ["RemoteClient"]
+__all__ = ["TOKEN_VARIABLE", "RemoteClient"]
 
+TOKEN_VARIABLE = "AERODAAS_REMOTE_TOKEN"  # noqa: S105 - a name, not a secret
+"""Environment variable of the token, for the service and its clients."""
 _TIMEOUT = 10.0
 _MALFORMED = {400, 401, 403, 411, 413, 422}
 

@@ -1,0 +1,201 @@
+"""The work of `aerodaas lab`: simulations, tables and plots."""
+
+from __future__ import annotations
+
+import json
+import random
+from collections.abc import Sequence
+from math import isnan
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from aerodaas.config.extras import require_extra
+from aerodaas.schedulers.analytics.base import MILLISECOND, AnalyticsScheduler, Resources
+from aerodaas.schedulers.analytics.published.profiles import PUBLISHED
+from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_names
+from aerodaas.schedulers.lab import (
+    ExecutionTimes,
+    LabResult,
+    Network,
+    Workload,
+    load_workload,
+    run_lab,
+)
+from aerodaas.schedulers.lab.metrics import Score, score
+from aerodaas.schedulers.lab.run import Spread
+from aerodaas.schedulers.lab.workload import SIX
+from aerodaas.types.clock import NANOSECONDS
+
+__all__ = ["registered", "study"]
+
+_BOUND_EDGES = 10
+"""Most edges for which the clairvoyant bound is computed unasked."""
+
+
+def study(
+    scheduler: str,
+    workload: str,
+    *,
+    flown: Path | None,
+    seeds: int,
+    network: str,
+    times: str,
+    duration: float | None,
+    cloud_slots: int | None,
+    bound: bool | None,
+    jobs: int | None,
+    address: str | None,
+    plots: Path | None,
+    json_path: Path | None,
+) -> None:
+    """Compare schedulers and print the tables; the arguments are those of `aerodaas lab run`."""
+    results: list[LabResult] = []
+    names = [name.strip() for name in scheduler.split(",")]
+    loads, resources, as_flown = _loads(workload, flown, duration)
+    if cloud_slots is not None:
+        resources = Resources(cloud_slots=cloud_slots)
+    spread, wanted = _spread(address, names)
+    for load in loads:
+        with _progress() as progress:
+            bar = progress.add_task(load.name, total=seeds * load.edges)
+            result = run_lab(
+                load,
+                wanted,
+                range(seeds),
+                network=Network.named(network, load.duration),
+                times=ExecutionTimes.named(times),
+                resources=resources,
+                bound=load.edges <= _BOUND_EDGES if bound is None else bound,
+                jobs=jobs,
+                spread=spread,
+                progress=lambda done, _: progress.update(bar, completed=done),  # noqa: B023
+            )
+        if as_flown is not None:
+            result.scores["as flown"] = [as_flown] * seeds
+        results.append(result)
+        Console().print(_result_table(result))
+        if plots is not None:
+            _plot(result, names, resources, plots)
+    if json_path is not None:
+        json_path.write_text(json.dumps([r.as_json() for r in results], indent=1))
+
+
+def registered() -> None:
+    """Print the registered schedulers, the published models and the workloads' names."""
+    table = Table("name", "scheduler", title="Schedulers")
+    for name in scheduler_names():
+        text = (type(load_scheduler(name)).__doc__ or "").strip().splitlines()[0]
+        table.add_row(name, text)
+    Console().print(table)
+    columns = ("benefit", "deadline ms", "edge ms", "cloud ms", "edge cost", "cloud cost", "QoE")
+    models = Table("model", title="Models of the published evaluation")
+    for column in columns:
+        models.add_column(column, justify="right")
+    for name, p in PUBLISHED.items():
+        clock = (p.deadline / MILLISECOND, p.edge_time / MILLISECOND, p.cloud_time / MILLISECOND)
+        bonus = p.qoe.bonus if p.qoe else 0
+        figures = (p.benefit, *clock, p.edge_cost, p.cloud_cost, bonus)
+        models.add_row(name, *(f"{figure:g}" for figure in figures))
+    Console().print(models)
+    Console().print(f"Workloads: {', '.join(SIX)}, NNND-A/EDGES, or a JSON file", highlight=False)
+
+
+def _result_table(result: LabResult) -> Table:
+    """The table that `run` prints."""
+    title = (
+        f"{result.workload.name}: {result.workload.duration / 1e9:g} s, "
+        f"{result.network.name} network, {result.times.name} times, {len(result.seeds)} seeds"
+    )
+    table = Table(title=title, title_justify="left")
+    table.add_column("scheduler")
+    shares = ("completion", "late", "dropped", "migrated", "stolen", "edge use", "of bound")
+    columns = ["qos per s", "of bound", "completion", "qoe per s", "late", "dropped"]
+    columns += ["migrated", "stolen", "edge use", "cloud use", "cost per s"]
+    if result.bounds is None:
+        columns.remove("of bound")
+    for column in columns:
+        table.add_column(f"{column} %" if column in shares else column, justify="right")
+    best = max(result.figures(name)["qos per s"].value for name in result.scores)
+    for name in result.scores:
+        figures = result.figures(name)
+        cells = []
+        for column in columns:
+            scale = 100 if column in shares else 1
+            mean = figures[column]
+            margin = "" if isnan(mean.margin) else f" ±{mean.margin * scale:.1f}"
+            cells.append(f"{mean.value * scale:.1f}{margin}")
+        style = "bold" if figures["qos per s"].value == best else None
+        table.add_row(name, *cells, style=style)
+    return table
+
+
+def _workload(name: str, duration: float | None) -> Workload:
+    found = load_workload(name) if name.endswith(".json") else Workload.named(name)
+    return found if duration is None else found.lasting(round(duration * NANOSECONDS))
+
+
+def _spread(
+    address: str | None, names: list[str]
+) -> tuple[Spread | None, Sequence[str | type[AnalyticsScheduler]]]:
+    if address is None:
+        return None, names
+    from aerodaas.actors.cluster.ray_map import shipped, spread_over  # noqa: PLC0415 - loads ray
+
+    return spread_over(address), [shipped(name) for name in names]
+
+
+def _loads(
+    names: str, flown: Path | None, duration: float | None
+) -> tuple[list[Workload], Resources, Score | None]:
+    """The workloads, their resources, and the score of a recorded flight itself."""
+    if flown is None:
+        wanted = SIX if names == "six" else names.split(",")
+        return [_workload(name.strip(), duration) for name in wanted], Resources(), None
+    # Reading a recording takes libraries that simulating does not.
+    from aerodaas.cli.flown_tasks import Flown  # noqa: PLC0415
+    from aerodaas.cli.flown_workload import flown_trace, flown_workload  # noqa: PLC0415
+
+    flight = Flown.read(flown)
+    workload = flown_workload(flight)
+    tasks = workload.tasks(0, random.Random())
+    return [workload], flight.resources, score(tasks, flown_trace(flight, tasks))
+
+
+def _progress() -> Progress:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
+    return Progress(*columns, TimeRemainingColumn(), console=Console(), transient=True)
+
+
+def _plot(result: LabResult, names: list[str], resources: Resources, folder: Path) -> None:
+    require_extra("plots", "a plot")
+    # Matplotlib takes most of a second to import, which a table alone need not pay.
+    from aerodaas.schedulers.lab.plots import (  # noqa: PLC0415
+        plot_bars,
+        plot_observations,
+        plot_timeline,
+    )
+    from aerodaas.schedulers.lab.sample import SamplePath  # noqa: PLC0415
+    from aerodaas.schedulers.lab.simulator import simulate  # noqa: PLC0415
+
+    folder.mkdir(parents=True, exist_ok=True)
+    stem = "".join(
+        c if c.isalnum() else "_" for c in f"{result.workload.name} {result.network.name}"
+    )
+    plot_bars(result, folder / f"{stem}_bars.png")
+    path = SamplePath.draw(result.workload, 0, result.seeds[0], result.times, result.network)
+    middle = result.workload.duration / 2e9
+    traces = {}
+    for name in names:
+        traces[name] = simulate(path, load_scheduler(name), resources, record=True)
+        title = f"{name} on edge 0 of {result.workload.name}, seed {result.seeds[0]}"
+        file = folder / f"{stem}_timeline_{_file_name(name)}.png"
+        plot_timeline(traces[name], file, title, middle, middle + 6)
+    plot_observations(traces, path, folder / f"{stem}_over_time.png")
+    Console().print(f"plots in {folder}", highlight=False)
+
+
+def _file_name(text: str) -> str:
+    return "".join(c if c.isalnum() else "_" for c in text)
