@@ -23,6 +23,13 @@ from aerodaas.recording.report.flight import RecordedFlight
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
 _ROOT = Path(__file__).resolve().parents[2]
+# A shell starts what runs in its background with Ctrl-C ignored.
+_MAIN = """
+import signal
+from aerodaas.cli.app import main
+signal.signal(signal.SIGINT, signal.default_int_handler)
+main()
+"""
 _APP = """
 import time
 from aerodaas import AeroNavigation, Environment, NavigationType, Waypoint
@@ -45,7 +52,7 @@ def running(folder: Path, ending: str, *more: str) -> Iterator[subprocess.Popen[
     (folder / "app.py").write_text(_APP + ending)
     words = ["run", str(folder / "app.py"), "--speed", "1", "--record", str(folder / "out"), *more]
     with subprocess.Popen(
-        [sys.executable, "-c", "from aerodaas.cli.app import main; main()", *words],
+        [sys.executable, "-c", _MAIN, *words],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
