@@ -45,10 +45,18 @@ from aerodaas.types.errors import GraphError
 from aerodaas.types.identifiers import require_name
 from aerodaas.types.vehicle import VehicleState
 
-__all__ = ["Analytics", "ComputeKind", "Context", "FileUse", "NavigableAnalytics", "TimedContext"]
+__all__ = [
+    "Analytics",
+    "ComputeKind",
+    "Context",
+    "NavigableAnalytics",
+    "ResourceUse",
+    "TimedContext",
+]
 
 ComputeKind: TypeAlias = Literal["edge", "cloud"]
-FileUse: TypeAlias = Literal["model", "input", "output"]
+ResourceUse: TypeAlias = Literal["model", "input", "output", "environment"]
+"""A model file, a file that is read, a folder written to, what the environment file alone says."""
 O_co = TypeVar("O_co", covariant=True)
 
 
@@ -106,8 +114,8 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
     """Polling rate of an external source (`instantiate`), in Hz."""
     name: str = ""
     """Name of the stream; by default the class name in snake_case."""
-    files: ClassVar[Mapping[str, FileUse]] = {}
-    """Constructor's arguments that name files: models, files that are read, folders written to."""
+    resources: ClassVar[Mapping[str, ResourceUse]] = {}
+    """Constructor's arguments that reach beyond the analysis; a mission document binds them."""
 
     node: Node | None = None
     """Node in the graph, once `analyse` or `instantiate` was called."""

@@ -199,10 +199,10 @@ class Environment(PaperNames, IEnvironment):
 
         In flight, the whole queue is planned again by it.
         """
-        _checked_scheduler(scheduler)
+        checked = _checked_scheduler(scheduler)
         if self.run is not None and self.graph.flying:
-            self.run.use_scheduler(scheduler)
-        self._trajectory = self.chosen_trajectory = scheduler
+            self.run.use_scheduler(checked)
+        self._trajectory = self.chosen_trajectory = checked
 
     def set_analytics_scheduler(self, scheduler: Any) -> None:  # noqa: ANN401 - as the interface
         """Plug in the analytics scheduler: a name, `module:Class`, or an instance.

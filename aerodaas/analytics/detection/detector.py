@@ -14,7 +14,7 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 from typing_extensions import Self
 
-from aerodaas.analytics.base import Analytics, Context, FileUse
+from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.detection.coco import COCO_NAMES
 from aerodaas.analytics.detection.families import FAMILIES
 from aerodaas.analytics.detection.families.base import Candidates, Decoder, ModelFamily
@@ -58,7 +58,7 @@ class OnnxDetector(Analytics[Detections]):
     isolated = True
     scheduled = True
     concurrent = True
-    files: ClassVar[Mapping[str, FileUse]] = {"path": "model"}
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"path": "model"}
 
     def __init__(
         self,

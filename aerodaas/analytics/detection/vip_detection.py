@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from aerodaas.analytics.base import FileUse
+from aerodaas.analytics.base import ResourceUse
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.models import DETECTOR
 
@@ -16,7 +16,7 @@ __all__ = ["VipDetectionAnalytics"]
 class VipDetectionAnalytics(OnnxDetector):
     """An `OnnxDetector` for hazard vests, by default with the shipped model."""
 
-    files: ClassVar[Mapping[str, FileUse]] = {"model": "model"}
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"model": "model"}
 
     def __init__(
         self,

@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import cv2
 import numpy as np
 
-from aerodaas.analytics.base import Context, FileUse, NavigableAnalytics
+from aerodaas.analytics.base import Context, NavigableAnalytics, ResourceUse
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.follow.observation import observation
 from aerodaas.dataflow.graph import AeroStreamData, Trigger
@@ -51,7 +51,7 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
     inspection.
     """
 
-    files: ClassVar[Mapping[str, FileUse]] = {"pictures": "output"}
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"pictures": "output"}
 
     def __init__(
         self,

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar
 
-from aerodaas.analytics.base import Analytics, Context, FileUse
+from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.monitoring.gps_rows import TimedFix, parse_track
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Alert, GpsFix, Header
@@ -39,7 +39,7 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
     """
 
     produces: ClassVar[type] = GpsFix
-    files: ClassVar[Mapping[str, FileUse]] = {"source": "input"}
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"source": "input"}
 
     def __init__(
         self,

@@ -9,7 +9,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.analytics.base import Analytics, Context, FileUse
+from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.detection.keypoints import Box, KeypointModel
 from aerodaas.analytics.models import POSE
@@ -54,7 +54,7 @@ class PoseAnalytics(Analytics[Detections]):
     isolated = True
     scheduled = True
     concurrent = True
-    files: ClassVar[Mapping[str, FileUse]] = {"model": "model"}
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"model": "model"}
 
     def __init__(
         self,

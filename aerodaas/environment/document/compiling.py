@@ -99,7 +99,11 @@ class _Compiler:
 
     def _trigger(self, work: Analytics[Any], trigger: Trigger) -> dict[str, Any]:
         place = f"{type(work).__name__}.trigger(when=…)"
-        when = None if trigger.when is None else self._values.value(trigger.when, place)
+        try:
+            when = None if trigger.when is None else self._values.value(trigger.when, place)
+        except GraphError as error:
+            remedy = "aerodaas.analytics has conditions that are data: Near, Above, Below"
+            raise GraphError(f"{error}; {remedy}") from None
         return {"target": trigger.target, "command": trigger.method, "when": when}
 
     def _navigation(self, edge: NavigationEdge) -> dict[str, Any]:

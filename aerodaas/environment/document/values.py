@@ -16,7 +16,7 @@ from typing import Any, Literal, TypeGuard
 
 import numpy as np
 
-from aerodaas.analytics.base import Analytics, FileUse
+from aerodaas.analytics.base import Analytics, ResourceUse
 from aerodaas.config.plugins import load_plugin, plugin_names
 from aerodaas.environment.environment import Environment
 from aerodaas.types.errors import AeroDaaSError, GraphError
@@ -67,15 +67,15 @@ class ValueWriter:
                 "registered analyses only: have its package register it as an entry point of "
                 "`aerodaas.analytics`, or fly the application itself"
             )
-        return name, self.settings(work.given_settings(), work.files, name)
+        return name, self.settings(work.given_settings(), work.resources, name)
 
     def settings(
-        self, given: Mapping[str, Any], files: Mapping[str, FileUse], owner: str
+        self, given: Mapping[str, Any], bound: Mapping[str, ResourceUse], owner: str
     ) -> dict[str, Any]:
         """The arguments of a constructor; raises GraphError for one that is no data."""
         return {
-            name: self._file(value, files[name], f"{owner}({name}=…)")
-            if name in files and value is not None
+            name: self._resource(value, bound[name], f"{owner}({name}=…)")
+            if name in bound and value is not None
             else self.value(value, f"{owner}({name}=…)")
             for name, value in given.items()
         }
@@ -107,9 +107,10 @@ class ValueWriter:
         for name, target in _CLASSES.items():
             if type(value) is _imported(target):
                 return {"$settings": name, "of": self._fields(value, place)}
-        names = (name for name, target in _CONDITIONS.items() if value is _imported(target))
-        name = next(names, None)
-        return None if name is None else {"$condition": name}
+        for name, target in _CONDITIONS.items():
+            if value is _imported(target):
+                return {"$condition": name}
+        return None
 
     def _fields(self, value: Any, place: str) -> dict[str, Any]:  # noqa: ANN401 - a dataclass
         return {
@@ -118,7 +119,11 @@ class ValueWriter:
             if getattr(value, one.name) != one.default
         }
 
-    def _file(self, value: object, use: FileUse, place: str) -> dict[str, Any]:
+    def _resource(self, value: object, use: ResourceUse, place: str) -> dict[str, Any]:
+        if use == "environment":
+            if found := self._reference(value, place):
+                return found
+            raise GraphError(f"{place} comes from the environment file alone: leave it out")
         path = Path(str(value))
         if use == "model":
             return {"$model": path.name, "sha256": _hash_of(path)}
@@ -154,10 +159,10 @@ class ValueReader:
 
     def made(self, kind: Any, settings: Mapping[str, Any], owner: str) -> Any:  # noqa: ANN401 - any class
         """An instance of `kind`; raises GraphError for settings that it does not take."""
-        files: Mapping[str, FileUse] = getattr(kind, "files", {})
+        bound: Mapping[str, ResourceUse] = getattr(kind, "resources", {})
         found = {
-            name: self._file(value, files[name], f"{owner}.{name}")
-            if name in files and value is not None
+            name: self._resource(value, bound[name], f"{owner}.{name}")
+            if name in bound and value is not None
             else self.value(value, f"{owner}.{name}")
             for name, value in settings.items()
         }
@@ -193,9 +198,11 @@ class ValueReader:
                 return self.made(_imported(_CLASSES[name]), of, f"{place}: {name}")
         raise GraphError(f"{place}: there is no {kind} {str(content[kind])[:40]!r} here")
 
-    def _file(self, content: Any, use: FileUse, place: str) -> str | Path:  # noqa: ANN401 - any JSON
+    def _resource(self, content: Any, use: ResourceUse, place: str) -> Any:  # noqa: ANN401
         if isinstance(content, dict):
             match use, content:
+                case "environment", {"$environment": str(), **rest} if not rest:
+                    return self._special("$environment", content, place)
                 case "model", {"$model": str(name), "sha256": str(wanted), **rest} if not rest:
                     return self._model(name, wanted, place)
                 case "output", {"$output": str(name), **rest} if not rest and _is_plain(name):
@@ -203,7 +210,7 @@ class ValueReader:
                 case "input", {"$property": [str(sensor), str(name)], **rest} if not rest:
                     handle = self._environment.get_env_sensor_by_id(sensor)
                     return handle.get_sensor_property(name)
-        raise GraphError(f"{place}: a document names no file of this machine")
+        raise GraphError(f"{place}: a document names no file or address of this machine")
 
     def _model(self, name: str, wanted: str, place: str) -> Path:
         if not self._known:

@@ -22,6 +22,7 @@ from aerodaas.analytics import (
     MonitoringAnalytics,
     Near,
     OnnxDetector,
+    RemoteAnalytics,
     TowerInspectionAnalytics,
     VipDetectionAnalytics,
 )
@@ -223,6 +224,12 @@ def callbacks(env: Environment) -> None:
     fly(env)
 
 
+def own_address(env: Environment) -> None:
+    """Listens where it says itself."""
+    RemoteAnalytics(port=8351).deploy(env.get_compute_resource_by_id("edge")).instantiate()
+    fly(env)
+
+
 def velocities(env: Environment) -> None:
     """Flies by velocities that it gives itself."""
     commands = AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [VelocityCommand(0.2)])
@@ -240,6 +247,7 @@ def velocities(env: Environment) -> None:
         (packages, r"drone/monitoring: a document has no runtime_env"),
         (hooks, r"no hooks of on_start or on_end"),
         (callbacks, r"no callbacks of subscribe"),
+        (own_address, r"RemoteAnalytics\(port=…\) comes from the environment file alone"),
         (velocities, r"velocity commands in a document come from analyses"),
         (lambda _: None, r"nothing flies"),
     ],
@@ -333,10 +341,10 @@ def tower(**settings: Any) -> dict[str, Any]:  # noqa: ANN401 - any JSON
         (document_of(navigation=[{"robot": "other", "stream": "drone/odom"}]), "other"),
         (document_of(navigation=[{"robot": "drone", "stream": "drone/odom"}]), "drone/odom"),
         (document_of(navigation=[{"robot": "drone", "waypoints": [{"id": "a"}]}]), "x"),
-        (tower(pictures={"$output": "../../etc"}), "names no file of this machine"),
-        (tower(pictures={"$output": "C:\\x"}), "names no file of this machine"),
-        (tower(pictures="/etc/cron.d"), "names no file of this machine"),
-        (tower(pictures={"$model": "x", "sha256": "0" * 64}), "names no file of this machine"),
+        (tower(pictures={"$output": "../../etc"}), "names no file or address"),
+        (tower(pictures={"$output": "C:\\x"}), "names no file or address"),
+        (tower(pictures="/etc/cron.d"), "names no file or address"),
+        (tower(pictures={"$model": "x", "sha256": "0" * 64}), "names no file or address"),
         (
             detecting("/etc/passwd"),
             "names no file",
@@ -345,7 +353,18 @@ def tower(**settings: Any) -> dict[str, Any]:  # noqa: ANN401 - any JSON
             detecting({"$model": "x", "sha256": "0"}),
             "no model 'x' with the SHA-256",
         ),
-        (tower(detector={"$analysis": "RemoteAnalytics", "settings": {"port": "x"}}), "remote"),
+        (
+            monitoring(analysis="RemoteAnalytics", reads=[], settings={"port": 1}),
+            "names no file or address",
+        ),
+        (
+            monitoring(
+                id="drone/remote",
+                analysis="RemoteAnalytics",
+                settings={"env_data": {"remote": {"token": "known", "host": "192.0.2.1"}}},
+            ),
+            "names no file or address",
+        ),
         (tower(detector={"$condition": "print"}), r"no \$condition 'print'"),
     ],
 )
