@@ -77,10 +77,10 @@ class _Builder:
             work.task = TaskConfig.model_validate(entry.task)
         if entry.compute is not None:
             work.deploy(self._environment.get_compute_resource_by_id(entry.compute))
-        for name in entry.reads:
-            stream = work.analyse(self._stream(name, entry.id))
-        if not entry.reads:
-            stream = work.instantiate()
+        inputs = [self._stream(name, entry.id) for name in entry.reads]
+        stream = work.analyse(inputs[0]) if inputs else work.instantiate()
+        for further in inputs[1:]:
+            work.analyse(further)
         if stream.name != entry.id:
             raise GraphError(f"{entry.id} would be called {stream.name} here: the name is taken")
         self._streams[entry.id], self._works[entry.id] = stream, work
