@@ -1,17 +1,9 @@
 """Search and Rescue: search an area; the person found is escorted to safety (paper, section 6)."""
 
-from math import dist
+from aerodaas import AeroNavigation, Environment, MonitoringAnalytics, Waypoint
+from aerodaas.analytics import Near, VipDetectionAnalytics, VipFollowAnalytics
 
-from aerodaas import AeroNavigation, Environment, MonitoringAnalytics, Readings, Waypoint
-from aerodaas.analytics import VipDetectionAnalytics, VipFollowAnalytics
-
-SAFE, NEAR = (57, 6), 3
-
-
-def is_safe(readings: Readings) -> bool:
-    """Tell whether the drone has come near the safe place."""
-    at = readings.values
-    return dist((at["position.east"], at["position.north"]), SAFE) < NEAR
+SAFE = (57, 6)
 
 
 def main() -> None:
@@ -26,7 +18,7 @@ def main() -> None:
     follow = VipFollowAnalytics(distance=2).deploy(edge).analyse(vests)
     odometry = drone.get_sensor_by_id("odom").get_data_stream()
     watch = MonitoringAnalytics(["position"]).deploy(edge)
-    watch.trigger(drone.end_mission, when=is_safe).analyse(odometry)
+    watch.trigger(drone.end_mission, when=Near(SAFE, metres=3)).analyse(odometry)
 
     places = [(0, 12), (14, 13), (24, 26), (0, 26)]
     search = [Waypoint(f"wp{i}", x, y, 1.5, hover_duration=3) for i, (x, y) in enumerate(places, 1)]

@@ -416,3 +416,31 @@ def test_help_loads_no_library_that_flies() -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60
     )
     assert said.stdout.strip() == ""
+
+
+def test_compiling_says_what_no_document_can_hold(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One message and no file; what can be written goes into the file."""
+    (tmp_path / "environment.json").write_text(json.dumps(CONTENT))
+    application = tmp_path / "app.py"
+    watch = "watch = MonitoringAnalytics(['height']).deploy(edge)\nwatch.analyse(odometry)\n"
+    trigger = "watch.trigger(drone.end_mission, when=lambda one: True)\n"
+    starts = "drone.start_mission()\n"
+    wanted = tmp_path / "mission.json"
+    for text, folder, code in (
+        (HOP + watch + trigger + starts, tmp_path, 2),
+        (HOP + watch + starts, tmp_path / "none", 2),
+        (HOP + watch + starts, tmp_path, 0),
+    ):
+        application.write_text(text)
+        output = folder / wanted.name
+        words = ["aerodaas", "compile", str(application), "-o", str(output)]
+        monkeypatch.setattr(sys, "argv", words)
+        with pytest.raises(SystemExit) as ended:
+            main()
+        said = capsys.readouterr().err
+        assert (ended.value.code or 0) == code, said
+        assert said.count("error:") == (code != 0)
+        assert output.exists() == (code == 0)
+    assert json.loads(wanted.read_text())["analyses"][0]["id"] == "drone/monitoring"

@@ -34,6 +34,7 @@ from typing_extensions import Self
 from aerodaas.analytics.single_item import process_item
 from aerodaas.config.model import RuntimeEnvConfig, TaskConfig, as_runtime_env
 from aerodaas.dataflow.containers import AeroData
+from aerodaas.dataflow.given_settings import GivenSettings
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node, Trigger, refusal
 from aerodaas.dataflow.interfaces import IAeroData, IAnalyse, ICompute, INavigableAnalyse
 from aerodaas.dataflow.names import PaperNames, snake_case
@@ -44,9 +45,18 @@ from aerodaas.types.errors import GraphError
 from aerodaas.types.identifiers import require_name
 from aerodaas.types.vehicle import VehicleState
 
-__all__ = ["Analytics", "ComputeKind", "Context", "NavigableAnalytics", "TimedContext"]
+__all__ = [
+    "Analytics",
+    "ComputeKind",
+    "Context",
+    "NavigableAnalytics",
+    "ResourceUse",
+    "TimedContext",
+]
 
 ComputeKind: TypeAlias = Literal["edge", "cloud"]
+ResourceUse: TypeAlias = Literal["model", "input", "output", "environment"]
+"""A model file, a file that is read, a folder written to, what the environment file alone says."""
 O_co = TypeVar("O_co", covariant=True)
 
 
@@ -80,7 +90,7 @@ class TimedContext(Protocol):
         ...
 
 
-class Analytics(PaperNames, IAnalyse[O_co]):
+class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
     """An analysis; subclasses declare the types they accept and produce, and implement `process`.
 
     Life cycle in the actor: `open` once, `process` for one item at a time (the newest one; in
@@ -104,6 +114,8 @@ class Analytics(PaperNames, IAnalyse[O_co]):
     """Polling rate of an external source (`instantiate`), in Hz."""
     name: str = ""
     """Name of the stream; by default the class name in snake_case."""
+    resources: ClassVar[Mapping[str, ResourceUse]] = {}
+    """Constructor's arguments that reach beyond the analysis; a mission document binds them."""
 
     node: Node | None = None
     """Node in the graph, once `analyse` or `instantiate` was called."""
@@ -196,7 +208,8 @@ class Analytics(PaperNames, IAnalyse[O_co]):
             Exception: What the analysis' `open` raises, for a single item and in flight.
         """
         if isinstance(data, AeroStreamData):
-            return self._analyse_stream(data)
+            with data.graph.calling(self, data.name):
+                return self._analyse_stream(data)
         if not isinstance(data, AeroData):
             message = (
                 f"{type(self).__name__} takes a stream or AeroData, not {type(data).__name__}; "
@@ -238,13 +251,14 @@ class Analytics(PaperNames, IAnalyse[O_co]):
             raise GraphError(message)
         if self.node is not None:
             self._require_idle("instantiate it")
-        node = self._node_in(self._graph, None)
-        node.kind = "external"
-        try:
-            self._graph.launch(node)
-        except BaseException:
-            self._leave_flying(self._graph)
-            raise
+        with self._graph.calling(self, None):
+            node = self._node_in(self._graph, None)
+            node.kind = "external"
+            try:
+                self._graph.launch(node)
+            except BaseException:
+                self._leave_flying(self._graph)
+                raise
         return AeroStreamData(self._graph, node.id, self.produces)
 
     def trigger(
@@ -290,6 +304,11 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         self._triggers = (*self._triggers, trigger)
         return self
 
+    @property
+    def given_triggers(self) -> tuple[Trigger, ...]:
+        """What `trigger` was called with."""
+        return self._triggers
+
     def _require_idle(self, what: str) -> None:
         if self.node is not None and self._graph is not None:
             self._graph.require_idle(self.node, what)
@@ -320,8 +339,8 @@ class Analytics(PaperNames, IAnalyse[O_co]):
         return self.node
 
     def __getstate__(self) -> dict[str, Any]:
-        """State without the graph, to be sent to an actor."""
-        hidden = {"node", "_graph"}
+        """State without the graph and the constructor's arguments, to be sent to an actor."""
+        hidden = {"node", "_graph", "_given"}
         return {key: value for key, value in self.__dict__.items() if key not in hidden}
 
 

@@ -15,7 +15,13 @@ from aerodaas.cli.export import export
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.types.errors import AeroDaaSError, GraphError, InvalidWaypointError, UnknownIdError
+from aerodaas.types.errors import (
+    AeroDaaSError,
+    ConfigError,
+    GraphError,
+    InvalidWaypointError,
+    UnknownIdError,
+)
 
 __all__ = ["app", "main", "run_typer"]
 
@@ -43,7 +49,9 @@ app.add_typer(cluster.app, name="cluster")
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
 def run(
     context: typer.Context,
-    application: Annotated[Path, typer.Argument(help="The application: a Python file.")],
+    application: Annotated[
+        Path, typer.Argument(help="The application: a Python file, or a mission document.")
+    ],
     env: Annotated[
         Path | None, typer.Option(help="Environment file instead of the application's own.")
     ] = None,
@@ -134,6 +142,36 @@ def run(
     if live:
         typer.echo(f"live: open ws://{live_address} in Foxglove")
     run_application(application, context.args, options)
+
+
+@app.command("compile", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+def compile_command(
+    context: typer.Context,
+    application: Annotated[Path, typer.Argument(help="The application: a Python file.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="The document's file; default: printed.")
+    ] = None,
+    env: Annotated[
+        Path | None, typer.Option(help="Environment file instead of the application's own.")
+    ] = None,
+) -> None:
+    """Write an application as a mission document: data, which others fly without running code.
+
+    The file runs up to `start_mission()`. Words after `--` are the application's own.
+
+        aerodaas compile apps/farm_survey.py -o apps/farm_survey.json
+        aerodaas run apps/farm_survey.json
+    """
+    from aerodaas.environment.document.flying import compile_application  # noqa: PLC0415
+
+    text = compile_application(application, context.args, env).text()
+    if output is None:
+        typer.echo(text, nl=False)
+        return
+    try:
+        output.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"cannot write {output}: {error.strerror}") from None
 
 
 @app.command()

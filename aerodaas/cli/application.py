@@ -13,12 +13,19 @@ __all__ = ["run_application", "speed_option"]
 
 
 def run_application(application: Path, words: list[str], options: RunOptions) -> None:
-    """Run `application` with the arguments `words`, as Python itself would.
+    """Run `application` with the arguments `words`, as Python itself would; or fly a document.
 
     Raises ConfigError if there is no such file, and the application's own exceptions.
     """
     if not application.is_file():
         raise ConfigError(f"there is no application {application}")
+    if application.suffix == ".json":
+        from aerodaas.environment.document.flying import fly_mission  # noqa: PLC0415 - slow to load
+
+        if words:
+            raise ConfigError(f"a mission document takes no arguments of its own: {words[0]!r}")
+        fly_mission(application, options)
+        return
     current_options.set(options)
     sys.argv = [str(application), *words]
     sys.path.insert(0, str(application.resolve().parent))

@@ -28,7 +28,9 @@ __all__ = [
     "settings_model",
 ]
 
-PluginKind = Literal["drivers", "cameras", "trajectory_schedulers", "analytics_schedulers"]
+PluginKind = Literal[
+    "drivers", "cameras", "analytics", "trajectory_schedulers", "analytics_schedulers"
+]
 
 _BUILT_IN: dict[PluginKind, dict[str, str]] = {
     "drivers": {
@@ -46,6 +48,27 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
         "mavlink": "aerodaas.cameras.video:VideoCamera",
         "mcap": "aerodaas.recording.replay.mcap_camera:McapCamera",
         "replayed": "aerodaas.recording.replay.mcap_camera:ReplayedCamera",
+    },
+    "analytics": {
+        name: f"aerodaas.analytics:{name}"
+        for name in (
+            "BodyPoseEmergencyAnalytics",
+            "CarFollowAnalytics",
+            "CrowdDensityAnalytics",
+            "DistanceAnalytics",
+            "FollowAnalytics",
+            "GpsLoggerAnalytics",
+            "MonitoringAnalytics",
+            "OnnxDetector",
+            "PersonFollowAnalytics",
+            "PoseAnalytics",
+            "RemoteAnalytics",
+            "SyntheticAnalytics",
+            "TowerInspectionAnalytics",
+            "TrackingAnalytics",
+            "VipDetectionAnalytics",
+            "VipFollowAnalytics",
+        )
     },
     "trajectory_schedulers": {
         "ordered": "aerodaas.schedulers.trajectory.ordered:OrderedScheduler",

@@ -7,6 +7,7 @@ the finished graph and attaches itself, after which the same stream objects are 
 
 from __future__ import annotations
 
+import contextlib
 import inspect
 import linecache
 import typing
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AeroStreamData",
+    "AnalysisCall",
     "Graph",
     "NavigationEdge",
     "Node",
@@ -117,6 +119,16 @@ class NavigationEdge:
     """Stream whose first item empties the queue."""
 
 
+@dataclass(frozen=True)
+class AnalysisCall:
+    """One `analyse` or `instantiate` in the application."""
+
+    work: Any
+    """The analysis."""
+    stream: str | None
+    """Name of the stream that it was to analyse; None for `instantiate`."""
+
+
 class Graph:
     """The dataflow of one application."""
 
@@ -125,6 +137,9 @@ class Graph:
         self._sensors = frozenset(sensors)
         self.nodes: dict[str, Node] = {}
         self.navigation: list[NavigationEdge] = []
+        self.calls: list[AnalysisCall] = []
+        """What the application itself asked of analyses, in order."""
+        self._calling = False
         self.reader: Callable[[str], StreamReader[Any]] | None = None
         """Opens a live subscription by stream; set by the runtime while a mission runs."""
         self.on_launch: list[Callable[[], None]] = []
@@ -140,6 +155,17 @@ class Graph:
             count += 1
         self.nodes[node.id] = node
         return node
+
+    @contextlib.contextmanager
+    def calling(self, work: Any, stream: str | None) -> Iterator[None]:  # noqa: ANN401 - an analysis
+        """Record a call of the application; calls by an analysis within it are not its own."""
+        outer, self._calling = self._calling, True
+        try:
+            yield
+        finally:
+            self._calling = outer
+        if not outer:
+            self.calls.append(AnalysisCall(work, stream))
 
     @property
     def flying(self) -> bool:

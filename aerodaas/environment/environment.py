@@ -18,7 +18,7 @@ from aerodaas.dataflow.handles import Compute, Sensor
 from aerodaas.dataflow.interfaces import IAeroData, IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.environment import guest_process
+from aerodaas.environment.offering import offer
 from aerodaas.environment.run import Run
 from aerodaas.mission.commands import AddNavigation, Command, End, Pause, Resume, initial_commands
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
@@ -76,6 +76,10 @@ class Environment(PaperNames, IEnvironment):
         """Number of the graph's navigation edges that went to flights that have ended."""
         self._robots = {robot.id: Robot(self, robot) for robot in self.config.robots}
         self._trajectory: TrajectoryScheduler | None = None
+        self.chosen_trajectory: TrajectoryScheduler | None = None
+        """The trajectory scheduler that the application plugged in, if any."""
+        self.chosen_dispatch: object = None
+        """The analytics scheduler as the application named it, if it did."""
         self._dispatch_with: AnalyticsScheduler | None = None
         self._compute: list[ComputeConfig] | None = None
 
@@ -173,7 +177,7 @@ class Environment(PaperNames, IEnvironment):
             each()
         if hook is not None:
             hook()
-        if guest_process.offer(self):
+        if offer(self):
             return
         run = self.launch_again()
         run.on_end += [one for robot in robots for one in robot.end_hooks if one not in run.on_end]
@@ -195,12 +199,10 @@ class Environment(PaperNames, IEnvironment):
 
         In flight, the whole queue is planned again by it.
         """
-        if not isinstance(scheduler, TrajectoryScheduler):
-            kind = type(scheduler).__name__
-            raise ConfigError(f"a trajectory scheduler is a TrajectoryScheduler, not {kind}")
+        checked = _checked_scheduler(scheduler)
         if self.run is not None and self.graph.flying:
-            self.run.use_scheduler(scheduler)
-        self._trajectory = scheduler
+            self.run.use_scheduler(checked)
+        self._trajectory = self.chosen_trajectory = checked
 
     def set_analytics_scheduler(self, scheduler: Any) -> None:  # noqa: ANN401 - as the interface
         """Plug in the analytics scheduler: a name, `module:Class`, or an instance.
@@ -208,6 +210,7 @@ class Environment(PaperNames, IEnvironment):
         Raises UnknownIdError or SchedulerError if it cannot be used.
         """
         self._dispatch_with = load_scheduler(scheduler)
+        self.chosen_dispatch = scheduler
 
     def sensor(self, sensor: SensorConfig) -> Sensor[Any]:
         """The handle of a sensor."""
@@ -244,8 +247,8 @@ class Environment(PaperNames, IEnvironment):
         """The scheduler plugged in, or the one that the environment file names."""
         if self._trajectory is None:
             name = self.config.schedulers.trajectory
-            self.set_trajectory_scheduler(load_plugin("trajectory_schedulers", name)(self))
-        assert self._trajectory is not None  # noqa: S101 - set just now
+            scheduler = load_plugin("trajectory_schedulers", name)(self)
+            self._trajectory = _checked_scheduler(scheduler)
         return self._trajectory
 
     def analytics_scheduler(self) -> AnalyticsScheduler | None:
@@ -393,6 +396,13 @@ class Environment(PaperNames, IEnvironment):
                 self._require_granted(_addressee(one, robots), one.line)
             self.graph.navigation += [_edge(_addressee(one, robots), one) for one in entries]
             entries.clear()
+
+
+def _checked_scheduler(scheduler: object) -> TrajectoryScheduler:
+    if not isinstance(scheduler, TrajectoryScheduler):
+        kind = type(scheduler).__name__
+        raise ConfigError(f"a trajectory scheduler is a TrajectoryScheduler, not {kind}")
+    return scheduler
 
 
 class Robot(PaperNames, IRobot):

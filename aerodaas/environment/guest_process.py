@@ -13,7 +13,6 @@ import sys
 import traceback
 import types
 from collections.abc import Callable
-from contextvars import ContextVar
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,6 +29,7 @@ from aerodaas.analytics.guests.items import encoded
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.graph import NavigationEdge, Node, application_line
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.environment.offering import offered, the_only
 from aerodaas.recording.encoding import plain
 from aerodaas.types.errors import AeroDaaSError, GraphError, failure_line
 from aerodaas.types.guest_item import GuestItem
@@ -41,19 +41,7 @@ if TYPE_CHECKING:
     from aerodaas.types.data import Alert
     from aerodaas.types.vehicle import VehicleState
 
-__all__ = ["offer", "serve"]
-
-_offered: ContextVar[list[Environment] | None] = ContextVar("offered", default=None)
-"""Receiver of the environment of the guest under construction; None in any other process."""
-
-
-def offer(environment: Environment) -> bool:
-    """Receive the environment of a guest that is ready; False if this is no guest's process."""
-    offered = _offered.get()
-    if offered is None:
-        return False
-    offered.append(environment)
-    return True
+__all__ = ["serve"]
 
 
 def serve(channel: Channel) -> None:
@@ -137,14 +125,13 @@ def _opaque(item: object) -> GuestItem:
 
 def _built(catalogue: Catalogue, application: Path) -> tuple[dict[str, Any], bytes]:
     """Run the guest's file; returns its document and program, or what is wrong with it."""
-    offered: list[Environment] = []
-    _offered.set(offered)
     current_options.set(RunOptions(application=application, catalogue=catalogue, view=False))
     sys.argv = [str(application)]
     sys.path.insert(0, str(application.parent))
     try:
-        namespace = runpy.run_path(str(application), run_name="__main__")
-        environment = _only(offered)
+        with offered() as found:
+            namespace = runpy.run_path(str(application), run_name="__main__")
+        environment = the_only(found)
         document = _document(environment)
         program = _program(environment, namespace)
     except SystemExit as error:
@@ -159,14 +146,6 @@ def _built(catalogue: Catalogue, application: Path) -> tuple[dict[str, Any], byt
     if len(str(text)) > LARGEST_TEXT:
         return {"refused": "its dataflow is too large"}, b""
     return {"document": text}, program
-
-
-def _only(offered: list[Environment]) -> Environment:
-    if not offered:
-        raise GraphError("it never called start_mission()")
-    if any(one is not offered[0] for one in offered):
-        raise GraphError("it started several environments; a guest has one")
-    return offered[0]
 
 
 def _line(error: BaseException, application: Path) -> str:

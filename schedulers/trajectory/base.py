@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
+from aerodaas.dataflow.given_settings import GivenSettings
 from aerodaas.dataflow.graph import AeroStreamData, application_line
 from aerodaas.dataflow.interfaces import IAeroData, IEnvironment, INavigate, IRobot
 from aerodaas.dataflow.names import PaperNames
@@ -74,7 +75,7 @@ class NavigationSink(Protocol):
         ...
 
 
-class TrajectoryScheduler(PaperNames, INavigate):
+class TrajectoryScheduler(GivenSettings, PaperNames, INavigate):
     """Orders waypoints; subclasses implement `plan`, which must be pure.
 
     `plan` is called beside the setpoint loop each time the queue changes and, if
@@ -171,7 +172,8 @@ class TrajectoryScheduler(PaperNames, INavigate):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave the application's side behind when sent to the drone's actor."""
-        return {**self.__dict__, "_environment": None, "entries": []}
+        kept = {name: value for name, value in self.__dict__.items() if name != "_given"}
+        return {**kept, "_environment": None, "entries": []}
 
 
 def _id_of(robot: IRobot | str | None) -> str | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import logging
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
@@ -14,7 +14,7 @@ import onnxruntime as ort
 from numpy.typing import NDArray
 from typing_extensions import Self
 
-from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.detection.coco import COCO_NAMES
 from aerodaas.analytics.detection.families import FAMILIES
 from aerodaas.analytics.detection.families.base import Candidates, Decoder, ModelFamily
@@ -58,6 +58,7 @@ class OnnxDetector(Analytics[Detections]):
     isolated = True
     scheduled = True
     concurrent = True
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"path": "model"}
 
     def __init__(
         self,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import ClassVar
 
+from aerodaas.analytics.base import ResourceUse
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.models import DETECTOR
 
@@ -13,6 +15,8 @@ __all__ = ["VipDetectionAnalytics"]
 
 class VipDetectionAnalytics(OnnxDetector):
     """An `OnnxDetector` for hazard vests, by default with the shipped model."""
+
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"model": "model"}
 
     def __init__(
         self,

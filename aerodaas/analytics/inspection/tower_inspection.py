@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import cv2
 import numpy as np
 
-from aerodaas.analytics.base import Context, NavigableAnalytics
+from aerodaas.analytics.base import Context, NavigableAnalytics, ResourceUse
 from aerodaas.analytics.boxes import BoxAnalytics
 from aerodaas.analytics.follow.observation import observation
 from aerodaas.dataflow.graph import AeroStreamData, Trigger
@@ -50,6 +50,8 @@ class TowerInspectionAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics)
     nor while the tower is out of sight. Losing the tower or exceeding the time limit ends the
     inspection.
     """
+
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"pictures": "output"}
 
     def __init__(
         self,

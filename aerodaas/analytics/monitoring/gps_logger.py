@@ -7,10 +7,11 @@ import logging
 import math
 import time
 import urllib.request
+from collections.abc import Mapping
 from pathlib import Path
 from typing import ClassVar
 
-from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.monitoring.gps_rows import TimedFix, parse_track
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Alert, GpsFix, Header
@@ -38,6 +39,7 @@ class GpsLoggerAnalytics(Analytics[GpsFix]):
     """
 
     produces: ClassVar[type] = GpsFix
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"source": "input"}
 
     def __init__(
         self,

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, TypeAlias
 import numpy as np
 from typing_extensions import Self
 
-from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.detection.tracking import Tracker
 from aerodaas.analytics.people.arms import raised_arm
 from aerodaas.analytics.people.debounce import Debounce
@@ -79,6 +79,7 @@ class BodyPoseEmergencyAnalytics(Analytics[Detections]):
     Detector: TypeAlias = Analytics[Detections]
     accepts: ClassVar[tuple[type, ...]] = (Detections, Frame)
     produces: ClassVar[type] = Detections
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"gestures": "model"}
 
     def __init__(
         self,

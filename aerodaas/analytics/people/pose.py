@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.detection.keypoints import Box, KeypointModel
 from aerodaas.analytics.models import POSE
@@ -54,6 +54,7 @@ class PoseAnalytics(Analytics[Detections]):
     isolated = True
     scheduled = True
     concurrent = True
+    resources: ClassVar[Mapping[str, ResourceUse]] = {"model": "model"}
 
     def __init__(
         self,

@@ -7,12 +7,12 @@ import os
 import socket
 import threading
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 from pydantic import ValidationError
 
-from aerodaas.analytics.base import Context
+from aerodaas.analytics.base import Context, ResourceUse
 from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
 from aerodaas.analytics.remote.client import TOKEN_VARIABLE
 from aerodaas.analytics.remote.guard import Guard, is_loopback
@@ -54,6 +54,9 @@ class RemoteAnalytics(CommandingAnalytics):
 
     isolated = True
     rate = 20.0
+    resources: ClassVar[Mapping[str, ResourceUse]] = dict.fromkeys(
+        ("env_data", "host", "port"), "environment"
+    )
 
     def __init__(
         self,

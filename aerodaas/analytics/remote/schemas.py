@@ -4,20 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
+from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.mission.commands import Answer
 from aerodaas.types.clock import seconds
 from aerodaas.types.status import MissionStatus
 from aerodaas.types.vehicle import VehicleState
-from aerodaas.types.waypoints import DEFAULT_PRIORITY, NavigationType, SchedulingType, Waypoint
+from aerodaas.types.waypoints import NavigationType, SchedulingType
 
-__all__ = ["AnswerOut", "StatusOut", "WaypointIn", "WaypointsIn"]
+__all__ = ["AnswerOut", "StatusOut", "WaypointsIn"]
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
 _MOST_WAYPOINTS = 1000
 
 
@@ -27,25 +27,10 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
 
-class WaypointIn(_Strict):
-    """One waypoint, as in `aerodaas.Waypoint`."""
-
-    id: Annotated[str, Field(min_length=1, max_length=64)]
-    x: Number
-    y: Number
-    z: Number
-    hover_duration: Annotated[Number, Field(ge=0)] = 0.0
-    waypoint_type: Literal["relative", "local", "global"] = "relative"
-    yaw: Number | None = None
-    speed: Annotated[Number, Field(gt=0)] | None = None
-    priority: int = DEFAULT_PRIORITY
-    deadline: Number | None = None
-
-
 class WaypointsIn(_Strict):
     """Waypoints to add to the mission."""
 
-    waypoints: Annotated[list[WaypointIn], Field(min_length=1, max_length=_MOST_WAYPOINTS)]
+    waypoints: Annotated[list[WaypointEntry], Field(min_length=1, max_length=_MOST_WAYPOINTS)]
     ordered: bool = True
     """Whether to keep their order; otherwise the scheduler chooses it."""
     index: Annotated[int, Field(ge=0)] | None = None
@@ -53,7 +38,7 @@ class WaypointsIn(_Strict):
 
     @field_validator("waypoints")
     @classmethod
-    def _distinct(cls, waypoints: list[WaypointIn]) -> list[WaypointIn]:
+    def _distinct(cls, waypoints: list[WaypointEntry]) -> list[WaypointEntry]:
         ids = [waypoint.id for waypoint in waypoints]
         twice = sorted({name for name in ids if ids.count(name) > 1})
         if twice:
@@ -65,7 +50,7 @@ class WaypointsIn(_Strict):
         """Convert to navigation; raises InvalidWaypointError for waypoints that cannot be flown."""
         return AeroNavigation(
             NavigationType.ANALYTICS_DRIVEN,
-            [Waypoint(**waypoint.model_dump()) for waypoint in self.waypoints],
+            [waypoint.waypoint() for waypoint in self.waypoints],
             SchedulingType.ORDERED if self.ordered else SchedulingType.UNORDERED,
         )
 

@@ -1,0 +1,150 @@
+"""The mission document: an application's graph as data, which is checked and flown without code.
+
+It is JSON of a fixed format. It names analyses and schedulers that are registered where it is
+flown, and never a module, a package or an address.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from aerodaas.config.checked import checked
+from aerodaas.config.json_text import read_json
+from aerodaas.types.waypoints import DEFAULT_PRIORITY, Waypoint, WaypointType
+
+__all__ = [
+    "AnalysisEntry",
+    "MissionDocument",
+    "NavigationDocument",
+    "SchedulerEntry",
+    "TriggerEntry",
+    "WaypointEntry",
+    "read_mission",
+]
+
+_Word = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]{0,63}$")]
+_Number = Annotated[float, Field(allow_inf_nan=False)]
+_Name = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]{0,63}(/[^\W\d][\w\-]{0,63})?$")]
+_MOST = 64
+"""Most analyses, and most triggers, inputs or settings of one."""
+_MOST_WAYPOINTS = 10_000
+_MOST_HERTZ = 1000.0
+
+
+class _Entry(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class WaypointEntry(BaseModel):
+    """One waypoint, as in `aerodaas.Waypoint`: metres, seconds, radians, m/s."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    id: Annotated[str, Field(min_length=1, max_length=64)]
+    x: _Number
+    y: _Number
+    z: _Number
+    hover_duration: Annotated[_Number, Field(ge=0)] = 0.0
+    waypoint_type: Literal["relative", "local", "global"] = "relative"
+    yaw: _Number | None = None
+    speed: Annotated[_Number, Field(gt=0)] | None = None
+    priority: int = DEFAULT_PRIORITY
+    deadline: _Number | None = None
+
+    @classmethod
+    def of(cls, waypoint: Waypoint) -> WaypointEntry:
+        """Write a waypoint; raises ValueError for one that a document cannot hold."""
+        return cls.model_validate(
+            {
+                one.name: getattr(waypoint, one.name)
+                for one in dataclasses.fields(waypoint)
+                if one.name != "waypoint_type"
+            }
+            | {"waypoint_type": WaypointType(waypoint.waypoint_type).value}
+        )
+
+    def waypoint(self) -> Waypoint:
+        """Read a waypoint; raises InvalidWaypointError for one that cannot be flown."""
+        return Waypoint(**self.model_dump())
+
+
+class SchedulerEntry(_Entry):
+    """A registered scheduler and its settings."""
+
+    name: _Word
+    settings: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
+
+
+class TriggerEntry(_Entry):
+    """What an analysis does when a result meets a condition."""
+
+    target: _Name
+    """Id of the analysis that is woken, or of the robot that is commanded."""
+    command: Literal["end_mission", "pause_mission", "resume_mission"] | None = None
+    """The robot's method; None for an analysis."""
+    when: Any = None
+    """The condition, as a value of the document; None for every result."""
+
+
+class AnalysisEntry(_Entry):
+    """One analysis, by its registered name."""
+
+    id: _Name
+    """Name of its stream."""
+    analysis: _Word
+    settings: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
+    """Arguments of its constructor."""
+    reads: list[_Name] = Field(default_factory=list, max_length=_MOST)
+    """Sensors by full id, and analyses; empty for a source of its own."""
+    compute: _Name | None = None
+    rate: Annotated[float, Field(gt=0, le=_MOST_HERTZ)] | None = None
+    """Hz of a source of its own, where the application set it."""
+    task: dict[str, Any] | None = None
+    """Benefit and costs for the analytics scheduler, where the application set them."""
+    triggers: list[TriggerEntry] = Field(default_factory=list, max_length=_MOST)
+
+
+class NavigationDocument(_Entry):
+    """Navigation of a robot: waypoints, or the stream of an analysis."""
+
+    robot: _Word
+    stream: _Name | None = None
+    waypoints: list[WaypointEntry] = Field(default_factory=list, max_length=_MOST_WAYPOINTS)
+    ordered: bool = True
+    priority: Annotated[int, Field(ge=0)] | None = None
+    index: Annotated[int, Field(ge=0, le=_MOST_WAYPOINTS)] | None = None
+    deadline: Annotated[float, Field(gt=0)] | None = None
+    """Seconds of mission time."""
+    clear_on: _Name | None = None
+    """Stream whose first item empties the queue."""
+
+
+class MissionDocument(_Entry):
+    """One application's graph."""
+
+    format: Literal["aerodaas-mission"]
+    version: Literal[1]
+    name: str = Field("", max_length=100)
+    """Of the application."""
+    environment: str = Field("", max_length=200)
+    """File name of the environment that it was written for; a hint."""
+    sensors: list[_Name] = Field(default_factory=list, max_length=_MOST)
+    """Sensors that run, by full id."""
+    analyses: list[AnalysisEntry] = Field(default_factory=list, max_length=_MOST)
+    """Each after those that it reads."""
+    navigation: list[NavigationDocument] = Field(min_length=1, max_length=_MOST)
+    trajectory_scheduler: SchedulerEntry | None = None
+    analytics_scheduler: _Word | None = None
+
+    def text(self) -> str:
+        """The file's content: JSON, a setting a line, so that two of them can be compared."""
+        return self.model_dump_json(indent=2, exclude_defaults=True) + "\n"
+
+
+def read_mission(path: str | Path) -> MissionDocument:
+    """Read a mission document; raises ConfigError that names the file, the place and the remedy."""
+    return checked(MissionDocument, read_json(path, "the mission document"), str(path))

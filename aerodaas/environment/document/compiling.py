@@ -1,0 +1,154 @@
+"""Writing an application as a mission document: its file runs up to `start_mission()`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from pydantic import ValidationError
+
+from aerodaas.analytics.base import Analytics
+from aerodaas.config.checked import explained
+from aerodaas.config.model import TaskConfig
+from aerodaas.config.plugins import PluginKind
+from aerodaas.dataflow.graph import NavigationEdge, Trigger
+from aerodaas.dataflow.mission_document import MissionDocument, WaypointEntry
+from aerodaas.environment.document.values import ValueWriter, registered_name
+from aerodaas.environment.environment import Environment, Robot
+from aerodaas.types.errors import GraphError
+from aerodaas.types.waypoints import SchedulingType
+
+__all__ = ["write_mission"]
+
+
+def write_mission(environment: Environment, name: str) -> MissionDocument:
+    """The graph of an application as a document.
+
+    Args:
+        environment: The application's, ready to start.
+        name: Name of the application.
+
+    Raises:
+        GraphError: For what no document can hold, by name and with the remedy.
+    """
+    return _Compiler(environment).document(name)
+
+
+class _Compiler:
+    """Writer of one application."""
+
+    def __init__(self, environment: Environment) -> None:
+        self._environment = environment
+        self._graph = environment.graph
+        self._values = ValueWriter(environment)
+        self._works = list(dict.fromkeys(call.work for call in self._graph.calls))
+
+    def document(self, name: str) -> MissionDocument:
+        self._require_data()
+        self._environment.place_entries()
+        content = {
+            "format": "aerodaas-mission",
+            "version": 1,
+            "name": name,
+            "environment": self._environment.path.name,
+            "sensors": [one.id for one in self._graph.nodes.values() if one.kind == "sensor"],
+            "analyses": [self._analysis(work) for work in self._works],
+            "navigation": [self._navigation(edge) for edge in self._graph.navigation],
+            "trajectory_scheduler": self._trajectory(),
+            "analytics_scheduler": self._analytics(),
+        }
+        try:
+            return MissionDocument.model_validate(content)
+        except ValidationError as error:
+            raise GraphError(explained(error, MissionDocument, content)) from None
+
+    def _require_data(self) -> None:
+        """Raise GraphError for functions of the application that would run in its process."""
+        hooks = [robot for robot in self._environment.get_env_robots() if _has_hooks(robot)]
+        if hooks or self._graph.on_launch:
+            what = "hooks of on_start or on_end" if hooks else "callbacks of subscribe()"
+            raise GraphError(f"a document has no {what}, which are the application's own code")
+        edges = self._graph.navigation
+        if not edges and not self._environment.navigation_waiting():
+            raise GraphError("nothing flies: call navigate() before start_mission()")
+
+    def _analysis(self, work: Analytics[Any]) -> dict[str, Any]:
+        node = work.node
+        if node is None:
+            raise GraphError(f"{type(work).__name__} was taken out of the graph again")
+        if node.runtime_env is not None:
+            raise GraphError(
+                f"{node.id}: a document has no runtime_env; the environment file of whoever flies "
+                "it may give one"
+            )
+        name, settings = self._values.analysis(work)
+        calls = [call.stream for call in self._graph.calls if call.work is work]
+        task = vars(work).get("task")
+        return {
+            "id": node.id,
+            "analysis": name,
+            "settings": settings,
+            "reads": [stream for stream in calls if stream is not None],
+            "compute": node.compute,
+            "rate": float(work.rate) if node.kind == "external" else None,
+            "task": task.model_dump(exclude_defaults=True)
+            if isinstance(task, TaskConfig)
+            else None,
+            "triggers": [self._trigger(work, one) for one in work.given_triggers],
+        }
+
+    def _trigger(self, work: Analytics[Any], trigger: Trigger) -> dict[str, Any]:
+        place = f"{type(work).__name__}.trigger(when=…)"
+        try:
+            when = None if trigger.when is None else self._values.value(trigger.when, place)
+        except GraphError as error:
+            remedy = "aerodaas.analytics has conditions that are data: Near, Above, Below"
+            raise GraphError(f"{error}; {remedy}") from None
+        return {"target": trigger.target, "command": trigger.method, "when": when}
+
+    def _navigation(self, edge: NavigationEdge) -> dict[str, Any]:
+        navigation = edge.navigation
+        if navigation.commands:
+            raise GraphError(f"{edge.robot}: velocity commands in a document come from analyses")
+        return {
+            "robot": edge.robot,
+            "stream": navigation.stream.name if navigation.stream is not None else None,
+            "waypoints": list(self._waypoints(edge)),
+            "ordered": navigation.scheduling_type is SchedulingType.ORDERED,
+            "priority": navigation.priority,
+            "index": edge.index,
+            "deadline": edge.deadline,
+            "clear_on": edge.clear_on,
+        }
+
+    def _waypoints(self, edge: NavigationEdge) -> Iterator[dict[str, Any]]:
+        for waypoint in edge.navigation.waypoints:
+            yield WaypointEntry.of(waypoint).model_dump()
+
+    def _trajectory(self) -> dict[str, Any] | None:
+        scheduler = self._environment.chosen_trajectory
+        if scheduler is None:
+            return None
+        name = registered_name("trajectory_schedulers", type(scheduler))
+        if name is None:
+            raise _own_code(type(scheduler).__name__, "trajectory_schedulers")
+        given = scheduler.given_settings()
+        settings = {key: one for key, one in given.items() if one is not self._environment}
+        return {"name": name, "settings": self._values.settings(settings, {}, name)}
+
+    def _analytics(self) -> str | None:
+        chosen = self._environment.chosen_dispatch
+        if chosen is None or (isinstance(chosen, str) and ":" not in chosen):
+            return chosen
+        raise _own_code(str(chosen), "analytics_schedulers")
+
+
+def _own_code(what: str, kind: PluginKind) -> GraphError:
+    return GraphError(
+        f"{what} is the application's own code, and a document holds registered schedulers by "
+        f"name only: register it as an entry point of `aerodaas.{kind}`, or fly the application"
+    )
+
+
+def _has_hooks(robot: object) -> bool:
+    return isinstance(robot, Robot) and bool(robot.start_hooks or robot.end_hooks)

@@ -1,0 +1,82 @@
+"""Compiling an application's file to a mission document, and flying a document."""
+
+from __future__ import annotations
+
+import runpy
+import sys
+from pathlib import Path
+
+from aerodaas.config.options import RunOptions, current_options
+from aerodaas.dataflow.mission_document import MissionDocument, read_mission
+from aerodaas.environment.document.building import build_mission
+from aerodaas.environment.document.compiling import write_mission
+from aerodaas.environment.environment import Environment
+from aerodaas.environment.offering import offered, the_only
+from aerodaas.types.errors import AeroDaaSError, ConfigError, GraphError
+
+__all__ = ["compile_application", "fly_mission"]
+
+_MODELS = "models"
+"""Folder beside a document where models lie that are not shipped."""
+_ENVIRONMENTS = "environments"
+
+
+def compile_application(
+    application: Path, words: list[str], environment: Path | None = None
+) -> MissionDocument:
+    """Run an application up to `start_mission()` and write its graph; nothing flies.
+
+    Args:
+        application: Python file.
+        words: Its arguments.
+        environment: Environment file instead of the application's own.
+
+    Raises:
+        ConfigError: If there is no such file.
+        GraphError: If it holds what no document can, or starts no mission.
+    """
+    if not application.is_file():
+        raise ConfigError(f"there is no application {application}")
+    options = RunOptions(application=application.resolve(), environment=environment, view=False)
+    current_options.set(options)
+    sys.argv = [str(application), *words]
+    sys.path.insert(0, str(application.resolve().parent))
+    with offered() as found:
+        runpy.run_path(str(application), run_name="__main__")
+    try:
+        return write_mission(the_only(found), application.stem)
+    except GraphError as error:
+        raise GraphError(f"{application.name} cannot be written as a document: {error}") from None
+
+
+def fly_mission(path: Path, options: RunOptions) -> None:
+    """Fly a mission document; returns when the mission has ended.
+
+    Args:
+        path: The document. Models that are not shipped are looked up in `models/` beside it.
+        options: Of the run; without an environment file, the one that the document names is looked
+            up beside it and in `environments/`.
+
+    Raises:
+        AeroDaaSError: For a document that is malformed, or cannot be flown here.
+    """
+    document = read_mission(path)
+    current_options.set(options)
+    environment = Environment(options.environment or _environment_of(document, path))
+    try:
+        build_mission(document, environment, path.resolve().parent / _MODELS)
+    except AeroDaaSError as error:
+        raise type(error)(f"{path}: {error}") from None
+    environment.start_mission()
+
+
+def _environment_of(document: MissionDocument, path: Path) -> Path:
+    name = document.environment
+    if name and Path(name).name == name:
+        for folder in (path.parent, path.parent / _ENVIRONMENTS):
+            if (folder / name).is_file():
+                return (folder / name).resolve()
+    raise ConfigError(
+        f"{path} was written for {name or 'an environment without a name'}, which is not beside "
+        "it: give the file of yours by --env"
+    )

@@ -1,0 +1,256 @@
+"""Values in a mission document: settings of analyses and schedulers as JSON, and back.
+
+Numbers, texts, lists and mappings stand for themselves. An object with one key that begins with a
+dollar sign is something else: an analysis, settings of a known class, a condition, a model by the
+hash of its file, a sensor's property, a folder for output, or the environment.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import importlib
+from collections.abc import Mapping
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any, Literal, TypeGuard
+
+import numpy as np
+
+from aerodaas.analytics.base import Analytics, ResourceUse
+from aerodaas.config.plugins import load_plugin, plugin_names
+from aerodaas.environment.environment import Environment
+from aerodaas.types.errors import AeroDaaSError, GraphError
+
+__all__ = ["ValueReader", "ValueWriter", "registered_name"]
+
+_CLASSES = {
+    "Above": "aerodaas.analytics.conditions:Above",
+    "Below": "aerodaas.analytics.conditions:Below",
+    "FollowGains": "aerodaas.following.follow_settings:FollowGains",
+    "FollowLimits": "aerodaas.following.follow_settings:FollowLimits",
+    "LostPolicy": "aerodaas.following.follow_settings:LostPolicy",
+    "Near": "aerodaas.analytics.conditions:Near",
+    "TargetChoice": "aerodaas.following.follow_settings:TargetChoice",
+    "TargetSize": "aerodaas.following.relative_target:TargetSize",
+}
+"""Dataclasses that a document may hold."""
+_CONDITIONS = {
+    "fallen": "aerodaas.analytics.people.body_pose:fallen",
+    "hand_raised": "aerodaas.analytics.people.body_pose:hand_raised",
+}
+"""Functions that a trigger may have for its condition."""
+_OUTPUT = Path("runs")
+"""Folder, in the working directory, of all that a document's analyses write."""
+
+
+def _hash_of(path: Path) -> str:
+    """SHA-256 of a file, hexadecimal; raises GraphError if it cannot be read."""
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise GraphError(f"cannot read the model {path}: {error.strerror}") from None
+
+
+class ValueWriter:
+    """Writes values of one environment's application."""
+
+    def __init__(self, environment: Environment) -> None:
+        """Know the `environment`, to which values may refer."""
+        self._environment = environment
+
+    def analysis(self, work: Analytics[Any]) -> tuple[str, dict[str, Any]]:
+        """Registered name and settings of an analysis; raises GraphError if it has none."""
+        name = registered_name("analytics", type(work))
+        if name is None:
+            raise GraphError(
+                f"{type(work).__name__} is the application's own code, and a document holds "
+                "registered analyses only: have its package register it as an entry point of "
+                "`aerodaas.analytics`, or fly the application itself"
+            )
+        return name, self.settings(work.given_settings(), work.resources, name)
+
+    def settings(
+        self, given: Mapping[str, Any], bound: Mapping[str, ResourceUse], owner: str
+    ) -> dict[str, Any]:
+        """The arguments of a constructor; raises GraphError for one that is no data."""
+        return {
+            name: self._resource(value, bound[name], f"{owner}({name}=…)")
+            if name in bound and value is not None
+            else self.value(value, f"{owner}({name}=…)")
+            for name, value in given.items()
+        }
+
+    def value(self, value: object, place: str) -> Any:  # noqa: ANN401 - any JSON
+        """Any value; raises GraphError, with its `place`, for one that is no data."""
+        plain = value.item() if isinstance(value, np.generic) else value
+        if plain is None or isinstance(plain, bool | int | float | str):
+            return plain
+        if isinstance(value, list | tuple):
+            return [self.value(one, place) for one in value]
+        found = self._reference(value, place)
+        if found is None and _is_mapping(value):
+            found = {key: self.value(one, place) for key, one in value.items()}
+        if found is None:
+            what = getattr(value, "__qualname__", None) or repr(value)[:60]
+            raise GraphError(f"{place}: {what} is code or an object, which no document can hold")
+        return found
+
+    def _reference(self, value: object, place: str) -> dict[str, Any] | None:
+        """What stands for an object that is known at both ends; None for any other."""
+        if value is self._environment:
+            return {"$environment": "handle"}
+        if value is self._environment.env_data:
+            return {"$environment": "data"}
+        if isinstance(value, Analytics):
+            name, settings = self.analysis(value)
+            return {"$analysis": name, "settings": settings}
+        for name, target in _CLASSES.items():
+            if type(value) is _imported(target):
+                return {"$settings": name, "of": self._fields(value, place)}
+        for name, target in _CONDITIONS.items():
+            if value is _imported(target):
+                return {"$condition": name}
+        return None
+
+    def _fields(self, value: Any, place: str) -> dict[str, Any]:  # noqa: ANN401 - a dataclass
+        return {
+            one.name: self.value(getattr(value, one.name), place)
+            for one in dataclasses.fields(value)
+            if getattr(value, one.name) != one.default
+        }
+
+    def _resource(self, value: object, use: ResourceUse, place: str) -> dict[str, Any]:
+        if use == "environment":
+            if found := self._reference(value, place):
+                return found
+            raise GraphError(f"{place} comes from the environment file alone: leave it out")
+        path = Path(str(value))
+        if use == "model":
+            return {"$model": path.name, "sha256": _hash_of(path)}
+        if use == "output":
+            return {"$output": path.name}
+        for sensor in self._environment.config.all_sensors():
+            handle = self._environment.sensor(sensor)
+            for name in sensor.settings:
+                if handle.get_sensor_property(name) == str(value):
+                    return {"$property": [sensor.full_id, name]}
+        raise GraphError(
+            f"{place} reads {value}, which only this machine has: name it as a setting of a sensor "
+            "of the environment file, and take it from there by get_sensor_property"
+        )
+
+
+class ValueReader:
+    """Reads values into objects of this machine."""
+
+    def __init__(self, environment: Environment, models: Path) -> None:
+        """Know the `environment` to which values refer, and the folder of further models."""
+        self._environment = environment
+        self._models = models
+        self._known: dict[str, Path] = {}
+
+    def analysis(self, name: str, settings: Mapping[str, Any]) -> Analytics[Any]:
+        """Make a registered analysis; raises GraphError for a setting that it does not take."""
+        kind = load_plugin("analytics", name)
+        made = self.made(kind, settings, name)
+        if not isinstance(made, Analytics):
+            raise GraphError(f"{name} is no analysis")
+        return made
+
+    def made(self, kind: Any, settings: Mapping[str, Any], owner: str) -> Any:  # noqa: ANN401 - any class
+        """An instance of `kind`; raises GraphError for settings that it does not take."""
+        bound: Mapping[str, ResourceUse] = getattr(kind, "resources", {})
+        found = {
+            name: self._resource(value, bound[name], f"{owner}.{name}")
+            if name in bound and value is not None
+            else self.value(value, f"{owner}.{name}")
+            for name, value in settings.items()
+        }
+        try:
+            return kind(**found)
+        except AeroDaaSError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a stranger's values in any constructor
+            raise GraphError(f"{owner} does not take these settings: {error}"[:300]) from None
+
+    def value(self, content: Any, place: str) -> Any:  # noqa: ANN401 - any value
+        """Any value; raises GraphError, with its `place`, for one of an unknown kind."""
+        if isinstance(content, list):
+            return tuple(self.value(one, place) for one in content)
+        if not isinstance(content, dict):
+            return content
+        kind = next((key for key in content if key.startswith("$")), None)
+        if kind is None:
+            return {key: self.value(one, place) for key, one in content.items()}
+        return self._special(kind, content, place)
+
+    def _special(self, kind: str, content: dict[str, Any], place: str) -> Any:  # noqa: ANN401
+        match content:
+            case {"$environment": "handle", **rest} if not rest:
+                return self._environment
+            case {"$environment": "data", **rest} if not rest:
+                return self._environment.env_data
+            case {"$condition": str(name), **rest} if not rest and name in _CONDITIONS:
+                return _imported(_CONDITIONS[name])
+            case {"$analysis": str(name), "settings": dict(settings), **rest} if not rest:
+                return self.analysis(name, settings)
+            case {"$settings": str(name), "of": dict(of), **rest} if not rest and name in _CLASSES:
+                return self.made(_imported(_CLASSES[name]), of, f"{place}: {name}")
+        raise GraphError(f"{place}: there is no {kind} {str(content[kind])[:40]!r} here")
+
+    def _resource(self, content: Any, use: ResourceUse, place: str) -> Any:  # noqa: ANN401
+        if isinstance(content, dict):
+            match use, content:
+                case "environment", {"$environment": str(), **rest} if not rest:
+                    return self._special("$environment", content, place)
+                case "model", {"$model": str(name), "sha256": str(wanted), **rest} if not rest:
+                    return self._model(name, wanted, place)
+                case "output", {"$output": str(name), **rest} if not rest and _is_plain(name):
+                    return _OUTPUT / name
+                case "input", {"$property": [str(sensor), str(name)], **rest} if not rest:
+                    handle = self._environment.get_env_sensor_by_id(sensor)
+                    return handle.get_sensor_property(name)
+        raise GraphError(f"{place}: a document names no file or address of this machine")
+
+    def _model(self, name: str, wanted: str, place: str) -> Path:
+        if not self._known:
+            shipped = Path(
+                str(importlib.import_module("aerodaas.analytics.models").__file__)
+            ).parent
+            for folder in (shipped, self._models):
+                self._known |= {_hash_of(one): one for one in sorted(folder.glob("*.onnx"))}
+        if wanted not in self._known:
+            raise GraphError(
+                f"{place}: there is no model {name!r} with the SHA-256 {wanted[:16]}… here: put it "
+                f"into {self._models}"
+            )
+        return self._known[wanted]
+
+
+def _is_mapping(value: object) -> TypeGuard[Mapping[str, object]]:
+    return isinstance(value, Mapping) and all(
+        isinstance(key, str) and not key.startswith("$") for key in value
+    )
+
+
+def _is_plain(name: str) -> bool:
+    """Whether a name is one part of a path, on any system."""
+    return (
+        name not in {"", ".", ".."}
+        and PurePosixPath(name).name == name
+        and PureWindowsPath(name).name == name
+    )
+
+
+def registered_name(
+    kind: Literal["analytics", "trajectory_schedulers"], wanted: type
+) -> str | None:
+    """Name by which the class `wanted` is registered; None if it is not."""
+    names = plugin_names(kind)
+    first = [wanted.__name__] if wanted.__name__ in names else names
+    return next((name for name in first if load_plugin(kind, name) is wanted), None)
+
+
+def _imported(target: str) -> Any:  # noqa: ANN401 - a class or a function
+    module, _, name = target.partition(":")
+    return getattr(importlib.import_module(module), name)
