@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import atexit
-import contextlib
 import os
 import threading
 import time
@@ -200,9 +199,18 @@ class Run:
         while not self._finished.wait(_BEAT_SECONDS):
             if time.monotonic() - self._looked < _BEAT_AGE:
                 continue
-            # The thread that waits for the run meets the same error and handles it.
-            with contextlib.suppress(AeroDaaSError):
+            try:
                 self.look()
+            except AeroDaaSError:
+                # The thread that waits for the run meets the same error and handles it.
+                continue
+            except Exception:
+                assert self._flight is not None  # noqa: S101 - launched
+                if self._flight.reachable:
+                    raise
+                # The application has left the cluster, at any point of the call: no call can be
+                # made any more.
+                return
 
     def reports(self) -> dict[str, ActorReport]:
         """The newest report of each actor, by its name."""
