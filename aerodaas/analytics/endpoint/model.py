@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from aerodaas.analytics.endpoint.connection import Connection, Reply
 from aerodaas.analytics.endpoint.tensors import (
     HEADER_LENGTH,
+    MALFORMED,
     TensorSpec,
     decode_reply,
     encode_request,
@@ -149,14 +150,7 @@ def _metadata(reply: Reply, connection: Connection) -> dict[str, list[TensorSpec
             ]
             for key in ("inputs", "outputs")
         }
-    except (
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        RecursionError,
-        OverflowError,
-    ) as error:
+    except MALFORMED as error:
         reason = connection.cleaned(repr(error))[:_TEXT_SHOWN]
         raise ModelError(
             f"{connection.url} tells of no model of the Open Inference Protocol ({reason}); "

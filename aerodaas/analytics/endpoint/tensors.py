@@ -16,7 +16,14 @@ from numpy.typing import NDArray
 
 from aerodaas.types.errors import EndpointError
 
-__all__ = ["DATATYPES", "HEADER_LENGTH", "TensorSpec", "decode_reply", "encode_request"]
+__all__ = [
+    "DATATYPES",
+    "HEADER_LENGTH",
+    "MALFORMED",
+    "TensorSpec",
+    "decode_reply",
+    "encode_request",
+]
 
 HEADER_LENGTH = "Inference-Header-Content-Length"
 """HTTP header with the number of bytes of JSON before the binary data."""
@@ -35,6 +42,8 @@ DATATYPES: dict[str, type[np.generic]] = {
     "FP64": np.float64,
 }
 """Element types by the protocol's names, except BYTES, which is not numeric."""
+MALFORMED = (ValueError, KeyError, TypeError, AttributeError, RecursionError, OverflowError)
+"""What reading a stranger's JSON of another form raises."""
 _NAMES = {np.dtype(kind): name for name, kind in DATATYPES.items()}
 
 
@@ -105,14 +114,7 @@ def decode_reply(body: bytes, header_length: str | None) -> dict[str, NDArray[An
                 array = np.frombuffer(body[end : end + size], kind)
                 end += size
             found[str(output["name"])] = array.reshape(output["shape"])
-    except (
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        RecursionError,
-        OverflowError,
-    ) as error:
+    except MALFORMED as error:
         text = str(error).partition("\n")[0]
         raise EndpointError(f"no reply of the inference protocol: {text}") from None
     return found

@@ -17,6 +17,7 @@ from typing import Any, Literal, TypeGuard
 import numpy as np
 
 from aerodaas.analytics.base import Analytics, ResourceUse
+from aerodaas.analytics.models import DETECTOR
 from aerodaas.config.plugins import load_plugin, plugin_names
 from aerodaas.environment.environment import Environment
 from aerodaas.types.errors import AeroDaaSError, GraphError
@@ -214,10 +215,7 @@ class ValueReader:
 
     def _model(self, name: str, wanted: str, place: str) -> Path:
         if not self._known:
-            shipped = Path(
-                str(importlib.import_module("aerodaas.analytics.models").__file__)
-            ).parent
-            for folder in (shipped, self._models):
+            for folder in (DETECTOR.parent, self._models):
                 self._known |= {_hash_of(one): one for one in sorted(folder.glob("*.onnx"))}
         if wanted not in self._known:
             raise GraphError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from tools.fuzz.flight import (
     replaced,
     require,
 )
+from tools.fuzz.records import record, records
 
 __all__ = ["mutate", "run", "seeds"]
 
@@ -41,8 +42,7 @@ _ROBOT = RobotConfig.model_validate(
 _OWN, _STRANGER = ("127.0.0.1", 14550), ("127.0.0.1", 6666)
 _GUIDED = 4
 _KINDS = sorted(link._WANTED)  # noqa: SLF001 - every message that the driver reads
-_RECORD = struct.Struct(">BBH")
-"""What it is, turns until the next one, length of its body."""
+_LONGEST_BODY = 600
 _BYTES, _MESSAGE, _FORGED, _OTHER = range(4)
 """Bytes as they are; a message of the vehicle, of a stranger, of another system: kind, payload."""
 _QUIET = 0x80
@@ -154,7 +154,7 @@ def run(data: bytes) -> None:
                 _turn(rig, flight)
                 if flight.state is MissionState.ENROUTE:
                     break
-            for kind, rest, body in _records(data):
+            for kind, rest, body in records(data, _LONGEST_BODY):
                 _hear(rig, kind & 3, body)
                 rig.quiet = bool(kind & _QUIET)
                 for _ in range(1 + rest % _LONGEST_REST):
@@ -201,23 +201,10 @@ def _packet(number: int, payload: bytes, system: int) -> bytes:
     return b"\xfd" + head + payload + struct.pack("<H", crc.crc)
 
 
-def _records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
-    place = 0
-    while len(data) - place >= _RECORD.size:
-        kind, rest, length = _RECORD.unpack_from(data, place)
-        place += _RECORD.size
-        yield kind, rest, data[place : place + length % 600]
-        place += length
-
-
-def _record(kind: int, rest: int, body: bytes) -> bytes:
-    return _RECORD.pack(kind, rest, len(body)) + body
-
-
 def _said(message: Any, kind: int = _MESSAGE, rest: int = 1) -> bytes:  # noqa: ANN401
     packed = message.pack(mavlink.MAVLink(None, 1, 1))
     number = _KINDS.index(message.get_msgId())
-    return _record(kind, rest, bytes([number]) + bytes(packed[10:-2]))
+    return record(kind, rest, bytes([number]) + bytes(packed[10:-2]))
 
 
 def seeds() -> Iterable[bytes]:
@@ -237,7 +224,7 @@ def seeds() -> Iterable[bytes]:
     yield _said(mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, 0, 0, 20)) + _said(
         mavlink.MAVLink_ekf_status_report_message(831, 0, 0, 0, 0, 0)
     )
-    yield _record(_BYTES, 1, bytes(beat.pack(mavlink.MAVLink(None, 1, 1))) + b"\xfd\x00\xfenoise")
+    yield record(_BYTES, 1, bytes(beat.pack(mavlink.MAVLink(None, 1, 1))) + b"\xfd\x00\xfenoise")
 
 
 _PATTERNS = (
@@ -258,7 +245,7 @@ _SENT = (_MESSAGE, _MESSAGE, _MESSAGE, _FORGED, _OTHER)
 
 def mutate(data: bytes, rng: random.Random) -> bytes:
     """Insert messages of extreme values, drop records, change fields, waits and senders."""
-    found = list(_records(data))
+    found = list(records(data, _LONGEST_BODY))
     for _ in range(rng.randint(1, 4)):
         index = rng.randrange(len(found)) if found else 0
         kind, rest, body = found[index] if found else (0, 0, b"")
@@ -273,7 +260,7 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
             case _:
                 place = rng.randrange(1, max(2, len(body) - _WORD + 1))
                 found[index] = (kind, rest, body[:place] + _value(rng) + body[place + _WORD :])
-    return b"".join(_record(*one) for one in found[:30])
+    return b"".join(record(*one) for one in found[:30])
 
 
 def _body(rng: random.Random) -> bytes:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import queue
 import random
 import re
-import struct
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from types import SimpleNamespace
 from typing import Any
 
@@ -28,14 +27,14 @@ from tools.fuzz.flight import (
     replaced,
     require,
 )
+from tools.fuzz.records import record, records
 
 __all__ = ["mutate", "run", "seeds"]
 
 _ROBOT = RobotConfig.model_validate({"id": "t", "driver": "tello", "limits": LIMITS})
 _OWN = ("192.168.10.1", 8889)
 _STICKS = re.compile(r"rc (-?\d{1,3}) (-?\d{1,3}) (-?\d{1,3}) (-?\d{1,3})")
-_RECORD = struct.Struct(">BBH")
-"""What it is, turns until the next one, length of its body."""
+_LONGEST_BODY = 2000
 _REPLY, _STATE, _STRANGERS_REPLY, _STRANGERS_STATE = range(4)
 _QUIET = 0x80
 """Bit of a record: the Tello itself sends no state until the next one."""
@@ -151,28 +150,28 @@ def run(data: bytes) -> None:
         (link, "DeadMan", guard),
         (TelloLink, "_start", begin),
     ):
-        records = list(_records(data))
-        if records and records[0][0] & _QUIET:
+        heard = list(records(data, _LONGEST_BODY))
+        if heard and heard[0][0] & _QUIET:
             # Some inputs begin before the handshake.
-            _hear(rig, *records[0])
+            _hear(rig, *heard[0])
         try:
             rig.vehicle.connect(3.0)
         except VehicleError:
             return
         try:
-            _fly(rig, records)
+            _fly(rig, heard)
         finally:
             rig.quiet = False
             rig.vehicle.close()
 
 
-def _fly(rig: _Rig, records: list[tuple[int, int, bytes]]) -> None:
+def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]]) -> None:
     flight = FuzzedFlight(rig.vehicle, _ROBOT)
     for _ in range(60):
         _turn(rig, flight)
         if flight.state is MissionState.ENROUTE:
             break
-    for kind, rest, body in records:
+    for kind, rest, body in heard:
         _hear(rig, kind, rest, body)
         rig.quiet = bool(kind & _QUIET)
         for _ in range(1 + rest % _LONGEST_REST):
@@ -196,27 +195,14 @@ def _state(**fields: object) -> bytes:
     return "".join(f"{name}:{known.get(name, 0)};" for name in _FIELDS).encode() + b"\r\n"
 
 
-def _records(data: bytes) -> Iterator[tuple[int, int, bytes]]:
-    place = 0
-    while len(data) - place >= _RECORD.size:
-        kind, rest, length = _RECORD.unpack_from(data, place)
-        place += _RECORD.size
-        yield kind, rest, data[place : place + length % 2000]
-        place += length
-
-
-def _record(kind: int, rest: int, body: bytes) -> bytes:
-    return _RECORD.pack(kind, rest, len(body)) + body
-
-
 def seeds() -> Iterable[bytes]:
     """States and replies in flight, a stranger's, a silence, a fall, and a garbled packet."""
-    yield _record(_STATE, 3, _state(h=100, vgx=3, yaw=20)) + _record(_REPLY, 3, b"error Motor stop")
-    yield _record(_STRANGERS_STATE, 3, _state(bat=1)) + _record(_STRANGERS_REPLY, 3, b"ok")
-    yield _record(_STATE | _QUIET, 38, _state(h=100)) + _record(_STATE, 2, _state(h=90))
-    yield _record(_STATE, 1, _state(h=90, vgz=40)) + _record(_STATE, 30, _state(h=0))
-    yield _record(_STATE, 5, b"pitch:0;roll:0;bat:1e9;\xff\xfe") + _record(_REPLY, 1, b"\xff")
-    yield _record(_STATE, 2, _state(temph=90, bat=5)) + _record(_REPLY, 2, b"ok")
+    yield record(_STATE, 3, _state(h=100, vgx=3, yaw=20)) + record(_REPLY, 3, b"error Motor stop")
+    yield record(_STRANGERS_STATE, 3, _state(bat=1)) + record(_STRANGERS_REPLY, 3, b"ok")
+    yield record(_STATE | _QUIET, 38, _state(h=100)) + record(_STATE, 2, _state(h=90))
+    yield record(_STATE, 1, _state(h=90, vgz=40)) + record(_STATE, 30, _state(h=0))
+    yield record(_STATE, 5, b"pitch:0;roll:0;bat:1e9;\xff\xfe") + record(_REPLY, 1, b"\xff")
+    yield record(_STATE, 2, _state(temph=90, bat=5)) + record(_REPLY, 2, b"ok")
 
 
 _VALUES = (
@@ -242,7 +228,7 @@ _SENT = (_STATE, _STATE, _STATE, _STRANGERS_STATE, _REPLY, _STRANGERS_REPLY)
 
 def mutate(data: bytes, rng: random.Random) -> bytes:
     """Insert packets of extreme values, drop records, change fields, waits and senders."""
-    found = list(_records(data))
+    found = list(records(data, _LONGEST_BODY))
     for _ in range(rng.randint(1, 4)):
         index = rng.randrange(len(found)) if found else 0
         kind, rest, body = found[index] if found else (0, 0, b"")
@@ -259,7 +245,7 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
             case _:
                 place = rng.randrange(len(body) + 1)
                 found[index] = (kind, rest, body[:place] + _value(rng) + body[place + 1 :])
-    return b"".join(_record(*one) for one in found[:30])
+    return b"".join(record(*one) for one in found[:30])
 
 
 def _values(rng: random.Random) -> bytes:
