@@ -151,8 +151,7 @@ def _say(context: typer.Context, command: str, done: str) -> None:
 
 
 def _line(status: dict[str, Any]) -> str:
-    visited = set(status["visited"])
-    known = visited.union(status["pending"], [status["target"]] if status["target"] else [])
+    visited, known = status["waypoints_visited"], status["waypoints_known"]
     parts = [f"{status['time']:7.1f} s", status["state"]]
     if status["position"] is not None:
         east, north, up = ("?" if axis is None else f"{axis:.1f}" for axis in status["position"])
@@ -160,5 +159,5 @@ def _line(status: dict[str, Any]) -> str:
     if status["battery"] is not None:
         parts.append(f"battery {status['battery']:.0%}")
     if known:
-        parts.append(f"{len(visited)} of {len(known)} waypoints")
+        parts.append(f"{visited} of {known} waypoints")
     return "  ".join([*parts, *(text for text in (status["reason"], *status["faults"]) if text)])

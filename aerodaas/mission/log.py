@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from collections import deque
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,6 +12,7 @@ import numpy as np
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Alert, Header
 from aerodaas.types.geometry import Vector
+from aerodaas.types.status import RECENT
 
 __all__ = ["MissionLog", "words"]
 
@@ -28,7 +31,11 @@ class MissionLog:
 
     source: str
     """Source of the alerts' headers."""
-    visited: list[str] = field(default_factory=list)
+    visited: deque[str] = field(default_factory=lambda: deque(maxlen=RECENT))
+    """Waypoints reached last, in order."""
+    visits: int = 0
+    """How often a waypoint was reached."""
+    _reached: set[str] = field(default_factory=set)
     given_up: dict[str, str] = field(default_factory=dict)
     """Reason by waypoint id."""
     distance: float = 0.0
@@ -38,6 +45,16 @@ class MissionLog:
     """Every alert of the mission, oldest first."""
     _told: dict[tuple[str, str], int] = field(default_factory=dict)
     """Mission clock at which each kind and subject was last raised, nanoseconds."""
+
+    def visit(self, waypoint_id: str) -> None:
+        """Record that a waypoint was reached."""
+        self.visited.append(waypoint_id)
+        self.visits += 1
+        self._reached.add(waypoint_id)
+
+    def waypoint_counts(self, ahead: Iterable[str]) -> tuple[int, int]:
+        """How many waypoints were reached, and how many are known with those `ahead`."""
+        return len(self._reached), len(self._reached) + len(set(ahead) - self._reached)
 
     def fly(self, position: Vector) -> None:
         """Add the distance to `position`, ENU metres."""

@@ -47,7 +47,7 @@ from aerodaas.types.data import Alert
 from aerodaas.types.energy import EnergyMeter, EnergyModel
 from aerodaas.types.errors import failure_line
 from aerodaas.types.geometry import GeodeticOrigin, Vector, body_to_enu
-from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.status import RECENT, MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState, VelocitySetpoint
 from aerodaas.types.waypoints import Waypoint
 
@@ -161,9 +161,11 @@ class Mission:
             waypoints[0] if served else None,
             waypoints[1:] if served else waypoints,
             tuple(self._log.visited),
-            tuple(self._log.given_up),
+            tuple(self._log.given_up)[-RECENT:],
             self._log.distance,
             tuple(text for text in (*texts, self._navigator.fault, self._plan_fault) if text),
+            self._log.visits,
+            self._log.waypoint_counts(stop.id for stop in stops),
         )
 
     def handle(self, command: Command, now: int) -> Answer:
@@ -437,7 +439,7 @@ class Mission:
 
     def _finish(self, stop: QueuedWaypoint, phase: LegPhase) -> None:
         if phase is LegPhase.DONE:
-            self._log.visited.append(stop.id)
+            self._log.visit(stop.id)
         else:
             stalled = phase is LegPhase.STALLED
             why = (

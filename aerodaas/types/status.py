@@ -12,6 +12,7 @@ from aerodaas.types.vehicle import Setpoint
 from aerodaas.types.waypoints import Waypoint
 
 __all__ = [
+    "RECENT",
     "Decision",
     "Message",
     "MissionState",
@@ -21,6 +22,8 @@ __all__ = [
 ]
 
 E = TypeVar("E")
+RECENT = 64
+"""Most ids in a status' lists: a mission of hours reaches thousands of waypoints."""
 
 
 class MissionState(str, enum.Enum):
@@ -65,20 +68,17 @@ class MissionStatus:
     pending: tuple[Waypoint, ...] = ()
     """Waypoints still to be visited after the target, in planned order."""
     visited: tuple[str, ...] = ()
-    """Ids of the waypoints reached, in order."""
+    """Ids of the waypoints reached last, in order; `RECENT` at most, for a status is sent often."""
     given_up: tuple[str, ...] = ()
-    """Ids of the waypoints that the scheduler or the safety layer refused."""
+    """Ids of the waypoints refused last by the scheduler or the safety layer; `RECENT` at most."""
     distance: float = 0.0
     """Metres flown since take-off."""
     faults: tuple[str, ...] = ()
     """Present faults, as the safety layer names them."""
-
-    @property
-    def waypoint_counts(self) -> tuple[int, int]:
-        """How many waypoints were visited, and how many are known; one visited twice is one."""
-        visited = set(self.visited)
-        ahead = {waypoint.id for waypoint in (self.target, *self.pending) if waypoint is not None}
-        return len(visited), len(visited | ahead)
+    visits: int = 0
+    """How often a waypoint has been reached since take-off; `visited` holds the last of them."""
+    waypoint_counts: tuple[int, int] = (0, 0)
+    """How many waypoints were visited, and how many are known; one visited twice is one."""
 
     @property
     def progress(self) -> float:

@@ -123,7 +123,16 @@ class SyntheticFlight:
                 time += 1 / self.rate
                 ahead = tuple(w for w in plan if w.id not in visited and w is not target)
                 status = MissionStatus(
-                    round(time * 1e9), state, reason, target, ahead, visited, (), distance
+                    round(time * 1e9),
+                    state,
+                    reason,
+                    target,
+                    ahead,
+                    visited,
+                    (),
+                    distance,
+                    visits=len(visited),
+                    waypoint_counts=(len(visited), len(plan)),
                 )
                 yield Step(time, at, velocity, yaw, status)
 

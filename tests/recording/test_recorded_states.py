@@ -10,12 +10,14 @@ import pytest
 from synthetic_flight import PROVENANCE
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.mission.log import MissionLog
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.recording.report.flight import RecordedFlight
 from aerodaas.recording.report.report import read_report
 from aerodaas.recording.states import odometry_of, vehicle_states
 from aerodaas.types.data import Battery, GpsFix, Header, Odometry
-from aerodaas.types.status import Message, MissionState, MissionStatus
+from aerodaas.types.status import RECENT, Message, MissionState, MissionStatus
 from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
 from aerodaas.types.waypoints import Waypoint
 
@@ -114,8 +116,8 @@ def test_a_report_counts_a_waypoint_once(tmp_path: Path) -> None:
     late = Waypoint("late", 1, 1, 2)
     statuses = [
         MissionStatus(0, MissionState.ENROUTE, "", late, (Waypoint("a", 2, 2, 2),)),
-        MissionStatus(1, MissionState.ENROUTE, "", late, (), ("late",)),
-        MissionStatus(2, MissionState.LANDED, "", None, (), ("late", "late")),
+        MissionStatus(1, MissionState.ENROUTE, "", late, (), ("late",), visits=1),
+        MissionStatus(2, MissionState.LANDED, "", None, (), ("late", "late"), visits=2),
     ]
     path = tmp_path / "a.mcap"
     with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
@@ -124,3 +126,29 @@ def test_a_report_counts_a_waypoint_once(tmp_path: Path) -> None:
             recorder.write(Message("a/@mission", seq, status.stamp, header, 0, (), status))
     robot = read_report(path).summary.robots["a"]
     assert (robot.waypoints_visited, robot.waypoints_planned) == (1, 2)
+
+
+def test_all_visits_of_a_long_flight_are_found_again(tmp_path: Path) -> None:
+    """A status names the last few only, and one of them may be lost on its way to the recorder."""
+    log = MissionLog("a")
+    path = tmp_path / "a.mcap"
+    names = [f"w{number}" for number in range(300)]
+    with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE) as recorder:
+        for seq, name in enumerate(names):
+            log.visit(name)
+            log.give_up(seq, f"not-{name}", "too far")
+            if seq % 7 == 3:
+                continue
+            status = MissionStatus(
+                seq,
+                MissionState.ENROUTE,
+                visited=tuple(log.visited),
+                given_up=tuple(log.given_up)[-RECENT:],
+                visits=log.visits,
+            )
+            assert len(status.visited) <= RECENT
+            recorder.write(Message("a/@mission", seq, seq, Header(seq, seq, "a"), 0, (), status))
+    with Recording.open(path) as recording:
+        robot = RecordedFlight.read(recording).robots["a"]
+    assert robot.visited == tuple(names)
+    assert robot.given_up == tuple(f"not-{name}" for name in names)

@@ -28,7 +28,14 @@ def snapshot(
     """A drone on its way north."""
     target = Waypoint("north", 0.0, 10.0, 1.5)
     mission = MissionStatus(
-        0, state, "to [north]", target, (Waypoint("east", 10.0, 0.0, 1.5),), ("start",)
+        0,
+        state,
+        "to [north]",
+        target,
+        (Waypoint("east", 10.0, 0.0, 1.5),),
+        ("start",),
+        visits=1,
+        waypoint_counts=(1, 3),
     )
     odometry = Odometry(np.array([-0.01, time, 1.5]), np.array([0.0, 1.0, 0.0]), 1.57)
     vehicle = VehicleState(0, odometry, Battery(0.5), VehicleMode.GUIDED, armed=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from aerodaas.mission.log import MissionLog
 from aerodaas.terminal.panels import waypoints_text
 from aerodaas.types.status import MissionState, MissionStatus
 from aerodaas.types.waypoints import Waypoint
@@ -29,7 +30,13 @@ def test_a_waypoint_counts_once(
     counts: tuple[int, int],
 ) -> None:
     """However often it is visited, and also while the drone is still there."""
-    status = MissionStatus(0, MissionState.ENROUTE, "", target, pending, visited)
+    log = MissionLog("drone")
+    for name in visited:
+        log.visit(name)
+    ahead = (waypoint.id for waypoint in (target, *pending) if waypoint is not None)
+    status = MissionStatus(
+        0, MissionState.ENROUTE, waypoint_counts=log.waypoint_counts(ahead), visits=log.visits
+    )
     assert status.waypoint_counts == counts
     share = counts[0] / counts[1] if counts[1] else 0.0
     assert status.progress == share

@@ -81,7 +81,12 @@ class StatusOut(BaseModel):
     """Waypoint being flown to or hovered at."""
     pending: list[str]
     visited: list[str]
+    """Waypoints reached last, in order; at most 64."""
     given_up: list[str]
+    """Waypoints refused last; at most 64."""
+    waypoints_visited: int
+    waypoints_known: int
+    """Waypoints visited or ahead; one visited twice counts once."""
     distance: float
     """Metres flown."""
     faults: list[str]
@@ -108,6 +113,8 @@ class StatusOut(BaseModel):
             pending=[waypoint.id for waypoint in status.pending],
             visited=list(status.visited),
             given_up=list(status.given_up),
+            waypoints_visited=status.waypoint_counts[0],
+            waypoints_known=status.waypoint_counts[1],
             distance=status.distance,
             faults=list(status.faults),
         )

@@ -105,6 +105,7 @@ class _MissionStatus(TypedDict):
     state: Word
     reason: Text
     visited: list[Word]
+    visits: NotRequired[Annotated[int, Field(strict=True, ge=0)]]
     given_up: list[Word]
     distance: Number
 

@@ -96,6 +96,8 @@ class RobotFlight:
     plan: dict[str, tuple[float, float, float]] = field(default_factory=dict)
     """All waypoints planned during the flight, by id, local ENU metres."""
     visited: tuple[str, ...] = ()
+    visits: int = 0
+    """How often a waypoint was reached, if the recording says so."""
     given_up: tuple[str, ...] = ()
     distance: float = 0.0
     """Metres flown, from the mission status."""
@@ -231,9 +233,18 @@ def _mission(flight: RecordedFlight, record: Record) -> None:
     else:
         last = robot.bands[-1]
         robot.bands[-1] = Band(last.state, last.start, now, value["reason"] or last.reason)
-    robot.visited = tuple(value["visited"])
-    robot.given_up = tuple(value["given_up"])
+    _visit(robot, value["visited"], value.get("visits"))
+    robot.given_up = tuple(dict.fromkeys((*robot.given_up, *value["given_up"])))
     robot.distance = float(value["distance"])
+
+
+def _visit(robot: RobotFlight, recent: list[str], visits: int | None) -> None:
+    """Take over the last visits of `visits`; early recordings have all of them and no number."""
+    if visits is None:
+        robot.visited = tuple(recent)
+    elif visits > robot.visits:
+        robot.visited = (*robot.visited, *recent[robot.visits - visits :])
+        robot.visits = visits
 
 
 def _plan(flight: RecordedFlight, record: Record) -> None:

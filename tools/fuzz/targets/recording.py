@@ -341,7 +341,9 @@ def _messages() -> Iterator[Message[Any]]:
             truth=odometry,
         )
         yield _message("drone/@state", turn, stamp, state)
-        status = MissionStatus(stamp, states[turn // 2], "so", plan[0], plan[1:], ("a",), (), turn)
+        status = MissionStatus(
+            stamp, states[turn // 2], "so", plan[0], plan[1:], ("a",), (), turn, visits=1
+        )
         yield _message("drone/@status", turn, stamp, status)
         asked = PositionSetpoint(at, None, 1.0)
         sent = VelocitySetpoint(odometry.velocity)
