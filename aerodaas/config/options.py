@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from aerodaas.config.grants import Catalogue
+    from aerodaas.config.model import EnvironmentConfig
 
 __all__ = ["RunOptions", "current_options"]
 
@@ -19,6 +20,8 @@ class RunOptions:
 
     environment: Path | None = None
     """Environment file instead of the application's own."""
+    config: EnvironmentConfig | None = None
+    """Environment itself, in the place of the file's content; relative paths are the file's."""
     speed: float | None = None
     """Mission seconds per wall second."""
     lockstep: bool | None = None

@@ -55,7 +55,8 @@ class Environment(PaperNames, IEnvironment):
         if options.catalogue is not None:
             config = options.catalogue.config
         elif options.replay is None:
-            config = overridden(EnvironmentConfig.load(self.path), settings)
+            given = options.config or EnvironmentConfig.load(self.path)
+            config = overridden(given, settings)
         else:
             from aerodaas.recording.replay.environment import (  # noqa: PLC0415 - only for a replay
                 replay_environment,

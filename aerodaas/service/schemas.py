@@ -230,6 +230,8 @@ class MissionOut(_Out):
     reason: str = ""
     robots: list[str]
     lease: str | None = None
+    share: list[str] = Field(default_factory=list)
+    """Tenants that may watch it."""
     submitted: float
     started: float | None = None
     ended: float | None = None
