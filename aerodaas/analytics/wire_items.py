@@ -1,0 +1,1 @@
+def pack(item): return None, b""
