@@ -1,4 +1,4 @@
-"""Who may do what at the service: accounts, tokens, roles, rate limits, quotas and the audit log."""
+"""Who may do what at the service: accounts, tokens, roles, rate limits, quotas, audit log."""
 
 from aerodaas.service.access.access import Access
 from aerodaas.service.access.accounts import Accounts

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-
-from typing_extensions import TypeAlias
+from typing import TypeAlias
 
 __all__ = ["Candidate", "Fleet"]
 

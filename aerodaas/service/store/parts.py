@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Collection
 from typing import Any
 
@@ -9,6 +10,7 @@ from sqlalchemy import ColumnElement, delete, func, insert, select, true
 
 from aerodaas.service.schemas import LeaseState, MissionPhase
 from aerodaas.service.store import tables
+from aerodaas.service.store.database import Database
 from aerodaas.service.store.rows import (
     Account,
     AuditEntry,
@@ -94,9 +96,7 @@ class Leases(Rows[Lease]):
     def all(self, tenant: str | None = None, limit: int = _PAGE) -> list[Lease]:
         """The newest of a tenant, or of all, newest first."""
         columns = tables.LEASES.c
-        return self._select(
-            _is(columns.tenant, tenant), order=[columns.number.desc()], limit=limit
-        )
+        return self._select(_is(columns.tenant, tenant), order=[columns.number.desc()], limit=limit)
 
     def highest_number(self) -> int:
         """The highest place in the queue that was ever given; 0 before the first."""
@@ -151,10 +151,11 @@ class Usages(Rows[Usage]):
     def total(self, tenant: str, since: float) -> tuple[float, int, int]:
         """Flight seconds, tasks and cloud calls of a tenant's missions that started since then."""
         columns = tables.USAGE.c
-        sums = (func.sum(one) for one in (columns.flight_seconds, columns.tasks, columns.cloud_calls))
+        used = (columns.flight_seconds, columns.tasks, columns.cloud_calls)
         chosen = (columns.tenant == tenant) & (columns.started >= since)
+        statement = select(*map(func.sum, used)).where(chosen)
         with self._database.reading() as connection:
-            flown, tasks, calls = connection.execute(select(*sums).where(chosen)).one()
+            flown, tasks, calls = connection.execute(statement).one()
         return float(flown or 0), int(tasks or 0), int(calls or 0)
 
     def stored_bytes(self, tenant: str) -> int:
@@ -169,18 +170,41 @@ class Usages(Rows[Usage]):
 class AuditLog:
     """Entries of the audit log, which only grow; see `aerodaas.service.access.Audit`."""
 
-    def __init__(self, database: Any) -> None:
+    def __init__(self, database: Database) -> None:
         """Keep in an open database."""
         self._database = database
 
-    def add(self, entry: AuditEntry) -> None:
-        """Keep an entry; the database numbers it."""
+    def add(self, *entries: AuditEntry) -> int:
+        """Keep entries in their order; the database numbers them.
+
+        Returns:
+            The number of the last one.
+        """
+        number = 0
+        with self._database.writing() as connection:
+            for entry in entries:
+                values = dataclasses.asdict(entry)
+                del values["number"]
+                done = connection.execute(insert(tables.AUDIT).values(values))
+                (number,) = done.inserted_primary_key or (0,)
+        return number
 
     def all(self, tenant: str | None = None, limit: int = _PAGE) -> list[AuditEntry]:
         """The newest of a tenant, or of all, newest first."""
+        columns = tables.AUDIT.c
+        statement = (
+            select(tables.AUDIT)
+            .where(_is(columns.tenant, tenant))
+            .order_by(columns.number.desc())
+            .limit(limit)
+        )
+        with self._database.reading() as connection:
+            return [AuditEntry(*found) for found in connection.execute(statement)]
 
-    def trim(self, most: int) -> None:
-        """Drop all but the newest `most` entries."""
+    def trim(self, below: int) -> None:
+        """Drop those whose number is below `below`."""
+        with self._database.writing() as connection:
+            connection.execute(delete(tables.AUDIT).where(tables.AUDIT.c.number < below))
 
 
 def _is(column: ColumnElement[Any], wanted: str | None) -> ColumnElement[bool]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from typing_extensions import Self
+
 from aerodaas.service.store.database import Database
 from aerodaas.service.store.parts import (
     Accounts,
@@ -61,7 +63,7 @@ class Store:
         """Close its connections."""
         self._database.close()
 
-    def __enter__(self) -> Store:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -96,9 +96,7 @@ class Rows(Generic[Row]):
             row = self._row(found)
             changed = change(row)
             if changed != row:
-                connection.execute(
-                    update(self._table).where(chosen).values(self._values(changed))
-                )
+                connection.execute(update(self._table).where(chosen).values(self._values(changed)))
             return changed
 
     def _select(
