@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli import cluster, lab, remote
+from aerodaas.cli.serve import serve
 from aerodaas.cli.application import run_application, speed_option
 from aerodaas.cli.export import export
 from aerodaas.cli.replay import replay
@@ -200,6 +201,7 @@ def doctor(
     raise typer.Exit(0 if examine(address) else 1)
 
 
+app.command()(serve)
 app.command()(report)
 app.command()(compare)
 app.command()(export)

@@ -37,6 +37,7 @@ from aerodaas.types.errors import AeroDaaSError, MissionError
 __all__ = ["MissionDesk"]
 
 _log = logging.getLogger(__name__)
+_OPEN = frozenset(MissionPhase) - OVER
 _TURN_SECONDS = 0.1
 _HEARD_SECONDS = 1.0
 
@@ -68,7 +69,7 @@ class MissionDesk:
         self._missions: dict[str, ActiveMission] = {}
         bookings.on_end.append(self._recall)
         bookings.on_extension.append(self._prolong)
-        for row in store.missions.open():
+        for row in store.missions.all(phases=_OPEN):
             self._missions[row.id] = self._active(row)
 
     def start(self) -> None:
@@ -162,7 +163,7 @@ class MissionDesk:
     def missions(self, principal: Principal) -> list[MissionOut]:
         """All missions that this account may see, newest first."""
         with self._lock:
-            found = [self._with_news(row) for row in self._store.missions.newest()]
+            found = [self._with_news(row) for row in self._store.missions.all()]
         return [one for one in found if sees(principal, one.tenant, one.share)]
 
     def shown(self, mission: str) -> MissionOut:
@@ -177,6 +178,13 @@ class MissionDesk:
         """A number that grows with each change of a mission; -1 once it is over."""
         one = self._missions.get(mission)
         return -1 if one is None else one.version
+
+    def flying(self, robot: str) -> str | None:
+        """The mission that flies a robot now; None if none does."""
+        for one in list(self._missions.values()):
+            if one.phase is MissionPhase.FLYING and robot in one.row.robots:
+                return one.row.id
+        return None
 
     def flies(self, principal: Principal, mission: str) -> bool:
         """Whether a mission is this account's own, so that its presence counts."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -11,9 +12,9 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
-from aerodaas.service.access import Access, Audit, Principal, RefusedError, require
+from aerodaas.service.access import Access, Audit, Principal, RateLimiter, require
 from aerodaas.service.schemas import RefusalOut, Role, Scope
-from aerodaas.service.store import StoreError
+from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["Admission", "close_refused", "register_refusals"]
@@ -28,10 +29,11 @@ _MOST_TEXT = 120
 class Admission:
     """Looks up the account of each request."""
 
-    def __init__(self, access: Access, audit: Audit) -> None:
-        """Admit by `access`; refusals go to the audit log."""
+    def __init__(self, access: Access, audit: Audit, rates: RateLimiter) -> None:
+        """Admit by `access`, no more often than `rates` allow; refusals go to the audit log."""
         self._access = access
         self._audit = audit
+        self._rates = rates
 
     def needs(
         self, role: Role = Role.VIEWER, scope: Scope | None = None
@@ -61,9 +63,17 @@ class Admission:
         principal: Principal | None = None
         try:
             principal = self._access.of(token.strip() if kind.lower() == "bearer" else "", address)
+            self._rates.admit(principal.account)
             require(principal, role, scope)
         except RefusedError as error:
-            self._audit.write(principal, address, action, accepted=False, text=str(error))
+            self._audit.write(
+                principal,
+                action,
+                text=str(error),
+                accepted=False,
+                address=address,
+                required=False,
+            )
             raise
         return principal
 
@@ -85,7 +95,7 @@ def _refused(_: Request, error: Exception) -> JSONResponse:
     assert isinstance(error, RefusedError)  # noqa: S101 - registered for it alone
     headers = {"WWW-Authenticate": "Bearer"} if error.status == 401 else {}  # noqa: PLR2004
     if error.retry_after:
-        headers["Retry-After"] = str(error.retry_after)
+        headers["Retry-After"] = str(math.ceil(error.retry_after))
     return _refusal(error.status, str(error), headers)
 
 

@@ -32,14 +32,16 @@ def missions_router(desk: MissionDesk, admission: Admission, audit: Audit) -> AP
     sensing = Depends(admission.needs(Role.VIEWER, Scope.SENSE))
 
     def note(principal: Principal, action: str, target: str, answer: AnswerOut) -> AnswerOut:
-        audit.write(principal, action, target, accepted=answer.accepted, text=answer.text)
+        audit.write(
+            principal, action, target, answer.text, accepted=answer.accepted, required=False
+        )
         return answer
 
     @router.post("", status_code=202)
     def submit(wanted: MissionIn, principal: Annotated[Principal, pilot]) -> MissionOut:
         """Submit a mission document to be rehearsed and flown."""
         found = desk.submit(principal, wanted)
-        audit.write(principal, "mission.submit", found.id, accepted=True, text=found.name)
+        audit.write(principal, "mission.submit", found.id, found.name, accepted=True)
         return found
 
     @router.get("")
@@ -50,14 +52,16 @@ def missions_router(desk: MissionDesk, admission: Admission, audit: Audit) -> AP
     @router.get("/{mission}")
     def one(mission: str, principal: Annotated[Principal, viewer]) -> MissionOut:
         """One mission with its newest state."""
-        desk.hear_of(principal, mission)
-        return desk.mission(principal, mission)
+        found = desk.mission(principal, mission)
+        if desk.flies(principal, mission):
+            desk.hear(mission)
+        return found
 
     @router.delete("/{mission}")
     def cancel(mission: str, principal: Annotated[Principal, pilot]) -> MissionOut:
         """Cancel a mission; drones in flight come home."""
         found = desk.cancel(principal, mission)
-        audit.write(principal, "mission.cancel", mission, accepted=True)
+        audit.write(principal, "mission.cancel", mission, accepted=True, required=False)
         return found
 
     @router.post("/{mission}/approve")

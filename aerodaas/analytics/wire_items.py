@@ -1,1 +1,0 @@
-def pack(item): return None, b""

@@ -1,0 +1,75 @@
+"""The service as one ASGI application, from its settings."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+from fastapi import FastAPI
+
+from aerodaas.service.access import Access, Accounts, Audit, Quotas, RateLimiter
+from aerodaas.service.bookings import Bookings
+from aerodaas.service.desk import MissionDesk
+from aerodaas.service.gate import Gate
+from aerodaas.service.garage import Garage
+from aerodaas.service.hub import StreamHub
+from aerodaas.service.limits import catalogue
+from aerodaas.service.models import ModelShelf
+from aerodaas.service.routes.accounts import accounts_router
+from aerodaas.service.routes.admission import Admission, register_refusals
+from aerodaas.service.routes.fleet import FleetView, fleet_router
+from aerodaas.service.routes.leases import leases_router
+from aerodaas.service.routes.live import live_router
+from aerodaas.service.routes.missions import missions_router
+from aerodaas.service.settings import ServiceSettings
+from aerodaas.service.store import Store
+
+__all__ = ["build_service"]
+
+_RATE = 50.0
+"""Requests a second of one account, on average."""
+_BURST = 200.0
+
+
+def build_service(
+    settings: ServiceSettings, store: Store, tell: Callable[[str], None] = lambda _: None
+) -> FastAPI:
+    """Build the service; its missions move on while the application runs.
+
+    Args:
+        settings: Of the provider.
+        store: Its open database.
+        tell: Tells the provider's people of what they should look at.
+    """
+    audit = Audit(store)
+    accounts, access = Accounts(store), Access(store, audit, tell)
+    quotas, garage = Quotas(store), Garage(settings.config, store)
+    models = ModelShelf(settings.models)
+    bookings = Bookings(settings.config, store, garage, quotas)
+    desk = MissionDesk(
+        settings, store, bookings=bookings, garage=garage, quotas=quotas, models=models
+    )
+    hub = StreamHub(desk.items)
+    admission = Admission(access, audit, RateLimiter(_RATE, _BURST))
+    shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)
+    fleet = FleetView(settings.config, shown, garage, bookings, desk)
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        desk.start()
+        yield
+        desk.close()
+
+    app = FastAPI(
+        title="AeroDaaS", version="1", docs_url=None, redoc_url=None, lifespan=lifespan,
+        openapi_url="/v1/openapi.json",
+    )
+    register_refusals(app)
+    app.include_router(fleet_router(fleet, garage, models, accounts, admission, audit))
+    app.include_router(leases_router(bookings, admission, audit))
+    app.include_router(missions_router(desk, admission, audit))
+    app.include_router(accounts_router(accounts, store, admission, audit))
+    app.include_router(live_router(desk, hub, admission))
+    app.add_middleware(Gate)
+    return app
