@@ -33,10 +33,10 @@ def serve(
     speed: Annotated[
         str, typer.Option(help="Mission seconds per wall second of simulated drones, or `max`.")
     ] = "1",
-    rehearse: Annotated[
+    rehearse: Annotated[  # noqa: FBT002 - Typer's flags
         bool, typer.Option(help="Fly each mission in simulation before it flies.")
     ] = True,
-    approval: Annotated[
+    approval: Annotated[  # noqa: FBT002 - as above
         bool, typer.Option("--approval", help="Have an operator approve each mission.")
     ] = False,
     address: Annotated[str | None, typer.Option(help="Ray cluster that flights join.")] = None,
@@ -74,5 +74,5 @@ def serve(
         database=database,
         certificate=certificate,
         key=key,
-        tell=lambda text: typer.echo(text),
+        tell=typer.echo,
     )

@@ -6,22 +6,25 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from typing import Any
 
-from fastapi import FastAPI
+from fastapi import FastAPI, Security
+from fastapi.security import HTTPBearer
 
 from aerodaas.service.access import Access, Accounts, Audit, Quotas, RateLimiter
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
-from aerodaas.service.gate import Gate
+from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
+from aerodaas.service.gate import Gate
 from aerodaas.service.hub import StreamHub
 from aerodaas.service.limits import catalogue
 from aerodaas.service.models import ModelShelf
-from aerodaas.service.routes.accounts import accounts_router
-from aerodaas.service.routes.admission import Admission, register_refusals
-from aerodaas.service.routes.fleet import FleetView, fleet_router
-from aerodaas.service.routes.leases import leases_router
-from aerodaas.service.routes.live import live_router
-from aerodaas.service.routes.missions import missions_router
+from aerodaas.service.routes.accounts import AccountRoutes
+from aerodaas.service.routes.admission import Admission
+from aerodaas.service.routes.fleet import FleetRoutes
+from aerodaas.service.routes.leases import LeaseRoutes
+from aerodaas.service.routes.live import LiveRoutes
+from aerodaas.service.routes.missions import MissionRoutes
+from aerodaas.service.routes.refusals import register_refusals
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
 
@@ -62,14 +65,23 @@ def build_service(
         desk.close()
 
     app = FastAPI(
-        title="AeroDaaS", version="1", docs_url=None, redoc_url=None, lifespan=lifespan,
+        title="AeroDaaS",
+        version="1",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
         openapi_url="/v1/openapi.json",
     )
     register_refusals(app)
-    app.include_router(fleet_router(fleet, garage, models, accounts, admission, audit))
-    app.include_router(leases_router(bookings, admission, audit))
-    app.include_router(missions_router(desk, admission, audit))
-    app.include_router(accounts_router(accounts, store, admission, audit))
-    app.include_router(live_router(desk, hub, admission))
-    app.add_middleware(Gate)
+    # The gate has looked at the token by then; this tells the schema's readers of it.
+    secured = [Security(HTTPBearer(auto_error=False))]
+    for routes in (
+        FleetRoutes(fleet, garage, models, accounts, admission, audit),
+        LeaseRoutes(bookings, admission, audit),
+        MissionRoutes(desk, admission, audit),
+        AccountRoutes(accounts, store, admission, audit),
+    ):
+        app.include_router(routes.router(), dependencies=secured)
+    app.include_router(LiveRoutes(desk, hub, admission).router())
+    app.add_middleware(Gate, admission=admission)
     return app

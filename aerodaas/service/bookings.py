@@ -6,7 +6,8 @@ import time
 from collections.abc import Callable, Collection
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.service.access import Principal, Quotas, reaches, sees
+from aerodaas.service.access import Principal, Quotas, sees
+from aerodaas.service.access.principal import reaches
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.garage import Garage
 from aerodaas.service.leases import Candidate, Fleet, LeaseBook

@@ -56,9 +56,7 @@ class Briefing:
         order = self._order(mission, "rehearsal", None)
         states = self._garage.states
         battery = {
-            name: charge
-            for name in mission.robots
-            if (charge := states[name].battery) is not None
+            name: charge for name in mission.robots if (charge := states[name].battery) is not None
         }
         others = [
             OtherLease(id=one.id, area=list(one.area))
@@ -125,6 +123,6 @@ def usage_of(mission: Mission, outcome: Outcome, recording: Path) -> Usage:
 def _require_known(kind: str, wanted: list[str], known: set[str]) -> None:
     missing = sorted(set(wanted) - known)
     if missing:
-        text = f"this provider has no {kind} {', '.join(missing)}; it has {', '.join(sorted(known))}"
+        found = ", ".join(sorted(known)) or "none"
+        text = f"this provider has no {kind} {', '.join(missing)}; it has {found}"
         raise RefusedError(_UNPROCESSABLE, text)
-

@@ -13,14 +13,15 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
-from aerodaas.service.access import Principal, Quotas, reaches, sees
+from aerodaas.service.access import Principal, Quotas, sees
+from aerodaas.service.access.principal import reaches
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.garage import Garage
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.phases import OVER
-from aerodaas.service.garage import Garage
 from aerodaas.service.records import shown
 from aerodaas.service.schemas import (
     CommandIn,
@@ -238,11 +239,14 @@ class MissionDesk:
 
     def _run(self) -> None:
         while not self._closed.wait(_TURN_SECONDS):
-            try:
-                self.turn()
-            except AeroDaaSError:
-                # The database may be gone for a while; flights do not need it.
-                _log.exception("the desk could not move on")
+            self._try()
+
+    def _try(self) -> None:
+        try:
+            self.turn()
+        except AeroDaaSError:
+            # The database may be gone for a while; flights do not need it.
+            _log.exception("the desk could not move on")
 
     def turn(self) -> None:
         """Move every mission on by what has happened."""

@@ -73,7 +73,9 @@ class Garage:
         """Raise RefusedError for a drone that is out of service."""
         out = [name for name in robots if not self._states[name].enabled]
         if out:
-            raise RefusedError(409, f"{', '.join(out)}: out of service until an operator has looked")
+            raise RefusedError(
+                409, f"{', '.join(out)}: out of service until an operator has looked"
+            )
 
     def _change(self, robot: str, *, enabled: bool) -> RobotState:
         with self._lock:

@@ -1,38 +1,62 @@
-"""The gate before the service: bounds of a request's body, before anything reads it."""
+"""The gate before the service: who sends a request, and how large it is, before it is read."""
 
 from __future__ import annotations
 
-import json
+import asyncio
 from http import HTTPStatus
 
+from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from aerodaas.service.errors import RefusedError
 from aerodaas.service.models import LARGEST_MODEL
+from aerodaas.service.routes.admission import Admission
+from aerodaas.service.routes.refusals import refusal_of
+from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["Gate"]
 
 _LARGEST_BODY = 4 << 20
 """Bytes of a JSON body: a document of 10,000 waypoints has 2 MB."""
+_POLICY_VIOLATION = 1008
 
 
 class Gate:
-    """ASGI middleware that refuses bodies that are too large, however they are sent."""
+    """ASGI middleware that admits valid tokens only, and bodies of a bounded size."""
 
-    def __init__(self, app: ASGIApp) -> None:
+    def __init__(self, app: ASGIApp, admission: Admission) -> None:
         """Protect `app`."""
         self._app = app
+        self._admission = admission
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Forward a request, or refuse it."""
-        if scope["type"] != "http":
+        if scope["type"] not in {"http", "websocket"}:
             await self._app(scope, receive, send)
             return
-        most = LARGEST_MODEL if scope["path"].startswith("/v1/models/") else _LARGEST_BODY
-        length = dict(scope["headers"]).get(b"content-length", b"0")
-        if not length.isdigit() or int(length) > most:
-            await _refuse(send, most)
+        connection = HTTPConnection(scope)
+        try:
+            most = _bound_of(connection)
+            await asyncio.to_thread(self._admission.enter, connection)
+        except AeroDaaSError as error:
+            if scope["type"] == "websocket":
+                reason = str(error)[:100]
+                await send({"type": "websocket.close", "code": _POLICY_VIOLATION, "reason": reason})
+            else:
+                await refusal_of(error)(scope, receive, send)
             return
         await self._app(scope, _Bounded(receive, most), send)
+
+
+def _bound_of(connection: HTTPConnection) -> int:
+    """Most bytes of a request's body; raises RefusedError for one that says it has more."""
+    model = connection.url.path.startswith("/v1/models/")
+    most = LARGEST_MODEL if model else _LARGEST_BODY
+    length = connection.headers.get("content-length", "0")
+    if not length.isdecimal() or int(length) > most:
+        status = int(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
+        raise RefusedError(status, f"a body has at most {most} bytes")
+    return most
 
 
 class _Bounded:
@@ -49,11 +73,3 @@ class _Bounded:
             if self._left < 0:
                 return {"type": "http.disconnect"}
         return message
-
-
-async def _refuse(send: Send, most: int) -> None:
-    body = json.dumps({"text": f"a body has at most {most} bytes"}).encode()
-    headers = [(b"content-type", b"application/json"), (b"content-length", b"%d" % len(body))]
-    status = int(HTTPStatus.REQUEST_ENTITY_TOO_LARGE)
-    await send({"type": "http.response.start", "status": status, "headers": headers})
-    await send({"type": "http.response.body", "body": body})

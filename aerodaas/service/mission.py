@@ -76,7 +76,7 @@ class ActiveMission:
     def to(self, phase: MissionPhase, reason: str = "", **changes: object) -> None:
         """Change the phase; the database is written first."""
         assert phase in FOLLOWING[self.phase], (self.phase, phase)  # noqa: S101 - our own order
-        row = replace(self.row, phase=phase, reason=reason, **changes)
+        row = replace(self.row, phase=phase, reason=reason, **changes)  # type: ignore[arg-type]
         self._save(row)
         self.row = row
         self.version += 1

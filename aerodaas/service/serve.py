@@ -52,8 +52,8 @@ def serve(
     """
     if certificate is None and not is_loopback(host):
         raise ConfigError(
-            f"tokens do not go over a network in the clear: to listen on {host}, give --certificate "
-            "and --key, or listen on 127.0.0.1 behind a proxy that has them"
+            f"tokens do not go over a network in the clear: to listen on {host}, give "
+            "--certificate and --key, or listen on 127.0.0.1 behind a proxy that has them"
         )
     settings.state.mkdir(parents=True, exist_ok=True, mode=0o700)
     settings.state.chmod(0o700)

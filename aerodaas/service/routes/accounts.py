@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from fastapi import APIRouter, Depends, Query, Response
+from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict
 
-from aerodaas.service.access import Accounts, Audit, Principal, reaches, usage_csv, usage_out
+from aerodaas.service.access import Accounts, Audit, usage_csv
+from aerodaas.service.access.principal import reaches
+from aerodaas.service.access.usage import usage_out
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.schemas import (
     AccountIn,
@@ -17,10 +19,11 @@ from aerodaas.service.schemas import (
     Scope,
     TokenIn,
     TokenOut,
+    UsageOut,
 )
 from aerodaas.service.store import Store
 
-__all__ = ["accounts_router"]
+__all__ = ["AccountRoutes"]
 
 _MOST_ENTRIES = 1000
 
@@ -35,74 +38,91 @@ class AccountChange(BaseModel):
     disabled: bool | None = None
 
 
-def accounts_router(
-    accounts: Accounts, store: Store, admission: Admission, audit: Audit
-) -> APIRouter:
+class AccountRoutes:
     """Routes `/v1/accounts`, `/v1/tokens`, `/v1/audit` and `/v1/usage`."""
-    router = APIRouter(prefix="/v1")
-    admin = Depends(admission.needs(Role.ADMIN))
-    viewer = Depends(admission.needs(Role.VIEWER))
 
-    @router.get("/accounts", tags=["accounts"])
-    def all_accounts(principal: Annotated[Principal, admin]) -> list[AccountOut]:  # noqa: ARG001
+    def __init__(
+        self, accounts: Accounts, store: Store, admission: Admission, audit: Audit
+    ) -> None:
+        """Answer from these."""
+        self._accounts = accounts
+        self._store = store
+        self._admission = admission
+        self._audit = audit
+
+    def router(self) -> APIRouter:
+        """The routes."""
+        router = APIRouter(prefix="/v1", tags=["accounts"])
+        router.add_api_route("/accounts", self.accounts)
+        router.add_api_route("/accounts", self.add, methods=["POST"], status_code=201)
+        router.add_api_route("/accounts/{name}", self.change, methods=["PATCH"])
+        router.add_api_route("/tokens", self.tokens)
+        router.add_api_route("/tokens", self.issue, methods=["POST"], status_code=201)
+        router.add_api_route("/tokens/{token}", self.revoke, methods=["DELETE"])
+        router.add_api_route("/audit", self.audit)
+        router.add_api_route("/usage", self.usage, response_model=list[UsageOut])
+        return router
+
+    def accounts(self, request: Request) -> list[AccountOut]:
         """All accounts."""
-        return accounts.all()
+        self._admission.require(request, Role.ADMIN)
+        return self._accounts.all()
 
-    @router.post("/accounts", tags=["accounts"], status_code=201)
-    def add(account: AccountIn, principal: Annotated[Principal, admin]) -> AccountOut:
+    def add(self, account: AccountIn, request: Request) -> AccountOut:
         """Make an account, and its tenant if it is a new one."""
-        made = accounts.add(account)
-        audit.write(principal, "account.add", account.name, account.role.value, accepted=True)
+        principal = self._admission.require(request, Role.ADMIN)
+        made = self._accounts.add(account)
+        role = account.role.value
+        self._audit.write(principal, "account.add", account.name, role, accepted=True)
         return made
 
-    @router.patch("/accounts/{name}", tags=["accounts"])
-    def change(
-        name: str, body: AccountChange, principal: Annotated[Principal, admin]
-    ) -> AccountOut:
+    def change(self, name: str, body: AccountChange, request: Request) -> AccountOut:
         """Change an account's role or scopes, or disable it; its tokens obey at once."""
-        found = accounts.change(name, role=body.role, scopes=body.scopes, disabled=body.disabled)
-        audit.write(principal, "account.change", name, body.model_dump_json(), accepted=True)
+        principal = self._admission.require(request, Role.ADMIN)
+        found = self._accounts.change(
+            name, role=body.role, scopes=body.scopes, disabled=body.disabled
+        )
+        text = body.model_dump_json(exclude_none=True)
+        self._audit.write(principal, "account.change", name, text, accepted=True)
         return found
 
-    @router.get("/tokens", tags=["accounts"])
-    def tokens(principal: Annotated[Principal, viewer]) -> list[TokenOut]:
+    def tokens(self, request: Request) -> list[TokenOut]:
         """One's own tokens; all of them for an administrator. Secrets are not among it."""
+        principal = self._admission.require(request, Role.VIEWER)
         every = reaches(principal.role, Role.ADMIN)
-        return accounts.tokens(None if every else principal.account)
+        return self._accounts.tokens(None if every else principal.account)
 
-    @router.post("/tokens", tags=["accounts"], status_code=201)
-    def issue(body: TokenIn, principal: Annotated[Principal, admin]) -> TokenOut:
+    def issue(self, body: TokenIn, request: Request) -> TokenOut:
         """Make a token; this answer alone has its secret."""
-        made = accounts.issue(body)
-        audit.write(principal, "token.issue", made.id, body.account, accepted=True)
+        principal = self._admission.require(request, Role.ADMIN)
+        made = self._accounts.issue(body)
+        self._audit.write(principal, "token.issue", made.id, body.account, accepted=True)
         return made
 
-    @router.delete("/tokens/{token}", tags=["accounts"])
-    def revoke(token: str, principal: Annotated[Principal, admin]) -> TokenOut:
+    def revoke(self, token: str, request: Request) -> TokenOut:
         """Revoke a token."""
-        found = accounts.revoke(token)
-        audit.write(principal, "token.revoke", token, found.account, accepted=True, required=False)
+        principal = self._admission.require(request, Role.ADMIN)
+        found = self._accounts.revoke(token)
+        owner = found.account
+        self._audit.write(principal, "token.revoke", token, owner, accepted=True, required=False)
         return found
 
-    @router.get("/audit", tags=["provider"])
-    def entries(
-        principal: Annotated[Principal, admin],  # noqa: ARG001
-        limit: Annotated[int, Query(ge=1, le=_MOST_ENTRIES)] = 100,
+    def audit(
+        self, request: Request, limit: Annotated[int, Query(ge=1, le=_MOST_ENTRIES)] = 100
     ) -> list[AuditOut]:
         """The newest entries of the audit log."""
-        return audit.newest(limit)
+        self._admission.require(request, Role.ADMIN)
+        return self._audit.newest(limit)
 
-    @router.get("/usage", tags=["provider"])
     def usage(
-        principal: Annotated[Principal, viewer],
+        self,
+        request: Request,
         form: Annotated[Literal["json", "csv"], Query(alias="format")] = "json",
-    ) -> Response:
+    ) -> Any:  # noqa: ANN401 - JSON by its model, or CSV
         """What missions have used: the tenant's own, or all for an operator."""
+        principal = self._admission.require(request, Role.VIEWER)
         every = reaches(principal.role, Role.OPERATOR)
-        rows = store.usage.all(None if every else principal.tenant)
+        rows = self._store.usage.all(None if every else principal.tenant)
         if form == "csv":
             return Response(usage_csv(rows), media_type="text/csv")
-        lines = ",".join(usage_out(row).model_dump_json() for row in rows)
-        return Response(f"[{lines}]", media_type="application/json")
-
-    return router
+        return [usage_out(row) for row in rows]

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Any
 
-from fastapi import APIRouter, Depends, Request, Response
+from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict
 
-from aerodaas.config.model import EnvironmentConfig
-from aerodaas.service.access import Accounts, Audit, Principal, sees
-from aerodaas.service.bookings import Bookings
-from aerodaas.service.desk import MissionDesk
+from aerodaas.service.access import Accounts, Audit
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import LARGEST_MODEL, ModelShelf
 from aerodaas.service.routes.admission import Admission
-from aerodaas.service.schemas import AccountOut, FleetOut, RobotOut, Role, Scope
+from aerodaas.service.schemas import AccountOut, FleetOut, Role, Scope
 
-__all__ = ["FleetView", "fleet_router"]
+__all__ = ["FleetRoutes"]
 
 
 class RobotIn(BaseModel):
@@ -28,94 +26,66 @@ class RobotIn(BaseModel):
     enabled: bool
 
 
-class FleetView:
-    """The fleet as an account may see it."""
+class FleetRoutes:
+    """Routes `/v1/me`, `/v1/fleet`, `/v1/robots` and `/v1/models`."""
 
     def __init__(
         self,
-        config: EnvironmentConfig,
-        catalogue: dict[str, Any],
+        fleet: FleetView,
         garage: Garage,
-        bookings: Bookings,
-        desk: MissionDesk,
+        models: ModelShelf,
+        accounts: Accounts,
+        admission: Admission,
+        audit: Audit,
     ) -> None:
-        """Show `catalogue`, and the drones of `config`."""
-        self._config = config
-        self._catalogue = catalogue
+        """Answer from these."""
+        self._fleet = fleet
         self._garage = garage
-        self._bookings = bookings
-        self._desk = desk
+        self._models = models
+        self._accounts = accounts
+        self._admission = admission
+        self._audit = audit
 
-    def seen_by(self, principal: Principal) -> FleetOut:
-        """The fleet as this account may see it."""
-        robots = [self._robot(robot.id, principal) for robot in self._config.robots]
-        return FleetOut(name=self._config.name, robots=robots, environment=self._catalogue)
+    def router(self) -> APIRouter:
+        """The routes."""
+        router = APIRouter(prefix="/v1", tags=["fleet"])
+        none: dict[str, Any] = {"status_code": 204, "response_class": Response}
+        router.add_api_route("/me", self.me)
+        router.add_api_route("/fleet", self.fleet)
+        router.add_api_route("/robots/{robot}", self.enable, methods=["PATCH"], **none)
+        router.add_api_route("/models/{sha256}", self.has_model, methods=["HEAD"], **none)
+        router.add_api_route("/models/{sha256}", self.put_model, methods=["PUT"], **none)
+        return router
 
-    def _robot(self, name: str, principal: Principal) -> RobotOut:
-        state, lease = self._garage.states[name], self._bookings.holder(name)
-        config = next(robot for robot in self._config.robots if robot.id == name)
-        mine = lease is not None and sees(principal, lease.tenant)
-        return RobotOut(
-            id=name,
-            sensors=[sensor.full_id for sensor in config.sensors],
-            lease=None if lease is None else lease.id,
-            tenant=lease.tenant if lease is not None and mine else None,
-            mission=self._desk.flying(name) if mine else None,
-            battery=state.battery,
-            position=state.position,
-            heard=state.heard,
-            enabled=state.enabled,
-        )
-
-
-def fleet_router(
-    fleet: FleetView,
-    garage: Garage,
-    models: ModelShelf,
-    accounts: Accounts,
-    admission: Admission,
-    audit: Audit,
-) -> APIRouter:
-    """Routes `/v1/me`, `/v1/fleet`, `/v1/robots` and `/v1/models`."""
-    router = APIRouter(prefix="/v1")
-    viewer = Depends(admission.needs(Role.VIEWER))
-    pilot = Depends(admission.needs(Role.PILOT, Scope.COMPUTE))
-    operator = Depends(admission.needs(Role.OPERATOR))
-
-    @router.get("/me", tags=["accounts"])
-    def me(principal: Annotated[Principal, viewer]) -> AccountOut:
+    def me(self, request: Request) -> AccountOut:
         """The account that asks."""
-        return accounts.get(principal.account)
+        principal = self._admission.require(request, Role.VIEWER)
+        return self._accounts.get(principal.account)
 
-    @router.get("/fleet", tags=["fleet"])
-    def whole(principal: Annotated[Principal, viewer]) -> FleetOut:
+    def fleet(self, request: Request) -> FleetOut:
         """The drones, and the environment that applications are built against."""
-        return fleet.seen_by(principal)
+        return self._fleet.seen_by(self._admission.require(request, Role.VIEWER))
 
-    @router.patch("/robots/{robot}", tags=["fleet"], status_code=204)
-    def enable(robot: str, body: RobotIn, principal: Annotated[Principal, operator]) -> Response:
+    def enable(self, robot: str, body: RobotIn, request: Request) -> Response:
         """Put a drone into service, or take it out."""
-        garage.enable(robot, enabled=body.enabled)
-        audit.write(principal, "robot.enable", robot, str(body.enabled), accepted=True)
+        principal = self._admission.require(request, Role.OPERATOR)
+        self._garage.enable(robot, enabled=body.enabled)
+        self._audit.write(principal, "robot.enable", robot, str(body.enabled), accepted=True)
         return Response(status_code=204)
 
-    @router.head("/models/{sha256}", tags=["models"], status_code=204)
-    def has_model(sha256: str, principal: Annotated[Principal, viewer]) -> Response:  # noqa: ARG001
+    def has_model(self, sha256: str, request: Request) -> Response:
         """Whether a model is here."""
-        return Response(status_code=204 if models.has(sha256) else 404)
+        self._admission.require(request, Role.VIEWER)
+        return Response(status_code=204 if self._models.has(sha256) else 404)
 
-    @router.put("/models/{sha256}", tags=["models"], status_code=204)
-    async def put_model(
-        sha256: str, request: Request, principal: Annotated[Principal, pilot]
-    ) -> Response:
+    async def put_model(self, sha256: str, request: Request) -> Response:
         """Bring a model, an ONNX file of at most 64 MiB, named by its SHA-256."""
+        principal = self._admission.require(request, Role.PILOT, Scope.COMPUTE)
         content = bytearray()
         async for part in request.stream():
             content += part
             if len(content) > LARGEST_MODEL:
                 raise RefusedError(413, f"a model has at most {LARGEST_MODEL >> 20} MiB")
-        models.put(sha256, bytes(content))
-        audit.write(principal, "model.put", sha256, f"{len(content)} bytes", accepted=True)
+        self._models.put(sha256, bytes(content))
+        self._audit.write(principal, "model.put", sha256, f"{len(content)} bytes", accepted=True)
         return Response(status_code=204)
-
-    return router

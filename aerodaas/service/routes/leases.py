@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Request
 from pydantic import BaseModel, ConfigDict, Field
 
-from aerodaas.service.access import Audit, Principal
+from aerodaas.service.access import Audit
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.leases import lease_out
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.schemas import LeaseIn, LeaseOut, Role, Scope
 
-__all__ = ["leases_router"]
+__all__ = ["LeaseRoutes"]
 
 _MOST_MINUTES = 24 * 60
 
@@ -26,45 +26,53 @@ class ExtensionIn(BaseModel):
     minutes: Annotated[float, Field(gt=0, le=_MOST_MINUTES)]
 
 
-def leases_router(bookings: Bookings, admission: Admission, audit: Audit) -> APIRouter:
+class LeaseRoutes:
     """Routes below `/v1/leases`."""
-    router = APIRouter(prefix="/v1/leases", tags=["leases"])
-    viewer = Depends(admission.needs(Role.VIEWER))
-    pilot = Depends(admission.needs(Role.PILOT, Scope.FLY))
 
-    @router.post("", status_code=201)
-    def request(wish: LeaseIn, principal: Annotated[Principal, pilot]) -> LeaseOut:
+    def __init__(self, bookings: Bookings, admission: Admission, audit: Audit) -> None:
+        """Answer from the bookings."""
+        self._bookings = bookings
+        self._admission = admission
+        self._audit = audit
+
+    def router(self) -> APIRouter:
+        """The routes."""
+        router = APIRouter(prefix="/v1/leases", tags=["leases"])
+        router.add_api_route("", self.request, methods=["POST"], status_code=201)
+        router.add_api_route("", self.leases)
+        router.add_api_route("/{lease}", self.lease)
+        router.add_api_route("/{lease}", self.end, methods=["DELETE"])
+        router.add_api_route("/{lease}/extend", self.extend, methods=["POST"])
+        return router
+
+    def request(self, wish: LeaseIn, request: Request) -> LeaseOut:
         """Ask for drones: granted at once, or queued."""
-        lease = bookings.request(principal, wish)
-        audit.write(principal, "lease.request", lease.id, lease.state.value, accepted=True)
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        lease = self._bookings.request(principal, wish)
+        self._audit.write(principal, "lease.request", lease.id, lease.state.value, accepted=True)
         return lease_out(lease)
 
-    @router.get("")
-    def leases(principal: Annotated[Principal, viewer]) -> list[LeaseOut]:
+    def leases(self, request: Request) -> list[LeaseOut]:
         """Leases that go on, in the queue's order."""
-        return [lease_out(one) for one in bookings.all_seen(principal)]
+        principal = self._admission.require(request, Role.VIEWER)
+        return [lease_out(one) for one in self._bookings.all_seen(principal)]
 
-    @router.get("/{lease}")
-    def one(lease: str, principal: Annotated[Principal, viewer]) -> LeaseOut:
+    def lease(self, lease: str, request: Request) -> LeaseOut:
         """One lease."""
-        return lease_out(bookings.seen(principal, lease))
+        principal = self._admission.require(request, Role.VIEWER)
+        return lease_out(self._bookings.seen(principal, lease))
 
-    @router.post("/{lease}/extend")
-    def extend(
-        lease: str, body: ExtensionIn, principal: Annotated[Principal, pilot]
-    ) -> LeaseOut:
+    def extend(self, lease: str, body: ExtensionIn, request: Request) -> LeaseOut:
         """Let a granted lease end later, if nobody waits for its drones."""
-        found = bookings.extend(principal, lease, body.minutes)
-        audit.write(principal, "lease.extend", lease, f"{body.minutes:g} min", accepted=True)
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        found = self._bookings.extend(principal, lease, body.minutes)
+        self._audit.write(principal, "lease.extend", lease, f"{body.minutes:g} min", accepted=True)
         return lease_out(found)
 
-    @router.delete("/{lease}")
-    def end(lease: str, principal: Annotated[Principal, pilot]) -> LeaseOut:
+    def end(self, lease: str, request: Request) -> LeaseOut:
         """Give a lease back; an operator revokes anybody's. Its drones come home."""
-        found = bookings.end(principal, lease)
-        audit.write(
-            principal, "lease.end", lease, found.reason, accepted=True, required=False
-        )
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        found = self._bookings.end(principal, lease)
+        text = found.reason
+        self._audit.write(principal, "lease.end", lease, text, accepted=True, required=False)
         return lease_out(found)
-
-    return router

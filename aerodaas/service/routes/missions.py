@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Any
 
-from fastapi import APIRouter, Depends
+from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse
-from pydantic import Field
 
 from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
 from aerodaas.service.access import Audit, Principal
@@ -14,91 +13,100 @@ from aerodaas.service.desk import MissionDesk
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.schemas import CommandIn, MissionIn, MissionOut, Role, Scope, Word
 
-__all__ = ["missions_router"]
+__all__ = ["MissionRoutes"]
 
 
 class NavigationIn(WaypointsIn):
     """Waypoints for one robot of a mission."""
 
-    robot: Annotated[Word, Field()]
+    robot: Word
 
 
-def missions_router(desk: MissionDesk, admission: Admission, audit: Audit) -> APIRouter:
+class MissionRoutes:
     """Routes below `/v1/missions`."""
-    router = APIRouter(prefix="/v1/missions", tags=["missions"])
-    viewer = Depends(admission.needs(Role.VIEWER))
-    pilot = Depends(admission.needs(Role.PILOT, Scope.FLY))
-    operator = Depends(admission.needs(Role.OPERATOR))
-    sensing = Depends(admission.needs(Role.VIEWER, Scope.SENSE))
 
-    def note(principal: Principal, action: str, target: str, answer: AnswerOut) -> AnswerOut:
-        audit.write(
-            principal, action, target, answer.text, accepted=answer.accepted, required=False
-        )
-        return answer
+    def __init__(self, desk: MissionDesk, admission: Admission, audit: Audit) -> None:
+        """Answer from the desk."""
+        self._desk = desk
+        self._admission = admission
+        self._audit = audit
 
-    @router.post("", status_code=202)
-    def submit(wanted: MissionIn, principal: Annotated[Principal, pilot]) -> MissionOut:
+    def router(self) -> APIRouter:
+        """The routes."""
+        router = APIRouter(prefix="/v1/missions", tags=["missions"])
+        router.add_api_route("", self.submit, methods=["POST"], status_code=202)
+        router.add_api_route("", self.missions)
+        router.add_api_route("/{mission}", self.mission)
+        router.add_api_route("/{mission}", self.cancel, methods=["DELETE"])
+        router.add_api_route("/{mission}/approve", self.approve, methods=["POST"])
+        router.add_api_route("/{mission}/commands", self.command, methods=["POST"])
+        router.add_api_route("/{mission}/navigation", self.navigation, methods=["POST"])
+        files: dict[str, Any] = {"response_class": FileResponse}
+        router.add_api_route("/{mission}/recording", self.recording, **files)
+        router.add_api_route("/{mission}/rehearsal.png", self.picture, **files)
+        return router
+
+    def submit(self, wanted: MissionIn, request: Request) -> MissionOut:
         """Submit a mission document to be rehearsed and flown."""
-        found = desk.submit(principal, wanted)
-        audit.write(principal, "mission.submit", found.id, found.name, accepted=True)
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        found = self._desk.submit(principal, wanted)
+        self._audit.write(principal, "mission.submit", found.id, found.name, accepted=True)
         return found
 
-    @router.get("")
-    def missions(principal: Annotated[Principal, viewer]) -> list[MissionOut]:
+    def missions(self, request: Request) -> list[MissionOut]:
         """All missions that the account may see, newest first."""
-        return desk.missions(principal)
+        return self._desk.missions(self._admission.require(request, Role.VIEWER))
 
-    @router.get("/{mission}")
-    def one(mission: str, principal: Annotated[Principal, viewer]) -> MissionOut:
+    def mission(self, mission: str, request: Request) -> MissionOut:
         """One mission with its newest state."""
-        found = desk.mission(principal, mission)
-        if desk.flies(principal, mission):
-            desk.hear(mission)
+        principal = self._admission.require(request, Role.VIEWER)
+        found = self._desk.mission(principal, mission)
+        if self._desk.flies(principal, mission):
+            self._desk.hear(mission)
         return found
 
-    @router.delete("/{mission}")
-    def cancel(mission: str, principal: Annotated[Principal, pilot]) -> MissionOut:
+    def cancel(self, mission: str, request: Request) -> MissionOut:
         """Cancel a mission; drones in flight come home."""
-        found = desk.cancel(principal, mission)
-        audit.write(principal, "mission.cancel", mission, accepted=True, required=False)
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        found = self._desk.cancel(principal, mission)
+        self._audit.write(principal, "mission.cancel", mission, accepted=True, required=False)
         return found
 
-    @router.post("/{mission}/approve")
-    def approve(mission: str, principal: Annotated[Principal, operator]) -> MissionOut:
+    def approve(self, mission: str, request: Request) -> MissionOut:
         """Approve a mission that waits for an operator."""
-        found = desk.approve(principal, mission)
-        audit.write(principal, "mission.approve", mission, accepted=True)
+        principal = self._admission.require(request, Role.OPERATOR)
+        found = self._desk.approve(principal, mission)
+        self._audit.write(principal, "mission.approve", mission, accepted=True)
         return found
 
-    @router.post("/{mission}/commands")
-    def command(
-        mission: str, body: CommandIn, principal: Annotated[Principal, pilot]
-    ) -> AnswerOut:
+    def command(self, mission: str, body: CommandIn, request: Request) -> AnswerOut:
         """Give one of the mission's robots a command; answers what the drone said."""
-        answer = desk.command(principal, mission, body)
-        return note(principal, f"mission.{body.command}", f"{mission}/{body.robot}", answer)
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        answer = self._desk.command(principal, mission, body)
+        return self._noted(principal, body.command, f"{mission}/{body.robot}", answer)
 
-    @router.post("/{mission}/navigation")
-    def navigation(
-        mission: str, body: NavigationIn, principal: Annotated[Principal, pilot]
-    ) -> AnswerOut:
+    def navigation(self, mission: str, body: NavigationIn, request: Request) -> AnswerOut:
         """Add waypoints to the queue of one of the mission's robots."""
-        waypoints = WaypointsIn(
-            waypoints=body.waypoints, ordered=body.ordered, index=body.index
-        )
-        answer = desk.fly(principal, mission, body.robot, waypoints)
-        return note(principal, "mission.navigation", f"{mission}/{body.robot}", answer)
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        answer = self._desk.fly(principal, mission, body.robot, body)
+        return self._noted(principal, "navigation", f"{mission}/{body.robot}", answer)
 
-    @router.get("/{mission}/recording", response_class=FileResponse)
-    def recording(mission: str, principal: Annotated[Principal, sensing]) -> FileResponse:
+    def recording(self, mission: str, request: Request) -> FileResponse:
         """The flight's recording, an MCAP file, once it is over."""
-        path = desk.file(principal, mission, "recording")
+        principal = self._admission.require(request, Role.VIEWER, Scope.SENSE)
+        path = self._desk.file(principal, mission, "recording")
         return FileResponse(path, media_type="application/octet-stream", filename=f"{mission}.mcap")
 
-    @router.get("/{mission}/rehearsal.png", response_class=FileResponse)
-    def picture(mission: str, principal: Annotated[Principal, viewer]) -> FileResponse:
+    def picture(self, mission: str, request: Request) -> FileResponse:
         """Picture of the rehearsed flight."""
-        return FileResponse(desk.file(principal, mission, "picture"), media_type="image/png")
+        principal = self._admission.require(request, Role.VIEWER)
+        return FileResponse(self._desk.file(principal, mission, "picture"), media_type="image/png")
 
-    return router
+    def _noted(
+        self, principal: Principal, action: str, target: str, answer: AnswerOut
+    ) -> AnswerOut:
+        """Audit a command that the drone has answered; what is safe goes on without the log."""
+        said, accepted = answer.text, answer.accepted
+        name = f"mission.{action}"
+        self._audit.write(principal, name, target, said, accepted=accepted, required=False)
+        return answer
