@@ -22,7 +22,7 @@ class Access:
         tell: Callable[[str], None] = lambda _: None,
         clock: Callable[[], float] = time.time,
     ) -> None:
-        """Look tokens up in `store`; `tell` tells people of many wrong ones; `clock` is Unix time."""
+        """Look tokens up in `store`; `tell` tells people of many wrong ones; times are Unix time."""
         raise NotImplementedError
 
     def of(self, token: str, address: str) -> Principal:

@@ -1,17 +1,27 @@
-"""The book of leases: rules of who flies which drone until when."""
+"""The book of leases: who flies which drone until when."""
 
 from __future__ import annotations
 
 import math
 import secrets
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterable
+from dataclasses import replace
 from typing import Protocol
 
+from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.leases.candidates import Fleet
-from aerodaas.service.schemas import LeaseIn, LeaseOut
-from aerodaas.service.store import Lease
+from aerodaas.service.leases.rules import MINUTE, grants, is_waited_for, over
+from aerodaas.service.leases.wish import check_wish, lease_of
+from aerodaas.service.schemas import LeaseIn, LeaseState
+from aerodaas.service.store import Lease, LeaseEnd
 
-__all__ = ["LeaseBook", "Shelf", "lease_out"]
+__all__ = ["LeaseBook", "Shelf"]
+
+_MOST_WAITING = 1000
+_MOST_WAITING_OF_TENANT = 50
+_LONGEST = 24 * 60
+"""Minutes of a lease with all of its extensions."""
 
 
 class Shelf(Protocol):
@@ -36,14 +46,18 @@ class LeaseBook:
     - One granted lease holds a robot; a lease of several robots is granted as a whole.
     - Leases are granted in the order in which they were asked for. A later one may be granted
       before an earlier one only if they share no robot that the earlier one waits for.
-    - A lease with a robot that is out of service waits, and holds up nobody.
+    - A lease of any one that fits waits for all that fit now: those whose charge, place or camera
+      does not suffice may go to others meanwhile.
+    - A lease that names a robot out of service waits, and holds up nobody.
+    - A drone that still comes home from an ended lease is granted when it has landed.
     - A granted lease ends after its minutes at the latest; from then on it holds nothing, even
       before `tick` has told so.
 
-    Each change returns the leases whose state it changed, in order: those that ended first
-    (whose flights are to be recalled), then those granted (whose flights may start).
+    Each change returns the leases whose state has changed since the last one returned, in the order
+    in which they did: those that ended (whose flights are to be recalled) and those granted
+    (whose flights may start). A change that raises leaves what it has to tell to the next.
 
-    Ends hold even while the database fails; they are kept there with the next change. Requests,
+    Ends hold even while the database fails; it is told of them with the next change. Requests,
     grants and extensions are carried out only if the database has taken them.
     """
 
@@ -55,7 +69,13 @@ class LeaseBook:
         Raises:
             StoreError: If the database does not answer.
         """
-        raise NotImplementedError
+        self._shelf = shelf
+        self._new_id = new_id
+        self._lock = threading.RLock()
+        self._live = {lease.id: lease for lease in shelf.live()}
+        self._number = shelf.highest_number()
+        self._unsaved: dict[str, Lease] = {}
+        self._news: list[Lease] = []
 
     def request(
         self, wish: LeaseIn, tenant: str, account: str, now: float, fleet: Fleet
@@ -74,11 +94,30 @@ class LeaseBook:
 
         Raises:
             RefusedError: With status 404 for an unknown robot; 409 for one that is out of
-                service, or if no drone of the fleet could ever fit; 422 for a robot named twice;
-                429 if the tenant, or all of them, wait for too many.
+                service, or if no drone of the fleet has the camera that is asked for; 422 for a
+                robot named twice; 429 if the tenant, or all of them, wait for too many.
             StoreError: If the database does not take it; nothing is asked for then.
         """
-        raise NotImplementedError
+        check_wish(wish, fleet)
+        with self._lock:
+            self._settle(now, fleet)
+            waiting = [
+                lease.tenant for lease in self._live.values() if lease.state is LeaseState.QUEUED
+            ]
+            if waiting.count(tenant) >= _MOST_WAITING_OF_TENANT or len(waiting) >= _MOST_WAITING:
+                raise RefusedError(429, "too many leases wait: give some back")
+            # A number is used once, even by what the database may or may not have taken.
+            self._number += 1
+            lease = lease_of(
+                wish,
+                id_=self._new_id(),
+                number=self._number,
+                tenant=tenant,
+                account=account,
+                now=now,
+            )
+            self._write(now, fleet, lease)
+            return self._live[lease.id], self._told()
 
     def extend(
         self, id_: str, minutes: float, now: float, fleet: Fleet, allowed: float = math.inf
@@ -87,7 +126,7 @@ class LeaseBook:
 
         Args:
             id_: The lease.
-            minutes: How much later; positive.
+            minutes: How much later; positive and finite.
             now: Moment, seconds of Unix time.
             fleet: The drones as they are now.
             allowed: Minutes that the tenant's quota leaves, for all robots together.
@@ -96,19 +135,37 @@ class LeaseBook:
             The lease with its new end, and the leases changed.
 
         Raises:
-            RefusedError: With status 404 for an unknown lease; 409 if it is not granted or
-                another waits for one of its robots; 403 if the quota or a day is exceeded.
+            RefusedError: With status 404 for a lease that is unknown or has ended; 409 if it is
+                queued, or another waits for one of its robots; 403 if the quota is exceeded; 422
+                for minutes that are not positive, or make it longer than a day.
             StoreError: If the database does not take it; the lease ends as before.
         """
-        raise NotImplementedError
+        with self._lock:
+            self._settle(now, fleet)
+            lease = self._demand(id_)
+            if lease.ends is None:
+                raise RefusedError(409, f"lease {id_} is queued: extend it when it is granted")
+            if not 0 < minutes <= _LONGEST - lease.minutes:
+                raise RefusedError(422, "a lease lasts a day at most, with its extensions")
+            if is_waited_for(lease, self._live.values(), fleet):
+                raise RefusedError(409, f"another waits for a robot of lease {id_}")
+            if minutes * len(lease.robots) > allowed:
+                raise RefusedError(
+                    403, f"the quota of {lease.tenant} leaves {max(0.0, allowed):.1f} minutes"
+                )
+            longer = replace(
+                lease, minutes=lease.minutes + minutes, ends=lease.ends + minutes * MINUTE
+            )
+            self._write(now, fleet, longer)
+            return longer, self._told()
 
     def give_back(self, id_: str, now: float, fleet: Fleet) -> tuple[Lease, ...]:
-        """End a queued or granted lease at its tenant's wish; one that has ended stays so.
+        """End a queued or granted lease at its tenant's wish.
 
         Raises:
             RefusedError: With status 404 for a lease that is unknown or has ended.
         """
-        raise NotImplementedError
+        return self._end(id_, LeaseEnd.GIVEN_BACK, "given back", now, fleet)
 
     def revoke(self, id_: str, reason: str, now: float, fleet: Fleet) -> tuple[Lease, ...]:
         """End a queued or granted lease at an operator's wish, or a policy's, with the reason.
@@ -116,37 +173,91 @@ class LeaseBook:
         Raises:
             RefusedError: With status 404 for a lease that is unknown or has ended.
         """
-        raise NotImplementedError
+        return self._end(id_, LeaseEnd.REVOKED, reason, now, fleet)
 
     def tick(self, now: float, fleet: Fleet) -> tuple[Lease, ...]:
         """End what is over, and grant what has become free; call it every second or so.
 
         While the database fails, ends are returned, and grants wait.
         """
-        raise NotImplementedError
+        with self._lock:
+            self._settle(now, fleet)
+            return self._told()
 
     def live(self) -> list[Lease]:
         """Those queued or granted, in the queue's order."""
-        raise NotImplementedError
+        with self._lock:
+            return list(self._live.values())
 
     def get(self, id_: str) -> Lease | None:
         """A lease that is queued or granted; None for others, which the store knows."""
-        raise NotImplementedError
+        return self._live.get(id_)
 
     def holder(self, robot: str, now: float) -> Lease | None:
         """The granted lease that holds a robot now; None if it is free."""
-        raise NotImplementedError
+        for lease in self.live():
+            if robot in lease.robots and lease.ends is not None and now < lease.ends:
+                return lease
+        return None
 
     def committed(self, tenant: str, now: float) -> float:
         """Minutes, times robots, that a tenant's leases hold from now on or wait for."""
-        raise NotImplementedError
+        total = 0.0
+        for lease in self.live():
+            if lease.tenant == tenant:
+                left = lease.minutes
+                if lease.ends is not None:
+                    left = max(0.0, lease.ends - now) / MINUTE
+                total += left * len(lease.robots or lease.wanted or ("any",))
+        return total
 
     @property
     def unsaved(self) -> int:
         """Ended leases that the database has not taken yet."""
-        raise NotImplementedError
+        return len(self._unsaved)
 
+    def _end(
+        self, id_: str, end: LeaseEnd, reason: str, now: float, fleet: Fleet
+    ) -> tuple[Lease, ...]:
+        with self._lock:
+            self._drop(over(self._live.values(), now))
+            lease = self._demand(id_)
+            self._drop([replace(lease, state=LeaseState.ENDED, ended=now, end=end, reason=reason)])
+            self._settle(now, fleet)
+            return self._told()
 
-def lease_out(lease: Lease) -> LeaseOut:
-    """A lease as the HTTP interface shows it."""
-    raise NotImplementedError
+    def _demand(self, id_: str) -> Lease:
+        lease = self._live.get(id_)
+        if lease is None:
+            raise RefusedError(404, f"there is no lease {id_} that is queued or granted")
+        return lease
+
+    def _settle(self, now: float, fleet: Fleet) -> None:
+        """End what is over and grant what is free; while the database fails, nothing is granted."""
+        self._drop(over(self._live.values(), now))
+        try:
+            self._write(now, fleet)
+        except StoreError:
+            return
+
+    def _drop(self, ended: Iterable[Lease]) -> None:
+        for lease in ended:
+            del self._live[lease.id]
+            self._unsaved[lease.id] = lease
+            self._news.append(lease)
+
+    def _write(self, now: float, fleet: Fleet, *changed: Lease) -> None:
+        """Take over `changed` and what can be granted with it, if the database does."""
+        live = self._live | {lease.id: lease for lease in changed}
+        granted = grants(live.values(), now, fleet)
+        live |= {lease.id: lease for lease in granted}
+        rows = self._unsaved | {lease.id: live[lease.id] for lease in (*changed, *granted)}
+        if rows:
+            self._shelf.put(*rows.values())
+        self._unsaved.clear()
+        self._live = live
+        self._news += granted
+
+    def _told(self) -> tuple[Lease, ...]:
+        news, self._news = tuple(self._news), []
+        return news
