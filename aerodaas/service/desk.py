@@ -19,7 +19,7 @@ from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightErro
 from aerodaas.service.phases import OVER
 from aerodaas.service.quotas import Quotas
 from aerodaas.service.records import shown
-from aerodaas.service.schemas import (
+from aerodaas.protocol.schemas import (
     CommandIn,
     MissionIn,
     MissionOut,

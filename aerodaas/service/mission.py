@@ -17,7 +17,7 @@ from aerodaas.service.flights.link import FlightLink
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.starter import start_process
 from aerodaas.service.phases import FOLLOWING, OVER
-from aerodaas.service.schemas import MissionPhase, VerdictOut
+from aerodaas.protocol.schemas import MissionPhase, VerdictOut
 from aerodaas.service.store import MissionRow
 
 __all__ = ["CANCELLED_BY", "ActiveMission", "LostFlightError"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from aerodaas.service.mission import ActiveMission
-from aerodaas.service.schemas import MissionIn, MissionOut, MissionPhase, VerdictOut
+from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, VerdictOut
 
 __all__ = ["shown"]
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 
 from aerodaas.service.flights.order import FlightOrder
-from aerodaas.service.schemas import SilencePolicy
+from aerodaas.protocol.schemas import SilencePolicy
 
 __all__ = ["LeaseWatch"]
 

@@ -12,7 +12,7 @@ from aerodaas.service.desk import MissionDesk
 from aerodaas.service.hub import StreamHub, Watcher
 from aerodaas.service.phases import OVER
 from aerodaas.service.routes.admission import Admission, close_refused
-from aerodaas.service.schemas import Scope
+from aerodaas.protocol.schemas import Scope
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["live_router"]
