@@ -10,11 +10,11 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli import cluster, lab, remote
-from aerodaas.cli.serve import serve
 from aerodaas.cli.application import run_application, speed_option
 from aerodaas.cli.export import export
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
+from aerodaas.cli.serve import serve
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.errors import (
     AeroDaaSError,

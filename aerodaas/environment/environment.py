@@ -1,4 +1,4 @@
-"""Environment and Robot: the handles by which an application builds its graph and flies it."""
+"""Environment: the handle by which an application builds its graph and flies it."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from aerodaas.actors.run.checks import check_environment, sensor_properties
-from aerodaas.config.model import ComputeConfig, EnvironmentConfig, RobotConfig, SensorConfig
+from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
 from aerodaas.config.options import current_options
 from aerodaas.config.overrides import located, overridden
 from aerodaas.config.plugins import load_plugin
 from aerodaas.dataflow.graph import Graph, NavigationEdge, refusal
 from aerodaas.dataflow.handles import Compute, Sensor
-from aerodaas.dataflow.interfaces import IAeroData, IEnvironment, INavigate, IRobot, ISensor
+from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
-from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.offering import offer
+from aerodaas.environment.robot import Robot
 from aerodaas.environment.run import Run
-from aerodaas.mission.commands import AddNavigation, Command, End, Pause, Resume, initial_commands
+from aerodaas.mission.commands import AddNavigation, Command, End, initial_commands
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.trajectory.base import NavigationEntry, TrajectoryScheduler
@@ -31,7 +31,7 @@ from aerodaas.types.waypoints import Waypoint
 if TYPE_CHECKING:
     from aerodaas.environment.guests import GuestNote
 
-__all__ = ["Environment", "Robot"]
+__all__ = ["Environment"]
 
 
 class Environment(PaperNames, IEnvironment):
@@ -404,100 +404,6 @@ def _checked_scheduler(scheduler: object) -> TrajectoryScheduler:
         kind = type(scheduler).__name__
         raise ConfigError(f"a trajectory scheduler is a TrajectoryScheduler, not {kind}")
     return scheduler
-
-
-class Robot(PaperNames, IRobot):
-    """One drone of an environment."""
-
-    def __init__(self, environment: Environment, config: RobotConfig) -> None:
-        self._environment = environment
-        self.config = config
-        self.robot_id = config.id
-        self.start_hooks: list[Callable[[], None]] = []
-        self.end_hooks: list[Callable[[], None]] = []
-
-    def has_sensors(self) -> bool:
-        """Return True if the robot has any onboard sensors."""
-        return bool(self.config.sensors)
-
-    def get_sensors(self) -> list[ISensor[Any]]:
-        """Return all the sensors on board."""
-        return [self._environment.sensor(sensor) for sensor in self.config.sensors]
-
-    def get_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
-        """Return the requested sensor; raises UnknownIdError."""
-        for sensor in self.config.sensors:
-            if sensor_id in {sensor.id, sensor.full_id}:
-                return self._environment.sensor(sensor)
-        known = [sensor.id for sensor in self.config.sensors]
-        raise UnknownIdError(f"sensor of {self.robot_id}", sensor_id, known)
-
-    def is_navigable(self) -> bool:
-        """Return True if the robot is navigable: its driver takes setpoints."""
-        capabilities = load_plugin("drivers", self.config.driver)(
-            self.config, self._environment.config
-        ).capabilities
-        return bool(capabilities.position_setpoints or capabilities.velocity_setpoints)
-
-    def navigate(self, data: IAeroData[Any]) -> None:
-        """Fly by this navigation: waypoints, or a stream of navigation; in flight, from now on.
-
-        Raises GraphError if `data` is neither, or if this robot is not in the mission that flies,
-        and MissionError for what the mission refuses in flight.
-        """
-        navigation = data
-        if not isinstance(data, IAeroData):
-            raise refusal(
-                f"{self.robot_id} navigates by AeroListData([Waypoint(…), …]), AeroNavigation or a "
-                f"stream of navigation, not by {type(data).__name__}"
-            )
-        if not isinstance(navigation, AeroNavigation):
-            navigation = self._environment.trajectory_scheduler().generate_navigation(data)
-        stream = navigation.stream
-        if stream is not None and not issubclass(stream.item, AeroNavigation):
-            raise GraphError(
-                f"{self.robot_id} cannot navigate by {stream.name}, which carries "
-                f"{stream.item.__name__}; put a follow analysis between"
-            )
-        if stream is not None and stream.graph is not self._environment.graph:
-            raise GraphError(f"{stream.name} belongs to another Environment than {self.robot_id}")
-        self._environment.fly_by(NavigationEdge(self.robot_id, navigation))
-
-    def start_mission(self, hook: Callable[[], None] | None = None, *, wait: bool = True) -> None:
-        """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
-
-        With `wait=False`, return as soon as it flies; as a guest of another application, which
-        flies, at once. While the mission flies, this waits for it; after its end, it flies again:
-        the navigation given to `navigate` since, or else the same. Raises
-        the project's errors; whatever happens, the drone is landed and the recording closed first.
-        """
-        self._environment.start_mission(hook, wait=wait)
-
-    def end_mission(self) -> None:
-        """End the mission: land here; the hooks of `on_end` run once it is over."""
-        self._environment.command(self.robot_id, End())
-
-    def pause_mission(self) -> None:
-        """Pause the ongoing mission by putting the drone in hover mode."""
-        self._environment.command(self.robot_id, Pause())
-
-    def resume_mission(self) -> None:
-        """Resume the ongoing mission."""
-        self._environment.command(self.robot_id, Resume())
-
-    def wait(self) -> None:
-        """Return when the mission has ended; raises the error that it ended with."""
-        self._environment.launch().wait()
-
-    def on_start(self, hook: Callable[[], None]) -> Callable[[], None]:
-        """Register a hook to run before take-off; usable as a decorator."""
-        self.start_hooks.append(hook)
-        return hook
-
-    def on_end(self, hook: Callable[[], None]) -> Callable[[], None]:
-        """Register a hook to run after the mission has ended; usable as a decorator."""
-        self.end_hooks.append(hook)
-        return hook
 
 
 def _addressee(entry: NavigationEntry, flying: list[str]) -> str:

@@ -6,12 +6,12 @@ import time
 from collections.abc import Callable, Collection
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.access import Principal, Quotas, sees
 from aerodaas.service.access.principal import reaches
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.garage import Garage
 from aerodaas.service.leases import Candidate, Fleet, LeaseBook
-from aerodaas.service.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.store import Lease, Mission, Store
 
 __all__ = ["Bookings"]

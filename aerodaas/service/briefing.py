@@ -7,12 +7,12 @@ from pathlib import Path
 
 from aerodaas.config.plugins import require_plugin
 from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Principal, require
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.order import FlightLimits, FlightOrder, OtherLease, Outcome
 from aerodaas.service.garage import Garage
-from aerodaas.service.schemas import Role, Scope
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store, Usage
 

@@ -13,6 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
+from aerodaas.protocol.schemas import (
+    CommandIn,
+    LeaseState,
+    MissionIn,
+    MissionOut,
+    MissionPhase,
+    Role,
+)
 from aerodaas.service.access import Principal, Quotas, sees
 from aerodaas.service.access.principal import reaches
 from aerodaas.service.bookings import Bookings
@@ -23,14 +31,6 @@ from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightErro
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.phases import OVER
 from aerodaas.service.records import shown
-from aerodaas.service.schemas import (
-    CommandIn,
-    LeaseState,
-    MissionIn,
-    MissionOut,
-    MissionPhase,
-    Role,
-)
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
 from aerodaas.types.errors import AeroDaaSError, MissionError

@@ -5,11 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.schemas import FleetOut, RobotOut
 from aerodaas.service.access import Principal, sees
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.garage import Garage
-from aerodaas.service.schemas import FleetOut, RobotOut
 
 __all__ = ["FleetView"]
 

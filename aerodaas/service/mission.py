@@ -12,13 +12,13 @@ from dataclasses import replace
 from pathlib import Path
 
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
+from aerodaas.protocol.schemas import MissionPhase, VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.starter import start_process
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.phases import FOLLOWING, OVER
-from aerodaas.service.schemas import MissionPhase, VerdictOut
 from aerodaas.service.store import Mission
 
 __all__ = ["CANCELLED_BY", "ActiveMission", "LostFlightError"]

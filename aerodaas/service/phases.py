@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from aerodaas.service.schemas import MissionPhase
+from aerodaas.protocol.schemas import MissionPhase
 
 __all__ = ["FOLLOWING", "OVER"]
 

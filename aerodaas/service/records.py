@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from aerodaas.protocol.schemas import MissionOut, MissionPhase, VerdictOut
 from aerodaas.service.mission import ActiveMission
-from aerodaas.service.schemas import MissionOut, MissionPhase, VerdictOut
 
 __all__ = ["shown"]
 

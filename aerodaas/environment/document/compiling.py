@@ -14,7 +14,8 @@ from aerodaas.config.plugins import PluginKind
 from aerodaas.dataflow.graph import NavigationEdge, Trigger
 from aerodaas.dataflow.mission_document import MissionDocument, WaypointEntry
 from aerodaas.environment.document.values import ValueWriter, registered_name
-from aerodaas.environment.environment import Environment, Robot
+from aerodaas.environment.environment import Environment
+from aerodaas.environment.robot import Robot
 from aerodaas.types.errors import GraphError
 from aerodaas.types.waypoints import SchedulingType
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Collection
 
-from aerodaas.service.schemas import AccountIn, AccountOut, Role, Scope, TokenIn, TokenOut
+from aerodaas.protocol.schemas import AccountIn, AccountOut, Role, Scope, TokenIn, TokenOut
 from aerodaas.service.store import Store
 
 __all__ = ["Accounts"]

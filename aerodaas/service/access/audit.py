@@ -5,8 +5,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
+from aerodaas.protocol.schemas import AuditOut
 from aerodaas.service.access.principal import Principal
-from aerodaas.service.schemas import AuditOut
 from aerodaas.service.store import Store
 
 __all__ = ["Audit"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from aerodaas.service.schemas import UsageOut
+from aerodaas.protocol.schemas import UsageOut
 from aerodaas.service.store import Usage
 
 __all__ = ["usage_csv", "usage_out"]

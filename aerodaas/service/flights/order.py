@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
-from aerodaas.service.schemas import Area, SilencePolicy, VerdictOut
+from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
 
 __all__ = ["FlightLimits", "FlightOrder", "OtherLease", "Outcome"]
 

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.recording.reader import Recording
-from aerodaas.recording.report.flight import RecordedFlight
-from aerodaas.service.limits import Outline
-from aerodaas.service.rehearsal.findings import Finding, OtherArea, findings_of
-from aerodaas.service.schemas import VerdictOut
+from aerodaas.protocol.schemas import VerdictOut
+from aerodaas.service.rehearsal.findings import OtherArea
 
 __all__ = ["OtherArea", "judge"]
 

@@ -7,11 +7,7 @@ from typing import Annotated, Any, Literal
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict
 
-from aerodaas.service.access import Accounts, Audit, usage_csv
-from aerodaas.service.access.principal import reaches
-from aerodaas.service.access.usage import usage_out
-from aerodaas.service.routes.admission import Admission
-from aerodaas.service.schemas import (
+from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
     AuditOut,
@@ -21,6 +17,10 @@ from aerodaas.service.schemas import (
     TokenOut,
     UsageOut,
 )
+from aerodaas.service.access import Accounts, Audit, usage_csv
+from aerodaas.service.access.principal import reaches
+from aerodaas.service.access.usage import usage_out
+from aerodaas.service.routes.admission import Admission
 from aerodaas.service.store import Store
 
 __all__ = ["AccountRoutes"]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from starlette.requests import HTTPConnection
 
+from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Access, Audit, Principal, RateLimiter, require
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.schemas import Role, Scope
 
 __all__ = ["Admission"]
 

@@ -7,13 +7,13 @@ from typing import Any
 from fastapi import APIRouter, Request, Response
 from pydantic import BaseModel, ConfigDict
 
+from aerodaas.protocol.schemas import AccountOut, FleetOut, Role, Scope
 from aerodaas.service.access import Accounts, Audit
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import LARGEST_MODEL, ModelShelf
 from aerodaas.service.routes.admission import Admission
-from aerodaas.service.schemas import AccountOut, FleetOut, Role, Scope
 
 __all__ = ["FleetRoutes"]
 

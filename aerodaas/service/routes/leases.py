@@ -7,11 +7,11 @@ from typing import Annotated
 from fastapi import APIRouter, Request
 from pydantic import BaseModel, ConfigDict, Field
 
+from aerodaas.protocol.schemas import LeaseIn, LeaseOut, Role, Scope
 from aerodaas.service.access import Audit
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.leases import lease_out
 from aerodaas.service.routes.admission import Admission
-from aerodaas.service.schemas import LeaseIn, LeaseOut, Role, Scope
 
 __all__ = ["LeaseRoutes"]
 

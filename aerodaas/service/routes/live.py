@@ -8,12 +8,12 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, WebSocket, WebSocketDisconnect
 
+from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.hub import StreamHub, Watcher
 from aerodaas.service.phases import OVER
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.refusals import close_refused
-from aerodaas.service.schemas import Role, Scope
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["LiveRoutes"]

@@ -8,10 +8,10 @@ from fastapi import APIRouter, Request
 from fastapi.responses import FileResponse
 
 from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
+from aerodaas.protocol.schemas import CommandIn, MissionIn, MissionOut, Role, Scope, Word
 from aerodaas.service.access import Audit, Principal
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.routes.admission import Admission
-from aerodaas.service.schemas import CommandIn, MissionIn, MissionOut, Role, Scope, Word
 
 __all__ = ["MissionRoutes"]
 

@@ -10,8 +10,8 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException
 
+from aerodaas.protocol.schemas import RefusalOut
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.schemas import RefusalOut
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["close_refused", "refusal_of", "register_refusals"]
