@@ -16,7 +16,6 @@ from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
 from aerodaas.service.gate import Gate
 from aerodaas.service.hub import StreamHub
-from aerodaas.service.limits import catalogue
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.routes.accounts import AccountRoutes
 from aerodaas.service.routes.admission import Admission
