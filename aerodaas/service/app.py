@@ -9,6 +9,7 @@ from typing import Any
 from fastapi import FastAPI, Security
 from fastapi.security import HTTPBearer
 
+from aerodaas.config.redaction import catalogue
 from aerodaas.service.access import Access, Accounts, Audit, Quotas, RateLimiter
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk

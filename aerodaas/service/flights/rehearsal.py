@@ -11,7 +11,7 @@ from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.process import Flying, environment_of
-from aerodaas.service.rehearsal import OtherArea, judge
+from aerodaas.service.rehearsal import judge
 from aerodaas.service.rehearsal.picture import draw
 from aerodaas.types.errors import AeroDaaSError
 
@@ -36,13 +36,14 @@ def rehearse(path: Path) -> None:
 def _verdict(folder: FlightFolder, order: FlightOrder, outcome: Outcome) -> VerdictOut:
     if not folder.recording.is_file():
         return VerdictOut(approved=False, reasons=[outcome.reason])
-    others = [OtherArea(one.id, tuple(one.area)) for one in order.others]
     try:
         config = environment_of(order)
-        verdict = judge(folder.recording, config, minutes=order.minutes, others=others)
+        verdict = judge(folder.recording, config, minutes=order.minutes, others=order.others)
         # The picture is for people; a flight is not refused for want of it.
         with contextlib.suppress(AeroDaaSError):
-            draw(folder.recording, folder.picture, config, minutes=order.minutes, others=others)
+            draw(
+                folder.recording, folder.picture, config, minutes=order.minutes, others=order.others
+            )
     except AeroDaaSError as error:
         return VerdictOut(approved=False, reasons=[f"the rehearsal could not be judged: {error}"])
     here = ", ".join(read_mission(folder.document).here)
