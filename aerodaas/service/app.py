@@ -21,6 +21,7 @@ from aerodaas.service.models import ModelShelf
 from aerodaas.service.routes.accounts import AccountRoutes
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.fleet import FleetRoutes
+from aerodaas.service.routes.here import HereRoutes
 from aerodaas.service.routes.leases import LeaseRoutes
 from aerodaas.service.routes.live import LiveRoutes
 from aerodaas.service.routes.missions import MissionRoutes
@@ -83,5 +84,6 @@ def build_service(
     ):
         app.include_router(routes.router(), dependencies=secured)
     app.include_router(LiveRoutes(desk, hub, admission).router())
+    app.include_router(HereRoutes(desk, admission).router())
     app.add_middleware(Gate, admission=admission)
     return app

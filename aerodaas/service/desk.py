@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
 from aerodaas.protocol.schemas import (
     CommandIn,
@@ -213,6 +214,16 @@ class MissionDesk:
                 raise MissionError(f"{mission} is not flying")
             link = one.follow()
         return link.items(stream)
+
+    def here(self, mission: str) -> Channel | None:
+        """A channel to a flight for its user's side; None unless it is flying."""
+        one = self._missions.get(mission)
+        if one is None or one.phase is not MissionPhase.FLYING:
+            return None
+        try:
+            return one.follow().connected("here")
+        except (GuestError, OSError):
+            return None
 
     def file(self, principal: Principal, mission: str, name: str) -> Path:
         """The recording or the rehearsal's picture of a mission; raises RefusedError if none."""
