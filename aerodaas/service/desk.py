@@ -12,7 +12,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
 from aerodaas.protocol.schemas import (
     CommandIn,
@@ -27,6 +26,7 @@ from aerodaas.service.access.principal import reaches
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.garage import Garage
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
 from aerodaas.service.models import ModelShelf
@@ -215,15 +215,10 @@ class MissionDesk:
             link = one.follow()
         return link.items(stream)
 
-    def here(self, mission: str) -> Channel | None:
-        """A channel to a flight for its user's side; None unless it is flying."""
+    def flight(self, mission: str) -> FlightFolder | None:
+        """The folder of a mission's flight; None unless it is flying."""
         one = self._missions.get(mission)
-        if one is None or one.phase is not MissionPhase.FLYING:
-            return None
-        try:
-            return one.follow().connected("here")
-        except (GuestError, OSError):
-            return None
+        return one.flight if one is not None and one.phase is MissionPhase.FLYING else None
 
     def file(self, principal: Principal, mission: str, name: str) -> Path:
         """The recording or the rehearsal's picture of a mission; raises RefusedError if none."""

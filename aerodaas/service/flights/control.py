@@ -1,7 +1,7 @@
 """Control socket of a flight: commands from the service, status and items to it.
 
-Each connection begins with what it is for: `command`, `follow`, `items` or `here`. Messages are JSON with
-one blob. The socket lies in the flight's folder, which is open to its user alone.
+Each connection begins with what it is for: `command`, `follow`, `items` or `here`. Messages are
+JSON with one blob. The socket lies in the flight's folder, which is open to its user alone.
 """
 
 from __future__ import annotations

@@ -62,7 +62,7 @@ class FlightLink:
         with self._lock:
             try:
                 if self._channel is None:
-                    self._channel = self.connected("command")
+                    self._channel = self._connected("command")
                 self._channel.send(request, timeout=_ANSWER_SECONDS)
                 answer, _ = self._channel.receive(_ANSWER_SECONDS)
                 return AnswerOut.model_validate(answer)
@@ -76,7 +76,7 @@ class FlightLink:
         Raises ConfigError if there is no such stream, MissionError if the flight is lost.
         """
         try:
-            channel = self.connected("items", stream=stream)
+            channel = self._connected("items", stream=stream)
         except (GuestError, OSError) as error:
             raise MissionError(f"the flight's process does not answer: {error}") from None
         with contextlib.closing(channel):
@@ -93,8 +93,7 @@ class FlightLink:
         except GuestError as error:
             raise MissionError(f"the flight's stream has ended: {error}") from None
 
-    def connected(self, purpose: str, **more: str) -> Channel:
-        """A connection for one purpose; raises OSError or GuestError if nobody listens."""
+    def _connected(self, purpose: str, **more: str) -> Channel:
         connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         connection.settimeout(_CONNECT_SECONDS)
         try:
@@ -119,7 +118,7 @@ class FlightLink:
             self._closed.wait(_AGAIN_SECONDS)
 
     def _follow_once(self) -> None:
-        with contextlib.closing(self.connected("follow")) as channel:
+        with contextlib.closing(self._connected("follow")) as channel:
             while not self._closed.is_set():
                 self._take(channel.receive(_SILENT_SECONDS)[0])
 

@@ -7,12 +7,14 @@ import contextlib
 import json
 from typing import Any
 
-from fastapi import APIRouter, WebSocket, WebSocketDisconnect
+from fastapi import APIRouter, WebSocket
 
-from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.guests.channel import GuestError
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.flights.async_channel import AsyncChannel
+from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.phases import OVER
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.refusals import close_refused
@@ -52,51 +54,55 @@ class HereRoutes:
             await close_refused(socket, error)
             return
         await socket.accept()
-        answers = asyncio.create_task(self._answers(socket, mission))
         try:
-            await answers
+            await self._carry(socket, mission)
         finally:
-            answers.cancel()
             with contextlib.suppress(RuntimeError):
                 await socket.close()
 
-    async def _answers(self, socket: WebSocket, mission: str) -> None:
+    async def _carry(self, socket: WebSocket, mission: str) -> None:
+        """Connect the user with the mission's flight, again if need be, until it is over."""
         while self._desk.shown(mission).phase not in OVER:
-            channel = await asyncio.to_thread(self._desk.here, mission)
-            if channel is None:
-                await asyncio.sleep(_AGAIN_SECONDS)
-                continue
-            carried = [
-                asyncio.create_task(_ask(socket, channel)),
-                asyncio.create_task(_answer(socket, channel)),
-            ]
-            done, _ = await asyncio.wait(carried, return_when=asyncio.FIRST_COMPLETED)
-            channel.close()
-            for task in carried:
-                task.cancel()
-            results = await asyncio.gather(*carried, return_exceptions=True)
-            if any(isinstance(one, WebSocketDisconnect) for one in results):
-                return
-            del done
+            folder = self._desk.flight(mission)
+            try:
+                if folder is not None and not await _carried(socket, folder):
+                    return
+            except GuestError:
+                # The flight has not begun to listen, or has ended.
+                pass
+            await asyncio.sleep(_AGAIN_SECONDS)
 
 
-async def _ask(socket: WebSocket, channel: Channel) -> None:
-    """Carry questions to the user; returns when the flight has ended."""
-    with contextlib.suppress(GuestError):
-        while True:
-            question, blob = await asyncio.to_thread(channel.receive)
-            await socket.send_text(json.dumps({**question, "blob": bool(blob)}))
-            if blob:
-                await socket.send_bytes(blob)
+async def _carried(socket: WebSocket, folder: FlightFolder) -> bool:
+    """Carry messages until one side has gone; returns whether the user is still there."""
+    channel = await AsyncChannel.connect(folder, "here")
+    questions = asyncio.create_task(_ask(socket, channel))
+    answers = asyncio.create_task(_answer(socket, channel))
+    try:
+        await asyncio.wait((questions, answers), return_when=asyncio.FIRST_COMPLETED)
+        return not answers.done()
+    finally:
+        channel.close()
+        questions.cancel()
+        answers.cancel()
+        await asyncio.gather(questions, answers, return_exceptions=True)
 
 
-async def _answer(socket: WebSocket, channel: Channel) -> None:
+async def _ask(socket: WebSocket, channel: AsyncChannel) -> None:
+    """Carry questions to the user; raises GuestError when the flight has ended."""
+    while True:
+        question, blob = await channel.receive()
+        await socket.send_text(json.dumps({**question, "blob": bool(blob)}))
+        if blob:
+            await socket.send_bytes(blob)
+
+
+async def _answer(socket: WebSocket, channel: AsyncChannel) -> None:
     """Carry answers to the flight; raises WebSocketDisconnect when the user has gone."""
-    with contextlib.suppress(GuestError):
-        while True:
-            answer = _object(await socket.receive_text())
-            blob = await socket.receive_bytes() if answer.pop("blob", False) else b""
-            await asyncio.to_thread(channel.send, answer, blob, 5.0)
+    while True:
+        answer = _object(await socket.receive_text())
+        blob = await socket.receive_bytes() if answer.pop("blob", False) else b""
+        await channel.send(answer, blob)
 
 
 def _object(text: str) -> dict[str, Any]:
