@@ -64,7 +64,8 @@ def test_commands_reach_the_drone_and_answers_come_back(provider: Served) -> Non
     flying(provider, id_, "one", "paused")
     place = {"id": "more", "x": 3.0, "y": 3.0, "z": 2.0, "waypoint_type": "local"}
     more = {"robot": "one", "waypoints": [place]}
-    assert provider.ask("POST", f"/v1/missions/{id_}/navigation", more)["accepted"]
+    answer = provider.ask("POST", f"/v1/missions/{id_}/navigation", more)
+    assert answer["accepted"], answer
     outside = {"robot": "one", "waypoints": [{**place, "id": "outside", "x": 500.0}]}
     refused = provider.ask("POST", f"/v1/missions/{id_}/navigation", outside)
     assert not refused["accepted"]
