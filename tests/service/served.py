@@ -66,7 +66,7 @@ class Served:
     def __init__(self, content: dict[str, Any], *words: str) -> None:
         """Serve an environment file of this content with further words of the command line."""
         # A socket's path is short.
-        self._temporary = tempfile.TemporaryDirectory(prefix="served-", dir="/tmp")  # noqa: S108
+        self._temporary = tempfile.TemporaryDirectory(prefix="served-", dir="/tmp")
         self.folder = Path(self._temporary.name)
         self._file = self.folder / "fleet.json"
         self._file.write_text(json.dumps(content), encoding="utf-8")
