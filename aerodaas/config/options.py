@@ -11,7 +11,24 @@ if TYPE_CHECKING:
     from aerodaas.config.grants import Catalogue
     from aerodaas.config.model import EnvironmentConfig
 
-__all__ = ["RunOptions", "current_options"]
+__all__ = ["ProviderOptions", "RunOptions", "current_options"]
+
+
+@dataclass(frozen=True)
+class ProviderOptions:
+    """What the command line asks of a provider; None keeps the service's own default."""
+
+    url: str | None = None
+    """Provider's service instead of the application's environment."""
+    minutes: float | None = None
+    """Of the lease that is requested with a mission."""
+    lease: str | None = None
+    """A lease that the account has."""
+    silence: str | None = None
+    """`continue` or `return`: what the drones do when nothing is heard of their user."""
+    silence_seconds: float | None = None
+    share: tuple[str, ...] = ()
+    """Tenants that may watch."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +68,8 @@ class RunOptions:
     """Rights by guest, such as `sense:cam1`; a guest without any has none."""
     catalogue: Catalogue | None = None
     """In a guest's process: what it was granted, in the place of an environment file."""
+    provider: ProviderOptions = field(default_factory=ProviderOptions)
+    """For flights on a provider's drones."""
     application: Path | None = None
     """The application's file, for relative paths and the recording's provenance."""
 
