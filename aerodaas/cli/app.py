@@ -14,6 +14,7 @@ from aerodaas.cli.application import run_application, speed_option
 from aerodaas.cli.export import export
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
+from aerodaas.cli.serve import serve
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.errors import (
     AeroDaaSError,
@@ -200,6 +201,7 @@ def doctor(
     raise typer.Exit(0 if examine(address) else 1)
 
 
+app.command()(serve)
 app.command()(report)
 app.command()(compare)
 app.command()(export)

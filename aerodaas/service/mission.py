@@ -11,14 +11,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
-from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.dataflow.mission_document import MissionDocument, read_mission
+from aerodaas.protocol.schemas import MissionPhase, VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.link import FlightLink
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.starter import start_process
+from aerodaas.service.models import ModelShelf
 from aerodaas.service.phases import FOLLOWING, OVER
-from aerodaas.protocol.schemas import MissionPhase, VerdictOut
-from aerodaas.service.store import MissionRow
+from aerodaas.service.store import Mission
 
 __all__ = ["CANCELLED_BY", "ActiveMission", "LostFlightError"]
 
@@ -35,7 +36,7 @@ class LostFlightError(Exception):
 class ActiveMission:
     """A mission that is not over, with its folders and processes; for one thread at a time."""
 
-    def __init__(self, row: MissionRow, path: Path, save: Callable[[MissionRow], None]) -> None:
+    def __init__(self, row: Mission, path: Path, save: Callable[[Mission], None]) -> None:
         """Take up a mission.
 
         Args:
@@ -44,6 +45,7 @@ class ActiveMission:
             save: Writes a changed row.
         """
         self.row = row
+        self._document = path / "mission.json"
         self.flight = FlightFolder(path / "f")
         self.rehearsal = FlightFolder(path / "r")
         self.link: FlightLink | None = None
@@ -51,6 +53,15 @@ class ActiveMission:
         """Counts the changes."""
         self._save = save
         self._process: subprocess.Popen[bytes] | None = None
+
+    def write(self, document: MissionDocument) -> None:
+        """Keep the document."""
+        self._document.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        self._document.write_text(document.text(), encoding="utf-8")
+
+    def document(self) -> MissionDocument:
+        """The document; raises ConfigError if its file is gone."""
+        return read_mission(self._document)
 
     @property
     def phase(self) -> MissionPhase:
@@ -65,19 +76,22 @@ class ActiveMission:
     def to(self, phase: MissionPhase, reason: str = "", **changes: object) -> None:
         """Change the phase; the database is written first."""
         assert phase in FOLLOWING[self.phase], (self.phase, phase)  # noqa: S101 - our own order
-        row = replace(self.row, phase=phase, reason=reason, **changes)
+        row = replace(self.row, phase=phase, reason=reason, **changes)  # type: ignore[arg-type]
         self._save(row)
         self.row = row
         self.version += 1
 
-    def rehearse(self, order: FlightOrder, document: MissionDocument) -> None:
+    def change(self, **changes: object) -> None:
+        """Change the row within its phase."""
+        row = replace(self.row, **changes)  # type: ignore[arg-type]
+        self._save(row)
+        self.row = row
+
+    def rehearse(self, order: FlightOrder, models: ModelShelf) -> None:
         """Start the rehearsal; one that a former service began is begun again."""
         self.end_rehearsal()
         shutil.rmtree(self.rehearsal.path, ignore_errors=True)
-        self.rehearsal.make(order, document.text())
-
-    def start_rehearsal(self) -> None:
-        """Start the rehearsal's process."""
+        self._prepare(self.rehearsal, order, models)
         self._process = start_process(self.rehearsal)
 
     def verdict(self) -> VerdictOut | None:
@@ -86,6 +100,7 @@ class ActiveMission:
             return None
         if self._process is None and self.rehearsal.flying:
             return None
+        self._process = None
         outcome = self.rehearsal.outcome()
         if outcome is not None and outcome.verdict is not None:
             return outcome.verdict
@@ -99,16 +114,19 @@ class ActiveMission:
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
 
-    def take_off(self, order: FlightOrder, document: MissionDocument) -> None:
-        """Start the flight's process, unless it has been started before."""
-        if self.flight.begun:
-            return
-        self.flight.make(order, document.text())
+    def brief(self, order: FlightOrder, models: ModelShelf) -> None:
+        """Write down the flight's order, before anything of it begins."""
+        self._prepare(self.flight, order, models)
 
-    def start_flight(self) -> None:
-        """Start the process of the flight whose order has been written."""
-        if not self.flight.begun:
+    def take_off(self) -> None:
+        """Start the flight's process; one that was begun, by whatever service, begins no more."""
+        if self._process is None and not self.flight.begun:
             self._process = start_process(self.flight)
+
+    def _prepare(self, folder: FlightFolder, order: FlightOrder, models: ModelShelf) -> None:
+        document = self.document()
+        folder.make(order, document.text())
+        models.lend(document, folder.models)
 
     def follow(self) -> FlightLink:
         """The link to the flight, made when it is first needed."""

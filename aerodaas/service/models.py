@@ -54,7 +54,7 @@ class ModelShelf:
             raise
 
     def lend(self, document: MissionDocument, folder: Path) -> None:
-        """Put the models that a document names into `folder`; raises ConfigError for a missing one."""
+        """Put the models of a document into `folder`; raises ConfigError for a missing one."""
         for sha256 in sorted(set(_named(document.model_dump()))):
             if not self.has(sha256):
                 raise ConfigError(f"the model {sha256[:16]}… has not been sent: PUT /v1/models/…")

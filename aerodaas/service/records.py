@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from aerodaas.protocol.schemas import MissionOut, MissionPhase, VerdictOut
 from aerodaas.service.mission import ActiveMission
-from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, VerdictOut
 
 __all__ = ["shown"]
 
@@ -16,7 +16,7 @@ def shown(one: ActiveMission) -> MissionOut:
     status, alerts = (news.status, news.alerts) if news is not None else ({}, [])
     if outcome is not None:
         status, alerts = outcome.status, outcome.alerts
-    verdict = VerdictOut.model_validate_json(row.verdict) if row.verdict else None
+    verdict = VerdictOut.model_validate(row.verdict) if row.verdict else None
     if verdict is not None and one.rehearsal.picture.is_file():
         verdict = verdict.model_copy(update={"picture": f"/v1/missions/{row.id}/rehearsal.png"})
     return MissionOut(
@@ -28,7 +28,7 @@ def shown(one: ActiveMission) -> MissionOut:
         reason=row.reason,
         robots=list(row.robots),
         lease=row.lease,
-        share=MissionIn.model_validate_json(row.request).share,
+        share=list(row.request.get("share", ())),
         submitted=row.submitted,
         started=row.started,
         ended=row.ended,

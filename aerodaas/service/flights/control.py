@@ -120,7 +120,7 @@ class ControlServer:
 
     def _commands(self, channel: Channel, _: dict[str, Any]) -> None:
         while not self._closed.is_set():
-            request, _ = channel.receive()
+            request = channel.receive()[0]
             channel.send(self._answer(request), timeout=_SEND_SECONDS)
 
     def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -142,12 +142,15 @@ class ControlServer:
                 return AnswerOut(accepted=True)
         if self._lease.reason and not request.get("operator"):
             return AnswerOut(accepted=False, text=f"the drones come home: {self._lease.reason}")
+        return AnswerOut.of(self._commanded(request))
+
+    def _commanded(self, request: dict[str, Any]) -> Answer:
         if request["do"] == "fly":
             waypoints = WaypointsIn.model_validate(request["waypoints"])
-            return AnswerOut.of(self._flown.fly(request["robot"], waypoints))
+            return self._flown.fly(request["robot"], waypoints)
         if request["do"] not in COMMANDS:
-            return AnswerOut(accepted=False, text=f"there is no command {request['do']!r}")
-        return AnswerOut.of(self._flown.command(request["robot"], request["do"]))
+            return Answer(accepted=False, text=f"there is no command {request['do']!r}")
+        return self._flown.command(request["robot"], request["do"])
 
     def _follow(self, channel: Channel, _: dict[str, Any]) -> None:
         while not self._closed.is_set():

@@ -114,13 +114,15 @@ class FlightLink:
         while not self._closed.is_set():
             # Before the process listens and after its end there is nobody to connect to.
             with contextlib.suppress(GuestError, OSError, ValidationError):
-                with contextlib.closing(self._connected("follow")) as channel:
-                    while not self._closed.is_set():
-                        self._take(channel.receive(_SILENT_SECONDS)[0])
+                self._follow_once()
             self._closed.wait(_AGAIN_SECONDS)
+
+    def _follow_once(self) -> None:
+        with contextlib.closing(self._connected("follow")) as channel:
+            while not self._closed.is_set():
+                self._take(channel.receive(_SILENT_SECONDS)[0])
 
     def _take(self, message: dict[str, Any]) -> None:
         robots = {name: StatusOut(**one) for name, one in message["robots"].items()}
         self.news = FlightNews(self.news.number + 1, robots, message["alerts"])
         self._told()
-

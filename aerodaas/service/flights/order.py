@@ -12,7 +12,7 @@ from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
 from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
 
-__all__ = ["FlightLimits", "FlightOrder", "Outcome", "OtherLease"]
+__all__ = ["FlightLimits", "FlightOrder", "OtherLease", "Outcome"]
 
 
 class _Record(BaseModel):

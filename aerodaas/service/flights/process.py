@@ -25,8 +25,8 @@ from aerodaas.mission.commands import AddNavigation, Answer, ReturnHome
 from aerodaas.service.flights.commands import COMMANDS
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.meter import FlightMeter
+from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.service.limits import TenantLimits, limited
 from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError

@@ -7,8 +7,6 @@ from pathlib import Path
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.flights.process import fly
-from aerodaas.service.rehearsal import judge
-from aerodaas.service.rehearsal.picture import draw
 
 __all__ = ["rehearse"]
 

@@ -6,8 +6,8 @@ import threading
 import time
 from collections.abc import Callable
 
-from aerodaas.service.flights.order import FlightOrder
 from aerodaas.protocol.schemas import SilencePolicy
+from aerodaas.service.flights.order import FlightOrder
 
 __all__ = ["LeaseWatch"]
 

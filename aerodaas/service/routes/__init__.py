@@ -1,1 +1,1 @@
-"""HTTP and WebSocket routes, one module a subject; each only translates between JSON and the desk."""
+"""HTTP and WebSocket routes, a module a subject: between JSON and the desk, no more."""

@@ -8,27 +8,38 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, WebSocket, WebSocketDisconnect
 
+from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.hub import StreamHub, Watcher
 from aerodaas.service.phases import OVER
-from aerodaas.service.routes.admission import Admission, close_refused
-from aerodaas.protocol.schemas import Scope
+from aerodaas.service.routes.admission import Admission
+from aerodaas.service.routes.refusals import close_refused
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["live_router"]
+__all__ = ["LiveRoutes"]
 
 _MOST_STREAMS = 16
 _IDLE_SECONDS = 1.0
 """Most seconds between two messages of a mission that does not change."""
-_HEARD_SECONDS = 1.0
 
 
-def live_router(desk: MissionDesk, hub: StreamHub, admission: Admission) -> APIRouter:
-    """Routes of `/v1/missions/{id}/live`."""
-    router = APIRouter()
+class LiveRoutes:
+    """Route `/v1/missions/{id}/live`."""
 
-    @router.websocket("/v1/missions/{mission}/live")
+    def __init__(self, desk: MissionDesk, hub: StreamHub, admission: Admission) -> None:
+        """Show the desk's missions, and the hub's streams."""
+        self._desk = desk
+        self._hub = hub
+        self._admission = admission
+
+    def router(self) -> APIRouter:
+        """The route."""
+        router = APIRouter()
+        router.add_api_websocket_route("/v1/missions/{mission}/live", self.live)
+        return router
+
     async def live(
+        self,
         socket: WebSocket,
         mission: str,
         rate: Annotated[float, Query(gt=0, le=20, allow_inf_nan=False)] = 5.0,
@@ -37,28 +48,26 @@ def live_router(desk: MissionDesk, hub: StreamHub, admission: Admission) -> APIR
         """Send the mission's state, at most `rate` times a second, and items of `streams`."""
         wanted = [name for name in streams.split(",") if name][:_MOST_STREAMS]
         try:
-            principal = await admission.websocket(socket, Scope.SENSE if wanted else None)
-            await asyncio.to_thread(desk.mission, principal, mission)
+            scope = Scope.SENSE if wanted else None
+            principal = self._admission.require(socket, Role.VIEWER, scope)
+            await asyncio.to_thread(self._desk.mission, principal, mission)
+            own = await asyncio.to_thread(self._desk.flies, principal, mission)
         except AeroDaaSError as error:
             await close_refused(socket, error)
             return
         await socket.accept()
-        session = _Session(socket, desk, hub, mission)
-        own = await asyncio.to_thread(desk.flies, principal, mission)
-        jobs = [asyncio.create_task(session.state(rate, principal if own else None))]
-        jobs += [asyncio.create_task(session.items(name)) for name in wanted]
-        jobs.append(asyncio.create_task(session.read()))
+        session = _Session(socket, self._desk, self._hub, mission)
+        state = asyncio.create_task(session.state(rate, own=own))
+        gone = asyncio.create_task(session.read())
+        jobs = [state, gone, *(asyncio.create_task(session.items(name)) for name in wanted)]
         try:
-            await asyncio.wait(jobs[:1] + jobs[-1:], return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait((state, gone), return_when=asyncio.FIRST_COMPLETED)
         finally:
             for job in jobs:
                 job.cancel()
-            with contextlib.suppress(Exception):
-                await asyncio.gather(*jobs, return_exceptions=True)
+            await asyncio.gather(*jobs, return_exceptions=True)
             with contextlib.suppress(RuntimeError):
                 await socket.close()
-
-    return router
 
 
 class _Session:
@@ -72,15 +81,15 @@ class _Session:
         # An item's two messages stay together.
         self._sending = asyncio.Lock()
 
-    async def state(self, rate: float, user: object) -> None:
-        """Send the mission's state until it is over."""
+    async def state(self, rate: float, *, own: bool) -> None:
+        """Send the mission's state until it is over; its own user counts as present meanwhile."""
         sent, since = -1, 0.0
         loop = asyncio.get_running_loop()
         while True:
             version = self._desk.version(self._mission)
             if version != sent or loop.time() - since > _IDLE_SECONDS:
                 sent, since = version, loop.time()
-                if user is not None:
+                if own:
                     await asyncio.to_thread(self._desk.hear, self._mission)
                 mission = self._desk.shown(self._mission)
                 text = mission.model_dump_json()

@@ -20,7 +20,7 @@ from aerodaas.analytics.guests.document import (
     GuestTrigger,
     read_document,
 )
-from aerodaas.analytics.guests.items import ItemError, decoded, encoded
+from aerodaas.analytics.item_json import ItemError, decoded, encoded
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types.data import Detection, Detections, Header, Readings
 from aerodaas.types.errors import GraphError
