@@ -14,7 +14,7 @@ from aerodaas.config.options import current_options
 from aerodaas.config.overrides import located, overridden
 from aerodaas.config.plugins import load_plugin
 from aerodaas.dataflow.graph import Graph, NavigationEdge, refusal
-from aerodaas.dataflow.handles import Compute, Sensor
+from aerodaas.dataflow.handles import Compute, Here, Sensor
 from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.environment.offering import offer
@@ -131,6 +131,16 @@ class Environment(PaperNames, IEnvironment):
             if resource.id == compute_id:
                 return self._resource(resource)
         raise UnknownIdError("compute resource", compute_id, [one.id for one in self.compute()])
+
+    @property
+    def here(self) -> Here:
+        """The user's own side, to `deploy` analyses on whose code stays there.
+
+        A provider flies such an analysis without its code: its items come to this process over
+        the wire, and its results go back. In a flight of one's own it runs on the edge node beside
+        the drone, as one that is not deployed.
+        """
+        return Here(self.graph)
 
     def share_out(
         self,

@@ -10,7 +10,7 @@ import contextlib
 import socket
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from aerodaas.analytics.base import Analytics, Context
 from aerodaas.analytics.guests.answers import AnswerReader
@@ -55,6 +55,7 @@ class HereAnalysis(Analytics[Any]):
             sees_vehicle: Whether it is told the vehicle's state: that of its inputs' robot.
         """
         self.key = key
+        self.item = produces
         self.sees_vehicle = sees_vehicle
         self._site = site
         self._answers = AnswerReader(HERE, key, produces, kind=HERE, title="the user's side")
@@ -133,6 +134,7 @@ class HereConditions(HereAnalysis):
     It reads that analysis' stream, and its result says how many of them were met.
     """
 
+    produces: ClassVar[type] = Readings
     _asks = "met"
 
     def _result(self, answer: dict[str, Any], context: Context) -> Readings | None:

@@ -64,9 +64,10 @@ class ValueWriter:
         name = registered_name("analytics", type(work))
         if name is None:
             raise GraphError(
-                f"{type(work).__name__} is the application's own code, and a document holds "
-                "registered analyses only: have its package register it as an entry point of "
-                "`aerodaas.analytics`, or fly the application itself"
+                f"{type(work).__name__} is the application's own code, which no document holds: "
+                "keep it at your side by deploy(env.here), where it runs while a provider flies "
+                "the rest, or have its package register it as an entry point of "
+                "`aerodaas.analytics` wherever it is to fly"
             )
         return name, self.settings(work.given_settings(), work.resources, name)
 
