@@ -46,7 +46,7 @@ class ServiceAddress:
         host = parts.hostname
         if parts.scheme not in _PORTS or not host:
             raise ConfigError(
-                f"a provider's address is https://host, not {url.partition('@')[0]!r}"
+                f"a provider's address is https://host, not {shown_text(url)!r}"
             )
         if parts.username is not None or parts.query or parts.fragment:
             raise ConfigError(

@@ -94,18 +94,9 @@ class MissionFollower:
     def _follow(self) -> None:
         waiting, lost = pauses(), False
         while not self._closed.is_set() and not self._mission.phase.over:
+            seen = self._changes
             try:
-                with self._client.live(self._mission.id, self._rate) as live:
-                    self._connection = live
-                    for message in live:
-                        if not isinstance(message, MissionOut):
-                            continue
-                        if lost:
-                            self._say("the connection to the provider is back")
-                            waiting, lost = pauses(), False
-                        self._take(message)
-                        if self._closed.is_set():
-                            return
+                self._listen(lost=lost)
                 self._take(self._client.mission(self._mission.id))
             except ConfigError as error:
                 with self._changed:
@@ -113,13 +104,26 @@ class MissionFollower:
                     self._changed.notify_all()
                 return
             except AeroDaaSError as error:
-                if self._closed.is_set():
-                    return
-                if not lost:
+                if self._changes > seen:
+                    waiting, lost = pauses(), False
+                if not lost and not self._closed.is_set():
                     self._say(f"the connection is lost, the mission goes on without it: {error}")
                 lost = True
             if not self._mission.phase.over:
                 self._closed.wait(next(waiting))
+
+    def _listen(self, *, lost: bool) -> None:
+        """Take what one connection brings."""
+        with self._client.live(self._mission.id, self._rate) as live:
+            self._connection = live
+            for message in live:
+                if self._closed.is_set():
+                    return
+                if isinstance(message, MissionOut):
+                    if lost:
+                        self._say("the connection to the provider is back")
+                        lost = False
+                    self._take(message)
 
     def _take(self, mission: MissionOut) -> None:
         with self._changed:

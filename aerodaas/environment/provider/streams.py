@@ -68,29 +68,32 @@ class WireReader:
         return self.next(timeout)
 
     def _read(self) -> None:
-        waiting, over_since = pauses(), 0.0
-        mission = self._follower.mission.id
+        waiting, until = pauses(), float("inf")
         try:
-            while not over_since or time.monotonic() - over_since < _LAST_SECONDS:
+            while time.monotonic() < until:
                 try:
-                    with self._client.live(mission, _RATE, self._stream) as live:
-                        for message in live:
-                            if isinstance(message, ReceivedItem):
-                                waiting = pauses()
-                                self._take(message)
-                    return
+                    self._listen()
                 except ConfigError as error:
                     self._failed = error
                     return
                 except AeroDaaSError:
                     # The follower meets and tells the same.
                     time.sleep(next(waiting))
-                if self._follower.mission.phase.over and not over_since:
-                    over_since = time.monotonic()
+                else:
+                    return
+                if self._follower.mission.phase.over:
+                    until = min(until, time.monotonic() + _LAST_SECONDS)
         finally:
             with self._arrived:
                 self._ended = True
                 self._arrived.notify_all()
+
+    def _listen(self) -> None:
+        """Take what one connection brings until the mission is over."""
+        with self._client.live(self._follower.mission.id, _RATE, self._stream) as live:
+            for message in live:
+                if isinstance(message, ReceivedItem):
+                    self._take(message)
 
     def _take(self, message: ReceivedItem) -> None:
         try:
