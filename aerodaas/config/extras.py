@@ -19,7 +19,7 @@ _PACKAGES = {
 
 
 def has_extra(extra: str) -> bool:
-    """Whether the packages of `extra` (`plots`, `remote`, `ros`, `routing`, `service`) are installed."""
+    """Whether the packages of an extra, such as `plots` or `service`, are installed."""
     return all(importlib.util.find_spec(package) is not None for package in _PACKAGES[extra])
 
 

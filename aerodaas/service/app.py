@@ -9,6 +9,7 @@ from typing import Any
 from fastapi import FastAPI, Security
 from fastapi.security import HTTPBearer
 
+from aerodaas.config.redaction import catalogue
 from aerodaas.service.access import Access, Accounts, Audit, Quotas, RateLimiter
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
@@ -16,11 +17,11 @@ from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
 from aerodaas.service.gate import Gate
 from aerodaas.service.hub import StreamHub
-from aerodaas.service.limits import catalogue
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.routes.accounts import AccountRoutes
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.fleet import FleetRoutes
+from aerodaas.service.routes.here import HereRoutes
 from aerodaas.service.routes.leases import LeaseRoutes
 from aerodaas.service.routes.live import LiveRoutes
 from aerodaas.service.routes.missions import MissionRoutes
@@ -83,5 +84,6 @@ def build_service(
     ):
         app.include_router(routes.router(), dependencies=secured)
     app.include_router(LiveRoutes(desk, hub, admission).router())
+    app.include_router(HereRoutes(desk, admission).router())
     app.add_middleware(Gate, admission=admission)
     return app

@@ -44,7 +44,8 @@ class Briefing:
             wanted = [one.compute for one in document.analyses if one.compute is not None]
             _require_known("compute resource", wanted, {one.id for one in config.compute})
         for one in document.analyses:
-            require_plugin("analytics", one.analysis)
+            if one.analysis is not None:
+                require_plugin("analytics", one.analysis)
         if cameras & set(document.sensors):
             require(principal, Role.PILOT, Scope.SENSE)
         if document.analyses:

@@ -26,6 +26,7 @@ from aerodaas.service.access.principal import reaches
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError
+from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.garage import Garage
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
 from aerodaas.service.models import ModelShelf
@@ -213,6 +214,11 @@ class MissionDesk:
                 raise MissionError(f"{mission} is not flying")
             link = one.follow()
         return link.items(stream)
+
+    def flight(self, mission: str) -> FlightFolder | None:
+        """The folder of a mission's flight; None unless it is flying."""
+        one = self._missions.get(mission)
+        return one.flight if one is not None and one.phase is MissionPhase.FLYING else None
 
     def file(self, principal: Principal, mission: str, name: str) -> Path:
         """The recording or the rehearsal's picture of a mission; raises RefusedError if none."""

@@ -1,12 +1,13 @@
 """Control socket of a flight: commands from the service, status and items to it.
 
-Each connection begins with what it is for: `command`, `follow` or `items`. Messages are JSON with
-one blob. The socket lies in the flight's folder, which is open to its user alone.
+Each connection begins with what it is for: `command`, `follow`, `items` or `here`. Messages are
+JSON with one blob. The socket lies in the flight's folder, which is open to its user alone.
 """
 
 from __future__ import annotations
 
 import contextlib
+import queue
 import socket
 import threading
 import time
@@ -16,6 +17,7 @@ from typing import Any, Protocol
 from pydantic import ValidationError
 
 from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut, WaypointsIn
 from aerodaas.mission.commands import Answer
 from aerodaas.service.flights.commands import COMMANDS
@@ -27,6 +29,8 @@ __all__ = ["ControlServer", "Flown", "Reader"]
 
 _MOST_CONNECTIONS = 64
 _SEND_SECONDS = 5.0
+_QUESTIONS = 64
+"""Questions to the user's side that wait to be sent; a fuller queue refuses them."""
 _RATE = 10.0
 """Status messages a second."""
 
@@ -67,10 +71,13 @@ class Flown(Protocol):
 class ControlServer:
     """Serves one flight until it is closed."""
 
-    def __init__(self, folder: FlightFolder, flown: Flown, lease: LeaseWatch) -> None:
+    def __init__(
+        self, folder: FlightFolder, flown: Flown, lease: LeaseWatch, relay: HereRelay
+    ) -> None:
         """Listen in the flight's folder."""
         self._flown = flown
         self._lease = lease
+        self._relay = relay
         self._places = threading.BoundedSemaphore(_MOST_CONNECTIONS)
         path = folder.socket
         path.unlink(missing_ok=True)
@@ -110,6 +117,7 @@ class ControlServer:
                 "command": self._commands,
                 "follow": self._follow,
                 "items": self._items,
+                "here": self._here,
             }
             purposes[first["for"]](channel, first)
         except (GuestError, KeyError, OSError):
@@ -176,3 +184,26 @@ class ControlServer:
             message, blob = found if found is not None else ({}, b"")
             # An empty message tells whether the other side is still there.
             channel.send(message, blob, timeout=_SEND_SECONDS)
+
+    def _here(self, channel: Channel, _: dict[str, Any]) -> None:
+        """Connect the user's side: questions go out by a bounded queue, answers come in."""
+        questions: queue.Queue[tuple[dict[str, Any], bytes]] = queue.Queue(_QUESTIONS)
+        user = self._relay.attach(lambda question, blob: questions.put_nowait((question, blob)))
+        gone = threading.Event()
+
+        def ask() -> None:
+            with contextlib.suppress(GuestError):
+                while not gone.is_set():
+                    with contextlib.suppress(queue.Empty):
+                        question, blob = questions.get(timeout=0.5)
+                        channel.send(question, blob, timeout=_SEND_SECONDS)
+
+        sender = threading.Thread(target=ask, name="questions", daemon=True)
+        sender.start()
+        try:
+            while not self._closed.is_set():
+                message, blob = channel.receive()
+                user.answered(message, blob)
+        finally:
+            gone.set()
+            user.detach()

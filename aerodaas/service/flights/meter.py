@@ -32,6 +32,11 @@ class FlightMeter:
         self._charges: dict[str, tuple[float, float]] = {}
         """First and newest known charge by robot."""
 
+    @property
+    def time(self) -> float:
+        """Mission seconds of the newest status."""
+        return max((one.time for one in self.status.values()), default=0.0)
+
     def note(self, state: FlightState) -> None:
         """Take over a state of the run."""
         for name, report in state.robots.items():

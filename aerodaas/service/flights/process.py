@@ -13,10 +13,13 @@ import time
 from pathlib import Path
 from typing import Any
 
+from aerodaas.analytics.here.analysis import HereSite
+from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import StatusOut, WaypointsIn
 from aerodaas.analytics.wire_items import pack
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions, current_options
+from aerodaas.config.overrides import located
 from aerodaas.dataflow.mission_document import read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
@@ -29,10 +32,11 @@ from aerodaas.service.flights.meter import FlightMeter
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.service.limits import TenantLimits, limited
+from aerodaas.service.rehearsal import rehearsal_config
 from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError
 from aerodaas.types.status import Message
 
-__all__ = ["fly"]
+__all__ = ["Flying", "environment_of", "fly"]
 
 _LOOK_SECONDS = 0.1
 """Wall seconds between two looks at the drones."""
@@ -47,10 +51,21 @@ def fly(path: Path) -> None:
     order = FlightOrder.read(folder.order)
     os.chdir(folder.path)
     with folder.claim():
-        folder.end(_Flight(folder, order).outcome())
+        folder.end(Flying(folder, order).outcome())
 
 
-class _Flight:
+def environment_of(order: FlightOrder) -> EnvironmentConfig:
+    """The environment of a flight; raises ConfigError where the limits leave no room for it."""
+    config = limited(
+        located(EnvironmentConfig.load(order.fleet), order.fleet.parent),
+        order.robots,
+        tenant=TenantLimits(order.limits.max_height, order.limits.max_speed),
+        area=order.area,
+    )
+    return rehearsal_config(config, order.battery, order.seed) if order.rehearsal else config
+
+
+class Flying:
     """One flight from its order to its outcome."""
 
     def __init__(self, folder: FlightFolder, order: FlightOrder) -> None:
@@ -58,6 +73,7 @@ class _Flight:
         self._order = order
         self._began = time.time()
         self._lease = LeaseWatch(order, self._come_home)
+        self._relay = HereRelay(folder.path / "here")
         self._run: Run | None = None
         self._environment: Environment | None = None
         self._meter = FlightMeter()
@@ -86,16 +102,10 @@ class _Flight:
 
     def _fly(self) -> None:
         order, document = self._order, read_mission(self._folder.document)
-        config = limited(
-            EnvironmentConfig.load(order.fleet),
-            order.robots,
-            tenant=TenantLimits(order.limits.max_height, order.limits.max_speed),
-            area=order.area,
-        )
         current_options.set(
             RunOptions(
                 environment=order.fleet,
-                config=config,
+                config=environment_of(order),
                 speed=None if order.speed == "max" else order.speed,
                 lockstep=order.speed == "max",
                 seed=order.seed,
@@ -105,18 +115,22 @@ class _Flight:
             )
         )
         environment = self._environment = Environment(order.fleet)
-        build_mission(document, environment, self._folder.models)
-        server = ControlServer(self._folder, self, self._lease)
+        here = HereSite(self._relay.path, lossless=order.speed == "max")
+        build_mission(document, environment, self._folder.models, here)
+        server = ControlServer(self._folder, self, self._lease, self._relay)
         try:
-            # The socket answers from the first moment on: a launch takes seconds.
+            # The sockets answer from the first moment on: a launch takes seconds.
+            self._relay.start()
             server.start()
             self._run = environment.launch()
-            self._lease.start()
+            if not order.rehearsal:
+                self._lease.start()
             threading.Thread(target=self._look, args=(self._run,), daemon=True).start()
             self._run.wait()
         finally:
             self._lease.stop()
             server.close()
+            self._relay.close()
 
     def _look(self, run: Run) -> None:
         """Keep the status up to date while the run goes on."""
@@ -125,6 +139,8 @@ class _Flight:
             # The thread that waits for the run meets the same error and handles it.
             with contextlib.suppress(AeroDaaSError):
                 self._meter.note(run.look(0))
+                if self._order.rehearsal and self._meter.time > 60.0 * self._order.minutes:
+                    self._lease.end("the lease has ended")
             time.sleep(max(0.0, began + _LOOK_SECONDS - time.monotonic()))
 
     def _come_home(self, reason: str) -> None:

@@ -32,7 +32,7 @@ def rehearsal_config(
         seed: Of wind and noise; None for the environment's own.
 
     Raises:
-        ConfigError: If a charge is not between 0 and 1.
+        ConfigError: If a charge or the seed is out of range.
     """
     content = config.model_dump(by_alias=True)
     for entry, robot in zip(content["robots"], config.robots, strict=True):
@@ -43,8 +43,7 @@ def rehearsal_config(
     content["sensors"] = [_sensor(sensor) for sensor in config.sensors]
     if seed is not None:
         content["simulation"]["seed"] = seed
-    rehearsed = validated(content, "the rehearsal's environment")
-    return rehearsed
+    return validated(content, "the rehearsal's environment")
 
 
 def _airframe(robot: RobotConfig) -> dict[str, Any]:
