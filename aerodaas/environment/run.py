@@ -7,14 +7,13 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerodaas.actors.run.checks import check_served
 from aerodaas.actors.stream_names import is_guest_actor
 from aerodaas.config.extras import require_extra
-from aerodaas.config.model import EnvironmentConfig, TaskConfig
-from aerodaas.config.options import RunOptions, current_options
+from aerodaas.config.model import TaskConfig
+from aerodaas.config.options import current_options
 from aerodaas.environment.mission_run import recording_path
 from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_termination
 from aerodaas.mission.commands import Answer, Command, End

@@ -8,7 +8,6 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 
 import numpy as np
 from rich.console import Console
@@ -25,7 +24,7 @@ from aerodaas.types.status import MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 from aerodaas.types.waypoints import Waypoint
 
-__all__ = ["ProvidedView", "download_view", "phase_text", "show_download_failed"]
+__all__ = ["ProvidedView", "download_view", "phase_text"]
 
 _WORDS = {
     MissionPhase.SUBMITTED: "submitted",
@@ -135,13 +134,12 @@ def _vector(axes: list[float | None] | None) -> np.ndarray[tuple[int], np.dtype[
 def download_view(*, shown: bool, what: str) -> Iterator[Callable[[int, int | None], None]]:
     """Show the progress of a download on a terminal; yields what is told of it."""
     console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), DownloadColumn(), TransferSpeedColumn())
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        DownloadColumn(),
+        TransferSpeedColumn(),
+    )
     with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
         task = progress.add_task(what, total=None)
         yield lambda done, size: progress.update(task, completed=done, total=size)
-
-
-def show_download_failed(mission: str, path: Path, why: str) -> None:
-    """Print why a recording is not here, and how it can be had."""
-    line = f"the recording could not be fetched: {why}; aerodaas fetch {mission} -o {path}"
-    Console(stderr=True, highlight=False, soft_wrap=True).print(line, markup=False)

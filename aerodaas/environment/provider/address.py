@@ -45,9 +45,7 @@ class ServiceAddress:
             raise ConfigError(f"a provider's address cannot be read: {error}") from None
         host = parts.hostname
         if parts.scheme not in _PORTS or not host:
-            raise ConfigError(
-                f"a provider's address is https://host, not {shown_text(url)!r}"
-            )
+            raise ConfigError(f"a provider's address is https://host, not {shown_text(url)!r}")
         if parts.username is not None or parts.query or parts.fragment:
             raise ConfigError(
                 "a provider's address has no user, password or parameters: give the token by "

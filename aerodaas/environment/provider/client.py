@@ -14,6 +14,7 @@ from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
 from aerodaas.environment.provider.address import ServiceAddress
 from aerodaas.environment.provider.exchange import Exchange, Method
 from aerodaas.environment.provider.live import LiveConnection
+from aerodaas.environment.provider.wire import WireConnection
 from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
@@ -186,6 +187,14 @@ class ProviderClient:
         path = f"/v1/missions/{_part(mission)}/live?{query}"
         # The handshake's refusal has no text; that of the same mission by HTTP has.
         return LiveConnection.open(self._exchange, path, lambda: self.mission(mission))
+
+    def here(self, mission: str) -> WireConnection:
+        """Connect as the user's side of a mission, which is asked by its own analyses.
+
+        Raises as `live`.
+        """
+        path = f"/v1/missions/{_part(mission)}/here"
+        return WireConnection.open(self._exchange, path, lambda: self.mission(mission))
 
     def accounts(self) -> list[AccountOut]:
         """All accounts, as an administrator."""

@@ -10,7 +10,7 @@ from typing import Any
 from aerodaas.environment.here_server import HereServer
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower, pauses
-from aerodaas.environment.provider.questions import QuestionConnection
+from aerodaas.environment.provider.wire import WireConnection
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["HereLink"]
@@ -30,7 +30,7 @@ class HereLink:
         self._follower = follower
         self._server = server
         self._closed = threading.Event()
-        self._connection: QuestionConnection | None = None
+        self._connection: WireConnection | None = None
         self._workers = ThreadPoolExecutor(_WORKERS, "here")
         threading.Thread(target=self._run, name="here", daemon=True).start()
 
@@ -48,16 +48,18 @@ class HereLink:
         while not self._closed.is_set() and not self._follower.mission.phase.over:
             # The follower meets and tells the same; the flight tells that it has no answers.
             with contextlib.suppress(AeroDaaSError, RuntimeError):
-                with self._client.questions(self._follower.mission.id) as connection:
-                    self._connection = connection
-                    for question, blob in connection:
-                        waiting = pauses()
-                        self._workers.submit(self._answer, connection, question, blob)
+                self._connect()
             self._closed.wait(next(waiting))
 
-    def _answer(
-        self, connection: QuestionConnection, question: dict[str, Any], blob: bytes
-    ) -> None:
+    def _connect(self) -> None:
+        """Answer by one connection."""
+        with self._client.here(self._follower.mission.id) as connection:
+            self._connection = connection
+            while not self._closed.is_set():
+                question, blob = connection.receive(None)
+                self._workers.submit(self._answer, connection, question, blob)
+
+    def _answer(self, connection: WireConnection, question: dict[str, Any], blob: bytes) -> None:
         answer, data = self._server.answer(question, blob)
         with contextlib.suppress(AeroDaaSError):
             connection.send(answer, data)
