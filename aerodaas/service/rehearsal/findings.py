@@ -128,15 +128,15 @@ class _RobotFindings:
             yield Finding(f"{self._id} did not land as planned: {flight.outcome}", self._last())
         elif end is None:
             yield Finding(
-                f"{self._id} had not landed after {flight.bands[-1].end / 60:.1f} min "
-                f"({flight.outcome}), and the lease is for {self._minutes:g} min: have the mission "
-                "end by itself, or ask for a longer lease",
+                f"{self._id} had not landed after {flight.bands[-1].end:.0f} s "
+                f"({flight.outcome}), and the lease is for {60 * self._minutes:.0f} s: have the "
+                "mission end by itself, or ask for a longer lease",
                 self._last(),
             )
         elif end > 60.0 * self._minutes:
             yield Finding(
-                f"{self._id} landed after {end / 60:.1f} min, and the lease is for "
-                f"{self._minutes:g} min: ask for a longer one, or fly a shorter way",
+                f"{self._id} landed after {end:.0f} s, and the lease is for "
+                f"{60 * self._minutes:.0f} s: ask for a longer one, or fly a shorter way",
                 self._at(60.0 * self._minutes),
             )
 
@@ -191,7 +191,7 @@ class _RobotFindings:
         away = shapely.distance(shapely.Polygon(other.area), shapely.points(self._path))
         nearest, wanted = int(np.argmin(away)), self._limits.separation
         if away[nearest] < wanted or away[nearest] <= 0.0:
-            near = "into" if away[nearest] <= 0.0 else f"to {away[nearest]:.1f} m from"
+            near = "into" if away[nearest] <= 0.0 else f"to {away[nearest]:.2f} m from"
             yield Finding(
                 f"{self._id} flew {near} the area of lease {other.id} at "
                 f"{_place(self._path[nearest])}, and {wanted:g} m are to be kept: stay away from "
