@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -29,6 +30,8 @@ class ProviderOptions:
     silence_seconds: float | None = None
     share: tuple[str, ...] = ()
     """Tenants that may watch."""
+    report: Callable[[Any], None] | None = None
+    """Told of each mission that has ended, a `MissionOut`."""
 
 
 @dataclass(frozen=True)

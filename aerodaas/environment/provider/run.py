@@ -299,6 +299,12 @@ class ProvidedRun:
                 self._client.cancel(self._id)
         self._close()
         self._finished.set()
+        self._report()
+
+    def _report(self) -> None:
+        report = self.options.provider.report
+        if report is not None:
+            report(self._following.mission)
 
     def _close(self) -> None:
         self._following.close()
@@ -324,6 +330,7 @@ class ProvidedRun:
         show_speed(self.options, max(times, default=0.0), flown, self._flying_since - self._began)
         if here:
             show_results(self.options, self.recording)
+        self._report()
 
     def _fetch(self, mission: MissionOut) -> bool:
         """Fetch the recording; returns whether it is here."""
