@@ -102,6 +102,11 @@ class MissionPhase(str, enum.Enum):
     CANCELLED = "cancelled"
     FAILED = "failed"
 
+    @property
+    def over(self) -> bool:
+        """Whether nothing follows this phase."""
+        return self in {self.LANDED, self.REFUSED, self.CANCELLED, self.FAILED}
+
 
 class _In(BaseModel):
     """Base of requests: unknown keys are errors."""

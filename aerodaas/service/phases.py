@@ -7,7 +7,7 @@ from aerodaas.protocol.schemas import MissionPhase
 __all__ = ["FOLLOWING", "OVER"]
 
 _P = MissionPhase
-OVER = frozenset({_P.LANDED, _P.REFUSED, _P.CANCELLED, _P.FAILED})
+OVER = frozenset(one for one in MissionPhase if one.over)
 """Phases that nothing follows."""
 FOLLOWING = {
     _P.SUBMITTED: {_P.REHEARSING, _P.AWAITING_APPROVAL, _P.QUEUED, _P.REFUSED, _P.CANCELLED},

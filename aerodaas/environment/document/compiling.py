@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
@@ -27,7 +29,16 @@ from aerodaas.types.data import Frame
 from aerodaas.types.errors import GraphError
 from aerodaas.types.waypoints import SchedulingType
 
-__all__ = ["write_mission"]
+__all__ = ["WrittenMission", "compile_mission", "write_mission"]
+
+
+@dataclass(frozen=True)
+class WrittenMission:
+    """A document and the files that it names."""
+
+    document: MissionDocument
+    models: Mapping[str, Path]
+    """Files of models by SHA-256."""
 
 
 def write_mission(environment: Environment, name: str, *, here: bool = False) -> MissionDocument:
@@ -37,13 +48,22 @@ def write_mission(environment: Environment, name: str, *, here: bool = False) ->
         environment: The application's, ready to start.
         name: Name of the application.
         here: Whether the user's side is there in flight: then analyses that are not registered
-            and not deployed elsewhere, and conditions that are code, stay there. Without it, those
-            that are deployed on `env.here` do.
+            and not deployed elsewhere, and conditions that are code, stay there, as do hooks and
+            callbacks. Without it, analyses that are deployed on `env.here` do.
 
     Raises:
         GraphError: For what no document can hold, by name and with the remedy.
     """
-    return _Compiler(environment, here=here).document(name)
+    return compile_mission(environment, name, here=here).document
+
+
+def compile_mission(environment: Environment, name: str, *, here: bool = False) -> WrittenMission:
+    """The graph of an application as a document, with the models that it names.
+
+    It takes the arguments of `write_mission`, and raises what that raises.
+    """
+    compiler = _Compiler(environment, here=here)
+    return WrittenMission(compiler.document(name), compiler.models)
 
 
 class _Compiler:
@@ -55,6 +75,10 @@ class _Compiler:
         self._graph = environment.graph
         self._values = ValueWriter(environment)
         self._works = list(dict.fromkeys(call.work for call in self._graph.calls))
+
+    @property
+    def models(self) -> Mapping[str, Path]:
+        return self._values.models
 
     def document(self, name: str) -> MissionDocument:
         self._require_data()
@@ -78,7 +102,8 @@ class _Compiler:
     def _require_data(self) -> None:
         """Raise GraphError for functions of the application that would run in its process."""
         hooks = [robot for robot in self._environment.get_env_robots() if _has_hooks(robot)]
-        if hooks or self._graph.on_launch:
+        # Where the user's side is there, the application runs its own functions.
+        if not self._here and (hooks or self._graph.on_launch):
             what = "hooks of on_start or on_end" if hooks else "callbacks of subscribe()"
             raise GraphError(f"a document has no {what}, which are the application's own code")
         edges = self._graph.navigation

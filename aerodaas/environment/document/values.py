@@ -58,6 +58,8 @@ class ValueWriter:
     def __init__(self, environment: Environment) -> None:
         """Know the `environment`, to which values may refer."""
         self._environment = environment
+        self.models: dict[str, Path] = {}
+        """Files of the models that were written, by SHA-256."""
 
     def analysis(self, work: Analytics[Any]) -> tuple[str, dict[str, Any]]:
         """Registered name and settings of an analysis; raises GraphError if it has none."""
@@ -128,7 +130,9 @@ class ValueWriter:
             raise GraphError(f"{place} comes from the environment file alone: leave it out")
         path = Path(str(value))
         if use == "model":
-            return {"$model": path.name, "sha256": _hash_of(path)}
+            sha256 = _hash_of(path)
+            self.models[sha256] = path
+            return {"$model": path.name, "sha256": sha256}
         if use == "output":
             return {"$output": path.name}
         for sensor in self._environment.config.all_sensors():
