@@ -9,7 +9,7 @@ import pytest
 from required import needs_peer, peer
 from sqlalchemy import create_engine
 
-from aerodaas.service.schemas import Role, Scope
+from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.store import Account, Store, Tenant
 from aerodaas.service.store.tables import METADATA
 

@@ -11,7 +11,8 @@ from typing import Any
 
 import psutil
 import pytest
-from served import Served, document, fleet, robot
+
+from service.served import Served, document, fleet, robot
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
@@ -26,7 +27,7 @@ def provider() -> Iterator[Served]:
         yield served
 
 
-def submitted(provider: Served, name: str, *places: tuple[float, float], **more: Any) -> str:
+def submitted(provider: Served, name: str, *places: tuple[float, float], **more: object) -> str:
     """Submit a mission; returns its id."""
     body = {"document": document(name, *places), **more}
     answer = provider.ask("POST", "/v1/missions", body)
