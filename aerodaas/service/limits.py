@@ -69,9 +69,7 @@ def limited(
     return validated(content, "the limits of this flight")
 
 
-def _limited(
-    robot: RobotConfig, tenant: TenantLimits, area: shapely.Polygon | None
-) -> RobotConfig:
+def _limited(robot: RobotConfig, tenant: TenantLimits, area: shapely.Polygon | None) -> RobotConfig:
     limits, fence = robot.limits, robot.limits.geofence
     ceiling = _least(fence.ceiling, tenant.max_height)
     if limits.takeoff_height > ceiling:

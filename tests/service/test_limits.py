@@ -72,7 +72,10 @@ cases = {
     "area": st.one_of(st.none(), stars(10, 60)),
     "tenant": st.builds(
         TenantLimits,
-        *[st.one_of(st.none(), st.floats(low, high)) for low, high in ((2, 60), (0.2, 12), (5, 90))],
+        *[
+            st.one_of(st.none(), st.floats(low, high))
+            for low, high in ((2, 60), (0.2, 12), (5, 90))
+        ],
     ),
 }
 
@@ -92,7 +95,9 @@ def narrowed(
 
 
 @settings(max_examples=100, deadline=None)
-@given(places=st.lists(st.tuples(*[st.floats(-70, 70)] * 2, st.floats(0, 70)), min_size=30), **cases)
+@given(
+    places=st.lists(st.tuples(*[st.floats(-70, 70)] * 2, st.floats(0, 70)), min_size=30), **cases
+)
 def test_a_place_that_is_allowed_is_allowed_by_each(
     places: list[tuple[float, float, float]], **case: Any
 ) -> None:
@@ -214,7 +219,11 @@ COMB = [(0, 0), (60, 0), (60, 40), (40, 40), (40, 10), (20, 10), (20, 40), (0, 4
 @pytest.mark.parametrize(
     ("area", "fence", "text"),
     [
-        ([(70, 0), (90, 0), (90, 20)], SQUARE, "the lease's area lies outside it, the fence of -50"),
+        (
+            [(70, 0), (90, 0), (90, 20)],
+            SQUARE,
+            "the lease's area lies outside it, the fence of -50",
+        ),
         ([(10, -9), (40, -9), (40, 9), (10, 9)], SQUARE, r"one stands at \(0, 0\), outside"),
         ([(-1, 20), (70, 20), (70, 30), (-1, 30)], COMB, "lies in 2 parts within it"),
         ([(-5, -5), (5, 5), (5, -5), (-5, 5)], SQUARE, "encloses nothing or crosses itself"),
