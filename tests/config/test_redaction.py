@@ -97,6 +97,7 @@ def test_it_has_what_an_application_asks_for() -> None:
     assert set(sensors) == {"px4/front", "px4/odom", "tello/phone"}
     assert sensors["px4/front"].settings == {"pitch": 20, "horizontal_fov": 90}
     assert sensors["tello/phone"].settings == {"path": "http://tello-phone.path.invalid"}
+    assert shown.compute != "auto"
     assert [(one.id, one.kind) for one in shown.compute] == [("edge", "edge"), ("lambda", "http")]
     endpoint = shown.compute[1].endpoint
     assert endpoint is not None

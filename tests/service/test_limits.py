@@ -27,7 +27,13 @@ Corners = Sequence[tuple[float, float]]
 
 def fleet(*, fence: dict[str, Any] | None = None, **limits: Any) -> EnvironmentConfig:  # noqa: ANN401
     """Two drones within a square of 100 m, three metres apart."""
-    whole = {"polygon": SQUARE, "floor": 0.3, "ceiling": 30, "margin": 2, **(fence or {})}
+    whole: dict[str, Any] = {
+        "polygon": SQUARE,
+        "floor": 0.3,
+        "ceiling": 30,
+        "margin": 2,
+        **(fence or {}),
+    }
     robots = [
         {"id": name, "start": [east, 0, 0], "limits": {**limits, "geofence": whole}}
         for name, east in (("one", 0), ("two", 3))
@@ -99,7 +105,8 @@ def narrowed(
     places=st.lists(st.tuples(*[st.floats(-70, 70)] * 2, st.floats(0, 70)), min_size=30), **cases
 )
 def test_a_place_that_is_allowed_is_allowed_by_each(
-    places: list[tuple[float, float, float]], **case: Any
+    places: list[tuple[float, float, float]],
+    **case: Any,  # noqa: ANN401
 ) -> None:
     """By the provider's fence, the tenant's height and range, and the lease's area."""
     provider, flight = narrowed(**case)
@@ -122,7 +129,9 @@ def test_a_place_that_is_allowed_is_allowed_by_each(
     **cases,
 )
 def test_a_setpoint_sent_is_within_each(
-    target: tuple[float, float, float], speed: float, **case: Any
+    target: tuple[float, float, float],
+    speed: float,
+    **case: Any,  # noqa: ANN401
 ) -> None:
     """Whatever is asked, what is sent keeps the least speed, height and range, and the fences."""
     provider, flight = narrowed(**case)
@@ -153,7 +162,8 @@ def test_a_setpoint_sent_is_within_each(
     **cases,
 )
 def test_a_drone_never_leaves_any_of_them(
-    wishes: list[tuple[float, float, float]], **case: Any
+    wishes: list[tuple[float, float, float]],
+    **case: Any,  # noqa: ANN401
 ) -> None:
     """Flown by whatever velocities for seconds each, the drone stays inside all three."""
     provider, flight = narrowed(**case)

@@ -65,10 +65,9 @@ def test_the_fleet_becomes_a_simulated_one() -> None:
 
 
 def test_a_charge_beyond_full_is_refused() -> None:
-    """By the simulated drone's own settings, when it is made."""
-    config = rehearsal_config(validated(FLEET, "fleet"), {"px4": 1.5})
-    with pytest.raises(ConfigError, match="battery"):
-        SimulatedVehicle(config.robots[0], config)
+    """With the drone's name."""
+    with pytest.raises(ConfigError, match=r"the rehearsal of px4: .*battery"):
+        rehearsal_config(validated(FLEET, "fleet"), {"px4": 1.5})
 
 
 def test_a_rehearsed_battery_hovers_for_the_real_ones_endurance() -> None:
