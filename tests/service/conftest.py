@@ -21,7 +21,7 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> str | Path:
     """Where an empty database is."""
     if request.param == "sqlite":
         return tmp_path / "service.db"
-    url = peer("AERODAAS_TEST_DATABASE")
+    url: str = peer("AERODAAS_TEST_DATABASE")
     engine = create_engine(url.replace("postgresql://", "postgresql+psycopg://"))
     METADATA.drop_all(engine)
     engine.dispose()
