@@ -12,7 +12,7 @@ from typing import Any
 import psutil
 import pytest
 
-from service.served import Served, document, fleet, robot
+from served import Served, document, fleet, robot
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
