@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
+import pytest
 from flying import FLAT, Flyer, recorded
 
 from aerodaas import Environment
@@ -74,7 +75,7 @@ odometry = drone.get_sensor_by_id("odom_drone").get_data_stream()
 circle = Circle()
 drone.navigate(circle.generate_navigation(Legs().analyse(odometry)))
 watch = MonitoringAnalytics(["height"]).deploy(env.get_compute_resource_by_id("edge"))
-watch.trigger(drone.end_mission, when=lambda seen: seen.values["height"] > 1.9)
+watch.trigger(drone.end_mission, when=lambda seen: seen.values["height"] > 1.75)
 watch.analyse(odometry)
 drone.start_mission()
 '''
@@ -147,9 +148,27 @@ def test_it_flies_as_the_application_does(flyer: Flyer) -> None:
         own = RecordedFlight.read(recording)
     (here,), (there,) = own.robots.values(), theirs.robots.values()
     assert here.outcome == there.outcome
+    assert "landed" in here.outcome
+    assert here.time[-1] < 30, "ended by the user's condition, not by an empty battery"
     assert len(here.position) > 100
     np.testing.assert_array_equal(here.position, there.position)
     times = relay.times()
     assert set(times) == {"drone/legs", "drone/circle", "drone/monitoring"}
     assert all(one.answers > 30 and not one.missed for one in times.values())
     assert all(0 < one.at_work < one.total for one in times.values())
+
+
+@pytest.mark.parametrize("how", ["killed", pytest.param("hung", marks=pytest.mark.slow)])
+def test_the_drone_comes_home_without_its_user(flyer: Flyer, how: str) -> None:
+    """By the rule of silent navigation; each analysis tells it once."""
+    flight, relay = fly(flyer, how)
+    (drone,) = flight.robots.values()
+    assert "landed" in drone.outcome
+    reasons = [band.reason for band in drone.bands]
+    assert any("navigation has been silent" in one for one in reasons)
+    assert np.linalg.norm(drone.position[-1][:2]) < 1.0
+    told = [text for _, kind, text in flight.alerts if kind == "analysis_failed"]
+    for name in ("drone/legs", "drone/circle", "drone/monitoring"):
+        assert sum(f"{name} has no results" in text for text in told) <= 1
+    assert any("user's side" in text for text in told)
+    assert relay.times()["drone/legs"].missed > 10
