@@ -231,7 +231,8 @@ def wide(content: dict[str, Any], blob: bytes) -> bytes:
     """A picture that claims to be huge, and whose size is told as it claims."""
     side = 1 << 13
     content["size"] = [side, MAX_PIXELS // side + 1]
-    return blob[:16] + side.to_bytes(4, "big") + content["size"][1].to_bytes(4, "big") + blob[24:]
+    sides = b"".join(int(one).to_bytes(4, "big") for one in content["size"])
+    return blob[:16] + sides + blob[24:]
 
 
 def bmp(content: dict[str, Any], blob: bytes) -> bytes:

@@ -65,7 +65,7 @@ class Circle(NavigableAnalytics):
     def process(self, item, context):
         battery = context.vehicle().battery.fraction
         forward = 1.0 + 0.01 * item.number + 0.1 * battery
-        command = VelocityCommand(forward, 0.0, 0.2 * math.sin(item.number / 10), 0.4)
+        command = VelocityCommand(forward, 0.0, 0.2 + 0.1 * math.sin(item.number / 10), 0.4)
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
 
 
@@ -75,7 +75,7 @@ odometry = drone.get_sensor_by_id("odom_drone").get_data_stream()
 circle = Circle()
 drone.navigate(circle.generate_navigation(Legs().analyse(odometry)))
 watch = MonitoringAnalytics(["height"]).deploy(env.get_compute_resource_by_id("edge"))
-watch.trigger(drone.end_mission, when=lambda seen: seen.values["height"] > 1.75)
+watch.trigger(drone.end_mission, when=lambda seen: seen.values["height"] > 2.5)
 watch.analyse(odometry)
 drone.start_mission()
 '''
@@ -156,6 +156,9 @@ def test_it_flies_as_the_application_does(flyer: Flyer) -> None:
     assert set(times) == {"drone/legs", "drone/circle", "drone/monitoring"}
     assert all(one.answers > 30 and not one.missed for one in times.values())
     assert all(0 < one.at_work < one.total for one in times.values())
+    # The way to the user and back is in the latency that is recorded for every analysis.
+    at_work = theirs.latencies["drone/circle"].work["drone/circle"]
+    assert sum(at_work) >= 1000 * 0.5 * times["drone/circle"].total
 
 
 @pytest.mark.parametrize("how", ["killed", pytest.param("hung", marks=pytest.mark.slow)])
