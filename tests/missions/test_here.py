@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import runpy
 import socket
 import subprocess
@@ -9,10 +10,11 @@ import sys
 import textwrap
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 import numpy as np
+import pytest
 from flying import FLAT, Flyer, recorded
 
 from aerodaas import Environment
@@ -23,6 +25,7 @@ from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.environment.document.building import build_mission
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.types.errors import MissionError
 
 USER = Path(__file__).with_name("here_user.py")
 APPLICATION = '''
@@ -64,7 +67,7 @@ class Circle(NavigableAnalytics):
     def process(self, item, context):
         battery = context.vehicle().battery.fraction
         forward = 1.0 + 0.01 * item.number + 0.1 * battery
-        command = VelocityCommand(forward, 0.0, 0.2 * math.sin(item.number / 10), 0.4)
+        command = VelocityCommand(forward, 0.0, 0.2 + 0.1 * math.sin(item.number / 10), 0.4)
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
 
 
@@ -74,7 +77,7 @@ odometry = drone.get_sensor_by_id("odom_drone").get_data_stream()
 circle = Circle()
 drone.navigate(circle.generate_navigation(Legs().analyse(odometry)))
 watch = MonitoringAnalytics(["height"]).deploy(env.get_compute_resource_by_id("edge"))
-watch.trigger(drone.end_mission, when=lambda seen: seen.values["height"] > 1.9)
+watch.trigger(drone.end_mission, when=lambda seen: seen.values["height"] > 2.5)
 watch.analyse(odometry)
 drone.start_mission()
 '''
@@ -120,8 +123,11 @@ class User:
             self.process.wait()
 
 
-def fly(flyer: Flyer, how: str = "") -> tuple[RecordedFlight, HereRelay]:
-    """Fly the application's document with its user in a process that misbehaves."""
+def fly(flyer: Flyer, how: str = "", said: str = "") -> tuple[RecordedFlight, HereRelay]:
+    """Fly the application's document with its user in a process that misbehaves.
+
+    `said` is told of the user's side then.
+    """
     application = flyer.folder / "application.py"
     flyer.write(FLAT)
     application.write_text(textwrap.dedent(APPLICATION))
@@ -133,7 +139,9 @@ def fly(flyer: Flyer, how: str = "") -> tuple[RecordedFlight, HereRelay]:
         environment = Environment(flyer.folder / "environment.json")
         build_mission(user.document, environment, flyer.folder, HereSite(relay.path))
         run = environment.launch()
-        run.wait()
+        # As in any flight, what an analysis raised is told at the end.
+        with pytest.raises(MissionError, match=said) if said else nullcontext():
+            run.wait()
     return recorded(run), relay
 
 
@@ -147,9 +155,36 @@ def test_it_flies_as_the_application_does(flyer: Flyer) -> None:
         own = RecordedFlight.read(recording)
     (here,), (there,) = own.robots.values(), theirs.robots.values()
     assert here.outcome == there.outcome
+    assert "landed" in here.outcome
+    assert here.time[-1] < 30, "ended by the user's condition, not by an empty battery"
     assert len(here.position) > 100
     np.testing.assert_array_equal(here.position, there.position)
     times = relay.times()
     assert set(times) == {"drone/legs", "drone/circle", "drone/monitoring"}
     assert all(one.answers > 30 and not one.missed for one in times.values())
     assert all(0 < one.at_work < one.total for one in times.values())
+    # The way to the user and back is in the latency that is recorded for every analysis.
+    at_work = theirs.latencies["drone/circle"].work["drone/circle"]
+    assert sum(at_work) >= 1000 * 0.5 * times["drone/circle"].total
+
+
+@pytest.mark.parametrize(
+    ("how", "said"),
+    [
+        ("killed", "user's side has left"),
+        pytest.param("hung", r"no answer in 1 s", marks=pytest.mark.slow),
+    ],
+)
+def test_the_drone_comes_home_without_its_user(flyer: Flyer, how: str, said: str) -> None:
+    """By the rule of silent navigation; each analysis tells it once."""
+    flight, relay = fly(flyer, how, said)
+    (drone,) = flight.robots.values()
+    assert "landed" in drone.outcome
+    reasons = [band.reason for band in drone.bands]
+    assert any("navigation has been silent" in one for one in reasons)
+    assert np.linalg.norm(drone.position[-1][:2]) < 1.0
+    told = [text for _, kind, text in flight.alerts if kind == "analysis_failed"]
+    for name in ("drone/legs", "drone/circle", "drone/monitoring"):
+        assert sum(f"{name} has no results" in text for text in told) <= 1
+    assert any(re.search(said, text) for text in told)
+    assert relay.times()["drone/legs"].missed > 10

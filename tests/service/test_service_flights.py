@@ -11,7 +11,6 @@ from typing import Any
 
 import psutil
 import pytest
-
 from served import Served, document, fleet, robot
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
