@@ -1,8 +1,9 @@
-"""A service for the client's own tests: it answers by the wire's models, and fails as it is told."""
+"""A service for the client's own tests: answers by the wire's models, and fails as it is told."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import socket
 import threading
 from collections.abc import Callable
@@ -116,84 +117,86 @@ class Stub:
 
     def sent(self, method: str, ending: str) -> list[Any]:
         """Contents of the requests of this kind."""
-        return [content for one, path, content in self.asked if (one, path[-len(ending) :]) == (method, ending)]
+        return [
+            content
+            for one, path, content in self.asked
+            if (one, path[-len(ending) :]) == (method, ending)
+        ]
 
     def _app(self) -> FastAPI:
         app = FastAPI()
-
-        @app.middleware("http")
-        async def refuse(request: Request, go_on: Any) -> Response:  # noqa: ANN401
-            path = request.url.path
-            body = await request.body()
-            self.asked.append((request.method, path, body))
-            if self.slow is not None:
-                await asyncio.to_thread(self.slow.wait, 20)
-            for start, (code, content) in self.refusals.items():
-                if path.startswith(start):
-                    if isinstance(content, bytes):
-                        return Response(content, code)
-                    return JSONResponse(content, code)
-            if request.headers.get("authorization") != f"Bearer {TOKEN}":
-                return JSONResponse({"text": "no valid token"}, 401)
-            answer: Response = await go_on(request)
-            return answer
-
-        @app.get("/v1/fleet")
-        def fleet() -> FleetOut:
-            robots = [RobotOut(id="drone", sensors=["drone/odom"], battery=0.75)]
-            return FleetOut(name="campus", robots=robots, environment=CATALOGUE)
-
-        @app.head("/v1/models/{sha256}")
-        def has(sha256: str) -> Response:
-            return Response(status_code=204 if sha256 in self.models else 404)
-
-        @app.put("/v1/models/{sha256}")
-        def put(sha256: str) -> Response:
-            self.models.add(sha256)
-            return Response(status_code=204)
-
-        @app.post("/v1/missions")
-        def submit(wanted: MissionIn) -> MissionOut:
-            assert wanted.document.navigation
-            return mission(MissionPhase.SUBMITTED)
-
-        @app.get("/v1/missions")
-        def missions() -> list[MissionOut]:
-            return [self.state]
-
-        @app.get("/v1/missions/{id_}")
-        def one(id_: str) -> MissionOut:  # noqa: ARG001
-            return self.state
-
-        @app.delete("/v1/missions/{id_}")
-        def cancel(id_: str) -> MissionOut:  # noqa: ARG001
-            self.on_cancel()
-            return self.state
-
-        @app.post("/v1/missions/{id_}/commands")
-        def command(id_: str, body: CommandIn) -> AnswerOut:  # noqa: ARG001
-            return self.answer
-
-        @app.post("/v1/missions/{id_}/navigation")
-        def navigation(id_: str, body: dict[str, Any]) -> AnswerOut:  # noqa: ARG001
-            return self.answer
-
-        @app.get("/v1/missions/{id_}/recording")
-        def recording(id_: str) -> Response:  # noqa: ARG001
-            return Response(self.recording)
-
-        @app.websocket("/v1/missions/{id_}/live")
-        async def live(socket: WebSocket, id_: str, streams: str = "") -> None:  # noqa: ARG001
-            if "/v1/missions" in self.refusals:
-                await socket.close(1008)
-                return
-            await socket.accept()
-            try:
-                await self._live(socket, streams)
-            except (WebSocketDisconnect, RuntimeError):
-                return
-
+        app.middleware("http")(self._admit)
+        for method, path, answer in (
+            ("GET", "/fleet", self._fleet),
+            ("HEAD", "/models/{sha256}", self._has_model),
+            ("PUT", "/models/{sha256}", self._put_model),
+            ("POST", "/missions", self._submit),
+            ("GET", "/missions", self._missions),
+            ("GET", "/missions/{mission}", self._mission),
+            ("DELETE", "/missions/{mission}", self._cancel),
+            ("POST", "/missions/{mission}/commands", self._command),
+            ("POST", "/missions/{mission}/navigation", self._navigation),
+            ("GET", "/missions/{mission}/recording", self._recording),
+        ):
+            app.add_api_route(f"/v1{path}", answer, methods=[method])
+        app.add_api_websocket_route("/v1/missions/{mission}/live", self._follow)
         return app
+
+    async def _admit(self, request: Request, go_on: Any) -> Response:  # noqa: ANN401
+        path = request.url.path
+        self.asked.append((request.method, path, await request.body()))
+        if self.slow is not None:
+            await asyncio.to_thread(self.slow.wait, 20)
+        for start, (code, content) in self.refusals.items():
+            if path.startswith(start):
+                raw = isinstance(content, bytes)
+                return Response(content, code) if raw else JSONResponse(content, code)
+        if request.headers.get("authorization") != f"Bearer {TOKEN}":
+            return JSONResponse({"text": "no valid token"}, 401)
+        answer: Response = await go_on(request)
+        return answer
+
+    def _fleet(self) -> FleetOut:
+        robots = [RobotOut(id="drone", sensors=["drone/odom"], battery=0.75)]
+        return FleetOut(name="campus", robots=robots, environment=CATALOGUE)
+
+    def _has_model(self, sha256: str) -> Response:
+        return Response(status_code=204 if sha256 in self.models else 404)
+
+    def _put_model(self, sha256: str) -> Response:
+        self.models.add(sha256)
+        return Response(status_code=204)
+
+    def _submit(self, wanted: MissionIn) -> MissionOut:
+        assert wanted.document.navigation
+        return mission(MissionPhase.SUBMITTED)
+
+    def _missions(self) -> list[MissionOut]:
+        return [self.state]
+
+    def _mission(self) -> MissionOut:
+        return self.state
+
+    def _cancel(self) -> MissionOut:
+        self.on_cancel()
+        return self.state
+
+    def _command(self, body: CommandIn) -> AnswerOut:  # noqa: ARG002 - checked by its model
+        return self.answer
+
+    def _navigation(self, body: dict[str, Any]) -> AnswerOut:  # noqa: ARG002 - as above
+        return self.answer
+
+    def _recording(self) -> Response:
+        return Response(self.recording)
+
+    async def _follow(self, socket: WebSocket, streams: str = "") -> None:
+        if "/v1/missions" in self.refusals:
+            await socket.close(1008)
+            return
+        await socket.accept()
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            await self._live(socket, streams)
 
     async def _live(self, socket: WebSocket, streams: str) -> None:
         for head, blob in self.items if streams else ():

@@ -81,7 +81,7 @@ def test_a_refusal_is_an_error_with_the_services_text(
 
 def test_a_wrong_token_is_told_with_the_remedy(stub: Stub) -> None:
     """`aerodaas login` is named."""
-    with pytest.raises(ConfigError, match="no valid token.*aerodaas login"):
+    with pytest.raises(ConfigError, match=r"no valid token.*aerodaas login"):
         ProviderClient(stub.url, "wrong").fleet()
 
 
@@ -96,7 +96,10 @@ def test_a_wrong_token_is_told_with_the_remedy(stub: Stub) -> None:
     ],
 )
 def test_an_answer_of_another_kind_is_told(
-    client: ProviderClient, stub: Stub, content: Any, said: str  # noqa: ANN401
+    client: ProviderClient,
+    stub: Stub,
+    content: Any,  # noqa: ANN401 - JSON
+    said: str,
 ) -> None:
     """Whatever stands there, it is one message that names the address."""
     stub.refusals["/v1/fleet"] = (200, content)
@@ -145,9 +148,11 @@ def test_a_redirection_is_not_followed() -> None:
     """The token goes to the address that was named, and to no other."""
     with answering(b"HTTP/1.1 200 OK\r\n\r\n{}") as (other, elsewhere):
         moved = f"HTTP/1.1 302 Found\r\nLocation: {other}/v1/fleet\r\nContent-Length: 0\r\n\r\n"
-        with answering(moved.encode()) as (url, _):
-            with pytest.raises(MissionError, match="status 302"):
-                ProviderClient(url, TOKEN).fleet()
+        with (
+            answering(moved.encode()) as (url, _),
+            pytest.raises(MissionError, match="status 302"),
+        ):
+            ProviderClient(url, TOKEN).fleet()
         assert elsewhere == []
 
 
@@ -161,9 +166,11 @@ def test_a_recording_arrives_whole_or_not_at_all(
     client.recording(MISSION, target, lambda *one: seen.append(one))
     assert target.read_bytes() == stub.recording
     assert seen[-1] == (1_000_000, 1_000_000)
-    with answering(b"HTTP/1.1 200 OK\r\nContent-Length: 100\r\n\r\nonly this") as (url, _):
-        with pytest.raises(SourceError, match="does not answer"):
-            ProviderClient(url, TOKEN).recording(MISSION, tmp_path / "cut" / "flight.mcap")
+    with (
+        answering(b"HTTP/1.1 200 OK\r\nContent-Length: 100\r\n\r\nonly this") as (url, _),
+        pytest.raises(SourceError, match="does not answer"),
+    ):
+        ProviderClient(url, TOKEN).recording(MISSION, tmp_path / "cut" / "flight.mcap")
     assert list((tmp_path / "cut").iterdir()) == []
     stub.refusals["/v1/missions"] = (404, {"text": "it has no recording yet"})
     with pytest.raises(ConfigError, match="no recording yet"):

@@ -33,9 +33,7 @@ def following(client: ProviderClient, said: list[str] | None = None) -> MissionF
     return follower
 
 
-def test_each_change_arrives_until_the_mission_is_over(
-    client: ProviderClient, stub: Stub
-) -> None:
+def test_each_change_arrives_until_the_mission_is_over(client: ProviderClient, stub: Stub) -> None:
     """The last state is the one that it ended in."""
     follower = following(client)
     stub.state = mission(MissionPhase.FLYING, reason="on its way")
@@ -48,9 +46,7 @@ def test_each_change_arrives_until_the_mission_is_over(
     assert follower.mission == stub.state
 
 
-def test_a_lost_connection_is_told_once_and_made_again(
-    client: ProviderClient, stub: Stub
-) -> None:
+def test_a_lost_connection_is_told_once_and_made_again(client: ProviderClient, stub: Stub) -> None:
     """The mission goes on meanwhile; its end is not missed."""
     said: list[str] = []
     stub.cuts = 3
@@ -139,9 +135,9 @@ def test_a_malformed_item_is_left_out(client: ProviderClient, stub: Stub) -> Non
         ({"seq": 1, "item": 5}, b"bytes beside a number"),
         *heads("well"),
     ]
+    follower = following(client)
     with pytest.warns(UserWarning, match="left out"):
-        reader = WireReader(client, following(client), "drone/odom")
-        assert reader.next(SECONDS) == "well"
+        assert WireReader(client, follower, "drone/odom").next(SECONDS) == "well"
 
 
 def test_a_stream_is_read_on_after_a_lost_connection(client: ProviderClient, stub: Stub) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import stat
 
 import pytest
@@ -20,7 +19,10 @@ PROVIDER = ServiceAddress.parse("https://provider.example")
 
 @given(_HOST, st.integers(1, 65535) | st.none(), _PATH, st.booleans())
 def test_all_spellings_of_an_address_are_one(
-    host: str, port: int | None, path: str, capitals: bool  # noqa: FBT001
+    host: str,
+    port: int | None,
+    path: str,
+    capitals: bool,  # noqa: FBT001
 ) -> None:
     """A token that is stored for one is found for the other."""
     place = host if port is None else f"{host}:{port}"
@@ -102,7 +104,7 @@ def test_a_broken_file_of_logins_is_told(content: str) -> None:
 def test_the_nearest_token_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     """One that is given goes before the environment's, and that before a stored one."""
     url = PROVIDER.base
-    with pytest.raises(ConfigError, match="aerodaas login https://provider.example"):
+    with pytest.raises(ConfigError, match=r"aerodaas login https://provider\.example"):
         client_for(url)
     Logins().store(PROVIDER, "stored")
     assert _token(client_for(url)) == "stored"
@@ -133,7 +135,7 @@ def test_a_file_that_cannot_be_written_is_told() -> None:
     logins.path.parent.write_text("a file where the folder would be")
     with pytest.raises(ConfigError, match="cannot write"):
         logins.store(PROVIDER, "x")
-    assert os.listdir(logins.path.parent.parent) == ["aerodaas"]
+    assert [one.name for one in logins.path.parent.parent.iterdir()] == ["aerodaas"]
 
 
 def _token(client: object) -> str:
