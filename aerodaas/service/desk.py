@@ -143,7 +143,7 @@ class MissionDesk:
 
     def fly(self, principal: Principal, mission: str, robot: str, body: WaypointsIn) -> AnswerOut:
         """Add waypoints to a flying mission; raises MissionError if it is lost."""
-        waypoints = body.model_dump()
+        waypoints = body.model_dump(mode="json", include=set(WaypointsIn.model_fields))
         return self._ask(principal, mission, do="fly", robot=robot, waypoints=waypoints)
 
     def _ask(self, principal: Principal, mission: str, **request: Any) -> AnswerOut:  # noqa: ANN401

@@ -23,14 +23,14 @@ FLIGHT_SECONDS = 240.0
 OVER = {"landed", "refused", "cancelled", "failed"}
 
 
-def robot(name: str, east: float = 0.0, **limits: Any) -> dict[str, Any]:
+def robot(name: str, east: float = 0.0, **limits: object) -> dict[str, Any]:
     """A simulated drone that stands `east` metres of home, with odometry."""
     fence = {"polygon": [[-30, -30], [60, -30], [60, 60], [-30, 60]], "ceiling": 20}
     return {
         "id": name,
         "start": [east, 0, 0],
         "sensors": [{"id": "odometry", "type": "odometry", "rate": 10}],
-        "limits": {"geofence": fence, "cruise_speed": 3, **limits},
+        "limits": {"geofence": fence, "cruise_speed": 2, **limits},
     }
 
 
@@ -44,7 +44,7 @@ def fleet(*robots: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def document(robot: str, *places: tuple[float, float], **changes: Any) -> dict[str, Any]:
+def document(robot: str, *places: tuple[float, float], **changes: object) -> dict[str, Any]:
     """A mission document that visits these places, 2 m up."""
     waypoints = [
         {"id": f"wp{number}", "x": east, "y": north, "z": 2.0, "waypoint_type": "local"}
@@ -66,7 +66,7 @@ class Served:
     def __init__(self, content: dict[str, Any], *words: str) -> None:
         """Serve an environment file of this content with further words of the command line."""
         # A socket's path is short.
-        self._temporary = tempfile.TemporaryDirectory(prefix="served-", dir="/tmp")  # noqa: S108
+        self._temporary = tempfile.TemporaryDirectory(prefix="served-", dir="/tmp")
         self.folder = Path(self._temporary.name)
         self._file = self.folder / "fleet.json"
         self._file.write_text(json.dumps(content), encoding="utf-8")
@@ -113,14 +113,14 @@ class Served:
         self.process.send_signal(number)
         self.process.wait(30)
 
-    def ask(self, method: str, path: str, body: Any = None, token: str | None = None) -> Any:
+    def ask(self, method: str, path: str, body: object = None, token: str | None = None) -> Any:  # noqa: ANN401 - JSON
         """Send a request; returns the answer's JSON, or the status and text of a refusal."""
         status, content = self.send(method, path, body, token)
-        found = json.loads(content) if content else None
+        found: Any = json.loads(content) if content else None
         return found if status < 400 else (status, found["text"])
 
     def send(
-        self, method: str, path: str, body: Any = None, token: str | None = None
+        self, method: str, path: str, body: object = None, token: str | None = None
     ) -> tuple[int, bytes]:
         """Send a request; returns status and body."""
         data = body if isinstance(body, bytes) or body is None else json.dumps(body).encode()
@@ -133,7 +133,7 @@ class Served:
         except urllib.error.HTTPError as error:
             return error.code, error.read()
 
-    def user(self, name: str, tenant: str, role: str = "pilot", **more: Any) -> str:
+    def user(self, name: str, tenant: str, role: str = "pilot", **more: object) -> str:
         """Make an account; returns a token of it."""
         self.ask("POST", "/v1/accounts", {"name": name, "tenant": tenant, "role": role, **more})
         return str(self.ask("POST", "/v1/tokens", {"account": name})["secret"])

@@ -6,7 +6,7 @@ from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.principal import Principal, require, sees
 from aerodaas.service.access.quotas import Quotas, QuotasLeft
 from aerodaas.service.access.rates import RateLimiter
-from aerodaas.service.access.usage import usage_csv
+from aerodaas.service.access.usage import usage_csv, usage_out
 from aerodaas.service.errors import RefusedError
 
 __all__ = [
@@ -21,4 +21,5 @@ __all__ = [
     "require",
     "sees",
     "usage_csv",
+    "usage_out",
 ]
