@@ -42,11 +42,13 @@ def send_command(client: ProviderClient, mission: str, robot: str, command: Comm
     that the wire cannot hold, and the client's errors.
     """
     if isinstance(command, AddNavigation):
-        waypoints = _waypoints(robot, command)
+        waypoints = _waypoints(robot, command) if command.navigation else None
         if command.clear_first:
             cleared = client.command(mission, CommandIn(robot=robot, command="clear"))
-            if not cleared.accepted:
+            if not cleared.accepted or waypoints is None:
                 return _answer(cleared)
+        if waypoints is None:
+            return Answer(accepted=True)
         return _answer(client.add_navigation(mission, robot, waypoints))
     word = _WORDS.get(type(command))
     if word is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Callable
+from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
 from typing_extensions import Self
@@ -25,10 +26,11 @@ _LARGEST = 64 << 20
 class WireConnection:
     """An open connection; one thread receives, any may send or close."""
 
-    def __init__(self, exchange: Exchange, connection: ClientConnection) -> None:
-        """Speak over `connection`; errors are worded by `exchange`."""
+    def __init__(self, exchange: Exchange, connection: ClientConnection, stack: ExitStack) -> None:
+        """Speak over `connection`, which `stack` closes; errors are worded by `exchange`."""
         self.exchange = exchange
         self._connection = connection
+        self._stack = stack
         # A message's two parts stay together.
         self._sending = threading.Lock()
 
@@ -42,22 +44,25 @@ class WireConnection:
         from websockets.exceptions import InvalidHandshake  # noqa: PLC0415 - only to follow
         from websockets.sync.client import connect  # noqa: PLC0415 - as above
 
+        stack = ExitStack()
         try:
-            connection = connect(
-                f"{exchange.address.websocket}{path}",
-                additional_headers=exchange.headers,
-                ssl=exchange.ssl,
-                proxy=None,
-                open_timeout=_OPEN_SECONDS,
-                close_timeout=1.0,
-                max_size=_LARGEST,
+            connection = stack.enter_context(
+                connect(
+                    f"{exchange.address.websocket}{path}",
+                    additional_headers=exchange.headers,
+                    ssl=exchange.ssl,
+                    proxy=None,
+                    open_timeout=_OPEN_SECONDS,
+                    close_timeout=1.0,
+                    max_size=_LARGEST,
+                )
             )
         except InvalidHandshake as error:
             explain()
             raise exchange.unreachable(error) from None
         except (OSError, EOFError) as error:
             raise exchange.unreachable(error) from None
-        return cls(exchange, connection)
+        return cls(exchange, connection, stack)
 
     def __enter__(self) -> Self:
         """Return the connection, which is closed on exit."""
@@ -69,7 +74,7 @@ class WireConnection:
 
     def close(self) -> None:
         """Close the connection; whoever receives from it meets SourceError."""
-        self._connection.close()
+        self._stack.close()
 
     def send(self, content: dict[str, Any], blob: bytes = b"") -> None:
         """Send a message; raises SourceError if the connection is lost."""
