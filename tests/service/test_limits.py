@@ -35,7 +35,7 @@ def fleet(*, fence: dict[str, Any] | None = None, **limits: Any) -> EnvironmentC
         **(fence or {}),
     }
     robots = [
-        {"id": name, "start": [east, 0, 0], "limits": {**limits, "geofence": whole}}
+        {"id": name, "start": [east, 0, 0], "limits": {"geofence": whole, **limits}}
         for name, east in (("one", 0), ("two", 3))
     ]
     return validated({"robots": robots}, "fleet")
@@ -87,7 +87,10 @@ cases = {
 
 
 def narrowed(
-    fence: Corners, no_fly: list[list[tuple[float, float]]], margin: float, **given: Any
+    fence: Corners,
+    no_fly: list[list[tuple[float, float]]],
+    margin: float,
+    **given: Any,  # noqa: ANN401
 ) -> tuple[LimitsConfig, LimitsConfig]:
     """The provider's limits and the flight's; a refusal is no case."""
     zones = {"polygon": fence, "no_fly": no_fly, "margin": margin}

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from stub import TOKEN, Stub
+from provider.stub import TOKEN, Stub
 
 from aerodaas.environment.provider.client import ProviderClient
 

@@ -17,7 +17,8 @@ from aerodaas.service.store import Mission, Store, Tenant, Usage
 
 def moment(year: int, month: int, day: int, *time: int) -> float:
     """Seconds of Unix time."""
-    return datetime(year, month, day, *time, tzinfo=timezone.utc).timestamp()
+    hour, minute, second = (*time, 0, 0, 0)[:3]
+    return datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc).timestamp()
 
 
 def fly(
