@@ -78,7 +78,7 @@ class HereServer:
             answer = self._answer(request, blob)
             wrong = oversize(answer, b"")
         except Exception as error:  # noqa: BLE001 - whatever a provider sends
-            wrong = failure_line(error)
+            answer, wrong = {}, failure_line(error)
         if wrong:
             answer = {"failed": wrong}
         took = time.perf_counter() - began
