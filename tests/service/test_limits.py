@@ -34,8 +34,9 @@ def fleet(*, fence: dict[str, Any] | None = None, **limits: Any) -> EnvironmentC
         "margin": 2,
         **(fence or {}),
     }
+    given = {"geofence": whole, **limits}
     robots = [
-        {"id": name, "start": [east, 0, 0], "limits": {"geofence": whole, **limits}}
+        {"id": name, "start": [east, 0, 0], "limits": given}
         for name, east in (("one", 0), ("two", 3))
     ]
     return validated({"robots": robots}, "fleet")

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from provider.stub import TOKEN, Stub
 
 from aerodaas.environment.provider.client import ProviderClient
+from provider.stub import TOKEN, Stub
 
 
 @pytest.fixture(autouse=True)
