@@ -137,12 +137,12 @@ class Flying:
 
     def _await_user(self, document: MissionDocument) -> None:
         """Wait for the user's side, if the document needs it; a rehearsal goes without."""
-        if document.here and not self._order.rehearsal:
-            if not self._relay.wait_attached(_USER_SECONDS):
-                raise MissionError(
-                    f"{', '.join(document.here)} run at the user's side, which did not connect "
-                    f"within {_USER_SECONDS:g} s"
-                )
+        needed = bool(document.here) and not self._order.rehearsal
+        if needed and not self._relay.wait_attached(_USER_SECONDS):
+            raise MissionError(
+                f"{', '.join(document.here)} run at the user's side, which did not connect within "
+                f"{_USER_SECONDS:g} s"
+            )
 
     def _look(self, run: Run) -> None:
         """Keep the status up to date while the run goes on."""
