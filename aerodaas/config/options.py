@@ -55,6 +55,8 @@ class RunOptions:
     """Settings by `id.setting`, such as `camera.rate`."""
     view: bool = True
     """Show the live terminal view."""
+    report: bool = True
+    """Write the report beside the recording."""
     live: str | None = None
     """Serve Foxglove's WebSocket at this `host:port` while flying."""
     page: str | None = None

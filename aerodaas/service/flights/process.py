@@ -114,6 +114,7 @@ class Flying:
                 record=self._folder.recording,
                 address=order.address,
                 view=False,
+                report=not order.rehearsal,
             )
         )
         environment = self._environment = Environment(order.fleet)

@@ -30,6 +30,8 @@ def rehearse(path: Path) -> None:
     with folder.claim():
         outcome = Flying(folder, order).outcome()
         verdict = _verdict(folder, order, outcome)
+        # The verdict and its picture are all that is kept of it.
+        folder.recording.unlink(missing_ok=True)
         folder.end(outcome.model_copy(update={"verdict": verdict}))
 
 

@@ -43,6 +43,7 @@ def rehearsal_config(
         checked(Airframe, settings, f"the rehearsal of {robot.id}")
         entry |= {"driver": "simulated", "settings": settings}
         entry["sensors"] = [_sensor(sensor) for sensor in robot.sensors]
+    content["recording"]["images"] = "none"
     content["sensors"] = [_sensor(sensor) for sensor in config.sensors]
     if seed is not None:
         content["simulation"]["seed"] = seed
