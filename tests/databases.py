@@ -37,7 +37,7 @@ def place(request: pytest.FixtureRequest, tmp_path: Path) -> str | Path:
 @pytest.fixture
 def store(place: str | Path) -> Iterator[Store]:
     """With the tenant `farm` and its account `pilot`."""
-    from aerodaas.service.schemas import Role, Scope  # noqa: PLC0415
+    from aerodaas.protocol.schemas import Role, Scope  # noqa: PLC0415
     from aerodaas.service.store import Account, Store, Tenant  # noqa: PLC0415
 
     with Store.open(place) as opened:

@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
+from aerodaas.protocol.schemas import AccountIn, AccountOut, Role, Scope, TokenIn, TokenOut
 from aerodaas.service.access.tokens import digest_of, new_secret
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.schemas import AccountIn, AccountOut, Role, Scope, TokenIn, TokenOut
 from aerodaas.service.store import Account, Store, Tenant, Token
 
 __all__ = ["Accounts"]

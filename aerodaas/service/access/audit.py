@@ -8,9 +8,9 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
+from aerodaas.protocol.schemas import AuditOut
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import StoreError
-from aerodaas.service.schemas import AuditOut
 from aerodaas.service.store import AuditEntry, Store
 
 __all__ = ["Audit"]

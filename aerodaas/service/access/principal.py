@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
+from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.schemas import Role, Scope
 
 __all__ = ["Principal", "reaches", "require", "sees"]
 

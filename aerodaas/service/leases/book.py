@@ -9,11 +9,11 @@ from collections.abc import Callable, Iterable
 from dataclasses import replace
 from typing import Protocol
 
+from aerodaas.protocol.schemas import LeaseIn, LeaseState
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.leases.candidates import Fleet
 from aerodaas.service.leases.rules import MINUTE, grants, is_waited_for, over
 from aerodaas.service.leases.wish import check_wish, lease_of
-from aerodaas.service.schemas import LeaseIn, LeaseState
 from aerodaas.service.store import Lease, LeaseEnd
 
 __all__ = ["LeaseBook", "Shelf"]

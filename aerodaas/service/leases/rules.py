@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 
+from aerodaas.protocol.schemas import LeaseState
 from aerodaas.service.leases.candidates import Fleet, distance, waited_for
-from aerodaas.service.schemas import LeaseState
 from aerodaas.service.store import Lease, LeaseEnd
 
 __all__ = ["MINUTE", "grants", "is_waited_for", "over"]

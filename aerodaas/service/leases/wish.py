@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from aerodaas.protocol.schemas import LeaseIn, LeaseOut
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.leases.candidates import Fleet
-from aerodaas.service.schemas import LeaseIn, LeaseOut
 from aerodaas.service.store import Lease
 
 __all__ = ["check_wish", "lease_of", "lease_out"]

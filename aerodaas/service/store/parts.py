@@ -8,7 +8,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, delete, func, insert, select, true
 
-from aerodaas.service.schemas import LeaseState, MissionPhase
+from aerodaas.protocol.schemas import LeaseState, MissionPhase
 from aerodaas.service.store import tables
 from aerodaas.service.store.database import Database
 from aerodaas.service.store.rows import (

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from aerodaas.service.schemas import LeaseState, MissionPhase, Role, Scope
+from aerodaas.protocol.schemas import LeaseState, MissionPhase, Role, Scope
 
 __all__ = [
     "Account",

@@ -15,7 +15,7 @@ from sqlalchemy import (
     Table,
 )
 
-from aerodaas.service.schemas import LeaseState, MissionPhase, Role, Scope
+from aerodaas.protocol.schemas import LeaseState, MissionPhase, Role, Scope
 from aerodaas.service.store.columns import EnumText, JsonText, Words, tuples
 from aerodaas.service.store.rows import LeaseEnd
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from aerodaas.protocol.schemas import AccountIn, Role, Scope, TokenIn
 from aerodaas.service.access import Access, Accounts, Audit, Principal, require, sees
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.schemas import AccountIn, Role, Scope, TokenIn
 from aerodaas.service.store import Store
 
 DAY = 86400.0

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Audit, Principal
 from aerodaas.service.errors import StoreError
-from aerodaas.service.schemas import Role, Scope
 from aerodaas.service.store import AuditEntry, Store
 
 PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(Scope), "0" * 16)

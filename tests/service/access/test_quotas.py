@@ -9,9 +9,9 @@ from datetime import datetime, timezone
 
 import pytest
 
+from aerodaas.protocol.schemas import MissionPhase
 from aerodaas.service.access import Quotas, usage_csv, usage_out
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.schemas import MissionPhase
 from aerodaas.service.store import Mission, Store, Tenant, Usage
 
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
+from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.leases import Candidate, LeaseBook, lease_out
-from aerodaas.service.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.store import Account, Lease, LeaseEnd, Store, Tenant
 
 FLEET = {

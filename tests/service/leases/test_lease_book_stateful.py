@@ -12,9 +12,9 @@ import hypothesis.strategies as st
 from hypothesis import settings
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
+from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role, Scope
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.leases import Candidate, LeaseBook, Shelf
-from aerodaas.service.schemas import LeaseIn, LeaseState, Role, Scope
 from aerodaas.service.store import Account, Lease, Store, Tenant
 
 ROBOTS = ("a", "b", "c", "d")

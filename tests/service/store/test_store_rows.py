@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from aerodaas.protocol.schemas import LeaseState, MissionPhase, Role, Scope
 from aerodaas.service.errors import RefusedError, StoreError
-from aerodaas.service.schemas import LeaseState, MissionPhase, Role, Scope
 from aerodaas.service.store import (
     Account,
     AuditEntry,

@@ -102,6 +102,11 @@ class MissionPhase(str, enum.Enum):
     CANCELLED = "cancelled"
     FAILED = "failed"
 
+    @property
+    def over(self) -> bool:
+        """Whether nothing follows this phase."""
+        return self in {self.LANDED, self.REFUSED, self.CANCELLED, self.FAILED}
+
 
 class _In(BaseModel):
     """Base of requests: unknown keys are errors."""
@@ -230,6 +235,8 @@ class MissionOut(_Out):
     reason: str = ""
     robots: list[str]
     lease: str | None = None
+    share: list[str] = Field(default_factory=list)
+    """Tenants that may watch it."""
     submitted: float
     started: float | None = None
     ended: float | None = None
