@@ -155,7 +155,7 @@ class Usages(Rows[Usage]):
         chosen = (columns.tenant == tenant) & (columns.started >= since)
         statement = select(*map(func.sum, used)).where(chosen)
         with self._database.reading() as connection:
-            flown, tasks, calls = connection.execute(statement).one()
+            flown, tasks, calls = tuple(connection.execute(statement).one())
         return float(flown or 0), int(tasks or 0), int(calls or 0)
 
     def stored_bytes(self, tenant: str) -> int:

@@ -15,10 +15,9 @@ from aerodaas.service.errors import RefusedError
 from aerodaas.service.store import Mission, Store, Tenant, Usage
 
 
-def moment(year: int, month: int, day: int, *time: int) -> float:
-    """Seconds of Unix time."""
-    hour, minute, second = (*time, 0, 0, 0)[:3]
-    return datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc).timestamp()
+def moment(year: int, month: int, day: int) -> float:
+    """Seconds of Unix time at its beginning."""
+    return datetime(year, month, day, tzinfo=timezone.utc).timestamp()
 
 
 def fly(
@@ -53,9 +52,9 @@ def test_what_was_flown_this_month_counts(store: Store) -> None:
     """From its first second on, with what is flown just now."""
     store.tenants.put(Tenant("farm", flight_minutes=100.0, tasks=50, cloud_calls=5))
     quotas = Quotas(store)
-    fly(store, moment(2026, 2, 28, 23, 59, 59), 90.0, tasks=40)
+    fly(store, moment(2026, 3, 1) - 1, 90.0, tasks=40)
     fly(store, moment(2026, 3, 1), 30.0, tasks=7, cloud_calls=6)
-    march = quotas.left("farm", moment(2026, 3, 31, 23), committed=20.0)
+    march = quotas.left("farm", moment(2026, 4, 1) - 1, committed=20.0)
     assert (march.flight_minutes, march.tasks, march.cloud_calls) == (50.0, 43, -1)
     assert march.storage_bytes == math.inf
     assert quotas.left("farm", moment(2026, 4, 1)).flight_minutes == 100.0

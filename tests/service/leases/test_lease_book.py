@@ -165,7 +165,7 @@ def test_any_one_that_waits_stands_against_an_extension(book: LeaseBook) -> None
     lease = ask(book, "near")
     ask(book, "far")
     ask(book, camera=True, battery_minutes=10.0)
-    assert book.extend(lease.id, 1, NOW, FLEET)
+    assert book.extend(lease.id, 1, NOW, FLEET)[0].minutes == 16
     ask(book, camera=True)
     with pytest.raises(RefusedError, match="another waits"):
         book.extend(lease.id, 1, NOW, FLEET)

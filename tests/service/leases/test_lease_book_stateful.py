@@ -128,10 +128,12 @@ class Leases(RuleBasedStateMachine):
         assert [one.end is not None for one in news if one.id == lease.id][-1]
         self.hear(news)
 
-    @rule(seconds=st.sampled_from([0.0, 1.0, 59.0, 60.0, 300.0, 4000.0]))
-    def pass_time(self, seconds: float) -> None:
-        """Nobody looks meanwhile."""
+    @rule(seconds=st.sampled_from([1.0, 59.0, 60.0, 300.0, 4000.0]), looks=st.booleans())
+    def pass_time(self, seconds: float, *, looks: bool) -> None:
+        """Somebody looks afterwards, or nobody does."""
         self.now += seconds
+        if looks:
+            self.tick()
 
     @rule()
     def tick(self) -> None:

@@ -161,25 +161,28 @@ def test_a_change_that_fails_changes_nothing(store: Store) -> None:
     assert store.robots.demand("a").battery == 0.5
 
 
-def test_threads_change_one_row_one_after_the_other(store: Store) -> None:
+def test_threads_and_programs_change_one_row_one_after_the_other(
+    store: Store, place: str | Path
+) -> None:
     """No change is lost; else a mission could begin twice."""
     store.leases.put(LEASE)
     store.missions.add(MISSION)
     store.usage.add(replace(USAGE, tasks=0))
     errors: list[Exception] = []
 
-    def count() -> None:
+    def count(by: Store) -> None:
         try:
             for _ in range(10):
-                store.usage.update("m1", lambda row: replace(row, tasks=row.tasks + 1))
+                by.usage.update("m1", lambda row: replace(row, tasks=row.tasks + 1))
         except Exception as error:  # noqa: BLE001 - told below
             errors.append(error)
 
-    threads = [threading.Thread(target=count) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with Store.open(place) as other:
+        threads = [threading.Thread(target=count, args=[by]) for by in (store, other) * 4]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
     assert not errors
     assert store.usage.demand("m1").tasks == 80
 
