@@ -145,9 +145,9 @@ class _RobotFindings:
         if area is not None and len(self._path):
             outside = shapely.distance(area, shapely.points(self._path))
             worst = int(np.argmax(outside))
-            if outside[worst] > 0.0:
+            if (metres := float(np.max(outside))) > 0.0:
                 yield Finding(
-                    f"{self._id} left the fence by {outside[worst]:.1f} m at "
+                    f"{self._id} left the fence by {metres:.1f} m at "
                     f"{_place(self._path[worst])}: plan further inside it, or fly slower",
                     _pair(self._path[worst]),
                 )
@@ -189,9 +189,10 @@ class _RobotFindings:
         if not len(self._path):
             return
         away = shapely.distance(shapely.Polygon(other.area), shapely.points(self._path))
-        nearest, wanted = int(np.argmin(away)), self._limits.separation
-        if away[nearest] < wanted or away[nearest] <= 0.0:
-            near = "into" if away[nearest] <= 0.0 else f"to {away[nearest]:.2f} m from"
+        nearest, metres = int(np.argmin(away)), float(np.min(away))
+        wanted = self._limits.separation
+        if metres < wanted or metres <= 0.0:
+            near = "into" if metres <= 0.0 else f"to {metres:.2f} m from"
             yield Finding(
                 f"{self._id} flew {near} the area of lease {other.id} at "
                 f"{_place(self._path[nearest])}, and {wanted:g} m are to be kept: stay away from "
