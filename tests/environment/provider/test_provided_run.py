@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from stub import CATALOGUE, MISSION, TOKEN, Stub, mission
+from provider_stub import CATALOGUE, MISSION, TOKEN, Stub, mission
 
 from aerodaas import AeroNavigation, Environment, NavigationType, OrderedScheduler, Waypoint
 from aerodaas.analytics import MonitoringAnalytics, VipDetectionAnalytics

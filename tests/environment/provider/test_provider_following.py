@@ -7,7 +7,7 @@ import time
 
 import numpy as np
 import pytest
-from stub import MISSION, Stub, mission
+from provider_stub import MISSION, Stub, mission
 
 from aerodaas.analytics.wire_items import pack
 from aerodaas.environment.provider import follower as module

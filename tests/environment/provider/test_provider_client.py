@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from stub import MISSION, TOKEN, Stub, mission
+from provider_stub import MISSION, TOKEN, Stub, mission
 
 from aerodaas.analytics.remote.schemas import WaypointsIn
 from aerodaas.dataflow.mission_document import WaypointEntry
