@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import databases
 import pytest
 import required
 from flying import Flyer
@@ -25,8 +26,9 @@ _CI = bool(os.environ.get("CI"))
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """What is missing fails in continuous integration."""
+    """What is missing fails in continuous integration; databases are fixtures."""
     config.pluginmanager.register(required)
+    config.pluginmanager.register(databases)
 
 
 @pytest.hookimpl(optionalhook=True)

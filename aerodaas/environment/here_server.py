@@ -49,7 +49,7 @@ class HereServer:
             if entry.here is not None:
                 works[entry.id] = copy.deepcopy(work)
             conditions[entry.id] = [
-                one.when if trigger.at_users_side else None
+                one.when if trigger.at_users_side else _elsewhere
                 for one, trigger in zip(work.given_triggers, entry.triggers, strict=True)
             ]
         self._kept: OrderedDict[bytes, object] = OrderedDict()
@@ -78,7 +78,7 @@ class HereServer:
             answer = self._answer(request, blob)
             wrong = oversize(answer, b"")
         except Exception as error:  # noqa: BLE001 - whatever a provider sends
-            wrong = failure_line(error)
+            answer, wrong = {}, failure_line(error)
         if wrong:
             answer = {"failed": wrong}
         took = time.perf_counter() - began
@@ -112,3 +112,9 @@ class HereServer:
             if item.data not in self._kept:
                 raise ItemError(f"a {item.kind} that is no longer kept here")
             return self._kept[item.data]
+
+
+def _elsewhere(result: object) -> bool:
+    """A condition that the provider evaluates itself: it is never met here."""
+    del result
+    return False

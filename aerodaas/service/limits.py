@@ -77,7 +77,7 @@ def _limited(robot: RobotConfig, tenant: TenantLimits, area: shapely.Polygon | N
             f"{robot.id}: its take-off climbs to {limits.takeoff_height:g} m, and the tenant may "
             f"fly up to {ceiling:g} m: raise the tenant's max_height, or fly another robot"
         )
-    changes = {"ceiling": ceiling}
+    changes: dict[str, object] = {"ceiling": ceiling}
     if area is not None:
         changes["polygon"] = _intersection(robot, area)
     speed = _least(limits.max_speed, tenant.max_speed)

@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from flying import Flyer, hop, robot
 
-from aerodaas import Environment
+from aerodaas import (
+    AeroNavigation,
+    Environment,
+    NavigableAnalytics,
+    NavigationType,
+    VelocityCommand,
+)
+from aerodaas.analytics.base import Context
 from aerodaas.config.model import EnvironmentConfig, validated
-from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.service.rehearsal import rehearsal_config
+from aerodaas.types.data import Odometry
 from aerodaas.types.errors import MissionError
 
-__all__ = ["FIELD", "OtherLease", "Rehearsal", "rehearse"]
+__all__ = ["FIELD", "Eastwards", "OtherLease", "Rehearsal", "rehearse", "survey", "to_the_east"]
 
 FIELD: dict[str, Any] = {
     "name": "field",
@@ -42,25 +50,45 @@ class Rehearsal:
     config: EnvironmentConfig
 
 
+class Eastwards(NavigableAnalytics):
+    """Steers east for ten seconds, whatever lies there."""
+
+    accepts: ClassVar[tuple[type, ...]] = (Odometry,)
+
+    def process(self, item: Odometry, context: Context) -> AeroNavigation:
+        """Two metres a second."""
+        del item
+        steering = context.now() < 15_000_000_000
+        commands = [VelocityCommand(2.0, 0.0, 0.0, 0.0)] if steering else []
+        return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, commands)
+
+
+def survey(env: Environment) -> None:
+    """Two waypoints."""
+    env.get_robot_by_id("drone").navigate(hop((6, 0), (6, 6)))
+
+
+def to_the_east(env: Environment) -> None:
+    """Steered by an analysis."""
+    drone = env.get_robot_by_id("drone")
+    odometry = drone.get_sensor_by_id("odom_drone").get_data_stream()
+    drone.navigate(Eastwards().analyse(odometry))
+
+
 def rehearse(
     flyer: Flyer,
-    navigation: AeroNavigation | None = None,
+    build: Callable[[Environment], object] = survey,
     *,
     limits: Mapping[str, Any] | None = None,
-    driver: Mapping[str, Any] | None = None,
+    driver: str = "simulated",
     battery: float = 1.0,
 ) -> Rehearsal:
-    """Fly `navigation` in the rehearsal of the field, with further `limits`."""
-    content = {**FIELD, "robots": [{**FIELD["robots"][0], **(driver or {})}]}
-    content["robots"][0]["limits"] = {**FIELD["robots"][0]["limits"], **(limits or {})}
-    config = rehearsal_config(validated(content, "the field"), {"drone": battery}, seed=5)
-
-    def build(env: Environment) -> None:
-        env.get_robot_by_id("drone").navigate(navigation or hop((6, 0), (6, 6)))
-
-    try:
-        run = flyer.fly(build, config.model_dump(mode="json", by_alias=True), seed=5)
-    except MissionError:
-        return Rehearsal(next(flyer.folder.glob("flight/*.mcap")), config)
-    assert run.recording is not None
-    return Rehearsal(run.recording, config)
+    """Fly the rehearsal of a mission in the field, with further `limits`."""
+    drone = {**FIELD["robots"][0], "driver": driver}
+    drone["limits"] = {**drone["limits"], **(limits or {})}
+    config = validated({**FIELD, "robots": [drone]}, "the field")
+    config = rehearsal_config(config, {"drone": battery}, seed=5)
+    # A flight that fails has a recording, too.
+    with contextlib.suppress(MissionError):
+        flyer.fly(build, config.model_dump(mode="json", by_alias=True), seed=5)
+    return Rehearsal(next(flyer.folder.glob("flight/*.mcap")), config)

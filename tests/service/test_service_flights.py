@@ -26,7 +26,7 @@ def provider() -> Iterator[Served]:
         yield served
 
 
-def submitted(provider: Served, name: str, *places: tuple[float, float], **more: Any) -> str:
+def submitted(provider: Served, name: str, *places: tuple[float, float], **more: object) -> str:
     """Submit a mission; returns its id."""
     body = {"document": document(name, *places), **more}
     answer = provider.ask("POST", "/v1/missions", body)
@@ -141,7 +141,7 @@ def test_a_lease_that_ends_brings_the_drone_home(provider: Served) -> None:
     flying(provider, id_, "one", "returning", "landing", "landed")
     pause = {"robot": "one", "command": "pause"}
     late = provider.ask("POST", f"/v1/missions/{id_}/commands", pause, pilot)
-    assert late["text"] == "the drones come home: the lease has ended"
+    assert late["text"].startswith("the drones come home: the lease has ended")
     ended = provider.until_phase(id_)
     assert "the lease has ended" in ended["reason"]
     assert len(ended["status"]["one"]["visited"]) < 3

@@ -9,6 +9,7 @@ from typing import Any
 from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.guests.answers import AnsweredCondition
 from aerodaas.analytics.here.analysis import HERE, HereAnalysis, HereConditions, HereSite
+from aerodaas.config.checked import checked
 from aerodaas.config.model import TaskConfig
 from aerodaas.config.plugins import load_plugin, require_plugin
 from aerodaas.dataflow.graph import AeroStreamData, NavigationEdge
@@ -22,7 +23,7 @@ from aerodaas.dataflow.mission_document import (
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.document.values import ValueReader
 from aerodaas.environment.environment import Environment
-from aerodaas.types.errors import GraphError
+from aerodaas.types.errors import AeroDaaSError, GraphError
 from aerodaas.types.waypoints import NavigationType, SchedulingType
 
 __all__ = ["build_mission"]
@@ -91,13 +92,18 @@ class _Builder:
         if entry.rate is not None:
             work.rate = entry.rate
         if entry.task is not None:
-            work.task = TaskConfig.model_validate(entry.task)
+            work.task = checked(TaskConfig, entry.task, f"{entry.id}: task")
         if entry.compute is not None:
             work.deploy(self._environment.get_compute_resource_by_id(entry.compute))
         inputs = [self._stream(name, entry.id) for name in entry.reads]
-        stream = work.analyse(inputs[0]) if inputs else work.instantiate()
-        for further in inputs[1:]:
-            work.analyse(further)
+        try:
+            stream = work.analyse(inputs[0]) if inputs else work.instantiate()
+            for further in inputs[1:]:
+                work.analyse(further)
+        except AeroDaaSError:
+            raise
+        except Exception as error:  # noqa: BLE001 - a stranger's values in any analysis
+            raise GraphError(f"{entry.id} does not take these settings: {error}"[:300]) from None
         if stream.name != entry.id:
             raise GraphError(f"{entry.id} would be called {stream.name} here: the name is taken")
         if isinstance(work, HereAnalysis) and (node := work.node) is not None:

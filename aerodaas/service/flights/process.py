@@ -20,7 +20,7 @@ from aerodaas.analytics.wire_items import pack
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.config.overrides import located
-from aerodaas.dataflow.mission_document import read_mission
+from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.run import Run
@@ -38,6 +38,8 @@ from aerodaas.types.status import Message
 
 __all__ = ["Flying", "environment_of", "fly"]
 
+_USER_SECONDS = 30.0
+"""Wall seconds for the user's side to connect before take-off."""
 _LOOK_SECONDS = 0.1
 """Wall seconds between two looks at the drones."""
 
@@ -122,6 +124,7 @@ class Flying:
             # The sockets answer from the first moment on: a launch takes seconds.
             self._relay.start()
             server.start()
+            self._await_user(document)
             self._run = environment.launch()
             if not order.rehearsal:
                 self._lease.start()
@@ -131,6 +134,15 @@ class Flying:
             self._lease.stop()
             server.close()
             self._relay.close()
+
+    def _await_user(self, document: MissionDocument) -> None:
+        """Wait for the user's side, if the document needs it; a rehearsal goes without."""
+        needed = bool(document.here) and not self._order.rehearsal
+        if needed and not self._relay.wait_attached(_USER_SECONDS):
+            raise MissionError(
+                f"{', '.join(document.here)} run at the user's side, which did not connect within "
+                f"{_USER_SECONDS:g} s"
+            )
 
     def _look(self, run: Run) -> None:
         """Keep the status up to date while the run goes on."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig, validated
 from aerodaas.simulation.airframe import GRAVITY, Airframe
 from aerodaas.simulation.battery import flight_power
@@ -36,9 +37,11 @@ def rehearsal_config(
     """
     content = config.model_dump(by_alias=True)
     for entry, robot in zip(content["robots"], config.robots, strict=True):
-        entry |= {"driver": "simulated", "settings": _airframe(robot)}
+        settings = _airframe(robot)
         if robot.id in battery:
-            entry["settings"]["battery"] = battery[robot.id]
+            settings["battery"] = battery[robot.id]
+        checked(Airframe, settings, f"the rehearsal of {robot.id}")
+        entry |= {"driver": "simulated", "settings": settings}
         entry["sensors"] = [_sensor(sensor) for sensor in robot.sensors]
     content["sensors"] = [_sensor(sensor) for sensor in config.sensors]
     if seed is not None:

@@ -180,8 +180,8 @@ class _RobotFindings:
         if len(charges) and charges[-1] < reserve:
             yield Finding(
                 f"{self._id} began with {charges[0]:.0%} of its battery and ended with "
-                f"{charges[-1]:.0%}, below the reserve of {reserve:.0%}: fly a shorter way, or wait "
-                "until it is charged",
+                f"{charges[-1]:.0%}, below the reserve of {reserve:.0%}: fly a shorter way, or "
+                "wait until it is charged",
                 self._last(),
             )
 

@@ -38,7 +38,8 @@ class Rows(Generic[Row]):
         values = self._values(row)
         with self._database.writing() as connection:
             statement = self._database.insert(self._table).values(values)
-            if not connection.execute(statement.on_conflict_do_nothing()).rowcount:
+            new = statement.on_conflict_do_nothing().returning(self._key)
+            if connection.execute(new).one_or_none() is None:
                 raise RefusedError(409, f"there is a {self._what} {values[self._key.name]} already")
 
     def put(self, *rows: Row) -> None:

@@ -137,6 +137,8 @@ class Leases(RuleBasedStateMachine):
     def tick(self) -> None:
         """Nothing that somebody can use lies idle."""
         self.hear(self.book.tick(self.now, self.fleet))
+        for lease in self.book.live():
+            assert lease.ends is None or lease.ends > self.now
         if self.fails():
             return
         assert self.book.unsaved == 0
