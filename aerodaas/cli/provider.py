@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 __all__ = ["cancel", "fetch", "fleet", "leases", "login", "missions", "submit", "watch"]
 
 _LOOK_SECONDS = 0.5
+_WIDE = 1000
+"""Columns of a table that goes into a pipe."""
 At = Annotated[
     str | None,
     typer.Option(
@@ -359,4 +361,6 @@ def _table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> N
         table.add_column(head)
     for row in rows:
         table.add_row(*(Text(cell) for cell in row))
-    Console(highlight=False, soft_wrap=not sys.stdout.isatty()).print(table)
+    # What reads a pipe has no width to keep to.
+    width = None if sys.stdout.isatty() else _WIDE
+    Console(highlight=False, width=width).print(table)

@@ -5,18 +5,20 @@ from __future__ import annotations
 import stat
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.environment.provider.address import ServiceAddress, is_url
 from aerodaas.environment.provider.logins import Logins, client_for, default_url
 from aerodaas.types.errors import ConfigError
 
+pytestmark = pytest.mark.usefixtures("own_logins")
 _HOST = st.from_regex(r"[a-z][a-z0-9]{0,10}(\.[a-z]{2,5}){1,2}", fullmatch=True)
-_PATH = st.lists(st.from_regex(r"[a-z0-9\-]{1,8}", fullmatch=True), max_size=3).map("/".join)
+_PATH = st.sampled_from(["", "campus", "fields/campus-2", "a/b/c"])
 PROVIDER = ServiceAddress.parse("https://provider.example")
 
 
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(_HOST, st.integers(1, 65535) | st.none(), _PATH, st.booleans())
 def test_all_spellings_of_an_address_are_one(
     host: str,

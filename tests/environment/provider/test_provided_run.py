@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from provider_stub import CATALOGUE, MISSION, TOKEN, Stub, mission
 
 from aerodaas import AeroNavigation, Environment, NavigationType, OrderedScheduler, Waypoint
 from aerodaas.analytics import MonitoringAnalytics, VipDetectionAnalytics
@@ -29,7 +30,6 @@ from aerodaas.types.errors import (
     SourceError,
     UnknownIdError,
 )
-from provider.stub import CATALOGUE, MISSION, TOKEN, Stub, mission
 
 
 @pytest.fixture(autouse=True)

@@ -7,6 +7,7 @@ import time
 
 import numpy as np
 import pytest
+from provider_stub import MISSION, Stub, mission
 
 from aerodaas.analytics.wire_items import pack
 from aerodaas.environment.provider import follower as module
@@ -16,7 +17,6 @@ from aerodaas.environment.provider.streams import WireReader
 from aerodaas.protocol.schemas import MissionPhase
 from aerodaas.types.data import Frame, Header, Odometry
 from aerodaas.types.errors import ConfigError
-from provider.stub import MISSION, Stub, mission
 
 SECONDS = 20.0
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from provider_stub import MISSION, TOKEN, Stub, mission
 
 from aerodaas.analytics.remote.schemas import WaypointsIn
 from aerodaas.dataflow.mission_document import WaypointEntry
@@ -17,7 +18,6 @@ from aerodaas.environment.provider import exchange
 from aerodaas.environment.provider.client import LARGEST_MODEL, ProviderClient
 from aerodaas.protocol.schemas import CommandIn, MissionPhase
 from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError, SourceError
-from provider.stub import MISSION, TOKEN, Stub, mission
 
 
 @contextmanager
