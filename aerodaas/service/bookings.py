@@ -31,19 +31,24 @@ class Bookings:
         self._book = LeaseBook(store.leases)
         self.on_end: list[Callable[[Lease], None]] = []
         """Called with each lease that has ended, to recall its flights."""
+        self.flying: Callable[[], Collection[str]] = tuple
+        """Tells which robots are in flight: they may be on their way home from an ended lease."""
         self.on_extension: list[Callable[[Lease], None]] = []
 
     def request(self, principal: Principal, wish: LeaseIn) -> Lease:
         """Ask for drones; raises RefusedError, also for a quota that is used up."""
         now = time.time()
-        committed = self._book.committed(principal.tenant, now)
-        robots = len(wish.robots or [""])
-        self._quotas.check(principal.tenant, wish.minutes * robots, now, committed)
+        self.require_quota(principal.tenant, wish.minutes * len(wish.robots or [""]))
         lease, changed = self._book.request(
             wish, principal.tenant, principal.account, now, self._fleet()
         )
         self._tell(changed)
         return self.lease(lease.id)
+
+    def require_quota(self, tenant: str, minutes: float) -> None:
+        """Raise RefusedError if a tenant may not have another `minutes`, times robots."""
+        now = time.time()
+        self._quotas.check(tenant, minutes, now, self._book.committed(tenant, now))
 
     def for_mission(self, mission: Mission) -> Lease:
         """Ask for the drones of a mission that brought no lease; raises RefusedError."""
@@ -137,7 +142,7 @@ class Bookings:
                     call(lease)
 
     def _fleet(self) -> Fleet:
-        states, fleet = self._garage.states, {}
+        states, busy, fleet = self._garage.states, self.flying(), {}
         for robot in self._config.robots:
             state = states[robot.id]
             place = state.position or robot.start
@@ -149,5 +154,6 @@ class Bookings:
                 position=(place[0], place[1]),
                 battery_minutes=usable * robot.limits.endurance / 60.0,
                 enabled=state.enabled,
+                busy=robot.id in busy,
             )
         return fleet

@@ -69,6 +69,7 @@ class MissionDesk:
         self._closed = threading.Event()
         self._heard: dict[str, float] = {}
         self._missions: dict[str, ActiveMission] = {}
+        bookings.flying = self._busy
         bookings.on_end.append(self._recall)
         bookings.on_extension.append(self._prolong)
         for row in store.missions.all(phases=_OPEN):
@@ -92,7 +93,7 @@ class MissionDesk:
         """
         robots = self._briefing.check(principal, wanted.document)
         self._garage.require_enabled(robots)
-        self._quotas.check(principal.tenant, wanted.minutes * len(robots), time.time())
+        self._bookings.require_quota(principal.tenant, wanted.minutes * len(robots))
         if wanted.lease is not None:
             self._bookings.require(principal, wanted.lease, robots)
         name = secrets.token_hex(6)
@@ -314,8 +315,14 @@ class MissionDesk:
     def _has_place(self, wanted: ActiveMission) -> bool:
         """Whether a flight may begin: its drones may be on their way home from the last one."""
         flying = [one for one in self._missions.values() if one.phase is MissionPhase.FLYING]
-        busy = {robot for one in flying for robot in one.row.robots}
-        return len(flying) < self._settings.most_flights and busy.isdisjoint(wanted.row.robots)
+        free = self._busy().isdisjoint(wanted.row.robots)
+        return len(flying) < self._settings.most_flights and free
+
+    def _busy(self) -> set[str]:
+        """Robots in flight."""
+        missions = list(self._missions.values())
+        flying = [one for one in missions if one.phase is MissionPhase.FLYING]
+        return {robot for one in flying for robot in one.row.robots}
 
     def _watch(self, one: ActiveMission) -> None:
         # After a restart: a flight whose order was written may not have begun.
