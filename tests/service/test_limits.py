@@ -34,7 +34,7 @@ def fleet(*, fence: dict[str, Any] | None = None, **limits: Any) -> EnvironmentC
         "margin": 2,
         **(fence or {}),
     }
-    robots = [
+    robots: list[dict[str, Any]] = [
         {"id": name, "start": [east, 0, 0], "limits": {**limits, "geofence": whole}}
         for name, east in (("one", 0), ("two", 3))
     ]
