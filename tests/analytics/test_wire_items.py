@@ -197,7 +197,9 @@ class Own:
 
 
 @pytest.mark.parametrize(
-    "item", [Own(), [Own()], {1: 2}, np.array(["a"]), Readings, object()], ids=repr
+    "item",
+    [Own(), [Own()], {1: 2}, np.array(["a"]), Readings, object()],
+    ids=["own", "own in a list", "number for a key", "texts", "class", "object"],
 )
 def test_no_other_class_goes_over_the_wire(item: object) -> None:
     """It is refused, and never pickled."""

@@ -34,9 +34,8 @@ def fleet(*, fence: dict[str, Any] | None = None, **limits: Any) -> EnvironmentC
         "margin": 2,
         **(fence or {}),
     }
-    given = {"geofence": whole, **limits}
-    robots = [
-        {"id": name, "start": [east, 0, 0], "limits": given}
+    robots: list[dict[str, Any]] = [
+        {"id": name, "start": [east, 0, 0], "limits": {**limits, "geofence": whole}}
         for name, east in (("one", 0), ("two", 3))
     ]
     return validated({"robots": robots}, "fleet")
@@ -196,6 +195,7 @@ def test_each_limit_is_the_least() -> None:
     config = fleet(cruise_speed=3, max_speed=6, max_climb=2, max_range=300)
     flight = limits_of(config, TenantLimits(12, 2.5, 80), None)
     assert (flight.cruise_speed, flight.max_speed, flight.max_climb) == (2.5, 2.5, 2)
+    assert limits_of(config, TenantLimits(max_speed=1.5), None).max_climb == 1.5
     assert (flight.max_range, flight.geofence.ceiling) == (80, 12)
     assert limits_of(config, TenantLimits(120, 25, 8000), None) == config.robots[0].limits
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import os
+import secrets
+import socket
 import threading
 import time
 from pathlib import Path
@@ -17,7 +19,7 @@ from aerodaas.analytics.here.analysis import HereSite
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import StatusOut, WaypointsIn
 from aerodaas.analytics.wire_items import pack
-from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig, RemoteConfig
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.config.overrides import located
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
@@ -64,7 +66,19 @@ def environment_of(order: FlightOrder) -> EnvironmentConfig:
         tenant=TenantLimits(order.limits.max_height, order.limits.max_speed),
         area=order.area,
     )
-    return rehearsal_config(config, order.battery, order.seed) if order.rehearsal else config
+    if order.rehearsal:
+        config = rehearsal_config(config, order.battery, order.seed)
+    return config.model_copy(update={"remote": _closed_remote()})
+
+
+def _closed_remote() -> RemoteConfig:
+    """Remote control that nobody can reach: commands come by the service, with their lease.
+
+    An application's `RemoteAnalytics` runs all the same, at a free port with a token of its own.
+    """
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port: int = free.getsockname()[1]
+    return RemoteConfig(host="127.0.0.1", port=port, token=SecretStr(secrets.token_urlsafe()))
 
 
 class Flying:
