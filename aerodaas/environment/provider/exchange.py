@@ -21,6 +21,8 @@ __all__ = ["Exchange", "Method", "printed"]
 _MOST_BYTES = 32 << 20
 """Largest JSON of an answer: a mission of 64 robots has a thousandth of that."""
 _CHUNK = 1 << 18
+_KEPT_OPEN = 8
+"""Idle connections, for the threads that ask at once."""
 _MOST_TEXT = 2000
 """Characters of a refusal that are shown."""
 _CALLERS = frozenset(
@@ -51,7 +53,10 @@ class Exchange:
         # may close an idle connection at the moment that it is used.
         again = urllib3.Retry(total=1, connect=0, redirect=0, status=0, other=0)
         self._pool = urllib3.PoolManager(
-            retries=again, timeout=urllib3.Timeout(timeout), ssl_context=self.ssl, block=False
+            retries=again,
+            timeout=urllib3.Timeout(timeout),
+            ssl_context=self.ssl,
+            maxsize=_KEPT_OPEN,
         )
 
     def ask(self, method: Method, path: str, content: Any = None) -> Any:  # noqa: ANN401 - JSON
