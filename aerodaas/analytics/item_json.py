@@ -12,7 +12,7 @@ import enum
 import math
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -229,8 +229,11 @@ def _conforms(value: object, hint: Any) -> bool:  # noqa: ANN401 - an annotation
         return any(_conforms(value, one) for one in arguments)
     if origin is not None:
         return isinstance(value, origin) and _conform_inside(value, origin, hint)
-    if hint is Any or _is_enum(hint):
-        return hint is Any or (isinstance(value, str) and value in {one.value for one in hint})
+    if hint is Any:
+        return True
+    if _is_enum(hint):
+        words: Iterable[enum.Enum] = hint
+        return isinstance(value, str) and value in {one.value for one in words}
     if hint in {int, float} and isinstance(value, int):
         # JSON does not tell 1 from 1.0.
         most = 53 if hint is float else 63
