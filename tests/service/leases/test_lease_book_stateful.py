@@ -107,9 +107,9 @@ class Leases(RuleBasedStateMachine):
         except (RefusedError, StoreError):
             self.tick()
             return
-        assert longer.ends is not None
-        assert lease.ends is not None
-        assert longer.ends == lease.ends + 60 * minutes
+        # One that was queued, and whose turn has come since anybody looked, is granted first.
+        before = self.now + 60 * lease.minutes if lease.ends is None else lease.ends
+        assert longer.ends == before + 60 * minutes
         for other in self.queued():
             assert not self.usable(other) & set(longer.robots)
         self.hear(news)
