@@ -20,7 +20,7 @@ from .dataflow.navigation import AeroNav as AeroNav
 from .dataflow.navigation import AeroNavigation as AeroNavigation
 from .dataflow.navigation import PriorityQueue as PriorityQueue
 from .environment.environment import Environment as Environment
-from .environment.environment import Robot as Robot
+from .environment.robot import Robot as Robot
 from .schedulers.trajectory.base import TrajectoryScheduler as TrajectoryScheduler
 from .schedulers.trajectory.nearest_neighbor import (
     NearestNeighborScheduler as NearestNeighborScheduler,

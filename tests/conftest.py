@@ -6,13 +6,19 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+import databases
 import pytest
 import required
 from flying import Flyer
 
 from aerodaas.config.options import RunOptions, current_options
+
+if TYPE_CHECKING:
+    from provider_stub import Stub
+
+    from aerodaas.environment.provider.client import ProviderClient
 
 _ROOT = Path(__file__).resolve().parents[1]
 
@@ -20,8 +26,9 @@ _CI = bool(os.environ.get("CI"))
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """What is missing fails in continuous integration."""
+    """What is missing fails in continuous integration; databases are fixtures."""
     config.pluginmanager.register(required)
+    config.pluginmanager.register(databases)
 
 
 @pytest.hookimpl(optionalhook=True)
@@ -117,3 +124,30 @@ def runtime(plugin_folder: Path) -> Iterator[None]:
 def flyer(runtime: None, tmp_path: Path) -> Flyer:  # noqa: ARG001 - flights need Ray
     """Flies applications in this process, their files under `tmp_path`."""
     return Flyer(tmp_path)
+
+
+@pytest.fixture
+def own_logins(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No token of whoever runs the tests is read or written."""
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    for name in ("AERODAAS_TOKEN", "AERODAAS_PROVIDER", "AERODAAS_INSECURE"):
+        monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture
+def stub(own_logins: None) -> Iterator[Stub]:  # noqa: ARG001 - for its effect
+    """A provider's service that answers as a test tells it, on a loopback port."""
+    from provider_stub import Stub as Service  # noqa: PLC0415 - only for the tests of the client
+
+    with Service() as service:
+        yield service
+
+
+@pytest.fixture
+def client(stub: Stub) -> ProviderClient:
+    """A client with the right token for that service."""
+    from provider_stub import TOKEN  # noqa: PLC0415 - as above
+
+    from aerodaas.environment.provider.client import ProviderClient as Client  # noqa: PLC0415
+
+    return Client(stub.url, TOKEN)

@@ -55,6 +55,9 @@ PEERS = {
         ("/usr/sbin/sshd",),
         ("ssh", "ssh-keygen", "rsync"),
     ),
+    "AERODAAS_TEST_DATABASE": Peer(
+        "an empty PostgreSQL database, by a URL such as postgresql://USER@127.0.0.1/NAME"
+    ),
     "AERODAAS_TEST_DATA": Peer(
         "a folder of real pictures and models: tests/analytics/detection/test_real_models.py"
     ),

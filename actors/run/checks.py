@@ -138,7 +138,7 @@ def _check_process(node: Node) -> None:
 
 
 def check_tasks(graph: Graph, config: EnvironmentConfig) -> None:
-    """Raise UnknownIdError for tasks of unknown analyses, which would have no effect.
+    """Raise UnknownIdError for tasks and tenants of unknown analyses, which would have no effect.
 
     A file shared by several applications may name the analyses that ship with the project.
     """
@@ -147,6 +147,9 @@ def check_tasks(graph: Graph, config: EnvironmentConfig) -> None:
     shipped = {snake_case(name).removesuffix("_analytics") for name in dir(analytics)}
     told = [name for name in config.schedulers.tasks if name not in shipped]
     _check_names("schedulers.tasks", told, graph)
+    for tenant, one in config.schedulers.tenants.items():
+        told = [name for name in one.analyses if name not in shipped]
+        _check_names(f"schedulers.tenants.{tenant}", told, graph)
 
 
 def _check_names(section: str, told: Iterable[str], graph: Graph) -> None:

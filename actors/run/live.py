@@ -24,6 +24,8 @@ from aerodaas.types.status import Message
 __all__ = ["LiveReader"]
 
 _DEPTH = 4
+_WAITING = 256
+"""Most messages that wait for a slow reader; the oldest ones go first."""
 _PAUSE = 0.02
 """Seconds between two requests to a publisher."""
 _ANSWER = 0.2
@@ -102,12 +104,16 @@ class LiveReader:
         else:
             self._source = _Asking(publisher, stream)
             self._source.receive(0.0)
-        self._waiting: deque[Any] = deque()
+        self._waiting: deque[Message[Any]] = deque(maxlen=_WAITING)
         self._newest: Any = None
         self._over = over
 
     def next(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
-        """Return the next item, skipping empty messages.
+        """Return the next item, skipping empty messages; raises as `next_message` does."""
+        return self.next_message(timeout).item
+
+    def next_message(self, timeout: float | None) -> Message[Any]:
+        """Return the next message that has an item.
 
         Raises TimeoutError after `timeout` seconds, StopIteration once the flight is over.
         """
@@ -130,8 +136,7 @@ class LiveReader:
         return self._newest
 
     def _take(self, timeout: float) -> None:
-        items = [message.item for message in self._source.receive(timeout)]
-        for item in items:
-            if item is not None:
-                self._waiting.append(item)
-                self._newest = item
+        for message in self._source.receive(timeout):
+            if message.item is not None:
+                self._waiting.append(message)
+                self._newest = message.item

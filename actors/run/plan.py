@@ -216,10 +216,10 @@ class _Planner:
         )
 
     def managed_one(self, node: Node) -> Managed:
-        tasks = self.session.environment.schedulers.tasks
-        own = told(node.id, tasks) or TaskConfig()
+        schedulers = self.session.environment.schedulers
+        own = told(node.id, schedulers.tasks) or TaskConfig()
         times = ("edge_time", "cloud_time")
-        profile = told_profile(node.id, tasks)
+        profile = told_profile(node.id, schedulers)
         return Managed(
             stream=node.id,
             inputs=tuple(node.inputs),

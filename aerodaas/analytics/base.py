@@ -36,6 +36,7 @@ from aerodaas.config.model import RuntimeEnvConfig, TaskConfig, as_runtime_env
 from aerodaas.dataflow.containers import AeroData
 from aerodaas.dataflow.given_settings import GivenSettings
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node, Trigger, refusal
+from aerodaas.dataflow.handles import Here
 from aerodaas.dataflow.interfaces import IAeroData, IAnalyse, ICompute, INavigableAnalyse
 from aerodaas.dataflow.names import PaperNames, snake_case
 from aerodaas.dataflow.navigation import AeroNavigation
@@ -121,6 +122,7 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
     """Node in the graph, once `analyse` or `instantiate` was called."""
     _graph: Graph | None = None
     _compute: str | None = None
+    _here: bool = False
     _runtime_env: RuntimeEnvConfig | None = None
     _triggers: tuple[Trigger, ...] = ()
 
@@ -158,7 +160,7 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
         """Run on `compute`.
 
         Args:
-            compute: Edge or cloud node, or endpoint.
+            compute: Edge or cloud node, or endpoint; or `env.here`, the user's own side.
             runtime_env: The analysis' own runtime environment: `{"packages": ["torch==2.4.1"]}`,
                 `{"env_vars": {…}}` or `{"image_uri": "…"}`; the environment file may replace it.
                 Such an analysis runs in its own process.
@@ -170,7 +172,9 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
             ConfigError: If `runtime_env` is invalid.
             GraphError: If the analysis is already running.
         """
-        self._compute = compute.get_compute_id()
+        # In a flight of one's own, the user's side is the edge beside the drone, as by default.
+        self._here = isinstance(compute, Here)
+        self._compute = None if self._here else compute.get_compute_id()
         self._graph = getattr(compute, "graph", None)
         if runtime_env is not None:
             self._runtime_env = as_runtime_env(runtime_env, f"{type(self).__name__}.deploy")
@@ -183,6 +187,7 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
     def beside(self, other: Analytics[Any]) -> Self:
         """Run on the compute resource and in the runtime environment of `other`; returns itself."""
         self._compute, self._graph = other._compute, other._graph
+        self._here = other._here
         self._runtime_env = other._runtime_env
         return self
 
@@ -303,6 +308,11 @@ class Analytics(GivenSettings, PaperNames, IAnalyse[O_co]):
             self.node.triggers.append(trigger)
         self._triggers = (*self._triggers, trigger)
         return self
+
+    @property
+    def deployed_here(self) -> bool:
+        """Whether it was deployed on `env.here`."""
+        return self._here
 
     @property
     def given_triggers(self) -> tuple[Trigger, ...]:

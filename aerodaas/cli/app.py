@@ -9,11 +9,12 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli import cluster, lab, remote
+from aerodaas.cli import cluster, lab, provider, remote
 from aerodaas.cli.application import run_application, speed_option
 from aerodaas.cli.export import export
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
+from aerodaas.cli.serve import serve
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.errors import (
     AeroDaaSError,
@@ -27,6 +28,7 @@ __all__ = ["app", "main", "run_typer"]
 
 _CAUSED_BY_A_LINE = (GraphError, InvalidWaypointError, UnknownIdError)
 """Errors reported with the application's own line."""
+_PROVIDER = "At a provider"
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -200,10 +202,25 @@ def doctor(
     raise typer.Exit(0 if examine(address) else 1)
 
 
+app.command()(serve)
 app.command()(report)
 app.command()(compare)
 app.command()(export)
 app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(replay)
+for _command in (
+    provider.login,
+    provider.fleet,
+    provider.missions,
+    provider.watch,
+    provider.cancel,
+    provider.fetch,
+    provider.leases,
+):
+    app.command(rich_help_panel=_PROVIDER)(_command)
+app.command(
+    rich_help_panel=_PROVIDER,
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+)(provider.submit)
 
 
 def main() -> None:

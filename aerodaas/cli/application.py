@@ -5,11 +5,15 @@ from __future__ import annotations
 import runpy
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.errors import ConfigError
 
-__all__ = ["run_application", "speed_option"]
+if TYPE_CHECKING:
+    from aerodaas.protocol.schemas import MissionOut
+
+__all__ = ["run_application", "speed_option", "submit_application"]
 
 
 def run_application(application: Path, words: list[str], options: RunOptions) -> None:
@@ -30,6 +34,26 @@ def run_application(application: Path, words: list[str], options: RunOptions) ->
     sys.argv = [str(application), *words]
     sys.path.insert(0, str(application.resolve().parent))
     runpy.run_path(str(application), run_name="__main__")
+
+
+def submit_application(application: Path, words: list[str], options: RunOptions) -> MissionOut:
+    """Run `application` up to `start_mission()`, or read a document, and submit what it flies.
+
+    Raises what `run_application` raises, and GraphError for what is code of the application's own.
+    """
+    from aerodaas.environment.document.compiling import (  # noqa: PLC0415 - slow to load
+        compile_mission,
+    )
+    from aerodaas.environment.offering import offered, the_only  # noqa: PLC0415 - as above
+    from aerodaas.environment.provider.submission import submit  # noqa: PLC0415 - as above
+
+    with offered() as found:
+        run_application(application, words, options)
+    environment = the_only(found)
+    if environment.provider is None:
+        raise ConfigError(f"{application} is flown by no provider: name one")
+    written = compile_mission(environment, application.stem)
+    return submit(environment.provider, written.document, written.models, options)
 
 
 def speed_option(text: str | None) -> tuple[float | None, bool | None]:

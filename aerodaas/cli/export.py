@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aerodaas.cli.printable import printable
 from aerodaas.cli.report import Recorded
+from aerodaas.config.printable import printable
 
 if TYPE_CHECKING:
     from aerodaas.recording.reader import Recording

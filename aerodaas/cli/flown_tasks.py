@@ -94,7 +94,7 @@ class Flown:
                 )
             content = merged(allowed_content(recorded_content(recording)), {})
         environment = validated(content, f"the environment in {path}")
-        told = environment.schedulers.tasks
+        told = environment.schedulers
         models = {name: told_profile(name, told) for name in sorted({t.model for t in tasks})}
         return cls(Path(path).stem, tasks, models, Resources(_cloud_slots(environment)))
 

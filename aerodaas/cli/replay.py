@@ -12,9 +12,9 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli.application import run_application, speed_option
-from aerodaas.cli.printable import printable
 from aerodaas.cli.report import Recorded
 from aerodaas.config.options import RunOptions
+from aerodaas.config.printable import printable
 from aerodaas.types.errors import MissionError
 
 __all__ = ["replay"]

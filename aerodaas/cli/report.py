@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli.printable import printable
+from aerodaas.config.printable import printable
 
 __all__ = ["compare", "report"]
 

@@ -11,6 +11,7 @@ __all__ = ["has_extra", "require_extra"]
 _PACKAGES = {
     "plots": ("matplotlib",),
     "remote": ("fastapi", "uvicorn", "websockets"),
+    "service": ("fastapi", "sqlalchemy", "uvicorn", "websockets"),
     "ros": ("mcap_ros2",),
     "routing": ("pyvrp",),
 }
@@ -18,7 +19,7 @@ _PACKAGES = {
 
 
 def has_extra(extra: str) -> bool:
-    """Whether the packages of `extra` (`plots`, `remote`, `ros`, `routing`) are installed."""
+    """Whether the packages of an extra, such as `plots` or `service`, are installed."""
     return all(importlib.util.find_spec(package) is not None for package in _PACKAGES[extra])
 
 
@@ -26,7 +27,7 @@ def require_extra(extra: str, purpose: str) -> None:
     """Require the packages of an extra.
 
     Args:
-        extra: `plots`, `remote`, `ros` or `routing`.
+        extra: `plots`, `remote`, `ros`, `routing` or `service`.
         purpose: The feature, as the subject of the error's sentence, in the singular.
 
     Raises:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from aerodaas.config.checked import near
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.redaction import redacted
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["Catalogue", "GuestGrants", "GuestQuota", "parse_grants", "parse_words", "reduced"]
@@ -107,38 +108,5 @@ def reduced(config: EnvironmentConfig, grants: GuestGrants) -> EnvironmentConfig
     Without addresses, paths, drivers' settings, secrets, and what is not granted. All robots keep
     their ids, so that a guest can name one that it was not granted and be told so.
     """
-    shown = {"width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range"}
-
-    def granted(sensors: list[dict[str, object]], robot: str | None) -> list[dict[str, object]]:
-        kept = []
-        for one in sensors:
-            full = one["id"] if robot is None else f"{robot}/{one['id']}"
-            if full in grants.sense:
-                settings = one.get("settings")
-                known = settings.items() if isinstance(settings, dict) else ()
-                own = {key: value for key, value in known if key in shown}
-                driver = "simulated" if one["type"] == "camera" else None
-                kept.append({**one, "driver": driver, "settings": own})
-        return kept
-
-    whole = config.model_dump(mode="json", by_alias=True)
-    robots = [
-        {
-            "id": one["id"],
-            "limits": one["limits"],
-            "start": one["start"],
-            "start_yaw": one["start_yaw"],
-            "sensors": granted(one["sensors"], one["id"]),
-        }
-        for one in whole["robots"]
-    ]
     compute = [{"id": name, "kind": "edge"} for name in sorted(grants.compute)]
-    return EnvironmentConfig.model_validate(
-        {
-            "name": config.name,
-            "home": whole["home"],
-            "robots": robots,
-            "sensors": granted(whole["sensors"], None),
-            "compute": compute,
-        }
-    )
+    return redacted(config, sensors=grants.sense, compute=compute)

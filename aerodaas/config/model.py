@@ -51,6 +51,7 @@ __all__ = [
     "SensorConfig",
     "SimulationConfig",
     "TaskConfig",
+    "TenantConfig",
     "as_runtime_env",
     "validated",
 ]
@@ -404,14 +405,34 @@ class TaskConfig(_Strict):
     """Length of the windows, seconds."""
 
 
+class TenantConfig(_Strict):
+    """One tenant that shares edge and cloud with others, for the scheduler `sfq_dems`."""
+
+    analyses: list[ScopedName] = Field(default_factory=list)
+    """Its analyses, by name or `robot/analysis`; those of no tenant share the weight of one."""
+    weight: Positive = 1.0
+    """Its share is its weight over the sum of all tenants' that have tasks."""
+
+
 class SchedulersConfig(_Strict):
     """Default plug-ins: a registered name or `module:Class`."""
 
     trajectory: str = "ordered"
     tasks: dict[ScopedName, TaskConfig] = Field(default_factory=dict)
     """What the analytics scheduler is told of each analysis, by its name or `robot/analysis`."""
+    tenants: dict[Identifier, TenantConfig] = Field(default_factory=dict)
+    """Whose analyses are whose, for a scheduler that shares by tenant."""
     analytics: str | None = None
     """None: each analysis runs where it is deployed, on the newest item, without a dispatcher."""
+
+    @model_validator(mode="after")
+    def _one_tenant_each(self) -> Self:
+        names = [name for tenant in self.tenants.values() for name in tenant.analyses]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            message = f"more than one tenant has {', '.join(twice)}"
+            raise ValueError(message)
+        return self
 
 
 class RecordingConfig(_Strict):

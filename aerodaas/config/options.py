@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,8 +10,28 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from aerodaas.config.grants import Catalogue
+    from aerodaas.config.model import EnvironmentConfig
 
-__all__ = ["RunOptions", "current_options"]
+__all__ = ["ProviderOptions", "RunOptions", "current_options"]
+
+
+@dataclass(frozen=True)
+class ProviderOptions:
+    """What the command line asks of a provider; None keeps the service's own default."""
+
+    url: str | None = None
+    """Provider's service instead of the application's environment."""
+    minutes: float | None = None
+    """Of the lease that is requested with a mission."""
+    lease: str | None = None
+    """A lease that the account has."""
+    silence: str | None = None
+    """`continue` or `return`: what the drones do when nothing is heard of their user."""
+    silence_seconds: float | None = None
+    share: tuple[str, ...] = ()
+    """Tenants that may watch."""
+    report: Callable[[Any], None] | None = None
+    """Told of each mission that has ended, a `MissionOut`."""
 
 
 @dataclass(frozen=True)
@@ -19,6 +40,8 @@ class RunOptions:
 
     environment: Path | None = None
     """Environment file instead of the application's own."""
+    config: EnvironmentConfig | None = None
+    """Environment itself, in the place of the file's content; relative paths are the file's."""
     speed: float | None = None
     """Mission seconds per wall second."""
     lockstep: bool | None = None
@@ -32,6 +55,8 @@ class RunOptions:
     """Settings by `id.setting`, such as `camera.rate`."""
     view: bool = True
     """Show the live terminal view."""
+    report: bool = True
+    """Write the report beside the recording."""
     live: str | None = None
     """Serve Foxglove's WebSocket at this `host:port` while flying."""
     page: str | None = None
@@ -48,6 +73,8 @@ class RunOptions:
     """Rights by guest, such as `sense:cam1`; a guest without any has none."""
     catalogue: Catalogue | None = None
     """In a guest's process: what it was granted, in the place of an environment file."""
+    provider: ProviderOptions = field(default_factory=ProviderOptions)
+    """For flights on a provider's drones."""
     application: Path | None = None
     """The application's file, for relative paths and the recording's provenance."""
 

@@ -93,6 +93,7 @@ _BUILT_IN: dict[PluginKind, dict[str, str]] = {
         "dems": "aerodaas.schedulers.analytics.published.dems:Dems",
         "dems_a": "aerodaas.schedulers.analytics.published.dems_a:DemsA",
         "gems": "aerodaas.schedulers.analytics.published.gems:Gems",
+        "sfq_dems": "aerodaas.schedulers.analytics.sfq_dems:SfqDems",
         "kalmia": "aerodaas.schedulers.analytics.published.kalmia:Kalmia",
         "dedas": "aerodaas.schedulers.analytics.published.dedas:Dedas",
         "margin": "aerodaas.schedulers.analytics.margin:Margin",

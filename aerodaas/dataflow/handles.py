@@ -14,7 +14,7 @@ from aerodaas.types.data import Battery, Frame, GpsFix, Odometry
 from aerodaas.types.errors import UnknownIdError
 from aerodaas.types.status import MissionStatus
 
-__all__ = ["SENSOR_ITEMS", "Compute", "Sensor"]
+__all__ = ["SENSOR_ITEMS", "Compute", "Here", "Sensor"]
 
 E = TypeVar("E")
 
@@ -133,3 +133,23 @@ class Compute(PaperNames, ICompute):
         """
         properties = self.config.model_dump(mode="json")
         return {**properties.pop("settings"), **properties, **self._hardware()}
+
+
+class Here(PaperNames, ICompute):
+    """The user's own side, to `deploy` analyses on whose code stays with the user.
+
+    In a flight by a provider they run in the application's process, and their items come over the
+    wire; in a flight of one's own that is the edge node beside the drone.
+    """
+
+    def __init__(self, graph: Graph) -> None:
+        """The side of the user whose application has this `graph`."""
+        self.graph = graph
+
+    def get_compute_id(self) -> str:
+        """Return `here`."""
+        return "here"
+
+    def get_compute_properties(self) -> dict[str, Any]:
+        """Return `id` alone: the environment file says nothing of it."""
+        return {"id": self.get_compute_id()}

@@ -1,23 +1,31 @@
 """The mission document: an application's graph as data, which is checked and flown without code.
 
 It is JSON of a fixed format. It names analyses and schedulers that are registered where it is
-flown, and never a module, a package or an address.
+flown, and never a module, a package or an address. What is code of the application's own stays at
+its user's side: the document holds a place for it, by what it reads and what it produces.
 """
 
 from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from typing_extensions import Self
 
 from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.types import data
 from aerodaas.types.waypoints import DEFAULT_PRIORITY, Waypoint, WaypointType
 
 __all__ = [
+    "HERE_CONDITION",
+    "HERE_ITEMS",
     "AnalysisEntry",
+    "HereEntry",
+    "HereItem",
     "MissionDocument",
     "NavigationDocument",
     "SchedulerEntry",
@@ -33,6 +41,38 @@ _MOST = 64
 """Most analyses, and most triggers, inputs or settings of one."""
 _MOST_WAYPOINTS = 10_000
 _MOST_HERTZ = 1000.0
+HERE_CONDITION = "$here"
+"""Key of a condition that is code at the user's side; its value is the trigger's number."""
+HereItem: TypeAlias = Literal[
+    "AeroNavigation",
+    "Battery",
+    "Detections",
+    "GpsFix",
+    "None",
+    "Odometry",
+    "Readings",
+    "bool",
+    "float",
+    "int",
+    "object",
+    "str",
+]
+HERE_ITEMS: dict[HereItem, type] = {
+    "AeroNavigation": AeroNavigation,
+    "Battery": data.Battery,
+    "Detections": data.Detections,
+    "GpsFix": data.GpsFix,
+    "None": type(None),
+    "Odometry": data.Odometry,
+    "Readings": data.Readings,
+    "bool": bool,
+    "float": float,
+    "int": int,
+    "object": object,
+    "str": str,
+}
+"""What an analysis at the user's side may produce, by name; `object` is anything but pictures, and
+a class of the application's own is known at the user's side alone."""
 
 
 class _Entry(BaseModel):
@@ -89,13 +129,27 @@ class TriggerEntry(_Entry):
     when: Any = None
     """The condition, as a value of the document; None for every result."""
 
+    @property
+    def at_users_side(self) -> bool:
+        """Whether the condition is code that is evaluated at the user's side."""
+        return isinstance(self.when, dict) and HERE_CONDITION in self.when
+
+
+class HereEntry(_Entry):
+    """The place of an analysis that is code at the user's side."""
+
+    produces: HereItem
+    """Type of its results, a key of `HERE_ITEMS`."""
+
 
 class AnalysisEntry(_Entry):
-    """One analysis, by its registered name."""
+    """One analysis: by its registered name, or at the user's side."""
 
     id: _Name
     """Name of its stream."""
-    analysis: _Word
+    analysis: _Word | None = None
+    here: HereEntry | None = None
+    """For one at the user's side, which has neither `analysis` nor settings, compute or task."""
     settings: dict[str, Any] = Field(default_factory=dict, max_length=_MOST)
     """Arguments of its constructor."""
     reads: list[_Name] = Field(default_factory=list, max_length=_MOST)
@@ -106,6 +160,20 @@ class AnalysisEntry(_Entry):
     task: dict[str, Any] | None = None
     """Benefit and costs for the analytics scheduler, where the application set them."""
     triggers: list[TriggerEntry] = Field(default_factory=list, max_length=_MOST)
+
+    @model_validator(mode="after")
+    def _is_one_kind(self) -> Self:
+        if (self.analysis is None) == (self.here is None):
+            raise ValueError(f"{self.id} has either `analysis`, a registered name, or `here`")
+        if self.here is not None and (self.settings or self.compute or self.task):
+            raise ValueError(f"{self.id} is at the user's side: no settings, compute or task")
+        for number, one in enumerate(self.triggers):
+            if one.at_users_side and one.when != {HERE_CONDITION: number}:
+                raise ValueError(
+                    f"{self.id}: the condition of trigger {number} at the user's side is "
+                    f'{{"{HERE_CONDITION}": {number}}}'
+                )
+        return self
 
 
 class NavigationDocument(_Entry):
@@ -139,6 +207,15 @@ class MissionDocument(_Entry):
     navigation: list[NavigationDocument] = Field(min_length=1, max_length=_MOST)
     trajectory_scheduler: SchedulerEntry | None = None
     analytics_scheduler: _Word | None = None
+
+    @property
+    def here(self) -> list[str]:
+        """Ids of the analyses that need the user's side, for themselves or for a condition."""
+        return [
+            one.id
+            for one in self.analyses
+            if one.here is not None or any(trigger.at_users_side for trigger in one.triggers)
+        ]
 
     def text(self) -> str:
         """The file's content: JSON, a setting a line, so that two of them can be compared."""

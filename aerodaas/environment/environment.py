@@ -1,26 +1,26 @@
-"""Environment and Robot: the handles by which an application builds its graph and flies it."""
+"""Environment: the handle by which an application builds its graph and flies it."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from aerodaas.actors.run.checks import check_environment, sensor_properties
-from aerodaas.config.model import ComputeConfig, EnvironmentConfig, RobotConfig, SensorConfig
+from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
 from aerodaas.config.options import current_options
-from aerodaas.config.overrides import located, overridden
 from aerodaas.config.plugins import load_plugin
 from aerodaas.dataflow.graph import Graph, NavigationEdge, refusal
-from aerodaas.dataflow.handles import Compute, Sensor
-from aerodaas.dataflow.interfaces import IAeroData, IEnvironment, INavigate, IRobot, ISensor
+from aerodaas.dataflow.handles import Compute, Here, Sensor
+from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
-from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.environment.mission_run import MissionRun
 from aerodaas.environment.offering import offer
+from aerodaas.environment.robot import Robot
 from aerodaas.environment.run import Run
-from aerodaas.mission.commands import AddNavigation, Command, End, Pause, Resume, initial_commands
+from aerodaas.environment.source import EnvironmentSource
+from aerodaas.mission.commands import AddNavigation, Command, End, initial_commands
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.trajectory.base import NavigationEntry, TrajectoryScheduler
@@ -31,7 +31,7 @@ from aerodaas.types.waypoints import Waypoint
 if TYPE_CHECKING:
     from aerodaas.environment.guests import GuestNote
 
-__all__ = ["Environment", "Robot"]
+__all__ = ["Environment"]
 
 
 class Environment(PaperNames, IEnvironment):
@@ -40,37 +40,29 @@ class Environment(PaperNames, IEnvironment):
     A relative path is looked up beside the application's file, then in the working directory.
     `overrides` lays settings over the file, by `id.setting`: `{"camera.rate": 5}`.
     Raises ConfigError for a file that is missing or malformed.
+
+    `https://…` in the place of a path is the address of a provider's service: the application is
+    built against the provider's catalogue and flown on its drones, as the account of `token`, of
+    AERODAAS_TOKEN or of `aerodaas login`. Raises SourceError if the provider does not answer.
     """
 
     def __init__(
         self,
         path: str | Path = "environment.json",
         overrides: Mapping[str, Any] | None = None,
+        *,
+        token: str | None = None,
     ) -> None:
-        options = current_options.get()
-        self.path = _find(options.environment or Path(path), options.application)
-        settings = {**(overrides or {}), **options.overrides}
-        if options.seed is not None:
-            settings["simulation.seed"] = options.seed
-        if options.catalogue is not None:
-            config = options.catalogue.config
-        elif options.replay is None:
-            config = overridden(EnvironmentConfig.load(self.path), settings)
-        else:
-            from aerodaas.recording.replay.environment import (  # noqa: PLC0415 - only for a replay
-                replay_environment,
-            )
-
-            local = self.path if options.environment is not None else None
-            config = overridden(replay_environment(options.replay, local), options.overrides)
-        self.config: EnvironmentConfig = located(config, self.path.parent)
+        source = EnvironmentSource.find(path, overrides, token, current_options.get())
+        self.path, self.provider = source.path, source.client
+        self.config: EnvironmentConfig = source.config
         self.guest_notes: list[GuestNote] = []
         """What the owner is to be told of guests once a recording is open."""
-        check_environment(self.config, str(options.replay or self.path))
+        check_environment(self.config, source.place)
         self.env_data = self.config.model_dump(by_alias=True)
         """The environment file's content, for analyses that want it."""
         self.graph = Graph(sensor.full_id for sensor in self.config.all_sensors())
-        self.run: Run | None = None
+        self._mission: MissionRun | None = None
         self._flights = 0
         self._flown = 0
         """Number of the graph's navigation edges that went to flights that have ended."""
@@ -82,6 +74,11 @@ class Environment(PaperNames, IEnvironment):
         """The analytics scheduler as the application named it, if it did."""
         self._dispatch_with: AnalyticsScheduler | None = None
         self._compute: list[ComputeConfig] | None = None
+
+    @property
+    def run(self) -> Run | None:
+        """The flight of this process' own runtime; None before it, and where a provider flies."""
+        return self._mission if isinstance(self._mission, Run) else None
 
     def has_env_sensors(self) -> bool:
         """Return True if the environment has sensors."""
@@ -130,6 +127,16 @@ class Environment(PaperNames, IEnvironment):
             if resource.id == compute_id:
                 return self._resource(resource)
         raise UnknownIdError("compute resource", compute_id, [one.id for one in self.compute()])
+
+    @property
+    def here(self) -> Here:
+        """The user's own side, to `deploy` analyses on whose code stays there.
+
+        A provider flies such an analysis without its code: its items come to this process over
+        the wire, and its results go back. In a flight of one's own it runs on the edge node beside
+        the drone, as one that is not deployed.
+        """
+        return Here(self.graph)
 
     def share_out(
         self,
@@ -191,8 +198,8 @@ class Environment(PaperNames, IEnvironment):
 
     def wait(self) -> None:
         """Return when the mission has ended; raises the error that it ended with."""
-        if self.run is not None:
-            self.run.wait()
+        if self._mission is not None:
+            self._mission.wait()
 
     def set_trajectory_scheduler(self, scheduler: INavigate) -> None:
         """Plug in the trajectory scheduler; raises ConfigError if it is none.
@@ -200,8 +207,8 @@ class Environment(PaperNames, IEnvironment):
         In flight, the whole queue is planned again by it.
         """
         checked = _checked_scheduler(scheduler)
-        if self.run is not None and self.graph.flying:
-            self.run.use_scheduler(checked)
+        if self._mission is not None and self.graph.flying:
+            self._mission.use_scheduler(checked)
         self._trajectory = self.chosen_trajectory = checked
 
     def set_analytics_scheduler(self, scheduler: Any) -> None:  # noqa: ANN401 - as the interface
@@ -220,7 +227,7 @@ class Environment(PaperNames, IEnvironment):
         return Compute(self.graph, resource, partial(self._hardware, resource))
 
     def _hardware(self, resource: ComputeConfig) -> dict[str, Any]:
-        if resource.kind == "http":
+        if resource.kind == "http" or self.provider is not None:
             return {}
         from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
             ray_cluster as cluster,
@@ -232,7 +239,7 @@ class Environment(PaperNames, IEnvironment):
     def compute(self) -> list[ComputeConfig]:
         """The compute resources; those of the cluster where the file says "auto"."""
         if self._compute is None:
-            if self.config.compute == "auto":
+            if self.config.compute == "auto" and self.provider is None:
                 from aerodaas.actors.cluster import (  # noqa: PLC0415 - ray only where it is needed
                     ray_cluster as cluster,
                 )
@@ -240,7 +247,8 @@ class Environment(PaperNames, IEnvironment):
                 cluster.connect(current_options.get().address)
                 self._compute = cluster.discover()
             else:
-                self._compute = list(self.config.compute)
+                listed = self.config.compute
+                self._compute = [] if listed == "auto" else list(listed)
         return self._compute
 
     def trajectory_scheduler(self) -> TrajectoryScheduler:
@@ -335,46 +343,60 @@ class Environment(PaperNames, IEnvironment):
 
     def command(self, robot: str, command: Command) -> None:
         """Send a flying robot a command; raises MissionError if it does not fly or refuses."""
-        if self.run is None or robot not in {one.robot for one in self.graph.navigation}:
+        mission = self._mission
+        if mission is None or robot not in {one.robot for one in self.graph.navigation}:
             raise MissionError(f"{robot} is not flying: call start_mission(wait=False) first")
-        answer = self.run.command(robot, command)
+        answer = mission.command(robot, command)
         if not answer.accepted:
             raise MissionError(f"{robot}: {answer.text}")
 
     def launch(self) -> Run:
-        """Start the mission of every robot that navigates; once."""
-        if self.run is None:
-            self._admit()
-            self._start()
-        assert self.run is not None  # noqa: S101 - started just now
-        return self.run
+        """Start the mission of every robot that navigates, once, by this process' own runtime."""
+        mission = self.launched()
+        if not isinstance(mission, Run):
+            raise MissionError(f"the provider at {self.path} flies it: call start_mission()")
+        return mission
 
-    def launch_again(self) -> Run:
+    def launched(self) -> MissionRun:
+        """Start the mission of every robot that navigates, once; returns it."""
+        if self._mission is None:
+            self._admit()
+            return self._start()
+        return self._mission
+
+    def launch_again(self) -> MissionRun:
         """Start the first mission, or the next one after its end; returns a running one.
 
         The next mission flies the navigation given since the last one ended, and the streams of
         those before; without new navigation, it flies the same again.
         """
-        if self.run is None or not self.run.over:
-            return self.launch()
-        self.run.wait()
+        if self._mission is None or not self._mission.over:
+            return self.launched()
+        self._mission.wait()
         edges = self.graph.navigation
         if self._flown < len(edges) or self.trajectory_scheduler().entries:
             old, new = edges[: self._flown], edges[self._flown :]
             edges[:] = [edge for edge in old if edge.navigation.stream is not None] + new
-        self._start()
-        return self.run
+        return self._start()
 
-    def _start(self) -> None:
+    def _start(self) -> MissionRun:
         self.place_entries()
         self._flights += 1
-        run = self.run = Run(self, self._flights)
-        run.on_end.append(self._note_flown)
+        mission = self._mission = self._prepared()
+        mission.on_end.append(self._note_flown)
         try:
-            run.start()
+            mission.start()
         except BaseException:
-            self.run = None
+            self._mission = None
             raise
+        return mission
+
+    def _prepared(self) -> MissionRun:
+        if self.provider is None:
+            return Run(self, self._flights)
+        from aerodaas.environment.provider.run import ProvidedRun  # noqa: PLC0415 - only then
+
+        return ProvidedRun(self, self.provider, self._flights)
 
     def _note_flown(self) -> None:
         self._flown = len(self.graph.navigation)
@@ -405,100 +427,6 @@ def _checked_scheduler(scheduler: object) -> TrajectoryScheduler:
     return scheduler
 
 
-class Robot(PaperNames, IRobot):
-    """One drone of an environment."""
-
-    def __init__(self, environment: Environment, config: RobotConfig) -> None:
-        self._environment = environment
-        self.config = config
-        self.robot_id = config.id
-        self.start_hooks: list[Callable[[], None]] = []
-        self.end_hooks: list[Callable[[], None]] = []
-
-    def has_sensors(self) -> bool:
-        """Return True if the robot has any onboard sensors."""
-        return bool(self.config.sensors)
-
-    def get_sensors(self) -> list[ISensor[Any]]:
-        """Return all the sensors on board."""
-        return [self._environment.sensor(sensor) for sensor in self.config.sensors]
-
-    def get_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
-        """Return the requested sensor; raises UnknownIdError."""
-        for sensor in self.config.sensors:
-            if sensor_id in {sensor.id, sensor.full_id}:
-                return self._environment.sensor(sensor)
-        known = [sensor.id for sensor in self.config.sensors]
-        raise UnknownIdError(f"sensor of {self.robot_id}", sensor_id, known)
-
-    def is_navigable(self) -> bool:
-        """Return True if the robot is navigable: its driver takes setpoints."""
-        capabilities = load_plugin("drivers", self.config.driver)(
-            self.config, self._environment.config
-        ).capabilities
-        return bool(capabilities.position_setpoints or capabilities.velocity_setpoints)
-
-    def navigate(self, data: IAeroData[Any]) -> None:
-        """Fly by this navigation: waypoints, or a stream of navigation; in flight, from now on.
-
-        Raises GraphError if `data` is neither, or if this robot is not in the mission that flies,
-        and MissionError for what the mission refuses in flight.
-        """
-        navigation = data
-        if not isinstance(data, IAeroData):
-            raise refusal(
-                f"{self.robot_id} navigates by AeroListData([Waypoint(…), …]), AeroNavigation or a "
-                f"stream of navigation, not by {type(data).__name__}"
-            )
-        if not isinstance(navigation, AeroNavigation):
-            navigation = self._environment.trajectory_scheduler().generate_navigation(data)
-        stream = navigation.stream
-        if stream is not None and not issubclass(stream.item, AeroNavigation):
-            raise GraphError(
-                f"{self.robot_id} cannot navigate by {stream.name}, which carries "
-                f"{stream.item.__name__}; put a follow analysis between"
-            )
-        if stream is not None and stream.graph is not self._environment.graph:
-            raise GraphError(f"{stream.name} belongs to another Environment than {self.robot_id}")
-        self._environment.fly_by(NavigationEdge(self.robot_id, navigation))
-
-    def start_mission(self, hook: Callable[[], None] | None = None, *, wait: bool = True) -> None:
-        """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
-
-        With `wait=False`, return as soon as it flies; as a guest of another application, which
-        flies, at once. While the mission flies, this waits for it; after its end, it flies again:
-        the navigation given to `navigate` since, or else the same. Raises
-        the project's errors; whatever happens, the drone is landed and the recording closed first.
-        """
-        self._environment.start_mission(hook, wait=wait)
-
-    def end_mission(self) -> None:
-        """End the mission: land here; the hooks of `on_end` run once it is over."""
-        self._environment.command(self.robot_id, End())
-
-    def pause_mission(self) -> None:
-        """Pause the ongoing mission by putting the drone in hover mode."""
-        self._environment.command(self.robot_id, Pause())
-
-    def resume_mission(self) -> None:
-        """Resume the ongoing mission."""
-        self._environment.command(self.robot_id, Resume())
-
-    def wait(self) -> None:
-        """Return when the mission has ended; raises the error that it ended with."""
-        self._environment.launch().wait()
-
-    def on_start(self, hook: Callable[[], None]) -> Callable[[], None]:
-        """Register a hook to run before take-off; usable as a decorator."""
-        self.start_hooks.append(hook)
-        return hook
-
-    def on_end(self, hook: Callable[[], None]) -> Callable[[], None]:
-        """Register a hook to run after the mission has ended; usable as a decorator."""
-        self.end_hooks.append(hook)
-        return hook
-
-
 def _addressee(entry: NavigationEntry, flying: list[str]) -> str:
     """The robot of navigation without a robot's name; raises GraphError if there are several."""
     if entry.robot is not None:
@@ -517,15 +445,3 @@ def _edge(robot: str, entry: NavigationEntry) -> NavigationEdge:
     stream = entry.navigation.stream
     clear_on = stream.name if entry.clear_first and stream is not None else None
     return NavigationEdge(robot, entry.navigation, entry.index, entry.deadline, clear_on)
-
-
-def _find(path: Path, application: Path | None) -> Path:
-    if path.is_absolute():
-        return path
-    main = getattr(sys.modules.get("__main__"), "__file__", None)
-    beside = application or (Path(main) if main else None)
-    candidates = [beside.parent / path] if beside is not None else []
-    for candidate in [*candidates, path]:
-        if candidate.exists():
-            return candidate
-    return path

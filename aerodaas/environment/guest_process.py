@@ -12,8 +12,6 @@ import runpy
 import sys
 import traceback
 import types
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +23,8 @@ from aerodaas.analytics.guests.document import (
     GuestNode,
     GuestTrigger,
 )
-from aerodaas.analytics.guests.items import encoded
+from aerodaas.analytics.guests.works import Works
+from aerodaas.analytics.item_json import encoded
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.graph import NavigationEdge, Node, application_line
 from aerodaas.dataflow.navigation import AeroNavigation
@@ -38,8 +37,6 @@ from aerodaas.types.waypoints import SchedulingType
 if TYPE_CHECKING:
     from aerodaas.config.grants import Catalogue
     from aerodaas.environment.environment import Environment
-    from aerodaas.types.data import Alert
-    from aerodaas.types.vehicle import VehicleState
 
 __all__ = ["serve"]
 
@@ -57,8 +54,7 @@ class _Server:
     """The guest's program, once it is built or decoded."""
 
     def __init__(self) -> None:
-        self._works: dict[str, Any] = {}
-        self._conditions: dict[str, list[Callable[[Any], bool] | None]] = {}
+        self._works = Works({}, {}, _opaque, _revealed)
 
     def answer(self, request: dict[str, Any], blob: bytes) -> tuple[dict[str, Any], bytes]:
         if request["do"] == "build":
@@ -71,56 +67,23 @@ class _Server:
     def _open(self, program: bytes) -> None:
         application, content = pickle.loads(program)  # noqa: S301 - the guest's own
         pickle.loads(application)  # noqa: S301 - makes its modules available
-        self._works, self._conditions = pickle.loads(content)  # noqa: S301
-        for work in self._works.values():
-            work.open()
+        works, conditions = pickle.loads(content)  # noqa: S301
+        self._works = Works(works, conditions, _opaque, _revealed)
+        self._works.open()
 
     def _process(self, request: dict[str, Any], blob: bytes) -> dict[str, Any]:
         item, vehicle = pickle.loads(blob)  # noqa: S301 - the owner's
-        key = request["key"]
-        context = _Context(request["now"], vehicle, request["on"])
-        try:
-            if isinstance(item, GuestItem):
-                item = pickle.loads(item.data)  # noqa: S301 - the guest's own
-            result = self._works[key].process(item, context)
-            fired = [
-                number
-                for number, when in enumerate(self._conditions[key])
-                if result is not None and (when is None or when(result))
-            ]
-            return {"item": encoded(result, _opaque), "fired": fired, "alerts": context.alerts}
-        except Exception as error:  # noqa: BLE001 - a guest's analysis may raise anything
-            return {"failed": failure_line(error), "alerts": context.alerts}
-
-
-@dataclass
-class _Context:
-    """Services for an analysis of the guest."""
-
-    _now: int
-    _vehicle: VehicleState | None
-    kind: Any
-
-    def __post_init__(self) -> None:
-        self.alerts: list[str] = []
-
-    def now(self) -> int:
-        """Mission time of the item, nanoseconds."""
-        return self._now
-
-    def vehicle(self) -> VehicleState | None:
-        """State of the vehicle at the item; None unless one of its sensors is granted."""
-        return self._vehicle
-
-    def alert(self, alert: Alert) -> None:
-        """Send an alert's text with the result."""
-        self.alerts.append(f"{alert.kind}: {alert.text}")
+        return self._works.process(request["key"], item, request["now"], vehicle, request["on"])
 
 
 def _opaque(item: object) -> GuestItem:
     from aerodaas.actors.streams.definitions import pickled_class  # noqa: PLC0415 - loads Ray's
 
     return GuestItem(type(item).__name__, plain(item), pickled_class(item))
+
+
+def _revealed(item: GuestItem) -> object:
+    return pickle.loads(item.data)  # noqa: S301 - the guest's own
 
 
 def _built(catalogue: Catalogue, application: Path) -> tuple[dict[str, Any], bytes]:

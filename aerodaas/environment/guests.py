@@ -13,7 +13,8 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from aerodaas.analytics.guests.analysis import GuestAnalysis, GuestCondition
+from aerodaas.analytics.guests.analysis import GuestAnalysis
+from aerodaas.analytics.guests.answers import AnsweredCondition
 from aerodaas.analytics.guests.channel import GuestError
 from aerodaas.analytics.guests.document import (
     GuestDocument,
@@ -21,8 +22,8 @@ from aerodaas.analytics.guests.document import (
     GuestNode,
     read_document,
 )
-from aerodaas.analytics.guests.items import decoded
 from aerodaas.analytics.guests.process import GuestProcess
+from aerodaas.analytics.item_json import decoded
 from aerodaas.config.checked import near
 from aerodaas.config.grants import Catalogue, GuestGrants, parse_grants, reduced
 from aerodaas.config.options import RunOptions
@@ -155,7 +156,7 @@ class _Admission:
                 Trigger(
                     self._names[one.target] if one.method is None else one.target,
                     one.method,
-                    GuestCondition(self._guest, node.id, number),
+                    AnsweredCondition(self._guest, node.id, number),
                 )
                 for number, one in enumerate(node.triggers)
             ]

@@ -7,15 +7,14 @@ import os
 import threading
 import time
 from collections.abc import Callable
-from datetime import datetime
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from aerodaas.actors.run.checks import check_served
 from aerodaas.actors.stream_names import is_guest_actor
 from aerodaas.config.extras import require_extra
-from aerodaas.config.model import EnvironmentConfig, TaskConfig
-from aerodaas.config.options import RunOptions, current_options
+from aerodaas.config.model import TaskConfig
+from aerodaas.config.options import current_options
+from aerodaas.environment.mission_run import recording_path
 from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_termination
 from aerodaas.mission.commands import Answer, Command, End
 from aerodaas.types.clock import seconds
@@ -48,7 +47,6 @@ _BEAT_AGE = 1.5
 """Wall seconds after the last look at which a heartbeat needs one of its own."""
 _LANDING_SECONDS = 60.0
 """Wall seconds for the drones to land after an interruption."""
-_RECORDING = "flight.mcap"
 _STEPPED = {"simulated", "replayed"}
 """Drivers of vehicles whose time the run controls."""
 
@@ -62,7 +60,7 @@ class Run:
         self.config = environment.config
         self.graph = environment.graph
         self.on_end: list[Callable[[], None]] = []
-        self.recording = _recording_path(self.options, self.config, number)
+        self.recording = recording_path(self.options, self.config, number)
         self.state: FlightState | None = None
         self._environment = environment
         self._flight: Flight | None = None
@@ -367,8 +365,9 @@ class Run:
         show_speed(
             self.options, seconds(max(stamps, default=0)), flown, self._launched - self._began
         )
-        source = self.config.recording.application_source
-        show_results(self.options, self._flight.recording, source_recorded=source)
+        if self.options.report:
+            source = self.config.recording.application_source
+            show_results(self.options, self._flight.recording, source_recorded=source)
         if self._flight.headless:
             show_headless(self._flight.headless, self._flight.recording)
 
@@ -400,16 +399,3 @@ class Run:
         ]
         if problems:
             raise MissionError("; ".join(dict.fromkeys(problems)))
-
-
-def _recording_path(options: RunOptions, config: EnvironmentConfig, number: int) -> Path | None:
-    if not config.recording.enabled:
-        return None
-    wanted = options.record or (Path(config.recording.path) if config.recording.path else None)
-    if wanted is None:
-        name = options.application.stem if options.application else config.name
-        now = datetime.now().astimezone()
-        wanted = Path("runs") / f"{name}-{now:%Y%m%d-%H%M%S}"
-    path = wanted if wanted.suffix == ".mcap" else wanted / _RECORDING
-    # One environment may fly several times.
-    return path if number == 1 else path.with_stem(f"{path.stem}-{number}")

@@ -13,9 +13,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.recording.decoding.limits import MAX_PIXELS, MAX_SIDE
-from aerodaas.recording.decoding.picture_size import picture_size
 from aerodaas.types.errors import SourceError
+from aerodaas.types.picture_size import picture_fits, picture_size
 
 __all__ = [
     "IMAGE_SCHEMAS",
@@ -79,7 +78,7 @@ def decode_image(schema: str, value: Any) -> NDArray[np.uint8] | None:  # noqa: 
         if schema not in _COMPRESSED:
             return _decode_raw(value, data)
         size = picture_size(encoded)
-        if size is None or not _fits(*size):
+        if size is None or not picture_fits(*size):
             return None
         image = cv2.imdecode(data, cv2.IMREAD_COLOR)
     except cv2.error:
@@ -114,10 +113,6 @@ def check_picture(value: Any, *, video: bool) -> None:  # noqa: ANN401 - by sche
             raise ValueError(f"its {name} is no natural number")
 
 
-def _fits(width: int, height: int) -> bool:
-    return 0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE and width * height <= MAX_PIXELS
-
-
 def _decode_raw(value: Any, data: NDArray[np.uint8]) -> NDArray[np.uint8] | None:  # noqa: ANN401
     encoding = str(picture_field(value, "encoding"))
     layout = _LAYOUTS.get(encoding)
@@ -145,7 +140,7 @@ def _pixels(
     width, height = (int(picture_field(value, side, 0)) for side in ("width", "height"))
     pixel = layout.channels * np.dtype(layout.kind).itemsize
     step = int(picture_field(value, "step", 0)) or width * pixel
-    if not _fits(width, height) or step < width * pixel or data.size < step * height:
+    if not picture_fits(width, height) or step < width * pixel or data.size < step * height:
         return None
     rows = data[: step * height].reshape(height, step)[:, : width * pixel]
     order = ">" if picture_field(value, "is_bigendian", default=0) else "<"

@@ -113,6 +113,7 @@ _ALLOWED: dict[str, Rule] = {
         "trajectory": _named("trajectory_schedulers"),
         "analytics": _named("analytics_schedulers"),
         "tasks": {_ANY_KEY: _TASK},
+        "tenants": {_ANY_KEY: _fields("analyses", "weight")},
     },
     "simulation": _fields("seed", "wind", "gust", "sensor_noise"),
 }

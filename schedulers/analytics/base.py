@@ -89,6 +89,10 @@ class Profile:
     qoe: QoeGoal | None = None
     urgent: bool = True
     """False where a result a little after the deadline is still of use (the Kalmia variant)."""
+    tenant: str = ""
+    """Whose share of edge and cloud it uses; see `SfqDems`."""
+    weight: float = 1.0
+    """The tenant's weight, the same in all of its profiles."""
     edge_gain: float = field(init=False)
     """Gain of finishing in time on the edge: benefit less cost."""
     cloud_gain: float = field(init=False)
@@ -98,7 +102,7 @@ class Profile:
         """Derive the gains; refuse figures that no scheduler could work with."""
         object.__setattr__(self, "edge_gain", self.benefit - self.edge_cost)
         object.__setattr__(self, "cloud_gain", self.benefit - self.cloud_cost)
-        for name in ("deadline", "edge_time", "cloud_time"):
+        for name in ("deadline", "edge_time", "cloud_time", "weight"):
             if not 0 < getattr(self, name) < math.inf:
                 raise SchedulerError(
                     f"model {self.model!r}: {name} must be positive, not {getattr(self, name)}"

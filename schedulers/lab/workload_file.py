@@ -46,6 +46,8 @@ class _Model(_Strict):
     qoe_share: Annotated[float, Field(ge=0, le=1)] = 0.9
     qoe_window_s: Positive = 20.0
     urgent: bool = True
+    tenant: str = ""
+    weight: Positive = 1.0
 
     def profile(self, name: str) -> Profile:
         goal = QoeGoal(self.qoe_bonus, self.qoe_share, round(self.qoe_window_s * NANOSECONDS))
@@ -59,6 +61,8 @@ class _Model(_Strict):
             self.cloud_cost,
             goal if self.qoe_bonus else None,
             self.urgent,
+            self.tenant,
+            self.weight,
         )
 
 

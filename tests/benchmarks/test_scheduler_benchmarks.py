@@ -12,9 +12,10 @@ from bench_runs import run_benchmark
 @pytest.mark.parametrize(
     ("name", "arguments", "cases"),
     [
-        ("schedulers", "--workload 2D-P --case nominal --seeds 2 --duration 4", 16),
+        ("schedulers", "--workload 2D-P --case nominal --seeds 2 --duration 4", 17),
         ("decision", "--scheduler edf,margin --waiting 5,20 --rounds 10", 4),
         ("lab", "--scheduler edf --edges 1 --duration 2", 2),
+        ("fairness", "--seeds 1 --duration 4", 12),
     ],
 )
 def test_it_prints_a_table_and_writes_the_same_figures(

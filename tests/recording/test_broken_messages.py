@@ -13,8 +13,8 @@ from synthetic_flight import SyntheticFlight, record
 from typer.testing import CliRunner
 
 from aerodaas.cli.app import app
-from aerodaas.cli.printable import printable
 from aerodaas.config.model import RecordingConfig
+from aerodaas.config.printable import printable
 from aerodaas.recording.decoding.messages import decode_json
 from aerodaas.recording.export.tabular import table_of
 from aerodaas.recording.export.track import write_gpx, write_kml

@@ -123,7 +123,7 @@ def filled(place: list[str], value: object) -> dict[str, Any]:
         content = {place[depth]: content}
         if depth and place[depth - 1] in {"robots", "sensors", "compute"}:
             content = [content]
-        elif depth and place[depth - 1] in {"tasks", "runtime_env"}:
+        elif depth and place[depth - 1] in {"tasks", "tenants", "runtime_env"}:
             content = {"any": content}
     return typing.cast("dict[str, Any]", content)
 

@@ -23,14 +23,13 @@ from aerodaas.recording.decoding.limits import (
     MAX_CHANNELS,
     MAX_CHUNK,
     MAX_METADATA,
-    MAX_PIXELS,
 )
-from aerodaas.recording.decoding.picture_size import picture_size
 from aerodaas.recording.h264 import H264Decoder, H264Encoder
 from aerodaas.recording.images import check_picture, decode_image
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.report import write_report
 from aerodaas.types.errors import RecordingError
+from aerodaas.types.picture_size import MAX_PIXELS, picture_size
 
 MAGIC = b"\x89MCAP0\r\n"
 COMPRESSED = "foxglove.CompressedImage"

@@ -8,46 +8,25 @@ from __future__ import annotations
 
 import pickle
 import threading
-from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.analytics.base import Analytics, Context
+from aerodaas.analytics.guests.answers import AnswerReader
 from aerodaas.analytics.guests.channel import GuestError
-from aerodaas.analytics.guests.items import ItemError, decoded
 from aerodaas.analytics.guests.process import GuestProcess
 from aerodaas.config.grants import GuestQuota
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types.data import Alert, Header
 from aerodaas.types.errors import ModelError
 
-__all__ = ["GuestAnalysis", "GuestCondition"]
+__all__ = ["GuestAnalysis"]
 
 _OPENING = 40.0
 """Wall seconds for a guest to open its analyses: models are large."""
 _ITEM = 4.0
 """Wall seconds for a guest to process one item; shorter than the alert of a hung analysis."""
-_ALERTS = 100
-"""Most alerts of one analysis in a flight."""
-_TEXT = 500
 _processes: dict[str, GuestProcess] = {}
 """Running guests of this actor."""
-_fired: dict[tuple[str, str], frozenset[int]] = {}
-"""Triggers whose condition the last result met, by guest and analysis."""
 _lock = threading.Lock()
-
-
-@dataclass(frozen=True)
-class GuestCondition:
-    """Condition of a trigger that the guest's process has evaluated."""
-
-    guest: str
-    key: str
-    number: int
-
-    def __call__(self, result: object) -> bool:
-        """Whether the newest result met it."""
-        del result
-        return self.number in _fired.get((self.guest, self.key), ())
 
 
 class GuestAnalysis(Analytics[Any]):
@@ -77,11 +56,11 @@ class GuestAnalysis(Analytics[Any]):
         self.guest = guest
         self.key = key
         self.quota = quota
-        self.navigates = navigates
         self.sees_vehicle = sees_vehicle
         self.program = program
-        self._alerts = 0
         self._failed = ""
+        produces = AeroNavigation if navigates else object
+        self._answers = AnswerReader(guest, key, produces, kind="guest", title=f"guest {guest}")
 
     def open(self) -> None:
         """Start the guest's process with its first analysis; one that fails stays silent."""
@@ -98,7 +77,7 @@ class GuestAnalysis(Analytics[Any]):
 
     def process(self, item: Any, context: Context) -> Any:  # noqa: ANN401 - any result
         """Ask the guest's process; None, and an error once, if it has ended."""
-        _fired.pop((self.guest, self.key), None)
+        self._answers.forget()
         process = _processes.get(self.guest)
         if process is None:
             failed, self._failed = self._failed, ""
@@ -110,7 +89,7 @@ class GuestAnalysis(Analytics[Any]):
             blob = pickle.dumps((item, vehicle), protocol=5)
             request = {"do": "process", "key": self.key, "now": context.now(), "on": context.kind}
             answer, _ = process.ask(request, blob, _ITEM)
-            return self._result(answer, context)
+            return self._answers.read(answer, context)
         except GuestError as error:
             if process.told:
                 return None
@@ -123,26 +102,3 @@ class GuestAnalysis(Analytics[Any]):
             process = _processes.pop(self.guest, None) if self.program else None
         if process is not None:
             process.end()
-
-    def _result(self, answer: dict[str, Any], context: Context) -> Any:  # noqa: ANN401
-        for text in _texts(answer.get("alerts"))[: max(0, _ALERTS - self._alerts)]:
-            self._alerts += 1
-            header = Header(self._alerts, context.now(), self.guest)
-            context.alert(Alert(header, "guest", f"{self.guest}: {text}"))
-        failed = answer.get("failed")
-        if failed:
-            raise ModelError(f"guest {self.guest}: {str(failed)[:_TEXT]}")
-        result = decoded(answer.get("item"))
-        if self.navigates and not isinstance(result, AeroNavigation | None):
-            raise ItemError(
-                f"guest {self.guest}: {self.key} declares navigation and sent "
-                f"{type(result).__name__}"
-            )
-        fired = answer.get("fired")
-        numbers = fired if isinstance(fired, list) else []
-        _fired[self.guest, self.key] = frozenset(one for one in numbers if isinstance(one, int))
-        return result
-
-
-def _texts(found: object) -> list[str]:
-    return [str(one)[:_TEXT] for one in found] if isinstance(found, list) else []

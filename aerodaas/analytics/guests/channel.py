@@ -10,13 +10,14 @@ from typing import Any
 
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["LARGEST_BLOB", "LARGEST_TEXT", "Channel", "GuestError"]
+__all__ = ["HEAD", "LARGEST_BLOB", "LARGEST_TEXT", "Channel", "GuestError"]
 
 LARGEST_TEXT = 4 << 20
 """Bytes of a message's JSON."""
 LARGEST_BLOB = 64 << 20
 """Bytes of a message's blob: a program with its models, or a picture."""
-_HEAD = struct.Struct("<II")
+HEAD = struct.Struct("<II")
+"""Before each message: bytes of its JSON, and of its blob."""
 
 
 class GuestError(AeroDaaSError):
@@ -37,7 +38,7 @@ class Channel:
             raise GuestError(f"a message of {len(data)} and {len(blob)} bytes is too large")
         try:
             self._socket.settimeout(timeout)
-            self._socket.sendall(_HEAD.pack(len(data), len(blob)) + data + blob)
+            self._socket.sendall(HEAD.pack(len(data), len(blob)) + data + blob)
         except TimeoutError:
             raise GuestError(f"took no message for {timeout:g} s") from None
         except OSError as error:
@@ -46,7 +47,7 @@ class Channel:
     def receive(self, timeout: float | None = None) -> tuple[dict[str, Any], bytes]:
         """Receive one message; raises GuestError for none in time, and for a malformed one."""
         until = None if timeout is None else time.monotonic() + timeout
-        text, blob = _HEAD.unpack(self._read(_HEAD.size, until))
+        text, blob = HEAD.unpack(self._read(HEAD.size, until))
         if text > LARGEST_TEXT or blob > LARGEST_BLOB:
             raise GuestError(
                 f"sent a message of {text} and {blob} bytes; the most are {LARGEST_TEXT} and "

@@ -28,9 +28,13 @@ class WrongTokens:
     """
 
     def __init__(
-        self, tell: Callable[[str], None], clock: Callable[[], float] = time.monotonic
+        self,
+        tell: Callable[[str], None],
+        clock: Callable[[], float] = time.monotonic,
+        what: str = "remote control",
     ) -> None:
-        """Tell people through `tell`, once for each peer and period."""
+        """Tell people of `what` through `tell`, once for each peer and period."""
+        self._what = what
         self._tell = tell
         self._clock = clock
         self._peers: OrderedDict[str, tuple[float, int]] = OrderedDict()
@@ -50,10 +54,10 @@ class WrongTokens:
             self._peers.popitem(last=False)
         since, overall = self._overall = _later(self._overall, now)
         if count == _TOLD and now >= self._silent_until:
-            self._tell(f"remote control: {count} wrong tokens from {peer}")
+            self._tell(f"{self._what}: {count} wrong tokens from {peer}")
         elif overall == _FREE_OVERALL and now >= self._silent_until:
             self._silent_until = now + _PERIOD
-            self._tell(f"remote control: {overall} wrong tokens from several addresses")
+            self._tell(f"{self._what}: {overall} wrong tokens from several addresses")
         if count > _FREE:
             return max(1, round(began + _PERIOD - now))
         return max(1, round(since + _PERIOD - now)) if overall > _FREE_OVERALL else 0

@@ -2,46 +2,83 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from aerodaas.analytics.base import Analytics
+from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.config.checked import explained
 from aerodaas.config.model import TaskConfig
 from aerodaas.config.plugins import PluginKind
-from aerodaas.dataflow.graph import NavigationEdge, Trigger
-from aerodaas.dataflow.mission_document import MissionDocument, WaypointEntry
+from aerodaas.dataflow.graph import NavigationEdge, Node, Trigger
+from aerodaas.dataflow.mission_document import (
+    HERE_CONDITION,
+    HERE_ITEMS,
+    MissionDocument,
+    WaypointEntry,
+)
+from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.document.values import ValueWriter, registered_name
-from aerodaas.environment.environment import Environment, Robot
+from aerodaas.environment.environment import Environment
+from aerodaas.environment.robot import Robot
+from aerodaas.types.data import Frame
 from aerodaas.types.errors import GraphError
 from aerodaas.types.waypoints import SchedulingType
 
-__all__ = ["write_mission"]
+__all__ = ["WrittenMission", "compile_mission", "write_mission"]
 
 
-def write_mission(environment: Environment, name: str) -> MissionDocument:
+@dataclass(frozen=True)
+class WrittenMission:
+    """A document and the files that it names."""
+
+    document: MissionDocument
+    models: Mapping[str, Path]
+    """Files of models by SHA-256."""
+
+
+def write_mission(environment: Environment, name: str, *, here: bool = False) -> MissionDocument:
     """The graph of an application as a document.
 
     Args:
         environment: The application's, ready to start.
         name: Name of the application.
+        here: Whether the user's side is there in flight: then analyses that are not registered
+            and not deployed elsewhere, and conditions that are code, stay there, as do hooks and
+            callbacks. Without it, analyses that are deployed on `env.here` do.
 
     Raises:
         GraphError: For what no document can hold, by name and with the remedy.
     """
-    return _Compiler(environment).document(name)
+    return compile_mission(environment, name, here=here).document
+
+
+def compile_mission(environment: Environment, name: str, *, here: bool = False) -> WrittenMission:
+    """The graph of an application as a document, with the models that it names.
+
+    It takes the arguments of `write_mission`, and raises what that raises.
+    """
+    compiler = _Compiler(environment, here=here)
+    return WrittenMission(compiler.document(name), compiler.models)
 
 
 class _Compiler:
     """Writer of one application."""
 
-    def __init__(self, environment: Environment) -> None:
+    def __init__(self, environment: Environment, *, here: bool) -> None:
         self._environment = environment
+        self._here = here
         self._graph = environment.graph
         self._values = ValueWriter(environment)
         self._works = list(dict.fromkeys(call.work for call in self._graph.calls))
+
+    @property
+    def models(self) -> Mapping[str, Path]:
+        return self._values.models
 
     def document(self, name: str) -> MissionDocument:
         self._require_data()
@@ -52,7 +89,7 @@ class _Compiler:
             "name": name,
             "environment": self._environment.path.name,
             "sensors": [one.id for one in self._graph.nodes.values() if one.kind == "sensor"],
-            "analyses": [self._analysis(work) for work in self._works],
+            "analyses": [entry for work in self._works for entry in self._entries(work)],
             "navigation": [self._navigation(edge) for edge in self._graph.navigation],
             "trajectory_scheduler": self._trajectory(),
             "analytics_scheduler": self._analytics(),
@@ -65,14 +102,16 @@ class _Compiler:
     def _require_data(self) -> None:
         """Raise GraphError for functions of the application that would run in its process."""
         hooks = [robot for robot in self._environment.get_env_robots() if _has_hooks(robot)]
-        if hooks or self._graph.on_launch:
+        # Where the user's side is there, the application runs its own functions.
+        if not self._here and (hooks or self._graph.on_launch):
             what = "hooks of on_start or on_end" if hooks else "callbacks of subscribe()"
             raise GraphError(f"a document has no {what}, which are the application's own code")
         edges = self._graph.navigation
         if not edges and not self._environment.navigation_waiting():
             raise GraphError("nothing flies: call navigate() before start_mission()")
 
-    def _analysis(self, work: Analytics[Any]) -> dict[str, Any]:
+    def _entries(self, work: Analytics[Any]) -> Iterator[dict[str, Any]]:
+        """The entry of an analysis, after those of analyses that it has started for itself."""
         node = work.node
         if node is None:
             raise GraphError(f"{type(work).__name__} was taken out of the graph again")
@@ -81,6 +120,39 @@ class _Compiler:
                 f"{node.id}: a document has no runtime_env; the environment file of whoever flies "
                 "it may give one"
             )
+        if self._stays_here(work):
+            yield from self._at_users_side(node)
+        else:
+            yield self._analysis(work, node)
+
+    def _stays_here(self, work: Analytics[Any]) -> bool:
+        if work.deployed_here:
+            return True
+        by_default = self._here and work.node is not None and work.node.compute is None
+        return by_default and registered_name("analytics", type(work)) is None
+
+    def _at_users_side(self, node: Node) -> Iterator[dict[str, Any]]:
+        if isinstance(node.work, CommandingAnalytics):
+            raise GraphError(
+                f"{node.id} commands the drone, and cannot stay at the user's side: deploy it on "
+                "a compute resource of the environment"
+            )
+        given = {work.node.id for work in self._works if work.node is not None}
+        for name in node.inputs:
+            inner = self._graph.nodes[name]
+            if inner.kind != "sensor" and name not in given:
+                yield from self._at_users_side(inner)
+        yield {
+            "id": node.id,
+            "here": {"produces": _produced(node)},
+            "reads": list(node.inputs),
+            "rate": float(node.work.rate) if node.kind == "external" else None,
+            "triggers": [
+                _at_users_side(one, number) for number, one in enumerate(node.work.given_triggers)
+            ],
+        }
+
+    def _analysis(self, work: Analytics[Any], node: Node) -> dict[str, Any]:
         name, settings = self._values.analysis(work)
         calls = [call.stream for call in self._graph.calls if call.work is work]
         task = vars(work).get("task")
@@ -94,14 +166,18 @@ class _Compiler:
             "task": task.model_dump(exclude_defaults=True)
             if isinstance(task, TaskConfig)
             else None,
-            "triggers": [self._trigger(work, one) for one in work.given_triggers],
+            "triggers": [
+                self._trigger(work, one, number) for number, one in enumerate(work.given_triggers)
+            ],
         }
 
-    def _trigger(self, work: Analytics[Any], trigger: Trigger) -> dict[str, Any]:
+    def _trigger(self, work: Analytics[Any], trigger: Trigger, number: int) -> dict[str, Any]:
         place = f"{type(work).__name__}.trigger(when=…)"
         try:
             when = None if trigger.when is None else self._values.value(trigger.when, place)
         except GraphError as error:
+            if self._here:
+                return _at_users_side(trigger, number)
             remedy = "aerodaas.analytics has conditions that are data: Near, Above, Below"
             raise GraphError(f"{error}; {remedy}") from None
         return {"target": trigger.target, "command": trigger.method, "when": when}
@@ -141,6 +217,25 @@ class _Compiler:
         if chosen is None or (isinstance(chosen, str) and ":" not in chosen):
             return chosen
         raise _own_code(str(chosen), "analytics_schedulers")
+
+
+def _produced(node: Node) -> str:
+    """Name of what an analysis at the user's side produces; raises GraphError for pictures."""
+    if issubclass(node.item, Frame):
+        raise GraphError(
+            f"{node.id} produces pictures, which do not go back from the user's side: let it "
+            "produce what it finds in them"
+        )
+    known = {kind: name for name, kind in HERE_ITEMS.items()}
+    # A subclass of navigation goes over the wire as navigation; any other class is its own.
+    if issubclass(node.item, AeroNavigation):
+        return known[AeroNavigation]
+    return known.get(node.item, known[object])
+
+
+def _at_users_side(trigger: Trigger, number: int) -> dict[str, Any]:
+    when = None if trigger.when is None else {HERE_CONDITION: number}
+    return {"target": trigger.target, "command": trigger.method, "when": when}
 
 
 def _own_code(what: str, kind: PluginKind) -> GraphError:

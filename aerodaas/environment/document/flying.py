@@ -62,7 +62,11 @@ def fly_mission(path: Path, options: RunOptions) -> None:
     """
     document = read_mission(path)
     current_options.set(options)
-    environment = Environment(options.environment or _environment_of(document, path))
+    # A provider's catalogue needs no file.
+    provided = options.provider.url is not None
+    environment = Environment(
+        options.environment or ("" if provided else _environment_of(document, path))
+    )
     try:
         build_mission(document, environment, path.resolve().parent / _MODELS)
     except AeroDaaSError as error:

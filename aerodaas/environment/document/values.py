@@ -58,15 +58,18 @@ class ValueWriter:
     def __init__(self, environment: Environment) -> None:
         """Know the `environment`, to which values may refer."""
         self._environment = environment
+        self.models: dict[str, Path] = {}
+        """Files of the models that were written, by SHA-256."""
 
     def analysis(self, work: Analytics[Any]) -> tuple[str, dict[str, Any]]:
         """Registered name and settings of an analysis; raises GraphError if it has none."""
         name = registered_name("analytics", type(work))
         if name is None:
             raise GraphError(
-                f"{type(work).__name__} is the application's own code, and a document holds "
-                "registered analyses only: have its package register it as an entry point of "
-                "`aerodaas.analytics`, or fly the application itself"
+                f"{type(work).__name__} is the application's own code, which no document holds: "
+                "keep it at your side by deploy(env.here), where it runs while a provider flies "
+                "the rest, or have its package register it as an entry point of "
+                "`aerodaas.analytics` wherever it is to fly"
             )
         return name, self.settings(work.given_settings(), work.resources, name)
 
@@ -127,7 +130,9 @@ class ValueWriter:
             raise GraphError(f"{place} comes from the environment file alone: leave it out")
         path = Path(str(value))
         if use == "model":
-            return {"$model": path.name, "sha256": _hash_of(path)}
+            sha256 = _hash_of(path)
+            self.models[sha256] = path
+            return {"$model": path.name, "sha256": sha256}
         if use == "output":
             return {"$output": path.name}
         for sensor in self._environment.config.all_sensors():

@@ -15,10 +15,7 @@ __all__ = [
     "MAX_JSON",
     "MAX_KEYS",
     "MAX_METADATA",
-    "MAX_PIXELS",
     "MAX_RATIO",
-    "MAX_SCANS",
-    "MAX_SIDE",
     "MAX_UNPACKED",
     "MAX_VIDEO_GROUP",
 ]
@@ -42,12 +39,6 @@ MAX_ATTACHMENT = 64 << 20
 """Bytes of an attachment: environments and sources take a few thousand, maps more."""
 MAX_CHANNELS = 4096
 """Channels, and schemas, of a file; a flight has a few dozen for each robot."""
-MAX_PIXELS = 1 << 25
-"""Width times height of a picture, before it is decoded: 8K has 33.2 million, 100 MB as BGR."""
-MAX_SIDE = 1 << 14
-"""Pixels of a picture along one side, as many as H.264 allows."""
-MAX_SCANS = 100
-"""Passes of a progressive JPEG. Encoders make ten; each costs the time of a whole picture."""
 MAX_VIDEO_GROUP = 64 << 20
 """Bytes of a video kept since its last key frame; a second of ours takes about one million."""
 MAX_KEYS = 256

@@ -12,6 +12,7 @@ from typing import Any
 from google.protobuf.message import Message
 
 from aerodaas.recording.decoding.messages import BrokenMessageError, plain_fields
+from aerodaas.recording.export.cells import harmless
 from aerodaas.recording.export.output import file_name, new_file
 from aerodaas.recording.reader import Recording
 from aerodaas.types.clock import seconds
@@ -20,9 +21,6 @@ from aerodaas.types.errors import RecordingError
 __all__ = ["table_of", "write_csv", "write_parquet"]
 
 Row = dict[str, Any]
-
-_FORMULAS = ("=", "+", "-", "@", "\t", "\r")
-"""Beginnings of formulas, by OWASP's "CSV Injection"."""
 
 
 def table_of(recording: Recording, topic: str) -> list[Row]:
@@ -84,8 +82,8 @@ def write_csv(recording: Recording, topic: str, folder: Path) -> Path:
     try:
         with path.open("x", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
-            writer.writerow(map(_harmless, rows[0] if rows else ()))
-            writer.writerows(map(_harmless, row.values()) for row in rows)
+            writer.writerow(map(harmless, rows[0] if rows else ()))
+            writer.writerows(map(harmless, row.values()) for row in rows)
     except OSError as error:
         raise RecordingError(f"cannot write {path}: {error.strerror}") from None
     return path
@@ -128,11 +126,6 @@ def write_parquet(recording: Recording, topic: str, folder: Path) -> Path:
     except OSError as error:
         raise RecordingError(f"cannot write {path}: {error}") from None
     return path
-
-
-def _harmless(cell: object) -> object:
-    """A cell; a text that a spreadsheet would compute is led by an apostrophe (OWASP)."""
-    return f"'{cell}" if isinstance(cell, str) and cell.startswith(_FORMULAS) else cell
 
 
 def _known(recording: Recording, topic: str) -> str:

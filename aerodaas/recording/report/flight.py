@@ -104,6 +104,8 @@ class RobotFlight:
     fence: list[tuple[float, float]] = field(default_factory=list)
     clipped: Counter[str] = field(default_factory=Counter)
     """Number of setpoints changed by a limit, by limit."""
+    clipped_at: dict[str, float] = field(default_factory=dict)
+    """Mission seconds of the first setpoint changed by a limit, by limit."""
 
     @property
     def time(self) -> Floats:
@@ -258,7 +260,10 @@ def _fence(flight: RecordedFlight, record: Record) -> None:
 
 
 def _setpoint(flight: RecordedFlight, record: Record) -> None:
-    flight.robots[record.value["robot"]].clipped.update(record.value["clipped_by"])
+    robot, now = flight.robots[record.value["robot"]], seconds(record.value["stamp"])
+    robot.clipped.update(record.value["clipped_by"])
+    for limit in record.value["clipped_by"]:
+        robot.clipped_at.setdefault(limit, now)
 
 
 def _latency(flight: RecordedFlight, record: Record) -> None:

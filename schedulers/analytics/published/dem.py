@@ -43,7 +43,7 @@ class Dem(EdgeCloudEdf):
     def _victims(self, place: int, finish: int) -> list[Task]:
         victims = []
         for index, other in enumerate(self.queue[place:]):
-            finish += other.profile.edge_time
+            finish += self.occupied(other)
             if finish > other.deadline and not (self.published and index == 0):
                 victims.append(other)
         return victims

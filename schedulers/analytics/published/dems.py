@@ -99,7 +99,7 @@ class Dems(Dem):
         room = 1 << 62
         finish = now
         for task in self.queue:
-            finish += task.profile.edge_time
+            finish += self.occupied(task)
             spare = task.deadline - finish
             if spare >= 0:
                 room = min(room, spare)

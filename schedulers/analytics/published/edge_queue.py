@@ -81,11 +81,15 @@ class EdgeQueue(AnalyticsScheduler):
             return [self.drop(task, now, "no time left for the cloud")]
         return [self.send(task, reason)]
 
+    def occupied(self, task: Task) -> int:
+        """Time after which the edge can begin the task behind `task` in the queue."""
+        return task.profile.edge_time
+
     def slot(self, task: Task, now: int) -> tuple[int, int]:
         """Place of a newcomer in the queue, and when it would finish there."""
         place = bisect_right(self.queue, self.key(task), key=self.key)
-        ahead = sum(other.profile.edge_time for other in self.queue[:place])
-        return place, max(self.free_at, now) + ahead + task.profile.edge_time
+        ahead = sum(map(self.occupied, self.queue[:place]))
+        return place, max(self.free_at, now) + ahead + self.occupied(task)
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
         """The edge is free as soon as its task is back."""

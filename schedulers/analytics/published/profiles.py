@@ -7,9 +7,7 @@ measured on a Jetson edge and on AWS Lambda.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from aerodaas.config.model import TaskConfig
+from aerodaas.config.model import SchedulersConfig, TaskConfig
 from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.identifiers import told
@@ -53,13 +51,15 @@ ACTIVE: tuple[str, ...] = tuple(PUBLISHED)
 """Models of the A workloads."""
 
 
-def told_profile(model: str, tasks: Mapping[str, TaskConfig]) -> Profile:
-    """Profile of an analysis from the environment file's `schedulers.tasks`.
+def told_profile(model: str, schedulers: SchedulersConfig) -> Profile:
+    """Profile of an analysis from the environment file's `schedulers`.
 
     `model` is the analysis' stream; the file may leave the robot's name out. Raises
     SchedulerError for figures that no scheduler could work with.
     """
-    task = told(model, tasks) or TaskConfig()
+    task = told(model, schedulers.tasks) or TaskConfig()
+    owners = {name: one for one in schedulers.tenants for name in schedulers.tenants[one].analyses}
+    tenant = told(model, owners) or ""
     window = round(task.qoe_window * NANOSECONDS)
     return Profile(
         model,
@@ -70,4 +70,6 @@ def told_profile(model: str, tasks: Mapping[str, TaskConfig]) -> Profile:
         task.edge_cost,
         task.cloud_cost,
         QoeGoal(task.qoe_bonus, task.qoe_share, window) if task.qoe_bonus else None,
+        tenant=tenant,
+        weight=schedulers.tenants[tenant].weight if tenant else 1.0,
     )

@@ -12,7 +12,7 @@ import pytest
 
 from aerodaas.analytics.guests.channel import LARGEST_TEXT, Channel, GuestError
 from aerodaas.analytics.guests.document import read_document
-from aerodaas.analytics.guests.items import ItemError, decoded, encoded
+from aerodaas.analytics.item_json import ItemError, decoded, encoded
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types.data import Detection, Detections, Header, Odometry, Readings
 from aerodaas.types.errors import GraphError

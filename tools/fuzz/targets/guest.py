@@ -20,27 +20,17 @@ from aerodaas.analytics.guests.document import (
     GuestTrigger,
     read_document,
 )
-from aerodaas.analytics.guests.items import ItemError, decoded, encoded
+from aerodaas.analytics.item_json import ItemError, decoded, encoded
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types.data import Detection, Detections, Header, Readings
 from aerodaas.types.errors import GraphError
 from aerodaas.types.guest_item import GuestItem
 from aerodaas.types.waypoints import VelocityCommand, Waypoint
+from tools.fuzz.json_changes import VALUES, change_value, flip_byte
 
 _HEAD = struct.Struct("<II")
-_VALUES: tuple[Any, ...] = (
-    None,
-    True,
-    -1,
-    10**30,
-    1e308,
-    float("nan"),
-    "",
-    "a" * 300,
-    [],
-    {},
-    {"is": "tuple"},
-)
+_BYTES = 0.2
+"""Share of mutations that change a byte."""
 
 
 def seeds() -> Iterable[bytes]:
@@ -94,33 +84,15 @@ def mutate(data: bytes, rng: random.Random) -> bytes:
     try:
         content = json.loads(data[_HEAD.size : _HEAD.size + size])
     except (ValueError, RecursionError):
-        return _flipped(data, rng)
-    places = list(_places(content))
-    if not places or rng.random() < 0.2:  # noqa: PLR2004 - a share
-        return _flipped(data, rng)
-    holder, key = rng.choice(places)
-    holder[key] = rng.choice([*_VALUES, holder[key], rng.choice(places)[0]])
+        return flip_byte(data, rng)
+    if rng.random() < _BYTES or not change_value(content, rng, (*VALUES, {"is": "tuple"})):
+        return flip_byte(data, rng)
     try:
         return _message(content)
     except (ValueError, RecursionError):  # it holds itself
-        return _flipped(data, rng)
+        return flip_byte(data, rng)
 
 
 def _message(content: Any) -> bytes:  # noqa: ANN401 - JSON
     text = json.dumps(content).encode()
     return _HEAD.pack(len(text), 0) + text
-
-
-def _flipped(data: bytes, rng: random.Random) -> bytes:
-    changed = bytearray(data)
-    if changed:
-        changed[rng.randrange(len(changed))] = rng.randrange(256)
-    return bytes(changed)
-
-
-def _places(content: Any) -> Iterable[tuple[Any, Any]]:  # noqa: ANN401 - JSON
-    if isinstance(content, dict | list):
-        keys = content if isinstance(content, dict) else range(len(content))
-        for key in keys:
-            yield content, key
-            yield from _places(content[key])

@@ -19,7 +19,7 @@ from aerodaas.recording.report.plots.outcomes import outcomes_figure
 from aerodaas.recording.report.plots.timeline import timeline_figure
 from aerodaas.recording.report.plots.trajectory import profile_figure, trajectory_figure
 
-__all__ = ["plots_of"]
+__all__ = ["plots_of", "png_of"]
 
 _DPI = 200
 _MOST = 24
@@ -75,14 +75,20 @@ def plots_of(flight: RecordedFlight) -> list[Plot]:
             bool(flight.loads),
         ),
     ]
-    shown = _shown(flight)
+    return [
+        Plot(name, title, description, png_of(flight, make))
+        for name, title, description, make, wanted in makers
+        if wanted
+    ]
+
+
+def png_of(flight: RecordedFlight, make: Callable[[RecordedFlight], Figure]) -> bytes:
+    """PNG of the plot that `make` draws of a flight."""
     # Names in a recording may hold a `$`, which would begin a formula.
     with mpl.rc_context({"text.parse_math": False}):
-        return [
-            Plot(name, title, description, _png(make(shown)))
-            for name, title, description, make, wanted in makers
-            if wanted
-        ]
+        buffer = BytesIO()
+        make(_shown(flight)).savefig(buffer, dpi=_DPI)
+    return buffer.getvalue()
 
 
 def _shown(flight: RecordedFlight) -> RecordedFlight:
@@ -101,9 +107,3 @@ def _shown(flight: RecordedFlight) -> RecordedFlight:
 
 def _first(table: dict[str, V]) -> dict[str, V]:
     return dict(islice(table.items(), _MOST))
-
-
-def _png(figure: Figure) -> bytes:
-    buffer = BytesIO()
-    figure.savefig(buffer, dpi=_DPI)
-    return buffer.getvalue()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -31,11 +31,14 @@ _APART = 1.0
 Floats = NDArray[np.float64]
 
 
-def trajectory_figure(flight: RecordedFlight) -> Figure:
+def trajectory_figure(
+    flight: RecordedFlight, overlay: Callable[[Axes], list[Artist]] | None = None
+) -> Figure:
     """The flight from above: path coloured by mission state, waypoints, take-off, geofence.
 
     A ring around a waypoint shows a state in which the drone stayed there. Small marks on the
-    path show the drone's positions at detections.
+    path show the drone's positions at detections. `overlay` draws more onto the axes, and returns
+    its entries of the legend.
     """
     figure = new_figure(5.4)
     axes = figure.add_subplot()
@@ -55,6 +58,8 @@ def trajectory_figure(flight: RecordedFlight) -> Figure:
         marks.append(mark("waypoint, not visited", "white"))
     if any(robot.fence for robot in flight.robots.values()):
         marks.append(Line2D([], [], linestyle="--", color="black", label="geofence"))
+    if overlay is not None:
+        marks += overlay(axes)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set(xlabel="East of home (m)", ylabel="North of home (m)")
     axes.margins(0.08)

@@ -1,12 +1,17 @@
-"""Size of a compressed picture from its first bytes, before anything is decoded."""
+"""Size of a compressed picture from its first bytes, and its bounds, before it is decoded."""
 
 from __future__ import annotations
 
 import struct
 
-from aerodaas.recording.decoding.limits import MAX_SCANS
+__all__ = ["MAX_PIXELS", "MAX_SCANS", "MAX_SIDE", "picture_fits", "picture_size"]
 
-__all__ = ["picture_size"]
+MAX_PIXELS = 1 << 25
+"""Width times height of a picture, before it is decoded: 8K has 33.2 million, 100 MB as BGR."""
+MAX_SIDE = 1 << 14
+"""Pixels of a picture along one side, as many as H.264 allows."""
+MAX_SCANS = 100
+"""Passes of a progressive JPEG. Encoders make ten; each costs the time of a whole picture."""
 
 _PNG = b"\x89PNG\r\n\x1a\n"
 _JPEG = b"\xff\xd8"
@@ -16,6 +21,11 @@ _FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 """JPEG's markers of a frame's header, which holds the size."""
 _BARE = frozenset({0x01, *range(0xD0, 0xD8)})
 """JPEG's markers without a length."""
+
+
+def picture_fits(width: int, height: int) -> bool:
+    """Whether a picture of this size, in pixels, may be decoded."""
+    return 0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE and width * height <= MAX_PIXELS
 
 
 def picture_size(data: bytes) -> tuple[int, int] | None:

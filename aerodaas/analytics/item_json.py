@@ -1,7 +1,7 @@
-"""Items as data: results of a guest, written in its process and checked in its owner's.
+"""Items as data: written in one process, and checked in another that does not trust it.
 
-A result is JSON of known classes, never a pickle: each field is checked against the annotation of
-its class. What is of another class becomes a GuestItem, whose content stays with its guest.
+An item is JSON of known classes, never a pickle: each field is checked against the annotation of
+its class. What is of another class becomes a GuestItem, whose content stays with its author.
 """
 
 from __future__ import annotations
@@ -9,16 +9,17 @@ from __future__ import annotations
 import base64
 import dataclasses
 import enum
+import math
 import types
 import typing
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from aerodaas.dataflow.navigation import AeroNavigation
-from aerodaas.types import data, geometry, waypoints
+from aerodaas.types import data, geometry, status, vehicle, waypoints
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.guest_item import GuestItem
 
@@ -27,6 +28,7 @@ __all__ = ["ItemError", "decoded", "encoded"]
 _CLASSES: dict[str, type] = {
     one.__name__: one
     for one in (
+        data.Alert,
         data.Battery,
         data.Detection,
         data.Detections,
@@ -35,6 +37,9 @@ _CLASSES: dict[str, type] = {
         data.Odometry,
         data.Readings,
         geometry.CameraModel,
+        status.Decision,
+        status.MissionStatus,
+        vehicle.VehicleState,
         waypoints.VelocityCommand,
         waypoints.Waypoint,
     )
@@ -43,11 +48,12 @@ _DEEPEST = 12
 _LONGEST = 100_000
 """Most parts of one item."""
 _KINDS = "biuf"
+_NOT_FINITE = ("nan", "inf", "-inf")
 _PLAIN = (bool, int, float, str, type(None))
 
 
 class ItemError(AeroDaaSError):
-    """A guest's result is malformed."""
+    """An item is malformed, or of a class that is not known here."""
 
 
 class _UnknownError(Exception):
@@ -59,16 +65,26 @@ def encoded(item: object, opaque: Callable[[object], GuestItem]) -> Any:  # noqa
     try:
         return _write(item)
     except (_UnknownError, RecursionError):
-        hidden = opaque(item)
-        content = base64.b64encode(hidden.data).decode()
-        return {"is": "GuestItem", "kind": hidden.kind, "value": hidden.value, "data": content}
+        return _opaque(opaque(item))
+
+
+def _plain(item: object) -> Any:  # noqa: ANN401 - JSON
+    if isinstance(item, float) and not math.isfinite(item):
+        # JSON has no such numbers, and strict readers refuse what Python writes for them.
+        return {"is": "float", "of": repr(item)}
+    return item
+
+
+def _opaque(hidden: GuestItem) -> dict[str, Any]:
+    content = base64.b64encode(hidden.data).decode()
+    return {"is": "GuestItem", "kind": hidden.kind, "value": hidden.value, "data": content}
 
 
 def _write(item: object) -> Any:  # noqa: ANN401 - JSON
     if isinstance(item, enum.Enum | np.generic):
         item = item.value if isinstance(item, enum.Enum) else item.item()
     if type(item) in _PLAIN:
-        return item
+        return _plain(item)
     name = type(item).__name__
     content: list[Any] | dict[str, Any] | None = None
     if type(item) in {list, tuple}:
@@ -78,8 +94,15 @@ def _write(item: object) -> Any:  # noqa: ANN401 - JSON
     elif _CLASSES.get(name) is type(item):
         content = {one: _write(getattr(item, one)) for one in _names(type(item))}
     elif isinstance(item, AeroNavigation) and item.stream is None:
-        inner = [_write(one) for one in item]
-        return {"is": "AeroNavigation", "of": inner, "scheduling": item.scheduling_type.value}
+        return {
+            "is": "AeroNavigation",
+            "of": [_write(one) for one in item],
+            "type": item.navigation_type.value,
+            "scheduling": item.scheduling_type.value,
+            "priority": item.priority,
+        }
+    elif isinstance(item, GuestItem):
+        return _opaque(item)
     elif isinstance(item, np.ndarray) and item.dtype.kind in _KINDS:
         whole = base64.b64encode(np.ascontiguousarray(item).tobytes()).decode()
         return {"is": "array", "type": item.dtype.str, "shape": item.shape, "data": whole}
@@ -89,13 +112,13 @@ def _write(item: object) -> Any:  # noqa: ANN401 - JSON
 
 
 def decoded(content: Any) -> Any:  # noqa: ANN401 - JSON to any item
-    """Rebuild an item from a guest's JSON; raises ItemError if it is malformed."""
+    """Rebuild an item from another process' JSON; raises ItemError if it is malformed."""
     try:
         return _Reader().read(content)
     except ItemError:
         raise
     except Exception as error:  # noqa: BLE001 - a stranger's numbers in any constructor
-        raise ItemError(f"malformed result: {type(error).__name__}: {error}"[:300]) from None
+        raise ItemError(f"malformed item: {type(error).__name__}: {error}"[:300]) from None
 
 
 class _Reader:
@@ -107,29 +130,35 @@ class _Reader:
     def read(self, content: Any, depth: int = 0) -> Any:  # noqa: ANN401 - JSON
         self._parts += 1
         if depth > _DEEPEST or self._parts > _LONGEST:
-            raise ItemError(f"more than {_DEEPEST} levels or {_LONGEST} parts in one result")
+            raise ItemError(f"more than {_DEEPEST} levels or {_LONGEST} parts in one item")
         if isinstance(content, _PLAIN):
             return content
         kind = content.get("is") if isinstance(content, dict) else None
         if kind == "array":
             return _array(content)
         if kind == "GuestItem":
-            name, hidden = content["kind"], base64.b64decode(content["data"], validate=True)
-            if not isinstance(name, str) or not name.isidentifier():
-                raise ItemError("a class without a name")
-            self._limit_plain(content["value"], depth)
-            return GuestItem(name[:64], content["value"], hidden)
-        inner = content["of"] if kind is not None else None
+            return self._hidden(content, depth)
+        return self._inner(kind, content["of"] if kind is not None else None, content, depth)
+
+    def _hidden(self, content: Mapping[str, Any], depth: int) -> GuestItem:
+        name, hidden = content["kind"], base64.b64decode(content["data"], validate=True)
+        if not isinstance(name, str) or not name.isidentifier():
+            raise ItemError("a class without a name")
+        self._limit_plain(content["value"], depth)
+        return GuestItem(name[:64], content["value"], hidden)
+
+    def _inner(self, kind: Any, inner: Any, content: Any, depth: int) -> Any:  # noqa: ANN401 - JSON
+        if kind == "float" and inner in _NOT_FINITE:
+            return float(inner)
         if kind in {"list", "tuple", "AeroNavigation"} and isinstance(inner, list):
             found = [self.read(one, depth + 1) for one in inner]
             if kind == "AeroNavigation":
-                how = waypoints.SchedulingType(content["scheduling"])
-                return AeroNavigation(data=found, scheduling_type=how)
+                return _navigation(content, found)
             return found if kind == "list" else tuple(found)
         if isinstance(inner, dict) and (kind == "dict" or kind in _CLASSES):
             fields = {key: self.read(one, depth + 1) for key, one in inner.items()}
             return fields if kind == "dict" else _built(_CLASSES[kind], fields)
-        raise ItemError(f"there is no class {str(kind)[:40]!r} that a guest may send")
+        raise ItemError(f"there is no class {str(kind)[:40]!r} that may be sent")
 
     def _limit_plain(self, value: Any, depth: int) -> None:  # noqa: ANN401 - JSON
         self._parts += 1
@@ -138,6 +167,18 @@ class _Reader:
         if isinstance(value, dict | list):
             for one in value.values() if isinstance(value, dict) else value:
                 self._limit_plain(one, depth + 1)
+
+
+def _navigation(content: Mapping[str, Any], items: list[Any]) -> AeroNavigation:
+    priority = content["priority"]
+    if not _conforms(priority, int | None):
+        raise ItemError("navigation of a priority that is no number")
+    return AeroNavigation(
+        waypoints.NavigationType(content["type"]),
+        items,
+        waypoints.SchedulingType(content["scheduling"]),
+        priority=priority,
+    )
 
 
 def _array(content: Mapping[str, Any]) -> np.ndarray[Any, Any]:
@@ -153,10 +194,22 @@ def _array(content: Mapping[str, Any]) -> np.ndarray[Any, Any]:
 
 def _built(kind: type, fields: dict[str, Any]) -> Any:  # noqa: ANN401 - an instance
     hints = _hints(kind)
+    found = {}
     for name, value in fields.items():
         if name not in hints or not _conforms(value, hints[name]):
             raise ItemError(f"{kind.__name__}.{name[:40]} is of a wrong type")
-    return kind(**fields)
+        found[name] = _as_enum(value, hints[name])
+    return kind(**found)
+
+
+def _as_enum(value: Any, hint: Any) -> Any:  # noqa: ANN401 - an annotation
+    """The member of an enumeration for its value, where the field is one; `value` otherwise."""
+    kinds = [one for one in (hint, *typing.get_args(hint)) if _is_enum(one)]
+    return kinds[0](value) if kinds and value is not None else value
+
+
+def _is_enum(hint: Any) -> bool:  # noqa: ANN401 - an annotation
+    return isinstance(hint, type) and issubclass(hint, enum.Enum)
 
 
 def _names(kind: type) -> tuple[str, ...]:
@@ -174,15 +227,36 @@ def _conforms(value: object, hint: Any) -> bool:  # noqa: ANN401 - an annotation
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is typing.Union or isinstance(hint, types.UnionType):
         return any(_conforms(value, one) for one in arguments)
-    if origin is tuple:
-        return isinstance(value, tuple) and _conform(value, arguments)
-    if origin is dict:
-        return isinstance(value, dict) and _conform(tuple(value.values()), (arguments[1], ...))
+    if origin is not None:
+        return isinstance(value, origin) and _conform_inside(value, origin, hint)
+    if hint is Any:
+        return True
+    if _is_enum(hint):
+        words: Iterable[enum.Enum] = hint
+        return isinstance(value, str) and value in {one.value for one in words}
     if hint in {int, float} and isinstance(value, int):
         # JSON does not tell 1 from 1.0.
         most = 53 if hint is float else 63
         return not isinstance(value, bool) and abs(value) < 1 << most
-    return isinstance(value, origin or hint)
+    return isinstance(value, hint)
+
+
+def _conform_inside(value: Any, origin: Any, hint: Any) -> bool:  # noqa: ANN401 - an annotation
+    """Whether the parts of a tuple, dictionary or array are as its annotation says."""
+    arguments = typing.get_args(hint)
+    if origin is np.ndarray:
+        return _fits(value, hint)
+    if origin is dict:
+        return _conform(tuple(value.values()), (arguments[1], ...))
+    return _conform(value, arguments)
+
+
+def _fits(array: np.ndarray[Any, Any], hint: Any) -> bool:  # noqa: ANN401 - an annotation
+    """Whether an array is of the annotation's number type; for floats, any real numbers do."""
+    if hint == geometry.Vector and array.shape != (3,):
+        return False
+    wanted = np.dtype(typing.get_args(typing.get_args(hint)[1])[0])
+    return array.dtype.kind in "iuf" if wanted.kind == "f" else array.dtype == wanted
 
 
 def _conform(values: tuple[object, ...], hints: tuple[Any, ...]) -> bool:

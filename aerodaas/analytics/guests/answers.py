@@ -1,0 +1,92 @@
+"""Answers of an analysis' author to its stand-in: checked, and told as the stand-in's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from aerodaas.analytics.base import Context
+from aerodaas.analytics.item_json import ItemError, decoded
+from aerodaas.types.data import Alert, Header
+from aerodaas.types.errors import ModelError
+
+__all__ = ["AnswerReader", "AnsweredCondition"]
+
+_ALERTS = 100
+"""Most alerts of one analysis in a flight."""
+_TEXT = 500
+_fired: dict[tuple[str, str], frozenset[int]] = {}
+"""Triggers whose condition the last result met, by author and analysis."""
+
+
+@dataclass(frozen=True)
+class AnsweredCondition:
+    """Condition of a trigger that the author's process has evaluated with its result."""
+
+    author: str
+    key: str
+    number: int
+
+    def __call__(self, result: object) -> bool:
+        """Whether the newest result met it."""
+        del result
+        return self.number in _fired.get((self.author, self.key), ())
+
+
+class AnswerReader:
+    """Reader of the answers for one analysis."""
+
+    def __init__(
+        self, author: str, key: str, produces: type = object, *, kind: str, title: str
+    ) -> None:
+        """Read answers of `author` for its analysis `key`.
+
+        Args:
+            author: Whose process answers.
+            key: Id of the analysis there.
+            produces: Class of its results.
+            kind: Kind of its alerts, which it cannot choose.
+            title: Its author in errors.
+        """
+        self._author = author
+        self._key = key
+        self._produces = produces
+        self._kind = kind
+        self._title = title
+        self._alerts = 0
+
+    def forget(self) -> None:
+        """Forget what the last result met."""
+        _fired.pop((self._author, self._key), None)
+
+    def read(self, answer: dict[str, Any], context: Context) -> Any:  # noqa: ANN401 - any item
+        """Tell the answer's alerts and return its result.
+
+        Raises ModelError for a failure that it tells of, ItemError for a result that is malformed
+        or of another class than was declared.
+        """
+        for text in _texts(answer.get("alerts"))[: max(0, _ALERTS - self._alerts)]:
+            self._alerts += 1
+            header = Header(self._alerts, context.now(), self._author)
+            context.alert(Alert(header, self._kind, f"{self._author}: {text}"))
+        failed = answer.get("failed")
+        if failed:
+            raise ModelError(f"{self._title}: {str(failed)[:_TEXT]}")
+        result = decoded(answer.get("item"))
+        if not self._is_declared(result):
+            raise ItemError(
+                f"{self._title}: {self._key} declares {self._produces.__name__} and sent "
+                f"{type(result).__name__}"
+            )
+        fired = answer.get("fired")
+        numbers = fired if isinstance(fired, list) else []
+        _fired[self._author, self._key] = frozenset(one for one in numbers if type(one) is int)
+        return result
+
+    def _is_declared(self, result: object) -> bool:
+        wanted = (int, float) if self._produces is float else self._produces
+        return result is None or isinstance(result, wanted)
+
+
+def _texts(found: object) -> list[str]:
+    return [str(one)[:_TEXT] for one in found] if isinstance(found, list) else []

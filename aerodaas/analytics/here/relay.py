@@ -1,0 +1,267 @@
+"""HereRelay: takes questions of a flight's actors to the user's side, and the answers back.
+
+It lives in the flight's process. Stand-ins (`HereAnalysis`) connect to its Unix socket, each with
+one question at a time; the user's side is whatever connection the flight attaches to it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["LARGEST_ANSWER", "HereRelay", "HereTimes", "HereUser", "Send", "oversize"]
+
+Send: TypeAlias = Callable[[dict[str, Any], bytes], None]
+"""Sends one question, JSON and a blob, towards the user without waiting; raises if it cannot."""
+LARGEST_ANSWER = 1 << 20
+"""Bytes of an answer's JSON: a thousand waypoints or boxes take a quarter of it."""
+_ANSWER_SECONDS = 3.0
+"""Wall seconds for an answer, less than an actor waits, and than a hung analysis may take."""
+_PARTS = ("item", "fired", "alerts", "failed")
+"""What an answer may hold, beside its `number` and the seconds that it `took`."""
+_CONNECTIONS = 256
+"""Most actors' connections at once; a document has fewer analyses and conditions."""
+
+
+@dataclass
+class HereTimes:
+    """Wall seconds that answers have taken, from the question at the relay to its answer there."""
+
+    answers: int = 0
+    missed: int = 0
+    """Questions without an answer."""
+    newest: float = 0.0
+    longest: float = 0.0
+    total: float = 0.0
+    at_work: float = 0.0
+    """Seconds of `total` that the user's code itself took, as the user's side says."""
+
+
+@dataclass(eq=False)
+class _Question:
+    """A question on its way."""
+
+    key: str
+    user: HereUser
+    asked: float = field(default_factory=time.monotonic)
+    done: threading.Event = field(default_factory=threading.Event)
+    answer: dict[str, Any] = field(default_factory=dict)
+
+
+class HereUser:
+    """One connection of the user's side, until it is detached or replaced by a newer one."""
+
+    def __init__(self, relay: HereRelay, send: Send) -> None:
+        """Connection by which `send` reaches the user."""
+        self.send = send
+        self.slow: dict[str, int] = {}
+        """Questions whose time is over, by analysis: it is asked no more until it has answered."""
+        self._relay = relay
+
+    def answered(self, message: object, blob: bytes = b"") -> None:
+        """Take an answer, JSON and a blob, as it came from the user; never raises."""
+        self._relay.take(self, message, blob)
+
+    def detach(self) -> None:
+        """Tell the relay that this connection has ended."""
+        self._relay.leave(self)
+
+
+class HereRelay:
+    """Relay between the actors of one flight and the side of its user."""
+
+    def __init__(self, path: Path, *, seconds: float = _ANSWER_SECONDS) -> None:
+        """Relay at the socket `path`, which waits `seconds` for each answer."""
+        self.path = path
+        self._seconds = seconds
+        self._lock = threading.Lock()
+        self._attached = threading.Event()
+        self._user: HereUser | None = None
+        self._number = 0
+        self._waiting: dict[int, _Question] = {}
+        self._times: dict[str, HereTimes] = {}
+        self._open: set[socket.socket] = set()
+        self._closed = False
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+
+    def start(self) -> None:
+        """Listen for actors; raises ConfigError if there can be no socket at the path."""
+        try:
+            with contextlib.suppress(FileNotFoundError):
+                self.path.unlink()
+            self._listener.bind(str(self.path))
+            os.chmod(self.path, 0o600)  # noqa: PTH101 - of a socket
+            self._listener.listen(_CONNECTIONS)
+        except OSError as error:
+            raise ConfigError(f"no socket at {self.path}: {error.strerror or error}") from None
+        threading.Thread(target=self._accept, name="here", daemon=True).start()
+
+    def attach(self, send: Send) -> HereUser:
+        """Ask the user by `send` from now on; an earlier connection is asked no more.
+
+        `send` is called by several threads, one at a time, with the question as JSON, which has a
+        `number` that the answer repeats, and its blob. It must not wait: it fills a bounded queue,
+        and raises if that is full.
+        """
+        user = HereUser(self, send)
+        with self._lock:
+            before, self._user = self._user, user
+        if before is not None:
+            self._drop(before, "the user's side has connected anew")
+        self._attached.set()
+        return user
+
+    def wait_attached(self, timeout: float) -> bool:
+        """Wait for the user's side to connect, `timeout` seconds at most; whether it has."""
+        return self._attached.wait(timeout)
+
+    def leave(self, user: HereUser) -> None:
+        """Ask `user` no more; what waits for it is told so."""
+        with self._lock:
+            if self._user is user:
+                self._user = None
+                self._attached.clear()
+        self._drop(user, "the user's side has left")
+
+    def take(self, user: HereUser, message: object, blob: bytes) -> None:
+        """Take an answer of `user`; one to no question of theirs is ignored."""
+        content = message if isinstance(message, dict) else {}
+        number = content.get("number")
+        if not isinstance(number, int):
+            return
+        answer = _checked(content, blob)
+        with self._lock:
+            user.slow = {key: late for key, late in user.slow.items() if late != number}
+            question = self._waiting.get(number)
+            if question is None or question.user is not user:
+                return
+            del self._waiting[number]
+            self._note(question, content.get("took"))
+            question.answer = answer
+        question.done.set()
+
+    def times(self) -> dict[str, HereTimes]:
+        """How long answers have taken, by the id of the analysis."""
+        with self._lock:
+            return {key: HereTimes(**vars(one)) for key, one in self._times.items()}
+
+    def close(self) -> None:
+        """Close the socket and all connections, and remove the path."""
+        self._closed = True
+        with self._lock:
+            user, self._user = self._user, None
+            connections = list(self._open)
+        if user is not None:
+            self._drop(user, "the flight is over")
+        # A listener that is only closed keeps a thread in accept().
+        for one in (self._listener, *connections):
+            with contextlib.suppress(OSError):
+                one.shutdown(socket.SHUT_RDWR)
+        self._listener.close()
+        with contextlib.suppress(OSError):
+            self.path.unlink()
+
+    def ask(self, request: dict[str, Any], blob: bytes) -> dict[str, Any]:
+        """Ask the user; the answer, or why there is none, as `absent`."""
+        key = str(request.get("key"))
+        with self._lock:
+            user = self._user
+            if user is None:
+                return self._missed(key, "the user's side is not connected")
+            if key in user.slow:
+                return self._missed(key, "the user's side still works at an earlier item")
+            self._number += 1
+            number = self._number
+            question = self._waiting[number] = _Question(key, user)
+            try:
+                user.send({**request, "number": number}, blob)
+            except Exception as error:  # noqa: BLE001 - a full queue, a connection that has ended
+                del self._waiting[number]
+                return self._missed(key, f"the user's side takes nothing: {error}"[:200])
+        if question.done.wait(self._seconds):
+            return question.answer
+        with self._lock:
+            if self._waiting.pop(number, None) is None:
+                return question.answer
+            user.slow[key] = number
+            return self._missed(key, f"the user's side gave no answer in {self._seconds:g} s")
+
+    def _accept(self) -> None:
+        while not self._closed:
+            try:
+                connection, _ = self._listener.accept()
+            except OSError:
+                return
+            with self._lock:
+                welcome = len(self._open) < _CONNECTIONS and not self._closed
+                if welcome:
+                    self._open.add(connection)
+            if not welcome:
+                connection.close()
+                continue
+            threading.Thread(
+                target=self._serve, args=(connection,), name="here analysis", daemon=True
+            ).start()
+
+    def _serve(self, connection: socket.socket) -> None:
+        channel = Channel(connection)
+        try:
+            while True:
+                request, blob = channel.receive()
+                channel.send(self.ask(request, blob))
+        except GuestError:
+            return
+        finally:
+            with self._lock:
+                self._open.discard(connection)
+            channel.close()
+
+    def _drop(self, user: HereUser, reason: str) -> None:
+        with self._lock:
+            mine = [number for number, one in self._waiting.items() if one.user is user]
+            questions = [self._waiting.pop(number) for number in mine]
+            for one in questions:
+                one.answer = self._missed(one.key, reason)
+        for one in questions:
+            one.done.set()
+
+    def _missed(self, key: str, reason: str) -> dict[str, Any]:
+        self._times.setdefault(key, HereTimes()).missed += 1
+        return {"absent": reason}
+
+    def _note(self, question: _Question, took: object) -> None:
+        seconds = time.monotonic() - question.asked
+        times = self._times.setdefault(question.key, HereTimes())
+        times.answers += 1
+        times.newest = seconds
+        times.longest = max(times.longest, seconds)
+        times.total += seconds
+        if isinstance(took, int | float):
+            times.at_work += min(max(0.0, took), seconds)
+
+
+def oversize(content: dict[str, Any], blob: bytes) -> str:
+    """What is wrong with an answer's size; empty if nothing is."""
+    size = len(json.dumps(content))
+    if blob or size > LARGEST_ANSWER:
+        return f"an answer of {size} bytes and {len(blob)} beside it; the most are {LARGEST_ANSWER}"
+    return ""
+
+
+def _checked(content: dict[str, Any], blob: bytes) -> dict[str, Any]:
+    try:
+        wrong = oversize(content, blob)
+    except (TypeError, ValueError, RecursionError) as error:
+        wrong = f"an answer that is no JSON: {error}"[:200]
+    return {"failed": wrong} if wrong else {key: content[key] for key in _PARTS if key in content}

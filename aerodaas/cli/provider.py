@@ -1,0 +1,366 @@
+"""Commands at a provider's service: its fleet, and missions on it."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from aerodaas.cli.application import run_application, submit_application
+from aerodaas.config.options import ProviderOptions, RunOptions
+from aerodaas.types.errors import ConfigError, MissionError
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
+
+    from aerodaas.environment.provider.client import ProviderClient
+
+__all__ = ["cancel", "fetch", "fleet", "leases", "login", "missions", "submit", "watch"]
+
+_LOOK_SECONDS = 0.5
+_WIDE = 1000
+"""Columns of a table that goes into a pipe."""
+At = Annotated[
+    str | None,
+    typer.Option(
+        "--at",
+        metavar="URL",
+        envvar="AERODAAS_PROVIDER",
+        help="The provider. Default: the only one that you are logged in at.",
+    ),
+]
+Json = Annotated[bool, typer.Option("--json", help="For programs.")]
+MissionId = Annotated[str, typer.Argument(metavar="MISSION", help="Its id; `missions` lists them.")]
+
+
+def login(
+    url: Annotated[str, typer.Argument(help="The provider: https://host.")],
+    forget: Annotated[bool, typer.Option("--forget", help="Remove the stored token.")] = False,  # noqa: FBT002
+) -> None:
+    """Store the token of your account at a provider, for you alone (mode 0600).
+
+    It is asked for, or read from a pipe, and tried. The provider's administrator makes it. The
+    environment variable AERODAAS_TOKEN goes before it.
+
+        aerodaas login https://provider.example
+        aerodaas login https://provider.example < token.txt
+    """
+    from aerodaas.environment.provider.address import (  # noqa: PLC0415 - slow to load
+        INSECURE_VARIABLE,
+        ServiceAddress,
+    )
+    from aerodaas.environment.provider.logins import Logins, client_for  # noqa: PLC0415
+
+    address = ServiceAddress.parse(url, insecure=os.environ.get(INSECURE_VARIABLE) == "1")
+    if forget:
+        known = Logins().forget(address)
+        typer.echo(f"{'forgot the' if known else 'there was no'} token for {address.base}")
+        return
+    if sys.stdin.isatty():
+        token = typer.prompt(f"token for {address.base}", hide_input=True)
+    else:
+        token = sys.stdin.read()
+    account = client_for(url, token.strip() or _missing_token()).me()
+    logins = Logins()
+    logins.store(address, token.strip())
+    typer.echo(
+        f"{account.name} of {account.tenant} ({account.role.value}); stored in {logins.path}"
+    )
+
+
+def fleet(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
+    """Show a provider's drones: free or leased, their charge, where they are.
+
+    aerodaas fleet --at https://provider.example
+    aerodaas fleet --json | jq '.robots[] | select(.lease == null) | .id'
+    """
+    found = _client(at).fleet()
+    if as_json:
+        _print_json(found)
+        return
+    rows = [
+        (
+            one.id,
+            _use(one.enabled, one.lease, one.mission, one.tenant),
+            "-" if one.battery is None else f"{one.battery:.0%}",
+            _place(one.position),
+            ", ".join(sensor.rpartition("/")[2] for sensor in one.sensors),
+        )
+        for one in found.robots
+    ]
+    _table(found.name, ("robot", "use", "battery", "where", "sensors"), rows)
+
+
+def submit(
+    context: typer.Context,
+    application: Annotated[
+        Path, typer.Argument(help="The application: a Python file, or a mission document.")
+    ],
+    to: Annotated[
+        str | None,
+        typer.Option(
+            "--to",
+            metavar="URL",
+            envvar="AERODAAS_PROVIDER",
+            help="The provider. Default: the only one that you are logged in at.",
+        ),
+    ] = None,
+    minutes: Annotated[
+        float | None,
+        typer.Option(min=0.1, help="For which its drones are leased. Default: 15."),
+    ] = None,
+    lease: Annotated[
+        str | None, typer.Option(help="A lease that you have, instead of a new one.")
+    ] = None,
+    silence: Annotated[
+        str | None,
+        typer.Option(help="If your connection is lost: `continue` (default) or `return`."),
+    ] = None,
+    silence_seconds: Annotated[
+        float | None, typer.Option(min=1, help="After how long. Default: 30.")
+    ] = None,
+    share: Annotated[list[str] | None, typer.Option(help="A tenant that may watch, too.")] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the simulation, if the drones are.")
+    ] = None,
+    record: Annotated[
+        Path | None,
+        typer.Option(help="Where recording, plots and summary go. Default: a folder in runs/."),
+    ] = None,
+    wait: Annotated[  # noqa: FBT002
+        bool,
+        typer.Option(
+            "--wait/--no-wait",
+            help="Watch the flight and fetch its recording. Without it, the application runs up "
+            "to start_mission() only, and what is code of its own cannot fly.",
+        ),
+    ] = True,
+    view: Annotated[bool, typer.Option(help="Show the flight in the terminal.")] = True,  # noqa: FBT002
+    as_json: Json = False,  # noqa: FBT002
+) -> None:
+    """Fly an application on a provider's drones, unchanged but for the address.
+
+    Ctrl-C has the provider bring the drones home. Words after `--` are the application's own.
+
+        aerodaas submit apps/farm_survey.py --to https://provider.example
+        aerodaas submit farm.json --minutes 5 --silence return
+        aerodaas submit apps/farm_survey.py --no-wait --json | jq -r .id
+    """
+    from aerodaas.environment.provider.logins import default_url  # noqa: PLC0415 - slow to load
+
+    if silence not in {None, "continue", "return"}:
+        raise ConfigError(f"--silence is continue or return, not {silence!r}")
+    wanted = ProviderOptions(
+        url=to or default_url(),
+        minutes=minutes,
+        lease=lease,
+        silence=silence,
+        silence_seconds=silence_seconds,
+        share=tuple(share or ()),
+        report=_print_json if as_json else None,
+    )
+    options = RunOptions(
+        provider=wanted,
+        seed=seed,
+        record=record,
+        view=view and not as_json,
+        application=application.resolve(),
+    )
+    if wait:
+        run_application(application, context.args, options)
+        return
+    mission = submit_application(application, context.args, options)
+    if as_json:
+        _print_json(mission)
+    else:
+        typer.echo(f"{mission.id} is submitted; aerodaas watch {mission.id} follows it")
+
+
+def missions(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
+    """List the missions that you may see, newest first.
+
+    aerodaas missions
+    aerodaas missions --json | jq -r '.[] | select(.phase == "flying") | .id'
+    """
+    found = _client(at).missions()
+    if as_json:
+        _print_json(found)
+        return
+    rows = [
+        (
+            one.id,
+            one.name,
+            one.phase.value.replace("_", " "),
+            ", ".join(one.robots),
+            one.account,
+            _moment(one.submitted),
+            one.reason,
+        )
+        for one in found
+    ]
+    _table("missions", ("id", "name", "phase", "robots", "of", "submitted", "reason"), rows)
+
+
+def watch(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
+    """Watch a mission until it is over; Ctrl-C leaves it as it is.
+
+    Ends with 1 if the mission was refused, cancelled or failed.
+
+        aerodaas watch 3f1a6c0d9b2e
+        aerodaas watch 3f1a6c0d9b2e --json | jq -c .status
+    """
+    from aerodaas.environment.provider.follower import MissionFollower  # noqa: PLC0415 - slow
+    from aerodaas.terminal.provided import ProvidedView  # noqa: PLC0415 - slow to load
+
+    client = _client(at)
+    found = client.mission(mission)
+    with ProvidedView(shown=not as_json) as view:
+        follower = MissionFollower(client, found, view.note)
+        follower.start()
+        seen = -1
+        while True:
+            if seen < follower.changes:
+                seen = follower.changes
+                if as_json:
+                    typer.echo(found.model_dump_json())
+                else:
+                    view.update(found)
+            if found.phase.over:
+                break
+            found = follower.await_change(seen, _LOOK_SECONDS)
+    if found.phase.value != "landed":
+        raise MissionError(f"mission {found.id} {found.phase.value}: {found.reason}")
+    if not as_json:
+        typer.echo(f"landed; aerodaas fetch {found.id} brings the recording")
+
+
+def cancel(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
+    """Cancel a mission; drones in flight come home and land.
+
+    aerodaas cancel 3f1a6c0d9b2e
+    """
+    found = _client(at).cancel(mission)
+    if as_json:
+        _print_json(found)
+    elif found.phase.over:
+        typer.echo(f"{found.id} is cancelled")
+    else:
+        typer.echo(f"{found.id}: the drones come home; aerodaas watch {found.id} follows them")
+
+
+def fetch(
+    mission: MissionId,
+    output: Annotated[
+        Path | None,
+        typer.Option("--output", "-o", help="The file. Default: MISSION.mcap."),
+    ] = None,
+    at: At = None,
+    as_json: Json = False,  # noqa: FBT002
+) -> None:
+    """Fetch the recording of a mission that is over.
+
+    aerodaas fetch 3f1a6c0d9b2e -o flight.mcap
+    aerodaas report flight.mcap
+    """
+    from aerodaas.terminal.provided import download_view  # noqa: PLC0415 - slow to load
+
+    target = output or Path(f"{Path(mission).name}.mcap")
+    if target.exists():
+        raise ConfigError(f"{target} already exists and is not overwritten; name another file")
+    try:
+        with download_view(shown=not as_json, what=target.name) as progress:
+            _client(at).recording(mission, target, progress)
+    except OSError as error:
+        raise ConfigError(f"cannot write {target}: {error.strerror}") from None
+    size = target.stat().st_size
+    if as_json:
+        typer.echo(json.dumps({"mission": mission, "file": str(target), "bytes": size}))
+    else:
+        typer.echo(f"{target}: {size / 1e6:.1f} MB")
+
+
+def leases(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
+    """List the leases that you may see.
+
+    aerodaas leases
+    """
+    found = _client(at).leases()
+    if as_json:
+        _print_json(found)
+        return
+    rows = [
+        (
+            one.id,
+            one.state.value,
+            ", ".join(one.robots) or "any that fits",
+            f"{one.account} of {one.tenant}",
+            f"{one.minutes:g} min",
+            "-" if one.ends is None else _moment(one.ends),
+            one.reason,
+        )
+        for one in found
+    ]
+    _table("leases", ("id", "state", "robots", "of", "for", "ends", "reason"), rows)
+
+
+def _client(at: str | None) -> ProviderClient:
+    from aerodaas.environment.provider.logins import (  # noqa: PLC0415 - slow to load
+        client_for,
+        default_url,
+    )
+
+    return client_for(at or default_url())
+
+
+def _missing_token() -> str:
+    raise ConfigError("no token was given: type it, or pipe it in")
+
+
+def _print_json(found: BaseModel | Sequence[BaseModel]) -> None:
+    content: Any = (
+        [one.model_dump(mode="json") for one in found]
+        if isinstance(found, list | tuple)
+        else found.model_dump(mode="json")  # type: ignore[union-attr]
+    )
+    typer.echo(json.dumps(content, indent=2))
+
+
+def _use(enabled: bool, lease: str | None, mission: str | None, tenant: str | None) -> str:  # noqa: FBT001
+    if not enabled:
+        return "out of service"
+    if lease is None:
+        return "free"
+    return f"flies {mission}" if mission else f"leased by {tenant}" if tenant else "leased"
+
+
+def _place(position: tuple[float, float, float] | None) -> str:
+    if position is None:
+        return "-"
+    east, north, up = (round(axis, 1) + 0.0 for axis in position)
+    return f"E {east:.1f}  N {north:.1f}  up {up:.1f} m"
+
+
+def _moment(seconds: float) -> str:
+    from datetime import datetime  # noqa: PLC0415 - only for tables
+
+    return f"{datetime.fromtimestamp(seconds).astimezone():%Y-%m-%d %H:%M:%S}"
+
+
+def _table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
+    from rich.console import Console  # noqa: PLC0415 - only for tables
+    from rich.table import Table  # noqa: PLC0415
+    from rich.text import Text  # noqa: PLC0415
+
+    table = Table(box=None, title=Text(title), title_justify="left", header_style="dim")
+    for head in heads:
+        table.add_column(head)
+    for row in rows:
+        table.add_row(*(Text(cell) for cell in row))
+    # What reads a pipe has no width to keep to.
+    width = None if sys.stdout.isatty() else _WIDE
+    Console(highlight=False, width=width).print(table)

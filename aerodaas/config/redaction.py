@@ -1,0 +1,94 @@
+"""What others may know of an environment: geometry, limits and calibration, and no way in.
+
+Addresses, paths, nodes, drivers and their settings, plug-ins, packages and secrets are left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import Any
+
+from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
+
+__all__ = ["catalogue", "redacted"]
+
+_CALIBRATION = ("width", "height", "horizontal_fov", "mount", "pitch", "yaw", "depth_range")
+"""Settings of a sensor that anybody may know."""
+_NOWHERE = "http://{}.invalid"
+"""An address that leads nowhere, for whatever has one at its owner's (RFC 2606, section 2)."""
+
+
+def catalogue(config: EnvironmentConfig) -> EnvironmentConfig:
+    """The environment that users build their applications against.
+
+    It has all robots, sensors and compute resources, and compiles to the same mission documents.
+    The `path` of a sensor that is no camera, such as the log of a GPS logger, and the address of
+    an endpoint stand in it as words that name the setting and lead nowhere. A camera without a
+    source of pictures is left out.
+    """
+    sensors = [
+        one.full_id
+        for one in config.all_sensors()
+        if one.type != "camera" or config.has_pictures(one)
+    ]
+    compute = "auto" if config.compute == "auto" else [_resource(one) for one in config.compute]
+    return redacted(config, sensors=sensors, compute=compute, paths=True)
+
+
+def redacted(
+    config: EnvironmentConfig,
+    *,
+    sensors: Collection[str],
+    compute: object,
+    paths: bool = False,
+) -> EnvironmentConfig:
+    """An environment with all robots, but these sensors and compute resources alone.
+
+    Args:
+        config: The environment.
+        sensors: Full ids of the sensors that are shown.
+        compute: The compute resources as in an environment file.
+        paths: Whether the `path` of a sensor that is no camera is shown, as a word.
+    """
+    whole = config.model_dump(mode="json", by_alias=True)
+    ids = {"start", "start_yaw", "limits", "mission", "id"}
+    shown = {one.full_id: _sensor(one, paths=paths) for one in config.all_sensors()}
+    kept = {name: one for name, one in shown.items() if name in sensors}
+    robots = [
+        {key: value for key, value in one.items() if key in ids}
+        | {"sensors": [kept[name] for s in robot.sensors if (name := s.full_id) in kept]}
+        for one, robot in zip(whole["robots"], config.robots, strict=True)
+    ]
+    return EnvironmentConfig.model_validate(
+        {
+            "name": config.name,
+            "home": whole["home"],
+            "robots": robots,
+            "sensors": [kept[name] for s in config.sensors if (name := s.full_id) in kept],
+            "compute": compute,
+        }
+    )
+
+
+def _sensor(sensor: SensorConfig, *, paths: bool) -> dict[str, Any]:
+    settings = {key: sensor.settings[key] for key in _CALIBRATION if key in sensor.settings}
+    camera = sensor.type == "camera"
+    if paths and not camera and sensor.settings.get("path"):
+        settings["path"] = _NOWHERE.format(f"{sensor.full_id.replace('/', '-')}.path")
+    return {
+        "id": sensor.id,
+        "type": sensor.type,
+        "rate": sensor.rate,
+        "driver": "simulated" if camera else None,
+        "settings": settings,
+    }
+
+
+def _resource(resource: ComputeConfig) -> dict[str, Any]:
+    content: dict[str, Any] = {"id": resource.id, "kind": resource.kind}
+    if resource.endpoint is not None:
+        models = {name: name for name in resource.endpoint.models}
+        protocol = resource.endpoint.protocol
+        url = _NOWHERE.format(resource.id)
+        content["endpoint"] = {"url": url, "protocol": protocol, "models": models}
+    return content

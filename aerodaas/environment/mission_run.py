@@ -1,0 +1,61 @@
+"""What an environment asks of a flight, whether its own runtime flies it or a provider."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.options import RunOptions
+from aerodaas.mission.commands import Answer, Command
+
+if TYPE_CHECKING:
+    from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
+
+__all__ = ["MissionRun", "recording_path"]
+
+_RECORDING = "flight.mcap"
+
+
+class MissionRun(Protocol):
+    """One flight of an application, from its graph to its recording."""
+
+    on_end: list[Callable[[], None]]
+    """Called once the flight has ended and its recording is closed."""
+
+    @property
+    def over(self) -> bool:
+        """True once every mission has ended."""
+        ...
+
+    def start(self) -> None:
+        """Start, and return once the drones fly; raises the project's errors."""
+        ...
+
+    def command(self, robot: str, command: Command) -> Answer:
+        """Send a robot's mission a command; raises MissionError once the run is over."""
+        ...
+
+    def use_scheduler(self, scheduler: TrajectoryScheduler) -> None:
+        """Have all robots plan by `scheduler` from now on; raises the project's errors."""
+        ...
+
+    def wait(self) -> None:
+        """Return when the flight has ended; raises the error that it ended with."""
+        ...
+
+
+def recording_path(options: RunOptions, config: EnvironmentConfig, number: int) -> Path | None:
+    """Path of the recording of an environment's flight `number`; None if it is not recorded."""
+    if not config.recording.enabled:
+        return None
+    wanted = options.record or (Path(config.recording.path) if config.recording.path else None)
+    if wanted is None:
+        name = options.application.stem if options.application else config.name
+        now = datetime.now().astimezone()
+        wanted = Path("runs") / f"{name}-{now:%Y%m%d-%H%M%S}"
+    path = wanted if wanted.suffix == ".mcap" else wanted / _RECORDING
+    # One environment may fly several times.
+    return path if number == 1 else path.with_stem(f"{path.stem}-{number}")

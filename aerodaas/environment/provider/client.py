@@ -1,0 +1,258 @@
+"""ProviderClient: a provider's service as Python methods, one for each of its routes."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+from urllib.parse import quote, urlencode
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
+from aerodaas.environment.provider.address import ServiceAddress
+from aerodaas.environment.provider.exchange import Exchange, Method
+from aerodaas.environment.provider.live import LiveConnection
+from aerodaas.environment.provider.wire import WireConnection
+from aerodaas.protocol.schemas import (
+    AccountIn,
+    AccountOut,
+    AuditOut,
+    CommandIn,
+    FleetOut,
+    LeaseIn,
+    LeaseOut,
+    MissionIn,
+    MissionOut,
+    Role,
+    Scope,
+    TokenIn,
+    TokenOut,
+    UsageOut,
+)
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["LARGEST_MODEL", "ProviderClient"]
+
+M = TypeVar("M")
+LARGEST_MODEL = 64 << 20
+"""Bytes of a model that a service takes."""
+_ABSENT = frozenset({404})
+
+
+def _nothing(_done: int, _all: int | None) -> None:
+    """Show no progress."""
+
+
+class ProviderClient:
+    """Client of a provider's service; safe in any thread.
+
+    Each method raises ConfigError or MissionError with the service's own text where that refuses,
+    SourceError where it does not answer.
+
+    >>> client = ProviderClient("https://provider.example", token="…")  # doctest: +SKIP
+    >>> [robot.id for robot in client.fleet().robots if robot.lease is None]  # doctest: +SKIP
+    """
+
+    def __init__(
+        self,
+        url: str,
+        token: str | None = None,
+        *,
+        insecure: bool = False,
+        timeout: float = 10.0,
+    ) -> None:
+        """Configure the client, which connects with its first request.
+
+        Args:
+            url: `https://host`, with a port and a path if the service has them; `http` to this
+                machine only.
+            token: Of the account.
+            insecure: Allow `http` to other machines.
+            timeout: Seconds to wait for each answer.
+
+        Raises:
+            ConfigError: For an address of another form.
+        """
+        self.address = ServiceAddress.parse(url, insecure=insecure)
+        self._exchange = Exchange(self.address, token, timeout)
+
+    def me(self) -> AccountOut:
+        """The account that the token belongs to."""
+        return self._ask(AccountOut, "GET", "/v1/me")
+
+    def fleet(self) -> FleetOut:
+        """The drones, and the environment that applications are built against."""
+        return self._ask(FleetOut, "GET", "/v1/fleet")
+
+    def request_lease(self, wanted: LeaseIn) -> LeaseOut:
+        """Request drones for a time; the lease is queued until they are free."""
+        return self._ask(LeaseOut, "POST", "/v1/leases", wanted)
+
+    def leases(self) -> list[LeaseOut]:
+        """All leases that the account may see."""
+        return self._ask(list[LeaseOut], "GET", "/v1/leases")
+
+    def lease(self, lease: str) -> LeaseOut:
+        """One lease."""
+        return self._ask(LeaseOut, "GET", f"/v1/leases/{_part(lease)}")
+
+    def extend_lease(self, lease: str, minutes: float) -> LeaseOut:
+        """Have a lease end `minutes` later."""
+        path = f"/v1/leases/{_part(lease)}/extend"
+        return self._ask(LeaseOut, "POST", path, {"minutes": minutes})
+
+    def end_lease(self, lease: str) -> LeaseOut:
+        """Give a lease back, or revoke it as an operator; its drones come home."""
+        return self._ask(LeaseOut, "DELETE", f"/v1/leases/{_part(lease)}")
+
+    def has_model(self, sha256: str) -> bool:
+        """Whether the service has the model with this hash."""
+        path = f"/v1/models/{_part(sha256)}"
+        status, _ = self._exchange.send("HEAD", path, allowed=_ABSENT)
+        return status not in _ABSENT
+
+    def put_model(self, content: bytes) -> str:
+        """Bring a model, an ONNX file; returns its SHA-256. Raises ConfigError if too large."""
+        if len(content) > LARGEST_MODEL:
+            raise ConfigError(
+                f"a model for a provider has at most {LARGEST_MODEL >> 20} MiB, not "
+                f"{len(content) / (1 << 20):.0f}"
+            )
+        sha256 = hashlib.sha256(content).hexdigest()
+        headers = {"Content-Type": "application/octet-stream"}
+        self._exchange.send("PUT", f"/v1/models/{sha256}", content, headers)
+        return sha256
+
+    def submit(self, wanted: MissionIn) -> MissionOut:
+        """Submit a mission.
+
+        It is never sent twice. Where the answer is lost (SourceError), `missions` tells whether it
+        has arrived.
+        """
+        return self._ask(MissionOut, "POST", "/v1/missions", wanted)
+
+    def missions(self) -> list[MissionOut]:
+        """All missions that the account may see, newest first."""
+        return self._ask(list[MissionOut], "GET", "/v1/missions")
+
+    def mission(self, mission: str) -> MissionOut:
+        """One mission with its newest state."""
+        return self._ask(MissionOut, "GET", f"/v1/missions/{_part(mission)}")
+
+    def cancel(self, mission: str) -> MissionOut:
+        """Cancel a mission; drones in flight come home."""
+        return self._ask(MissionOut, "DELETE", f"/v1/missions/{_part(mission)}")
+
+    def approve(self, mission: str) -> MissionOut:
+        """Approve a mission that waits for it, as an operator."""
+        return self._ask(MissionOut, "POST", f"/v1/missions/{_part(mission)}/approve")
+
+    def command(self, mission: str, command: CommandIn) -> AnswerOut:
+        """Give a robot of a flying mission a command; the answer is its own."""
+        path = f"/v1/missions/{_part(mission)}/commands"
+        return self._ask(AnswerOut, "POST", path, command)
+
+    def add_navigation(self, mission: str, robot: str, waypoints: WaypointsIn) -> AnswerOut:
+        """Add waypoints to the queue of a robot; the answer is its own."""
+        path = f"/v1/missions/{_part(mission)}/navigation"
+        content = {**waypoints.model_dump(mode="json"), "robot": robot}
+        return self._ask(AnswerOut, "POST", path, content)
+
+    def recording(
+        self,
+        mission: str,
+        target: Path,
+        progress: Callable[[int, int | None], None] = _nothing,
+    ) -> None:
+        """Fetch the recording of a mission that is over into the file `target`.
+
+        `progress` is called with the bytes that are there, and all of them if that is known.
+        Raises OSError if the file cannot be written.
+        """
+        self._exchange.download(f"/v1/missions/{_part(mission)}/recording", target, progress)
+
+    def rehearsal_picture(self, mission: str, target: Path) -> None:
+        """Fetch the picture of a rehearsed flight, a PNG; raises OSError as `recording`."""
+        path = f"/v1/missions/{_part(mission)}/rehearsal.png"
+        self._exchange.download(path, target, _nothing)
+
+    def live(self, mission: str, rate: float = 5.0, *streams: str) -> LiveConnection:
+        """Connect to a mission's state, `rate` times a second at most, and items of `streams`.
+
+        Raises SourceError if there is no connection, else what `mission` raises.
+        """
+        query = urlencode({"rate": f"{rate:g}", "streams": ",".join(streams)})
+        path = f"/v1/missions/{_part(mission)}/live?{query}"
+        # The handshake's refusal has no text; that of the same mission by HTTP has.
+        return LiveConnection.open(self._exchange, path, lambda: self.mission(mission))
+
+    def here(self, mission: str) -> WireConnection:
+        """Connect as the user's side of a mission, which is asked by its own analyses.
+
+        Raises as `live`.
+        """
+        path = f"/v1/missions/{_part(mission)}/here"
+        return WireConnection.open(self._exchange, path, lambda: self.mission(mission))
+
+    def accounts(self) -> list[AccountOut]:
+        """All accounts, as an administrator."""
+        return self._ask(list[AccountOut], "GET", "/v1/accounts")
+
+    def add_account(self, account: AccountIn) -> AccountOut:
+        """Make an account, as an administrator."""
+        return self._ask(AccountOut, "POST", "/v1/accounts", account)
+
+    def change_account(
+        self,
+        name: str,
+        *,
+        role: Role | None = None,
+        scopes: list[Scope] | None = None,
+        disabled: bool | None = None,
+    ) -> AccountOut:
+        """Change an account, as an administrator; None keeps what is."""
+        content = {"role": role, "scopes": scopes, "disabled": disabled}
+        return self._ask(AccountOut, "PATCH", f"/v1/accounts/{_part(name)}", content)
+
+    def tokens(self) -> list[TokenOut]:
+        """One's own tokens, or all as an administrator; without their secrets."""
+        return self._ask(list[TokenOut], "GET", "/v1/tokens")
+
+    def issue_token(self, wanted: TokenIn) -> TokenOut:
+        """Make a token, as an administrator; only this answer has its secret."""
+        return self._ask(TokenOut, "POST", "/v1/tokens", wanted)
+
+    def revoke_token(self, token: str) -> TokenOut:
+        """Revoke a token, as an administrator."""
+        return self._ask(TokenOut, "DELETE", f"/v1/tokens/{_part(token)}")
+
+    def audit(self, limit: int = 100) -> list[AuditOut]:
+        """The newest entries of the audit log, as an administrator."""
+        return self._ask(list[AuditOut], "GET", f"/v1/audit?limit={limit:d}")
+
+    def usage(self) -> list[UsageOut]:
+        """What missions have used: the tenant's own, or all as an operator."""
+        return self._ask(list[UsageOut], "GET", "/v1/usage")
+
+    def _ask(
+        self,
+        kind: type[M],
+        method: Method,
+        path: str,
+        content: BaseModel | dict[str, Any] | None = None,
+    ) -> M:
+        body = content.model_dump(mode="json") if isinstance(content, BaseModel) else content
+        answer = self._exchange.ask(method, path, body)
+        try:
+            return TypeAdapter(kind).validate_python(answer)
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(map(str, first["loc"]))
+            raise self._exchange.strange(f"{path}: {place}: {first['msg']}") from None
+
+
+def _part(name: str) -> str:
+    """A name as one part of a path."""
+    return quote(name, safe="")

@@ -1,0 +1,195 @@
+"""HTTP exchanges with a provider's service: bounded answers, time limits, refusals as errors."""
+
+from __future__ import annotations
+
+import json
+import ssl
+from collections.abc import Callable, Mapping
+from http import HTTPStatus
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import urllib3
+from urllib3.exceptions import HTTPError, MaxRetryError
+
+from aerodaas.config.printable import printable
+from aerodaas.environment.provider.address import ServiceAddress
+from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError, SourceError
+
+__all__ = ["Exchange", "Method", "printed"]
+
+_MOST_BYTES = 32 << 20
+"""Largest JSON of an answer: a mission of 64 robots has a thousandth of that."""
+_CHUNK = 1 << 18
+_KEPT_OPEN = 8
+"""Idle connections, for the threads that ask at once."""
+_MOST_TEXT = 2000
+"""Characters of a refusal that are shown."""
+_CALLERS = frozenset(
+    {
+        HTTPStatus.BAD_REQUEST,
+        HTTPStatus.UNAUTHORIZED,
+        HTTPStatus.FORBIDDEN,
+        HTTPStatus.NOT_FOUND,
+        HTTPStatus.LENGTH_REQUIRED,
+        HTTPStatus.REQUEST_ENTITY_TOO_LARGE,
+        HTTPStatus.UNPROCESSABLE_ENTITY,
+    }
+)
+"""Refusals of what was asked, which asking again does not mend."""
+_LOGIN = "; is the token right? `aerodaas login` stores one"
+Method: TypeAlias = Literal["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE"]
+
+
+class Exchange:
+    """Requests to one service; safe in any thread."""
+
+    def __init__(self, address: ServiceAddress, token: str | None, timeout: float) -> None:
+        """Ask at `address` as the owner of `token`; wait `timeout` seconds for each answer."""
+        self.address = address
+        self.ssl = ssl.create_default_context() if address.scheme == "https" else None
+        self.headers = {} if token is None else {"Authorization": f"Bearer {token}"}
+        # A request that may have changed something is not sent again; others once, for a server
+        # may close an idle connection at the moment that it is used.
+        again = urllib3.Retry(total=1, connect=0, redirect=0, status=0, other=0)
+        self._pool = urllib3.PoolManager(
+            retries=again,
+            timeout=urllib3.Timeout(timeout),
+            ssl_context=self.ssl,
+            maxsize=_KEPT_OPEN,
+        )
+
+    def ask(self, method: Method, path: str, content: Any = None) -> Any:  # noqa: ANN401 - JSON
+        """Send a request with JSON, and return the JSON of its answer, its texts printable.
+
+        Raises:
+            ConfigError: With the service's text, for a request that it refuses as such.
+            MissionError: With the service's text, for one that it cannot fulfil now, and for an
+                answer that is no JSON.
+            SourceError: If the service cannot be reached, or does not answer in time.
+        """
+        data = None if content is None else json.dumps(content).encode()
+        _, answer = self.send(method, path, data, {"Content-Type": "application/json"})
+        try:
+            return printed(json.loads(answer))
+        except (ValueError, RecursionError):
+            raise self.strange("its answer is no JSON") from None
+
+    def send(
+        self,
+        method: Method,
+        path: str,
+        data: bytes | None = None,
+        headers: Mapping[str, str] | None = None,
+        allowed: frozenset[int] = frozenset(),
+    ) -> tuple[int, bytes]:
+        """Send a request; returns status and content of a success, or of an `allowed` status.
+
+        Raises what `ask` raises.
+        """
+        own = self.headers | (dict(headers or {}) if data is not None else {})
+        with self._answer(method, path, data, own) as response:
+            try:
+                answer = response.read(_MOST_BYTES + 1)
+            except (HTTPError, OSError) as error:
+                raise self.unreachable(error) from None
+            if len(answer) > _MOST_BYTES:
+                # The rest is not worth reading to keep the connection.
+                response.close()
+                raise self.strange(f"its answer is larger than {_MOST_BYTES >> 20} MiB")
+            if response.status not in allowed:
+                self._require_success(response.status, answer)
+            return response.status, answer
+
+    def download(
+        self, path: str, target: Path, progress: Callable[[int, int | None], None]
+    ) -> None:
+        """Write the content of an answer to a file, whole or not at all.
+
+        Args:
+            path: Of the resource.
+            target: The file, which is replaced.
+            progress: Called with the bytes that are there, and all of them if that is known.
+
+        Raises:
+            AeroDaaSError: As `ask`; SourceError also if the answer breaks off.
+            OSError: If the file cannot be written.
+        """
+        with self._answer("GET", path, None, self.headers) as response:
+            if response.status != HTTPStatus.OK:
+                self._require_success(response.status, response.read(_MOST_BYTES))
+            known = response.headers.get("Content-Length", "")
+            size, done = int(known) if known.isdigit() else None, 0
+            target.parent.mkdir(parents=True, exist_ok=True)
+            part = target.with_name(f"{target.name}.part")
+            try:
+                with part.open("wb") as file:
+                    for chunk in self._chunks(response):
+                        file.write(chunk)
+                        done += len(chunk)
+                        progress(done, size)
+                part.replace(target)
+            finally:
+                part.unlink(missing_ok=True)
+
+    def unreachable(self, error: Exception) -> SourceError:
+        """The error of a service that does not answer."""
+        inner = error.reason if isinstance(error, MaxRetryError) and error.reason else error
+        text = printable(str(inner))[:_MOST_TEXT] or type(inner).__name__
+        return SourceError(f"the provider at {self.address.base} does not answer: {text}")
+
+    def strange(self, why: str) -> MissionError:
+        """The error of a service that answers otherwise than agreed."""
+        return MissionError(
+            f"the provider at {self.address.base} does not answer as agreed: {why}; is it "
+            "`aerodaas serve` of this version?"
+        )
+
+    def refused(self, status: int, text: str) -> AeroDaaSError:
+        """The error of a refusal, with the service's text."""
+        hint = _LOGIN if status == HTTPStatus.UNAUTHORIZED else ""
+        kind = ConfigError if status in _CALLERS else MissionError
+        return kind(f"{self.address.host}: {text}{hint}")
+
+    def _answer(
+        self, method: Method, path: str, data: bytes | None, headers: Mapping[str, str]
+    ) -> urllib3.BaseHTTPResponse:
+        try:
+            return self._pool.request(
+                method,
+                f"{self.address.base}{path}",
+                body=data,
+                headers=headers,
+                preload_content=False,
+                redirect=False,
+            )
+        except (HTTPError, OSError) as error:
+            raise self.unreachable(error) from None
+
+    def _chunks(self, response: urllib3.BaseHTTPResponse) -> Any:  # noqa: ANN401 - an iterator
+        try:
+            yield from response.stream(_CHUNK)
+        except (HTTPError, OSError) as error:
+            raise self.unreachable(error) from None
+
+    def _require_success(self, status: int, answer: bytes) -> None:
+        if not HTTPStatus.OK <= status < HTTPStatus.MULTIPLE_CHOICES:
+            raise self.refused(status, _text(answer) or f"it answered with status {status}")
+
+
+def _text(answer: bytes) -> str:
+    try:
+        return printable(str(json.loads(answer)["text"]))[:_MOST_TEXT]
+    except (ValueError, KeyError, TypeError, RecursionError):
+        return ""
+
+
+def printed(content: Any) -> Any:  # noqa: ANN401 - JSON
+    """The same JSON, its texts safe for a terminal: they are another's."""
+    if isinstance(content, str):
+        return printable(content)
+    if isinstance(content, list):
+        return [printed(one) for one in content]
+    if isinstance(content, dict):
+        return {printable(key): printed(one) for key, one in content.items()}
+    return content

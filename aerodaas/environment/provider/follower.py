@@ -1,0 +1,142 @@
+"""MissionFollower: keeps up with a mission at a provider, across lost connections."""
+
+from __future__ import annotations
+
+import contextlib
+import random
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+from aerodaas.environment.provider.client import ProviderClient
+from aerodaas.environment.provider.live import LiveConnection
+from aerodaas.protocol.schemas import MissionOut
+from aerodaas.types.errors import AeroDaaSError, ConfigError
+
+__all__ = ["MissionFollower", "pauses"]
+
+_FIRST_PAUSE = 0.5
+_LONGEST_PAUSE = 10.0
+"""Seconds between two attempts to connect again."""
+
+
+def pauses() -> Iterator[float]:
+    """Yield pauses between attempts: doubled each time, and spread, so that clients do not meet."""
+    pause = _FIRST_PAUSE
+    while True:
+        yield pause * random.uniform(0.5, 1.0)
+        pause = min(2.0 * pause, _LONGEST_PAUSE)
+
+
+class MissionFollower:
+    """Follower of one mission, in a thread of its own, until it is over or closed.
+
+    While it is connected the provider hears of the user.
+    """
+
+    def __init__(
+        self,
+        client: ProviderClient,
+        mission: MissionOut,
+        say: Callable[[str], None] = lambda _: None,
+        rate: float = 5.0,
+    ) -> None:
+        """Follow `mission`; `say` is told, in the thread, of lost and found connections.
+
+        `rate` is the most states a second.
+        """
+        self._client = client
+        self._say = say
+        self._rate = rate
+        self._mission = mission
+        self._changes = 0
+        self._changed = threading.Condition()
+        self._closed = threading.Event()
+        self._connection: LiveConnection | None = None
+        self._failed: AeroDaaSError | None = None
+        self._thread = threading.Thread(target=self._follow, name="provider", daemon=True)
+
+    def start(self) -> None:
+        """Begin to follow."""
+        self._thread.start()
+
+    def close(self) -> None:
+        """Follow no more; the mission goes on."""
+        self._closed.set()
+        connection = self._connection
+        if connection is not None:
+            with contextlib.suppress(AeroDaaSError, OSError):
+                connection.close()
+
+    @property
+    def mission(self) -> MissionOut:
+        """The newest known state."""
+        return self._mission
+
+    @property
+    def changes(self) -> int:
+        """How many states have arrived."""
+        return self._changes
+
+    def await_change(self, seen: int, timeout: float) -> MissionOut:
+        """Return the newest state, once more than `seen` have arrived, or after `timeout` seconds.
+
+        Raises ConfigError if the provider refuses to tell any more.
+        """
+        with self._changed:
+            self._changed.wait_for(
+                lambda: self._changes > seen or self._failed is not None, timeout
+            )
+            if self._failed is not None:
+                raise self._failed
+            return self._mission
+
+    def _follow(self) -> None:
+        waiting, lost = pauses(), False
+        while not self._closed.is_set() and not self._mission.phase.over:
+            seen = self._changes
+            try:
+                self._listen(lost=lost)
+                self._take(self._client.mission(self._mission.id))
+            except ConfigError as error:
+                with self._changed:
+                    self._failed = error
+                    self._changed.notify_all()
+                return
+            except AeroDaaSError as error:
+                if self._changes > seen:
+                    waiting, lost = pauses(), False
+                if not lost and not self._closed.is_set():
+                    self._say(f"the connection is lost, the mission goes on without it: {error}")
+                lost = True
+            if not self._mission.phase.over:
+                self._closed.wait(next(waiting))
+
+    def _listen(self, *, lost: bool) -> None:
+        """Take what one connection brings."""
+        with self._client.live(self._mission.id, self._rate) as live:
+            self._connection = live
+            for message in live:
+                if self._closed.is_set():
+                    return
+                if isinstance(message, MissionOut):
+                    if lost:
+                        self._say("the connection to the provider is back")
+                        lost = False
+                    self._take(message)
+
+    def _take(self, mission: MissionOut) -> None:
+        with self._changed:
+            self._mission = mission
+            self._changes += 1
+            self._changed.notify_all()
+
+    def await_end(self, timeout: float) -> bool:
+        """Wait until the mission is over, `timeout` seconds at most; whether it is."""
+        until = time.monotonic() + timeout
+        while not self._mission.phase.over:
+            left = until - time.monotonic()
+            if left <= 0.0:
+                return False
+            self.await_change(self._changes, left)
+        return True

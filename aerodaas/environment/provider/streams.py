@@ -1,0 +1,109 @@
+"""WireReader: a stream of a provider's mission, read over the wire."""
+
+from __future__ import annotations
+
+import threading
+import time
+import warnings
+from collections import deque
+from typing import Any
+
+from aerodaas.analytics.wire_items import ItemError, unpack
+from aerodaas.environment.provider.client import ProviderClient
+from aerodaas.environment.provider.follower import MissionFollower, pauses
+from aerodaas.environment.provider.live import ReceivedItem
+from aerodaas.types.errors import AeroDaaSError, ConfigError
+
+__all__ = ["WireReader"]
+
+_WAITING = 256
+"""Most items that wait for a slow reader; the oldest ones go first."""
+_RATE = 1.0
+"""Hz of the mission's state on this connection, which is of no use to a stream."""
+_LOOK_SECONDS = 0.2
+_LAST_SECONDS = 2.0
+"""Seconds after the mission's end in which its last items may still arrive."""
+
+
+class WireReader:
+    """Reader of one stream until the mission is over; reconnects, and buffers the newest few."""
+
+    def __init__(self, client: ProviderClient, follower: MissionFollower, stream: str) -> None:
+        """Read `stream` of the mission that `follower` keeps up with."""
+        self._client = client
+        self._follower = follower
+        self._stream = stream
+        self._arrived = threading.Condition()
+        self._waiting: deque[Any] = deque(maxlen=_WAITING)
+        self._newest: Any = None
+        self._failed: AeroDaaSError | None = None
+        self._ended = False
+        threading.Thread(target=self._read, name=f"wire {stream}", daemon=True).start()
+
+    def next(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
+        """Return the next item, waiting up to `timeout` seconds (None: for ever).
+
+        Raises TimeoutError when none came, StopIteration once the mission has ended, ConfigError
+        if the provider refuses the stream.
+        """
+        until = time.monotonic() + (float("inf") if timeout is None else timeout)
+        with self._arrived:
+            while not self._waiting:
+                if self._failed is not None:
+                    raise self._failed
+                if self._ended:
+                    raise StopIteration
+                left = until - time.monotonic()
+                if left <= 0.0:
+                    raise TimeoutError(f"nothing arrived within {timeout} s")
+                self._arrived.wait(min(_LOOK_SECONDS, left))
+            return self._waiting.popleft()
+
+    def newest(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
+        """Return the newest item, again if there is none newer; raises like `next` without one."""
+        with self._arrived:
+            if self._newest is not None:
+                self._waiting.clear()
+                return self._newest
+        return self.next(timeout)
+
+    def _read(self) -> None:
+        waiting, until = pauses(), float("inf")
+        try:
+            while time.monotonic() < until:
+                try:
+                    self._listen()
+                except ConfigError as error:
+                    self._failed = error
+                    return
+                except AeroDaaSError:
+                    # The follower meets and tells the same.
+                    time.sleep(next(waiting))
+                else:
+                    return
+                if self._follower.mission.phase.over:
+                    until = min(until, time.monotonic() + _LAST_SECONDS)
+        finally:
+            with self._arrived:
+                self._ended = True
+                self._arrived.notify_all()
+
+    def _listen(self) -> None:
+        """Take what one connection brings until the mission is over."""
+        with self._client.live(self._follower.mission.id, _RATE, self._stream) as live:
+            for message in live:
+                if isinstance(message, ReceivedItem):
+                    self._take(message)
+
+    def _take(self, message: ReceivedItem) -> None:
+        try:
+            item = unpack(message.content, message.blob)
+        except ItemError as error:
+            warnings.warn(f"{self._stream}: an item is left out: {error}", stacklevel=2)
+            return
+        if item is None:
+            return
+        with self._arrived:
+            self._waiting.append(item)
+            self._newest = item
+            self._arrived.notify_all()

@@ -1,0 +1,118 @@
+"""One WebSocket to a provider's service: messages of JSON, each with a blob or without."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Callable
+from contextlib import ExitStack
+from typing import TYPE_CHECKING, Any
+
+from typing_extensions import Self
+
+from aerodaas.config.extras import require_extra
+from aerodaas.environment.provider.exchange import Exchange
+
+if TYPE_CHECKING:
+    from websockets.sync.client import ClientConnection
+
+__all__ = ["WireConnection"]
+
+_OPEN_SECONDS = 10.0
+_LARGEST = 64 << 20
+"""Bytes of one message: a picture of 4K with its depth, uncompressed."""
+
+
+class WireConnection:
+    """An open connection; one thread receives, any may send or close."""
+
+    def __init__(self, exchange: Exchange, connection: ClientConnection, stack: ExitStack) -> None:
+        """Speak over `connection`, which `stack` closes; errors are worded by `exchange`."""
+        self.exchange = exchange
+        self._connection = connection
+        self._stack = stack
+        # A message's two parts stay together.
+        self._sending = threading.Lock()
+
+    @classmethod
+    def open(cls, exchange: Exchange, path: str, explain: Callable[[], object]) -> Self:
+        """Connect; `explain` raises why, if the service has refused.
+
+        Raises ConfigError without the package for WebSockets, SourceError without a connection.
+        """
+        require_extra("remote", "following a provider's mission")
+        from websockets.exceptions import InvalidHandshake  # noqa: PLC0415 - only to follow
+        from websockets.sync.client import connect  # noqa: PLC0415 - as above
+
+        stack = ExitStack()
+        try:
+            connection = stack.enter_context(
+                connect(
+                    f"{exchange.address.websocket}{path}",
+                    additional_headers=exchange.headers,
+                    ssl=exchange.ssl,
+                    proxy=None,
+                    open_timeout=_OPEN_SECONDS,
+                    close_timeout=1.0,
+                    max_size=_LARGEST,
+                )
+            )
+        except InvalidHandshake as error:
+            explain()
+            raise exchange.unreachable(error) from None
+        except (OSError, EOFError) as error:
+            raise exchange.unreachable(error) from None
+        return cls(exchange, connection, stack)
+
+    def __enter__(self) -> Self:
+        """Return the connection, which is closed on exit."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the connection."""
+        self.close()
+
+    def close(self) -> None:
+        """Close the connection; whoever receives from it meets SourceError."""
+        self._stack.close()
+
+    def send(self, content: dict[str, Any], blob: bytes = b"") -> None:
+        """Send a message; raises SourceError if the connection is lost."""
+        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - only to follow
+
+        try:
+            with self._sending:
+                self._connection.send(json.dumps({**content, "blob": bool(blob)}))
+                if blob:
+                    self._connection.send(blob)
+        except (ConnectionClosed, OSError, EOFError) as error:
+            raise self.exchange.unreachable(error) from None
+
+    def receive(self, timeout: float | None) -> tuple[dict[str, Any], bytes]:
+        """Receive a message and its blob.
+
+        Raises SourceError if the connection is lost or none came within `timeout` seconds,
+        MissionError for one that is not as agreed.
+        """
+        text = self._part(timeout)
+        try:
+            message = json.loads(text) if isinstance(text, str) else None
+        except (ValueError, RecursionError):
+            message = None
+        if not isinstance(message, dict):
+            raise self.exchange.strange("a message that is no JSON object")
+        blob = self._part(timeout) if message.pop("blob", False) else b""
+        if isinstance(blob, str):
+            raise self.exchange.strange("a message without the bytes that it tells of")
+        return message, blob
+
+    def _part(self, timeout: float | None) -> str | bytes:
+        from websockets.exceptions import ConnectionClosed  # noqa: PLC0415 - only to follow
+
+        try:
+            return self._connection.recv(timeout)
+        except TimeoutError:
+            text = f"nothing came for {timeout:g} s"
+            raise self.exchange.unreachable(TimeoutError(text)) from None
+        except (ConnectionClosed, OSError, EOFError) as error:
+            raise self.exchange.unreachable(error) from None

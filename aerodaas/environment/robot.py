@@ -1,0 +1,115 @@
+"""Robot: the handle of one drone of an environment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from aerodaas.config.model import RobotConfig
+from aerodaas.config.plugins import load_plugin
+from aerodaas.dataflow.graph import NavigationEdge, refusal
+from aerodaas.dataflow.handles import Sensor
+from aerodaas.dataflow.interfaces import IAeroData, IRobot, ISensor
+from aerodaas.dataflow.names import PaperNames
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.mission.commands import End, Pause, Resume
+from aerodaas.types.errors import GraphError, UnknownIdError
+
+if TYPE_CHECKING:
+    from aerodaas.environment.environment import Environment
+
+__all__ = ["Robot"]
+
+
+class Robot(PaperNames, IRobot):
+    """One drone of an environment."""
+
+    def __init__(self, environment: Environment, config: RobotConfig) -> None:
+        self._environment = environment
+        self.config = config
+        self.robot_id = config.id
+        self.start_hooks: list[Callable[[], None]] = []
+        self.end_hooks: list[Callable[[], None]] = []
+
+    def has_sensors(self) -> bool:
+        """Return True if the robot has any onboard sensors."""
+        return bool(self.config.sensors)
+
+    def get_sensors(self) -> list[ISensor[Any]]:
+        """Return all the sensors on board."""
+        return [self._environment.sensor(sensor) for sensor in self.config.sensors]
+
+    def get_sensor_by_id(self, sensor_id: str) -> Sensor[Any]:
+        """Return the requested sensor; raises UnknownIdError."""
+        for sensor in self.config.sensors:
+            if sensor_id in {sensor.id, sensor.full_id}:
+                return self._environment.sensor(sensor)
+        known = [sensor.id for sensor in self.config.sensors]
+        raise UnknownIdError(f"sensor of {self.robot_id}", sensor_id, known)
+
+    def is_navigable(self) -> bool:
+        """Return True if the robot is navigable: its driver takes setpoints."""
+        capabilities = load_plugin("drivers", self.config.driver)(
+            self.config, self._environment.config
+        ).capabilities
+        return bool(capabilities.position_setpoints or capabilities.velocity_setpoints)
+
+    def navigate(self, data: IAeroData[Any]) -> None:
+        """Fly by this navigation: waypoints, or a stream of navigation; in flight, from now on.
+
+        Raises GraphError if `data` is neither, or if this robot is not in the mission that flies,
+        and MissionError for what the mission refuses in flight.
+        """
+        navigation = data
+        if not isinstance(data, IAeroData):
+            raise refusal(
+                f"{self.robot_id} navigates by AeroListData([Waypoint(…), …]), AeroNavigation or a "
+                f"stream of navigation, not by {type(data).__name__}"
+            )
+        if not isinstance(navigation, AeroNavigation):
+            navigation = self._environment.trajectory_scheduler().generate_navigation(data)
+        stream = navigation.stream
+        if stream is not None and not issubclass(stream.item, AeroNavigation):
+            raise GraphError(
+                f"{self.robot_id} cannot navigate by {stream.name}, which carries "
+                f"{stream.item.__name__}; put a follow analysis between"
+            )
+        if stream is not None and stream.graph is not self._environment.graph:
+            raise GraphError(f"{stream.name} belongs to another Environment than {self.robot_id}")
+        self._environment.fly_by(NavigationEdge(self.robot_id, navigation))
+
+    def start_mission(self, hook: Callable[[], None] | None = None, *, wait: bool = True) -> None:
+        """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
+
+        With `wait=False`, return as soon as it flies; as a guest of another application, which
+        flies, at once. While the mission flies, this waits for it; after its end, it flies again:
+        the navigation given to `navigate` since, or else the same. Raises
+        the project's errors; whatever happens, the drone is landed and the recording closed first.
+        """
+        self._environment.start_mission(hook, wait=wait)
+
+    def end_mission(self) -> None:
+        """End the mission: land here; the hooks of `on_end` run once it is over."""
+        self._environment.command(self.robot_id, End())
+
+    def pause_mission(self) -> None:
+        """Pause the ongoing mission by putting the drone in hover mode."""
+        self._environment.command(self.robot_id, Pause())
+
+    def resume_mission(self) -> None:
+        """Resume the ongoing mission."""
+        self._environment.command(self.robot_id, Resume())
+
+    def wait(self) -> None:
+        """Return when the mission has ended; raises the error that it ended with."""
+        self._environment.launched().wait()
+
+    def on_start(self, hook: Callable[[], None]) -> Callable[[], None]:
+        """Register a hook to run before take-off; usable as a decorator."""
+        self.start_hooks.append(hook)
+        return hook
+
+    def on_end(self, hook: Callable[[], None]) -> Callable[[], None]:
+        """Register a hook to run after the mission has ended; usable as a decorator."""
+        self.end_hooks.append(hook)
+        return hook

@@ -1,0 +1,1 @@
+"""What the provider's service and its clients say to each other."""

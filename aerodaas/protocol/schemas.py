@@ -1,0 +1,326 @@
+"""What the service and its clients say to each other: JSON models of the HTTP interface, version 1.
+
+Units are metres, seconds, radians and m/s; moments are seconds of Unix time; a charge is 0 to 1.
+"""
+
+from __future__ import annotations
+
+import enum
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.dataflow.mission_document import MissionDocument
+
+__all__ = [
+    "AccountIn",
+    "AccountOut",
+    "Area",
+    "AuditOut",
+    "CommandIn",
+    "FleetOut",
+    "LeaseIn",
+    "LeaseOut",
+    "LeaseState",
+    "MissionIn",
+    "MissionOut",
+    "MissionPhase",
+    "RefusalOut",
+    "RobotOut",
+    "Role",
+    "Scope",
+    "SilencePolicy",
+    "TokenIn",
+    "TokenOut",
+    "UsageOut",
+    "VerdictOut",
+]
+
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Word = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]{0,63}$")]
+Area = Annotated[list[tuple[Number, Number]], Field(min_length=3, max_length=100)]
+"""A polygon's corners (east, north) in metres of the provider's local frame."""
+_MOST_ROBOTS = 64
+_MOST_MINUTES = 24 * 60
+_YEAR_DAYS = 366
+
+
+class Role(str, enum.Enum):
+    """What an account may do; each role may do what those before it may."""
+
+    VIEWER = "viewer"
+    """See the fleet and one's own tenant's missions."""
+    PILOT = "pilot"
+    """Lease drones, fly missions and command them."""
+    OPERATOR = "operator"
+    """See and command all missions, approve, revoke leases."""
+    ADMIN = "admin"
+    """Manage accounts, tokens and quotas; read the audit log."""
+
+
+class Scope(str, enum.Enum):
+    """What a token may be used for, within its account's role."""
+
+    FLY = "fly"
+    SENSE = "sense"
+    """Receive cameras' pictures and other sensors' items."""
+    COMPUTE = "compute"
+    """Run analyses on the provider's edge and cloud."""
+
+
+class SilencePolicy(str, enum.Enum):
+    """What a mission does when its user's connection is lost."""
+
+    CONTINUE = "continue"
+    RETURN = "return"
+
+
+class LeaseState(str, enum.Enum):
+    """State of a lease."""
+
+    QUEUED = "queued"
+    GRANTED = "granted"
+    ENDED = "ended"
+    """Given back, expired or revoked, as its reason says."""
+
+
+class MissionPhase(str, enum.Enum):
+    """State of a submitted mission at the service; its drones have states of their own."""
+
+    SUBMITTED = "submitted"
+    REHEARSING = "rehearsing"
+    """Being flown in simulation first."""
+    AWAITING_APPROVAL = "awaiting_approval"
+    QUEUED = "queued"
+    """Waiting for its lease."""
+    FLYING = "flying"
+    LANDED = "landed"
+    """Over, as planned."""
+    REFUSED = "refused"
+    CANCELLED = "cancelled"
+    FAILED = "failed"
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing follows this phase."""
+        return self in {self.LANDED, self.REFUSED, self.CANCELLED, self.FAILED}
+
+
+class _In(BaseModel):
+    """Base of requests: unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class _Out(BaseModel):
+    """Base of answers."""
+
+    model_config = ConfigDict(frozen=True)
+
+
+class RefusalOut(_Out):
+    """Answer to each request that is not carried out, with the HTTP status."""
+
+    text: str
+    """Why, and the remedy."""
+
+
+class RobotOut(_Out):
+    """One drone of the fleet."""
+
+    id: str
+    sensors: list[str]
+    """Full ids."""
+    lease: str | None = None
+    """Lease that holds it; None if it is free."""
+    tenant: str | None = None
+    """Tenant of that lease; shown to operators and to the tenant itself."""
+    mission: str | None = None
+    """Mission that flies it; shown as the tenant is."""
+    battery: float | None = None
+    position: tuple[float, float, float] | None = None
+    """Metres east, north and up of home, where it was last heard of."""
+    heard: float | None = None
+    """Moment of battery and position."""
+    enabled: bool = True
+    """False after an operator has taken it out of service."""
+
+
+class FleetOut(_Out):
+    """The fleet, and the environment that an application's graph is built against."""
+
+    name: str
+    robots: list[RobotOut]
+    environment: dict[str, Any]
+    """An environment file's content without addresses, paths, drivers' settings and secrets."""
+
+
+class LeaseIn(_In):
+    """Request of drones for a time."""
+
+    robots: Annotated[list[Word], Field(min_length=1, max_length=_MOST_ROBOTS)] | None = None
+    """By id; None for any one that fits."""
+    camera: bool = False
+    """Any one with a camera."""
+    within: Positive | None = None
+    """Metres from `near` at most, for any one."""
+    near: tuple[Number, Number] = (0.0, 0.0)
+    """East and north."""
+    battery_minutes: Positive | None = None
+    """Minutes that the charge must last, for any one."""
+    minutes: Annotated[float, Field(gt=0, le=_MOST_MINUTES)] = 15.0
+    area: Area | None = None
+    """Where the drones will stay; intersected with the provider's fence."""
+
+
+class LeaseOut(_Out):
+    """A lease: while it is granted, its tenant alone flies its robots."""
+
+    id: str
+    tenant: str
+    account: str
+    robots: list[str]
+    """Empty while any one is wanted and none is granted."""
+    state: LeaseState
+    reason: str = ""
+    minutes: float
+    asked: float
+    granted: float | None = None
+    ends: float | None = None
+    """When a granted lease expires."""
+    area: list[tuple[float, float]] | None = None
+
+
+class MissionIn(_In):
+    """A mission to be flown."""
+
+    document: MissionDocument
+    lease: str | None = None
+    """None: one for the document's robots is requested with it, and given back after it."""
+    minutes: Annotated[float, Field(gt=0, le=_MOST_MINUTES)] = 15.0
+    """Of the lease that is requested with it."""
+    silence: SilencePolicy = SilencePolicy.CONTINUE
+    silence_seconds: Annotated[float, Field(ge=1, le=3600)] = 30.0
+    """Seconds without any request of the user after which the policy applies."""
+    share: list[Word] = Field(default_factory=list, max_length=_MOST_ROBOTS)
+    """Tenants that may watch it."""
+    seed: Annotated[int, Field(ge=0)] | None = None
+    """Of a simulated fleet."""
+
+
+class VerdictOut(_Out):
+    """Result of the rehearsal in simulation."""
+
+    approved: bool
+    reasons: list[str] = Field(default_factory=list)
+    """Why it was refused; or what could not be rehearsed."""
+    seconds: float | None = None
+    """Mission time of the rehearsed flight."""
+    distance: float | None = None
+    battery_used: float | None = None
+    picture: str | None = None
+    """Path of a PNG of the flight, at this service."""
+
+
+class MissionOut(_Out):
+    """A mission and its newest state."""
+
+    id: str
+    name: str
+    tenant: str
+    account: str
+    phase: MissionPhase
+    reason: str = ""
+    robots: list[str]
+    lease: str | None = None
+    share: list[str] = Field(default_factory=list)
+    """Tenants that may watch it."""
+    submitted: float
+    started: float | None = None
+    ended: float | None = None
+    verdict: VerdictOut | None = None
+    status: dict[str, StatusOut] = Field(default_factory=dict)
+    """Newest status by robot, while it flies and afterwards."""
+    alerts: list[str] = Field(default_factory=list)
+    """The newest alerts, oldest first."""
+    recording: bool = False
+    """Whether the recording can be fetched."""
+
+
+class CommandIn(_In):
+    """A command to one robot of a mission."""
+
+    robot: Word
+    command: Literal["pause", "resume", "clear", "return-home", "land"]
+
+
+class AccountIn(_In):
+    """A new account, or changes of one."""
+
+    name: Word
+    tenant: Word
+    role: Role = Role.PILOT
+    scopes: list[Scope] = Field(default_factory=lambda: list(Scope))
+
+
+class AccountOut(AccountIn):
+    """An account."""
+
+    created: float
+    disabled: bool = False
+
+
+class TokenIn(_In):
+    """Request of a token for an account."""
+
+    account: Word
+    days: Annotated[float, Field(gt=0, le=_YEAR_DAYS)] = 30.0
+    scopes: list[Scope] | None = None
+    """None: all of the account's."""
+
+
+class TokenOut(_Out):
+    """A token; its secret is shown once."""
+
+    id: str
+    account: str
+    scopes: list[Scope]
+    created: float
+    expires: float
+    revoked: bool = False
+    secret: str | None = None
+    """What a request carries as `Authorization: Bearer …`; only in the answer that creates it."""
+
+
+class AuditOut(_Out):
+    """One entry of the audit log."""
+
+    at: float
+    account: str
+    """Empty for a request without a valid token."""
+    tenant: str
+    address: str
+    action: str
+    """`lease.request`, `mission.submit`, `token.refused`, …"""
+    target: str = ""
+    accepted: bool
+    text: str = ""
+
+
+class UsageOut(_Out):
+    """What one mission has used."""
+
+    mission: str
+    tenant: str
+    account: str
+    started: float
+    flight_seconds: float
+    distance: float
+    battery_used: float
+    """Sum over its robots of the share of a full charge."""
+    compute_seconds: dict[str, float] = Field(default_factory=dict)
+    """Processor's seconds of analyses, by compute resource."""
+    cloud_calls: int = 0
+    recorded_bytes: int = 0

@@ -1,0 +1,112 @@
+"""From a token to who sends the request."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable
+
+from aerodaas.analytics.remote.attempts import WrongTokens
+from aerodaas.service.access.audit import Audit
+from aerodaas.service.access.principal import Principal
+from aerodaas.service.access.tokens import digest_of, fits, parse
+from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.store import Store
+
+__all__ = ["Access"]
+
+_NO_SECRET = "0" * 64
+_REMEMBERED = 600.0
+"""Seconds for which a token is known while the database does not answer."""
+_MOST_REMEMBERED = 1000
+
+
+class Access:
+    """Tells who sends a request by its token; wrong tokens are counted, slowed and audited.
+
+    The right token is never refused for the wrong ones of others behind the same address. While
+    the database does not answer, a token that was right in the last ten minutes stays so, for its
+    drones must still obey. Threads may share it.
+    """
+
+    def __init__(
+        self,
+        store: Store,
+        audit: Audit,
+        tell: Callable[[str], None] = lambda _: None,
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        """Look tokens up in `store`; `tell` people of many wrong ones; times are Unix time."""
+        self._store = store
+        self._audit = audit
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._wrong = WrongTokens(tell, what="service")
+        self._known: OrderedDict[str, tuple[Principal, float]] = OrderedDict()
+
+    def of(self, token: str, address: str) -> Principal:
+        """Who sends a request.
+
+        Args:
+            token: What followed `Bearer` in its header; empty for none.
+            address: Where it comes from.
+
+        Raises:
+            RefusedError: With status 401 for a token that is missing, malformed, unknown, wrong,
+                expired or revoked, or whose account is disabled; all with the same text. With
+                429 and `retry_after` after many wrong ones from one address or overall.
+            StoreError: If the database does not answer, and the token is not remembered.
+        """
+        principal = self._look_up(token)
+        if principal is not None:
+            return principal
+        with self._lock:
+            pause = self._wrong.count(address)
+        if pause:
+            raise RefusedError(429, "too many wrong tokens", retry_after=pause)
+        # So many entries as wrong tokens are answered as such, and no more: an audit log that a
+        # stranger can fill tells nothing.
+        self._audit.write(None, "token.refused", accepted=False, address=address, required=False)
+        raise RefusedError(401, "wrong or missing token: send it as `Authorization: Bearer …`")
+
+    def _look_up(self, text: str) -> Principal | None:
+        given = parse(text)
+        if given is None:
+            return None
+        key = digest_of(given.secret)
+        try:
+            found = self._store.tokens.owned(given.id)
+        except StoreError:
+            principal = self._remembered(key)
+            if principal is None or principal.token != given.id:
+                raise
+            return principal
+        if found is None:
+            fits(given.secret, _NO_SECRET)  # as long as for a known one
+            return None
+        token, account = found
+        now = self._clock()
+        valid = not token.revoked and now < token.expires and not account.disabled
+        if not fits(given.secret, token.digest) or not valid:
+            with self._lock:
+                self._known.pop(key, None)
+            return None
+        principal = Principal(
+            account=account.name,
+            tenant=account.tenant,
+            role=account.role,
+            scopes=token.scopes & account.scopes,
+            token=token.id,
+        )
+        with self._lock:
+            self._known[key] = (principal, min(token.expires, now + _REMEMBERED))
+            self._known.move_to_end(key)
+            if len(self._known) > _MOST_REMEMBERED:
+                self._known.popitem(last=False)
+        return principal
+
+    def _remembered(self, key: str) -> Principal | None:
+        with self._lock:
+            principal, until = self._known.get(key, (None, 0.0))
+        return principal if self._clock() < until else None

@@ -1,0 +1,61 @@
+"""Who sends a request, and what they may do."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+
+from aerodaas.protocol.schemas import Role, Scope
+from aerodaas.service.errors import RefusedError
+
+__all__ = ["Principal", "reaches", "require", "sees"]
+
+_ORDER = {role: place for place, role in enumerate(Role)}
+
+
+@dataclass(frozen=True, slots=True)
+class Principal:
+    """The account of a valid token, with what the token may be used for."""
+
+    account: str
+    tenant: str
+    role: Role
+    scopes: frozenset[Scope]
+    """Those of the token that its account still has."""
+    token: str
+    """The token's id."""
+
+
+def reaches(role: Role, wanted: Role) -> bool:
+    """Whether a role may do what `wanted` may."""
+    return _ORDER[role] >= _ORDER[wanted]
+
+
+def require(principal: Principal, role: Role, scope: Scope | None = None) -> None:
+    """Refuse who may not.
+
+    Args:
+        principal: Sender of the request.
+        role: The lowest role that may.
+        scope: What the token must be good for; None for any.
+
+    Raises:
+        RefusedError: With status 403.
+    """
+    if not reaches(principal.role, role):
+        raise RefusedError(
+            403, f"this needs the role {role.value}; {principal.account} is {principal.role.value}"
+        )
+    if scope is not None and scope not in principal.scopes:
+        raise RefusedError(403, f"this token is not good for {scope.value}: ask for one that is")
+
+
+def sees(principal: Principal, tenant: str, share: Collection[str] = ()) -> bool:
+    """Whether a principal may see what belongs to `tenant`.
+
+    Args:
+        principal: Sender of the request.
+        tenant: Owner of a mission, lease or recording.
+        share: Further tenants with which the owner shares it.
+    """
+    return principal.tenant in {tenant, *share} or reaches(principal.role, Role.OPERATOR)

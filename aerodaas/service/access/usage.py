@@ -1,0 +1,60 @@
+"""What missions have used, as a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from datetime import datetime, timezone
+
+from aerodaas.protocol.schemas import UsageOut
+from aerodaas.recording.export.cells import harmless
+from aerodaas.service.store import Usage
+
+__all__ = ["usage_csv", "usage_out"]
+
+_COLUMNS = (
+    "mission",
+    "tenant",
+    "account",
+    "started",
+    "flight_seconds",
+    "distance",
+    "battery_used",
+    "compute_seconds",
+    "tasks",
+    "cloud_calls",
+    "recorded_bytes",
+)
+
+
+def usage_out(usage: Usage) -> UsageOut:
+    """A row as the HTTP interface shows it."""
+    return UsageOut(
+        mission=usage.mission,
+        tenant=usage.tenant,
+        account=usage.account,
+        started=usage.started,
+        flight_seconds=usage.flight_seconds,
+        distance=usage.distance,
+        battery_used=usage.battery_used,
+        compute_seconds=dict(usage.compute_seconds),
+        cloud_calls=usage.cloud_calls,
+        recorded_bytes=usage.recorded_bytes,
+    )
+
+
+def usage_csv(rows: Iterable[Usage]) -> str:
+    """Rows as CSV with a header; `compute_seconds` is the sum over all resources.
+
+    Moments are ISO 8601 in UTC. Spreadsheets take no text of it for a formula.
+    """
+    text = io.StringIO(newline="")
+    writer = csv.writer(text)
+    writer.writerow(_COLUMNS)
+    for row in rows:
+        cells = {name: getattr(row, name) for name in _COLUMNS}
+        cells["started"] = datetime.fromtimestamp(row.started, timezone.utc).isoformat()
+        cells["compute_seconds"] = sum(row.compute_seconds.values())
+        writer.writerow(map(harmless, cells.values()))
+    return text.getvalue()

@@ -1,0 +1,89 @@
+"""The service as one ASGI application, from its settings."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+from fastapi import FastAPI, Security
+from fastapi.security import HTTPBearer
+
+from aerodaas.config.redaction import catalogue
+from aerodaas.service.access import Access, Accounts, Audit, Quotas, RateLimiter
+from aerodaas.service.bookings import Bookings
+from aerodaas.service.desk import MissionDesk
+from aerodaas.service.fleet_view import FleetView
+from aerodaas.service.garage import Garage
+from aerodaas.service.gate import Gate
+from aerodaas.service.hub import StreamHub
+from aerodaas.service.models import ModelShelf
+from aerodaas.service.routes.accounts import AccountRoutes
+from aerodaas.service.routes.admission import Admission
+from aerodaas.service.routes.fleet import FleetRoutes
+from aerodaas.service.routes.here import HereRoutes
+from aerodaas.service.routes.leases import LeaseRoutes
+from aerodaas.service.routes.live import LiveRoutes
+from aerodaas.service.routes.missions import MissionRoutes
+from aerodaas.service.routes.refusals import register_refusals
+from aerodaas.service.settings import ServiceSettings
+from aerodaas.service.store import Store
+
+__all__ = ["build_service"]
+
+_RATE = 50.0
+"""Requests a second of one account, on average."""
+_BURST = 200.0
+
+
+def build_service(
+    settings: ServiceSettings, store: Store, tell: Callable[[str], None] = lambda _: None
+) -> FastAPI:
+    """Build the service; its missions move on while the application runs.
+
+    Args:
+        settings: Of the provider.
+        store: Its open database.
+        tell: Tells the provider's people of what they should look at.
+    """
+    audit = Audit(store)
+    accounts, access = Accounts(store), Access(store, audit, tell)
+    quotas, garage = Quotas(store), Garage(settings.config, store)
+    models = ModelShelf(settings.models)
+    bookings = Bookings(settings.config, store, garage, quotas)
+    desk = MissionDesk(
+        settings, store, bookings=bookings, garage=garage, quotas=quotas, models=models
+    )
+    hub = StreamHub(desk.items)
+    admission = Admission(access, audit, RateLimiter(_RATE, _BURST))
+    shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)
+    fleet = FleetView(settings.config, shown, garage, bookings, desk)
+
+    @asynccontextmanager
+    async def lifespan(_: FastAPI) -> AsyncIterator[None]:
+        desk.start()
+        yield
+        desk.close()
+
+    app = FastAPI(
+        title="AeroDaaS",
+        version="1",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
+        openapi_url="/v1/openapi.json",
+    )
+    register_refusals(app)
+    # The gate has looked at the token by then; this tells the schema's readers of it.
+    secured = [Security(HTTPBearer(auto_error=False))]
+    for routes in (
+        FleetRoutes(fleet, garage, models, accounts, admission, audit),
+        LeaseRoutes(bookings, admission, audit),
+        MissionRoutes(desk, admission, audit),
+        AccountRoutes(accounts, store, admission, audit),
+    ):
+        app.include_router(routes.router(), dependencies=secured)
+    app.include_router(LiveRoutes(desk, hub, admission).router())
+    app.include_router(HereRoutes(desk, admission).router())
+    app.add_middleware(Gate, admission=admission)
+    return app

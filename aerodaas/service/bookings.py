@@ -1,0 +1,159 @@
+"""Bookings: the book of leases with the fleet as it is now, and the quotas of tenants."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
+from aerodaas.service.access import Principal, Quotas, sees
+from aerodaas.service.access.principal import reaches
+from aerodaas.service.errors import RefusedError
+from aerodaas.service.garage import Garage
+from aerodaas.service.leases import Candidate, Fleet, LeaseBook
+from aerodaas.service.store import Lease, Mission, Store
+
+__all__ = ["Bookings"]
+
+
+class Bookings:
+    """Leases of all tenants; safe in any thread."""
+
+    def __init__(
+        self, config: EnvironmentConfig, store: Store, garage: Garage, quotas: Quotas
+    ) -> None:
+        """Go on with the leases that the database has."""
+        self._config = config
+        self._store = store
+        self._garage = garage
+        self._quotas = quotas
+        self._book = LeaseBook(store.leases)
+        self.on_end: list[Callable[[Lease], None]] = []
+        """Called with each lease that has ended, to recall its flights."""
+        self.flying: Callable[[], Collection[str]] = tuple
+        """Tells which robots are in flight: they may be on their way home from an ended lease."""
+        self.on_extension: list[Callable[[Lease], None]] = []
+
+    def request(self, principal: Principal, wish: LeaseIn) -> Lease:
+        """Ask for drones; raises RefusedError, also for a quota that is used up."""
+        now = time.time()
+        self.require_quota(principal.tenant, wish.minutes * len(wish.robots or [""]))
+        lease, changed = self._book.request(
+            wish, principal.tenant, principal.account, now, self._fleet()
+        )
+        self._tell(changed)
+        return self.lease(lease.id)
+
+    def require_quota(self, tenant: str, minutes: float) -> None:
+        """Raise RefusedError if a tenant may not have another `minutes`, times robots."""
+        now = time.time()
+        self._quotas.check(tenant, minutes, now, self._book.committed(tenant, now))
+
+    def for_mission(self, mission: Mission) -> Lease:
+        """Ask for the drones of a mission that brought no lease; raises RefusedError."""
+        minutes = float(mission.request["minutes"])
+        wish = LeaseIn(robots=list(mission.robots), minutes=minutes)
+        lease, changed = self._book.request(
+            wish, mission.tenant, mission.account, time.time(), self._fleet()
+        )
+        self._tell(changed)
+        return self.lease(lease.id)
+
+    def require(self, principal: Principal, lease: str, robots: Collection[str]) -> None:
+        """Raise RefusedError unless a lease is the tenant's, goes on, and has these robots."""
+        found = self._own(principal, lease)
+        if found.state is LeaseState.ENDED:
+            raise RefusedError(409, f"the lease {lease} has ended: {found.reason}")
+        held = found.robots or found.wanted
+        missing = [robot for robot in robots if robot not in held]
+        if missing:
+            raise RefusedError(403, f"the lease {lease} is for {', '.join(held)}, not {missing[0]}")
+
+    def lease(self, lease: str) -> Lease:
+        """A lease, whoever asks; raises RefusedError if there is none."""
+        return self._book.get(lease) or self._store.leases.demand(lease)
+
+    def seen(self, principal: Principal, lease: str) -> Lease:
+        """A lease that this account may see; raises RefusedError for any other."""
+        found = self.lease(lease)
+        if not sees(principal, found.tenant):
+            raise RefusedError(404, f"there is no lease {lease}")
+        return found
+
+    def all_seen(self, principal: Principal) -> list[Lease]:
+        """Leases that go on, and which this account may see."""
+        return [one for one in self._book.live() if sees(principal, one.tenant)]
+
+    def granted(self) -> list[Lease]:
+        """All that are granted now."""
+        return [one for one in self._book.live() if one.state is LeaseState.GRANTED]
+
+    def extend(self, principal: Principal, lease: str, minutes: float) -> Lease:
+        """Let a lease end later; raises RefusedError."""
+        found, now = self._own(principal, lease), time.time()
+        committed = self._book.committed(found.tenant, now)
+        left = self._quotas.left(found.tenant, now, committed)
+        extended, changed = self._book.extend(
+            lease, minutes, now, self._fleet(), left.flight_minutes
+        )
+        self._tell(changed)
+        for call in self.on_extension:
+            call(extended)
+        return extended
+
+    def end(self, principal: Principal, lease: str) -> Lease:
+        """Give a lease back, or revoke another tenant's as an operator; drones come home."""
+        found = self.seen(principal, lease)
+        if found.tenant == principal.tenant and reaches(principal.role, Role.PILOT):
+            changed = self._book.give_back(lease, time.time(), self._fleet())
+        elif reaches(principal.role, Role.OPERATOR):
+            reason = f"revoked by {principal.account}"
+            changed = self._book.revoke(lease, reason, time.time(), self._fleet())
+        else:
+            raise RefusedError(403, f"the lease {lease} is {found.tenant}'s")
+        self._tell(changed)
+        return self.lease(lease)
+
+    def give_back(self, mission: Mission) -> None:
+        """Give back the lease that was asked for with a mission, once that is over."""
+        own = mission.request.get("lease") is None
+        if own and mission.lease is not None and self._book.get(mission.lease) is not None:
+            self._tell(self._book.give_back(mission.lease, time.time(), self._fleet()))
+
+    def holder(self, robot: str) -> Lease | None:
+        """The lease that holds a robot now."""
+        return self._book.holder(robot, time.time())
+
+    def tick(self) -> None:
+        """End what is over, and grant what has become free."""
+        self._tell(self._book.tick(time.time(), self._fleet()))
+
+    def _own(self, principal: Principal, lease: str) -> Lease:
+        found = self.seen(principal, lease)
+        if found.tenant != principal.tenant and not reaches(principal.role, Role.OPERATOR):
+            raise RefusedError(403, f"the lease {lease} is {found.tenant}'s")
+        return found
+
+    def _tell(self, changed: Collection[Lease]) -> None:
+        for lease in changed:
+            if lease.state is LeaseState.ENDED:
+                for call in self.on_end:
+                    call(lease)
+
+    def _fleet(self) -> Fleet:
+        states, busy, fleet = self._garage.states, self.flying(), {}
+        for robot in self._config.robots:
+            state = states[robot.id]
+            place = state.position or robot.start
+            charge = 1.0 if state.battery is None else state.battery
+            usable = max(0.0, charge - robot.limits.battery_return)
+            fleet[robot.id] = Candidate(
+                robot.id,
+                camera=any(one.type == "camera" for one in robot.sensors),
+                position=(place[0], place[1]),
+                battery_minutes=usable * robot.limits.endurance / 60.0,
+                enabled=state.enabled,
+                busy=robot.id in busy,
+            )
+        return fleet

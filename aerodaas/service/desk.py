@@ -1,0 +1,376 @@
+"""The desk: takes missions in, moves them on, and answers for those that there are."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import secrets
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
+from aerodaas.protocol.schemas import (
+    CommandIn,
+    LeaseState,
+    MissionIn,
+    MissionOut,
+    MissionPhase,
+    Role,
+)
+from aerodaas.service.access import Principal, Quotas, sees
+from aerodaas.service.access.principal import reaches
+from aerodaas.service.bookings import Bookings
+from aerodaas.service.briefing import Briefing, usage_of
+from aerodaas.service.errors import RefusedError
+from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.garage import Garage
+from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
+from aerodaas.service.models import ModelShelf
+from aerodaas.service.phases import OVER
+from aerodaas.service.records import shown
+from aerodaas.service.settings import ServiceSettings
+from aerodaas.service.store import Lease, Mission, Store
+from aerodaas.types.errors import AeroDaaSError, MissionError
+
+__all__ = ["MissionDesk"]
+
+_log = logging.getLogger(__name__)
+_OPEN = frozenset(MissionPhase) - OVER
+_TURN_SECONDS = 0.1
+_HEARD_SECONDS = 1.0
+
+
+class MissionDesk:
+    """Missions of all tenants; safe in any thread."""
+
+    def __init__(
+        self,
+        settings: ServiceSettings,
+        store: Store,
+        *,
+        bookings: Bookings,
+        garage: Garage,
+        quotas: Quotas,
+        models: ModelShelf,
+    ) -> None:
+        """Take up the missions that the database has; `start` moves them on."""
+        self._settings = settings
+        self._store = store
+        self._bookings = bookings
+        self._garage = garage
+        self._quotas = quotas
+        self._models = models
+        self._briefing = Briefing(settings, store, bookings, garage)
+        self._lock = threading.RLock()
+        self._closed = threading.Event()
+        self._heard: dict[str, float] = {}
+        self._missions: dict[str, ActiveMission] = {}
+        bookings.flying = self._busy
+        bookings.on_end.append(self._recall)
+        bookings.on_extension.append(self._prolong)
+        for row in store.missions.all(phases=_OPEN):
+            self._missions[row.id] = self._active(row)
+
+    def start(self) -> None:
+        """Move missions on from now on, in a thread of its own."""
+        threading.Thread(target=self._run, name="desk", daemon=True).start()
+
+    def close(self) -> None:
+        """Move on no more; flights go on by themselves."""
+        self._closed.set()
+        with self._lock:
+            for one in self._missions.values():
+                one.close()
+
+    def submit(self, principal: Principal, wanted: MissionIn) -> MissionOut:
+        """Take a mission in.
+
+        Raises RefusedError, with the reason, for one that cannot be flown here.
+        """
+        robots = self._briefing.check(principal, wanted.document)
+        self._garage.require_enabled(robots)
+        self._bookings.require_quota(principal.tenant, wanted.minutes * len(robots))
+        if wanted.lease is not None:
+            self._bookings.require(principal, wanted.lease, robots)
+        name = secrets.token_hex(6)
+        row = Mission(
+            id=name,
+            name=wanted.document.name or "mission",
+            tenant=principal.tenant,
+            account=principal.account,
+            phase=MissionPhase.SUBMITTED,
+            robots=tuple(robots),
+            lease=wanted.lease,
+            submitted=time.time(),
+            folder=str(self._path(name)),
+            request=wanted.model_dump(mode="json", exclude={"document"}),
+        )
+        mission = self._active(row)
+        mission.write(wanted.document)
+        with self._lock:
+            self._store.missions.add(row)
+            self._missions[row.id] = mission
+        return shown(mission)
+
+    def approve(self, principal: Principal, mission: str) -> MissionOut:
+        """Approve a mission that waits for it."""
+        with self._lock:
+            one = self._one(mission)
+            if one.phase is not MissionPhase.AWAITING_APPROVAL:
+                raise RefusedError(409, f"{mission} does not wait for approval: {one.phase.value}")
+            one.to(MissionPhase.QUEUED, f"approved by {principal.account}")
+            return shown(one)
+
+    def cancel(self, principal: Principal, mission: str) -> MissionOut:
+        """Cancel a mission; drones in flight come home first."""
+        self._require_own(principal, mission)
+        with self._lock:
+            one = self._one(mission)
+            reason = f"{CANCELLED_BY}{principal.account}"
+            if one.phase is not MissionPhase.FLYING:
+                one.end_rehearsal()
+                self._end(one, MissionPhase.CANCELLED, reason)
+                return shown(one)
+        one.follow().ask(do="end", reason=reason)
+        return shown(one)
+
+    def command(self, principal: Principal, mission: str, command: CommandIn) -> AnswerOut:
+        """Give a robot of a flying mission a command; raises MissionError if it is lost."""
+        return self._ask(principal, mission, do=command.command, robot=command.robot)
+
+    def fly(self, principal: Principal, mission: str, robot: str, body: WaypointsIn) -> AnswerOut:
+        """Add waypoints to a flying mission; raises MissionError if it is lost."""
+        waypoints = body.model_dump(mode="json", include=set(WaypointsIn.model_fields))
+        return self._ask(principal, mission, do="fly", robot=robot, waypoints=waypoints)
+
+    def _ask(self, principal: Principal, mission: str, **request: Any) -> AnswerOut:  # noqa: ANN401
+        self._require_own(principal, mission)
+        with self._lock:
+            one = self._one(mission)
+            if one.phase is not MissionPhase.FLYING:
+                raise RefusedError(409, f"{mission} is not flying: {one.phase.value}")
+            link = one.follow()
+        return link.ask(operator=reaches(principal.role, Role.OPERATOR), **request)
+
+    def mission(self, principal: Principal, mission: str) -> MissionOut:
+        """A mission that this account may see; raises RefusedError for any other."""
+        found = self.shown(mission)
+        if not sees(principal, found.tenant, found.share):
+            raise RefusedError(404, f"there is no mission {mission!r}")
+        return found
+
+    def missions(self, principal: Principal) -> list[MissionOut]:
+        """All missions that this account may see, newest first."""
+        with self._lock:
+            found = [self._with_news(row) for row in self._store.missions.all()]
+        return [one for one in found if sees(principal, one.tenant, one.share)]
+
+    def shown(self, mission: str) -> MissionOut:
+        """A mission, whoever asks."""
+        with self._lock:
+            one = self._missions.get(mission)
+            if one is not None:
+                return shown(one)
+        return shown(self._active(self._store.missions.demand(mission)))
+
+    def version(self, mission: str) -> int:
+        """A number that grows with each change of a mission; -1 once it is over."""
+        one = self._missions.get(mission)
+        return -1 if one is None else one.version
+
+    def flying(self, robot: str) -> str | None:
+        """The mission that flies a robot now; None if none does."""
+        for one in list(self._missions.values()):
+            if one.phase is MissionPhase.FLYING and robot in one.row.robots:
+                return one.row.id
+        return None
+
+    def flies(self, principal: Principal, mission: str) -> bool:
+        """Whether a mission is this account's own, so that its presence counts."""
+        found = self.shown(mission)
+        return found.tenant == principal.tenant and reaches(principal.role, Role.PILOT)
+
+    def hear(self, mission: str) -> None:
+        """Note that the user of a mission is there."""
+        now = time.monotonic()
+        one = self._missions.get(mission)
+        if one is None or one.phase is not MissionPhase.FLYING:
+            return
+        if now - self._heard.get(mission, 0.0) >= _HEARD_SECONDS:
+            self._heard[mission] = now
+            try:
+                one.follow().ask(do="heard")
+            except MissionError:
+                return
+
+    def items(self, mission: str, stream: str) -> Iterator[tuple[dict[str, Any], bytes]]:
+        """Items of a flying mission's stream; raises AeroDaaSError if there is none."""
+        with self._lock:
+            one = self._one(mission)
+            if one.phase is not MissionPhase.FLYING:
+                raise MissionError(f"{mission} is not flying")
+            link = one.follow()
+        return link.items(stream)
+
+    def flight(self, mission: str) -> FlightFolder | None:
+        """The folder of a mission's flight; None unless it is flying."""
+        one = self._missions.get(mission)
+        return one.flight if one is not None and one.phase is MissionPhase.FLYING else None
+
+    def file(self, principal: Principal, mission: str, name: str) -> Path:
+        """The recording or the rehearsal's picture of a mission; raises RefusedError if none."""
+        found = self.mission(principal, mission)
+        one = self._active(self._store.missions.demand(found.id))
+        files = {"recording": one.flight.recording, "picture": one.rehearsal.picture}
+        if not files[name].is_file() or (name == "recording" and found.phase not in OVER):
+            raise RefusedError(404, f"{mission} has no {name} yet")
+        return files[name]
+
+    def _recall(self, lease: Lease) -> None:
+        """Bring home what flies under a lease that has ended."""
+        self._ask_flying(lease, do="end", reason=f"the lease has ended: {lease.reason}")
+
+    def _prolong(self, lease: Lease) -> None:
+        self._ask_flying(lease, do="extend", ends=lease.ends)
+
+    def _ask_flying(self, lease: Lease, **request: Any) -> None:  # noqa: ANN401 - JSON
+        for one in list(self._missions.values()):
+            if one.row.lease == lease.id and one.phase is MissionPhase.FLYING:
+                # A flight knows the end of its lease, whether or not it can be reached.
+                with contextlib.suppress(MissionError):
+                    one.follow().ask(**request)
+
+    def _run(self) -> None:
+        while not self._closed.wait(_TURN_SECONDS):
+            self._try()
+
+    def _try(self) -> None:
+        try:
+            self.turn()
+        except AeroDaaSError:
+            # The database may be gone for a while; flights do not need it.
+            _log.exception("the desk could not move on")
+
+    def turn(self) -> None:
+        """Move every mission on by what has happened."""
+        with self._lock:
+            for one in list(self._missions.values()):
+                self._step(one)
+                if one.over:
+                    one.close()
+                    del self._missions[one.row.id]
+        self._bookings.tick()
+
+    def _step(self, one: ActiveMission) -> None:
+        steps: dict[MissionPhase, Callable[[ActiveMission], None]] = {
+            MissionPhase.SUBMITTED: self._begin,
+            MissionPhase.REHEARSING: self._judge,
+            MissionPhase.QUEUED: self._take_off,
+            MissionPhase.FLYING: self._watch,
+        }
+        step = steps.get(one.phase)
+        if step is not None:
+            step(one)
+
+    def _begin(self, one: ActiveMission) -> None:
+        if not self._settings.rehearse:
+            self._admit(one)
+            return
+        one.rehearse(self._briefing.rehearsal(one.row), self._models)
+        one.to(MissionPhase.REHEARSING)
+
+    def _judge(self, one: ActiveMission) -> None:
+        verdict = one.verdict()
+        if verdict is None:
+            return
+        one.row = replace(one.row, verdict=verdict.model_dump(mode="json"))
+        if verdict.approved:
+            self._admit(one)
+        else:
+            self._end(one, MissionPhase.REFUSED, "; ".join(verdict.reasons))
+
+    def _admit(self, one: ActiveMission) -> None:
+        if self._settings.approval:
+            one.to(MissionPhase.AWAITING_APPROVAL, "waits for an operator's approval")
+        else:
+            one.to(MissionPhase.QUEUED, "waits for its drones")
+
+    def _take_off(self, one: ActiveMission) -> None:
+        if one.row.lease is None:
+            lease = self._bookings.for_mission(one.row)
+            one.change(lease=lease.id)
+        else:
+            lease = self._bookings.lease(one.row.lease)
+        if lease.state is LeaseState.ENDED:
+            self._end(one, MissionPhase.REFUSED, f"its lease has ended: {lease.reason}")
+        elif lease.state is LeaseState.GRANTED and self._has_place(one):
+            one.brief(self._briefing.flight(one.row, lease), self._models)
+            one.to(MissionPhase.FLYING, started=time.time())
+            one.take_off()
+
+    def _has_place(self, wanted: ActiveMission) -> bool:
+        """Whether a flight may begin: its drones may be on their way home from the last one."""
+        flying = [one for one in self._missions.values() if one.phase is MissionPhase.FLYING]
+        free = self._busy().isdisjoint(wanted.row.robots)
+        return len(flying) < self._settings.most_flights and free
+
+    def _busy(self) -> set[str]:
+        """Robots in flight."""
+        missions = list(self._missions.values())
+        flying = [one for one in missions if one.phase is MissionPhase.FLYING]
+        return {robot for one in flying for robot in one.row.robots}
+
+    def _watch(self, one: ActiveMission) -> None:
+        # After a restart: a flight whose order was written may not have begun.
+        one.take_off()
+        link = one.follow()
+        self._garage.note(link.news.status)
+        try:
+            outcome = one.flown()
+        except LostFlightError as error:
+            reason = (
+                f"its process died in flight ({error}); its drones are out of service until an "
+                "operator has looked"
+            )
+            self._garage.take_out(one.row.robots)
+            self._end(one, MissionPhase.FAILED, reason)
+            return
+        if outcome is None:
+            return
+        self._garage.note(outcome.status, now=True)
+        self._store.usage.put(usage_of(one.row, outcome, one.flight.recording))
+        phase = MissionPhase.LANDED if outcome.landed else MissionPhase.FAILED
+        if outcome.landed and outcome.reason.startswith(CANCELLED_BY):
+            phase = MissionPhase.CANCELLED
+        self._end(one, phase, outcome.reason)
+
+    def _end(self, one: ActiveMission, phase: MissionPhase, reason: str) -> None:
+        one.to(phase, reason, ended=time.time())
+        if one.row.lease is not None:
+            self._bookings.give_back(one.row)
+
+    def _active(self, row: Mission) -> ActiveMission:
+        return ActiveMission(row, Path(row.folder), self._store.missions.put)
+
+    def _path(self, mission: str) -> Path:
+        return self._settings.missions / mission
+
+    def _one(self, mission: str) -> ActiveMission:
+        one = self._missions.get(mission)
+        if one is None:
+            phase = self.shown(mission).phase.value
+            raise RefusedError(409, f"{mission} is over: {phase}")
+        return one
+
+    def _with_news(self, row: Mission) -> MissionOut:
+        return shown(self._missions.get(row.id) or self._active(row))
+
+    def _require_own(self, principal: Principal, mission: str) -> None:
+        """Raise RefusedError unless this account may command a mission."""
+        found = self.mission(principal, mission)
+        if found.tenant != principal.tenant and not reaches(principal.role, Role.OPERATOR):
+            raise RefusedError(403, f"{mission} is {found.tenant}'s: you may watch it")

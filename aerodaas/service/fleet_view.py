@@ -1,0 +1,54 @@
+"""The fleet as an account may see it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.schemas import FleetOut, RobotOut
+from aerodaas.service.access import Principal, sees
+from aerodaas.service.bookings import Bookings
+from aerodaas.service.desk import MissionDesk
+from aerodaas.service.garage import Garage
+
+__all__ = ["FleetView"]
+
+
+class FleetView:
+    """The fleet as an account may see it."""
+
+    def __init__(
+        self,
+        config: EnvironmentConfig,
+        catalogue: dict[str, Any],
+        garage: Garage,
+        bookings: Bookings,
+        desk: MissionDesk,
+    ) -> None:
+        """Show `catalogue`, and the drones of `config`."""
+        self._config = config
+        self._catalogue = catalogue
+        self._garage = garage
+        self._bookings = bookings
+        self._desk = desk
+
+    def seen_by(self, principal: Principal) -> FleetOut:
+        """The fleet as this account may see it."""
+        robots = [self._robot(robot.id, principal) for robot in self._config.robots]
+        return FleetOut(name=self._config.name, robots=robots, environment=self._catalogue)
+
+    def _robot(self, name: str, principal: Principal) -> RobotOut:
+        state, lease = self._garage.states[name], self._bookings.holder(name)
+        config = next(robot for robot in self._config.robots if robot.id == name)
+        mine = lease is not None and sees(principal, lease.tenant)
+        return RobotOut(
+            id=name,
+            sensors=[sensor.full_id for sensor in config.sensors],
+            lease=None if lease is None else lease.id,
+            tenant=lease.tenant if lease is not None and mine else None,
+            mission=self._desk.flying(name) if mine else None,
+            battery=state.battery,
+            position=state.position,
+            heard=state.heard,
+            enabled=state.enabled,
+        )

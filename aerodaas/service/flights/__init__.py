@@ -1,0 +1,1 @@
+"""Flights: one process each, which outlives the service and is found again by its folder."""

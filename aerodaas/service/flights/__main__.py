@@ -1,0 +1,26 @@
+"""`python -m aerodaas.service.flights FOLDER`: fly the order in a folder, or rehearse it."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.order import FlightOrder
+
+
+def main() -> None:
+    """Fly or rehearse."""
+    path = Path(sys.argv[1])
+    if FlightOrder.read(FlightFolder(path).order).rehearsal:
+        from aerodaas.service.flights.rehearsal import rehearse  # noqa: PLC0415 - loads the plots
+
+        rehearse(path)
+        return
+    from aerodaas.service.flights.process import fly  # noqa: PLC0415 - the simulator's and Ray's
+
+    fly(path)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,209 @@
+"""Control socket of a flight: commands from the service, status and items to it.
+
+Each connection begins with what it is for: `command`, `follow`, `items` or `here`. Messages are
+JSON with one blob. The socket lies in the flight's folder, which is open to its user alone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Any, Protocol
+
+from pydantic import ValidationError
+
+from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.here.relay import HereRelay
+from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut, WaypointsIn
+from aerodaas.mission.commands import Answer
+from aerodaas.service.flights.commands import COMMANDS
+from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.types.errors import AeroDaaSError
+
+__all__ = ["ControlServer", "Flown", "Reader"]
+
+_MOST_CONNECTIONS = 64
+_SEND_SECONDS = 5.0
+_QUESTIONS = 64
+"""Questions to the user's side that wait to be sent; a fuller queue refuses them."""
+_RATE = 10.0
+"""Status messages a second."""
+
+
+class Reader(Protocol):
+    """Reader of one stream."""
+
+    def next_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
+        """The next item as a message with its blob; None if there was none within `timeout`."""
+        ...
+
+
+class Flown(Protocol):
+    """The flight as its control socket sees it; called from several threads."""
+
+    def command(self, robot: str, name: str) -> Answer:
+        """Execute a command of `COMMANDS`; raises AeroDaaSError."""
+        ...
+
+    def fly(self, robot: str, waypoints: WaypointsIn) -> Answer:
+        """Add waypoints; raises AeroDaaSError."""
+        ...
+
+    def status(self) -> tuple[dict[str, StatusOut], list[str]]:
+        """Newest status by robot, and the newest alerts."""
+        ...
+
+    def reader(self, stream: str) -> Reader:
+        """A reader of a stream; raises AeroDaaSError if there is none."""
+        ...
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight is over."""
+        ...
+
+
+class ControlServer:
+    """Serves one flight until it is closed."""
+
+    def __init__(
+        self, folder: FlightFolder, flown: Flown, lease: LeaseWatch, relay: HereRelay
+    ) -> None:
+        """Listen in the flight's folder."""
+        self._flown = flown
+        self._lease = lease
+        self._relay = relay
+        self._places = threading.BoundedSemaphore(_MOST_CONNECTIONS)
+        path = folder.socket
+        path.unlink(missing_ok=True)
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._socket.bind(str(path))
+        path.chmod(0o600)
+        self._socket.listen()
+        self._closed = threading.Event()
+
+    def start(self) -> None:
+        """Accept connections, in a thread of its own."""
+        threading.Thread(target=self._accept, name="control", daemon=True).start()
+
+    def close(self) -> None:
+        """Accept no more, and end the connections at their next message."""
+        self._closed.set()
+        with contextlib.suppress(OSError):
+            self._socket.shutdown(socket.SHUT_RDWR)
+        self._socket.close()
+
+    def _accept(self) -> None:
+        while not self._closed.is_set():
+            try:
+                connection, _ = self._socket.accept()
+            except OSError:
+                return
+            if not self._places.acquire(blocking=False):
+                connection.close()
+                continue
+            threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
+
+    def _serve(self, connection: socket.socket) -> None:
+        channel = Channel(connection)
+        try:
+            first, _ = channel.receive(_SEND_SECONDS)
+            purposes: dict[str, Callable[[Channel, dict[str, Any]], None]] = {
+                "command": self._commands,
+                "follow": self._follow,
+                "items": self._items,
+                "here": self._here,
+            }
+            purposes[first["for"]](channel, first)
+        except (GuestError, KeyError, OSError):
+            return
+        finally:
+            channel.close()
+            self._places.release()
+
+    def _commands(self, channel: Channel, _: dict[str, Any]) -> None:
+        while not self._closed.is_set():
+            request = channel.receive()[0]
+            channel.send(self._answer(request), timeout=_SEND_SECONDS)
+
+    def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
+        try:
+            return self._done(request).model_dump()
+        except (AeroDaaSError, ValidationError, KeyError, TypeError, ValueError) as error:
+            return AnswerOut(accepted=False, text=str(error)).model_dump()
+
+    def _done(self, request: dict[str, Any]) -> AnswerOut:
+        match request["do"]:
+            case "heard":
+                self._lease.hear()
+                return AnswerOut(accepted=True)
+            case "extend":
+                extended = self._lease.extend(float(request["ends"]))
+                return AnswerOut(accepted=extended, text="" if extended else self._lease.reason)
+            case "end":
+                self._lease.end(str(request["reason"]))
+                return AnswerOut(accepted=True)
+        if self._lease.reason and not request.get("operator"):
+            return AnswerOut(accepted=False, text=f"the drones come home: {self._lease.reason}")
+        return AnswerOut.of(self._commanded(request))
+
+    def _commanded(self, request: dict[str, Any]) -> Answer:
+        if request["do"] == "fly":
+            waypoints = WaypointsIn.model_validate(request["waypoints"])
+            return self._flown.fly(request["robot"], waypoints)
+        if request["do"] not in COMMANDS:
+            return Answer(accepted=False, text=f"there is no command {request['do']!r}")
+        return self._flown.command(request["robot"], request["do"])
+
+    def _follow(self, channel: Channel, _: dict[str, Any]) -> None:
+        while not self._closed.is_set():
+            began = time.monotonic()
+            status, alerts = self._flown.status()
+            robots = {name: one.model_dump() for name, one in status.items()}
+            over = self._flown.over
+            message = {"robots": robots, "alerts": alerts, "over": over}
+            channel.send(message, timeout=_SEND_SECONDS)
+            if over:
+                return
+            self._closed.wait(max(0.0, began + 1.0 / _RATE - time.monotonic()))
+
+    def _items(self, channel: Channel, first: dict[str, Any]) -> None:
+        try:
+            reader = self._flown.reader(str(first["stream"]))
+        except AeroDaaSError as error:
+            channel.send({"refused": str(error)}, timeout=_SEND_SECONDS)
+            return
+        channel.send({}, timeout=_SEND_SECONDS)
+        while not self._closed.is_set() and not self._flown.over:
+            found = reader.next_packed(0.5)
+            message, blob = found if found is not None else ({}, b"")
+            # An empty message tells whether the other side is still there.
+            channel.send(message, blob, timeout=_SEND_SECONDS)
+
+    def _here(self, channel: Channel, _: dict[str, Any]) -> None:
+        """Connect the user's side: questions go out by a bounded queue, answers come in."""
+        questions: queue.Queue[tuple[dict[str, Any], bytes]] = queue.Queue(_QUESTIONS)
+        user = self._relay.attach(lambda question, blob: questions.put_nowait((question, blob)))
+        gone = threading.Event()
+
+        def ask() -> None:
+            with contextlib.suppress(GuestError):
+                while not gone.is_set():
+                    with contextlib.suppress(queue.Empty):
+                        question, blob = questions.get(timeout=0.5)
+                        channel.send(question, blob, timeout=_SEND_SECONDS)
+
+        sender = threading.Thread(target=ask, name="questions", daemon=True)
+        sender.start()
+        try:
+            while not self._closed.is_set():
+                message, blob = channel.receive()
+                user.answered(message, blob)
+        finally:
+            gone.set()
+            user.detach()

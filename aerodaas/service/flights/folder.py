@@ -1,0 +1,108 @@
+"""Folder of one flight: its files, its lock, and the mark that it has begun."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from aerodaas.service.flights.order import FlightOrder, Outcome
+from aerodaas.types.errors import MissionError
+
+__all__ = ["FlightFolder"]
+
+_SOCKET_NAME = 100
+"""Bytes that a Unix socket's path may have on Linux (108), less some."""
+
+
+class FlightFolder:
+    """One flight's folder; its content is the truth of a flight, whatever a database says."""
+
+    def __init__(self, path: Path) -> None:
+        """Name a folder, which need not exist."""
+        self.path = path.absolute()
+        self.order = self.path / "order.json"
+        self.document = self.path / "mission.json"
+        self.models = self.path / "models"
+        self.recording = self.path / "flight.mcap"
+        self.picture = self.path / "rehearsal.png"
+        self.log = self.path / "log"
+        self._begun = self.path / "begun"
+        self._lock = self.path / "lock"
+        self._outcome = self.path / "outcome.json"
+
+    @property
+    def socket(self) -> Path:
+        """Path of the control socket.
+
+        Raises MissionError where it would be longer than the system allows.
+        """
+        path = self.path / "control"
+        if len(os.fsencode(path)) > _SOCKET_NAME:
+            raise MissionError(f"{path.parent} is too long a path for a socket: use a shorter one")
+        return path
+
+    def make(self, order: FlightOrder, document: str) -> None:
+        """Create the folder with an order and the text of a document, for this user alone."""
+        self.models.mkdir(parents=True, exist_ok=True, mode=0o700)
+        self._write(self.document, document)
+        self._write(self.order, order.model_dump_json(indent=2))
+
+    @property
+    def begun(self) -> bool:
+        """Whether a process has ever begun this flight."""
+        return self._begun.exists()
+
+    @contextlib.contextmanager
+    def claim(self) -> Iterator[None]:
+        """Begin the flight, once and for all; hold its lock until the flight is over.
+
+        Raises MissionError if it has been begun before, by this or any other process.
+        """
+        with self._lock.open("w") as lock:
+            # The lock first: a flight that has begun and holds no lock was killed.
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                self._begun.touch(exist_ok=False, mode=0o600)
+            except (BlockingIOError, FileExistsError):
+                text = f"the flight in {self.path} has been begun before"
+                raise MissionError(text) from None
+            yield
+
+    @property
+    def flying(self) -> bool:
+        """Whether a living process holds the flight's lock; a killed one holds none."""
+        try:
+            with self._lock.open("r") as lock:
+                fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
+        except FileNotFoundError:
+            return False
+        except BlockingIOError:
+            return True
+        return False
+
+    def end(self, outcome: Outcome) -> None:
+        """Write how the flight ended."""
+        self._write(self._outcome, outcome.model_dump_json(indent=2))
+
+    def outcome(self) -> Outcome | None:
+        """How the flight ended; None before, or where its process was killed."""
+        try:
+            return Outcome.model_validate_json(self._outcome.read_bytes())
+        except (OSError, ValidationError):
+            return None
+
+    @staticmethod
+    def _write(path: Path, text: str) -> None:
+        """Write a file of mode 0600 whole or not at all."""
+        handle, name = tempfile.mkstemp(dir=path.parent)
+        with os.fdopen(handle, "w", encoding="utf-8") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        Path(name).replace(path)

@@ -1,0 +1,128 @@
+"""Link of the service to a flight's process over its control socket."""
+
+from __future__ import annotations
+
+import contextlib
+import socket
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from pydantic import ValidationError
+
+from aerodaas.analytics.guests.channel import Channel, GuestError
+from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
+from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.types.errors import ConfigError, MissionError
+
+__all__ = ["FlightLink", "FlightNews"]
+
+_CONNECT_SECONDS = 2.0
+_ANSWER_SECONDS = 10.0
+_SILENT_SECONDS = 15.0
+_AGAIN_SECONDS = 0.2
+
+
+@dataclass(frozen=True)
+class FlightNews:
+    """What a flight has told last."""
+
+    number: int = 0
+    """Counts the news."""
+    status: dict[str, StatusOut] = field(default_factory=dict)
+    alerts: list[str] = field(default_factory=list)
+
+
+class FlightLink:
+    """Commands to one flight, its news, and its streams' items; safe in any thread."""
+
+    def __init__(self, folder: FlightFolder, told: Callable[[], None] = lambda: None) -> None:
+        """Follow the flight in `folder`; `told` is called after each news, in another thread."""
+        self._folder = folder
+        self._told = told
+        self._lock = threading.Lock()
+        self._channel: Channel | None = None
+        self._closed = threading.Event()
+        self.news = FlightNews()
+        threading.Thread(target=self._follow, name="flight", daemon=True).start()
+
+    def close(self) -> None:
+        """Follow no more; the flight goes on."""
+        self._closed.set()
+        with self._lock:
+            self._drop()
+
+    def ask(self, **request: Any) -> AnswerOut:  # noqa: ANN401 - JSON
+        """Send a request and return its answer.
+
+        Raises MissionError if the flight cannot be reached; a request that was sent is not sent
+        again, for it may have been carried out.
+        """
+        with self._lock:
+            try:
+                if self._channel is None:
+                    self._channel = self._connected("command")
+                self._channel.send(request, timeout=_ANSWER_SECONDS)
+                answer, _ = self._channel.receive(_ANSWER_SECONDS)
+                return AnswerOut.model_validate(answer)
+            except (GuestError, OSError, ValidationError) as error:
+                self._drop()
+                raise MissionError(f"the flight's process does not answer: {error}") from None
+
+    def items(self, stream: str) -> Iterator[tuple[dict[str, Any], bytes]]:
+        """Yield a stream's items until the flight is over; an empty message a while without any.
+
+        Raises ConfigError if there is no such stream, MissionError if the flight is lost.
+        """
+        try:
+            channel = self._connected("items", stream=stream)
+        except (GuestError, OSError) as error:
+            raise MissionError(f"the flight's process does not answer: {error}") from None
+        with contextlib.closing(channel):
+            first, _ = self._received(channel)
+            if "refused" in first:
+                raise ConfigError(str(first["refused"]))
+            while not self._closed.is_set():
+                message, blob = self._received(channel)
+                yield message, blob
+
+    def _received(self, channel: Channel) -> tuple[dict[str, Any], bytes]:
+        try:
+            return channel.receive(_SILENT_SECONDS)
+        except GuestError as error:
+            raise MissionError(f"the flight's stream has ended: {error}") from None
+
+    def _connected(self, purpose: str, **more: str) -> Channel:
+        connection = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        connection.settimeout(_CONNECT_SECONDS)
+        try:
+            connection.connect(str(self._folder.socket))
+        except OSError:
+            connection.close()
+            raise
+        channel = Channel(connection)
+        channel.send({"for": purpose, **more}, timeout=_CONNECT_SECONDS)
+        return channel
+
+    def _drop(self) -> None:
+        if self._channel is not None:
+            self._channel.close()
+            self._channel = None
+
+    def _follow(self) -> None:
+        while not self._closed.is_set():
+            # Before the process listens and after its end there is nobody to connect to.
+            with contextlib.suppress(GuestError, OSError, ValidationError):
+                self._follow_once()
+            self._closed.wait(_AGAIN_SECONDS)
+
+    def _follow_once(self) -> None:
+        with contextlib.closing(self._connected("follow")) as channel:
+            while not self._closed.is_set():
+                self._take(channel.receive(_SILENT_SECONDS)[0])
+
+    def _take(self, message: dict[str, Any]) -> None:
+        robots = {name: StatusOut(**one) for name, one in message["robots"].items()}
+        self.news = FlightNews(self.news.number + 1, robots, message["alerts"])
+        self._told()

@@ -1,0 +1,71 @@
+"""Meter of a flight: its newest status and alerts, and what it has used."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.types.clock import seconds
+from aerodaas.types.status import MissionState
+
+if TYPE_CHECKING:
+    from aerodaas.actors.base import ActorReport
+    from aerodaas.actors.run.flight import FlightState
+
+__all__ = ["FlightMeter"]
+
+_ALERTS = 50
+"""Most alerts told, the newest ones."""
+_GROUND = {MissionState.IDLE, MissionState.PREFLIGHT, MissionState.LANDED, MissionState.ABORTED}
+
+
+class FlightMeter:
+    """Newest status of each robot, and sums over the flight."""
+
+    def __init__(self) -> None:
+        self.status: dict[str, StatusOut] = {}
+        """By robot; replaced and never changed, because other threads read it."""
+        self.alerts: list[str] = []
+        self._flown: dict[str, float] = defaultdict(float)
+        self._charges: dict[str, tuple[float, float]] = {}
+        """First and newest known charge by robot."""
+
+    @property
+    def time(self) -> float:
+        """Mission seconds of the newest status."""
+        return max((one.time for one in self.status.values()), default=0.0)
+
+    def note(self, state: FlightState) -> None:
+        """Take over a state of the run."""
+        for name, report in state.robots.items():
+            now, before = seconds(report.status.stamp), self.status.get(name)
+            if before is not None and report.status.state not in _GROUND:
+                self._flown[name] += max(0.0, now - before.time)
+        self.status = {
+            name: StatusOut.of(report.status, report.state) for name, report in state.robots.items()
+        }
+        for name, status in self.status.items():
+            if status.battery is not None:
+                first, _ = self._charges.get(name, (status.battery, status.battery))
+                self._charges[name] = first, status.battery
+        self.alerts = [f"{one.kind}: {one.text}" for one in state.alerts[-_ALERTS:]]
+
+    def usage(self, reports: Mapping[str, ActorReport]) -> dict[str, Any]:
+        """What the flight has used, as `Outcome` has it; `reports` are its actors'."""
+        compute: dict[str, float] = defaultdict(float)
+        calls = 0
+        for name, report in reports.items():
+            kind, _, place = name.partition("/")
+            if kind == "analytics" and report.vitals is not None:
+                compute["cloud" if place == "cloud" else "edge"] += report.vitals.cpu_seconds
+            if kind == "dispatcher":
+                calls += sum(one["frames"] for one in report.values.get("sites", {}).values())
+        return {
+            "flight_seconds": sum(self._flown.values()),
+            "distance": sum(one.distance for one in self.status.values()),
+            "battery_used": sum(max(0.0, first - last) for first, last in self._charges.values()),
+            "compute_seconds": dict(compute),
+            "cloud_calls": calls,
+        }

@@ -1,0 +1,90 @@
+"""Order of a flight, and its outcome: what the service and the flight's process write down."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.config.checked import checked
+from aerodaas.config.json_text import read_json
+from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
+
+__all__ = ["FlightLimits", "FlightOrder", "OtherLease", "Outcome"]
+
+
+class _Record(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class FlightLimits(_Record):
+    """Limits of a tenant, on top of the provider's: metres, m/s; None for no further limit."""
+
+    max_height: Annotated[float, Field(gt=0)] | None = None
+    max_speed: Annotated[float, Field(gt=0)] | None = None
+
+
+class OtherLease(_Record):
+    """Area of another granted lease, from which the rehearsed flight has to stay away."""
+
+    id: str
+    area: Area
+
+
+class FlightOrder(_Record):
+    """All that a flight's process needs to know; the document lies beside it."""
+
+    mission: str
+    """Id of the mission."""
+    lease: str
+    fleet: Path
+    """The provider's environment file."""
+    robots: list[str]
+    ends: float
+    """End of the lease, Unix seconds; after it the drones come home, whatever becomes of the
+    service."""
+    minutes: float
+    """Length of the lease."""
+    limits: FlightLimits = FlightLimits()
+    area: Area | None = None
+    silence: SilencePolicy = SilencePolicy.CONTINUE
+    silence_seconds: float = 30.0
+    speed: Literal["max"] | float = 1.0
+    """Mission seconds a wall second; `max` for lockstep, where all robots are simulated."""
+    seed: int | None = None
+    address: str | None = None
+    """Ray cluster to join; None for one of its own."""
+    rehearsal: bool = False
+    """Fly in simulation, and judge the recording."""
+    battery: dict[str, float] = Field(default_factory=dict)
+    """Charge by robot, 0 to 1, with which the rehearsal begins."""
+    others: list[OtherLease] = Field(default_factory=list)
+
+    @classmethod
+    def read(cls, path: Path) -> FlightOrder:
+        """Read an order; raises ConfigError for one that is malformed."""
+        return checked(cls, read_json(path, "the flight's order"), str(path))
+
+
+class Outcome(_Record):
+    """How a flight ended; written last."""
+
+    landed: bool
+    """Whether it ended as planned."""
+    reason: str = ""
+    began: float
+    ended: float
+    """Unix seconds."""
+    status: dict[str, StatusOut] = Field(default_factory=dict)
+    """Last status by robot."""
+    alerts: list[str] = Field(default_factory=list)
+    flight_seconds: float = 0.0
+    """Sum of its robots' time in flight, mission seconds."""
+    distance: float = 0.0
+    battery_used: float = 0.0
+    compute_seconds: dict[str, float] = Field(default_factory=dict)
+    cloud_calls: int = 0
+    verdict: VerdictOut | None = None
+    """Of a rehearsal."""

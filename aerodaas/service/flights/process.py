@@ -1,0 +1,235 @@
+"""The process of one flight: `python -m aerodaas.service.flights FOLDER`.
+
+It holds all that the flight needs: the document, the limited environment and the end of the lease.
+The service starts it and talks to it, but neither its end nor the database's ends the flight.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+import socket
+import threading
+import time
+from pathlib import Path
+from typing import Any
+
+from pydantic import SecretStr
+
+from aerodaas.analytics.here.analysis import HereSite
+from aerodaas.analytics.here.relay import HereRelay
+from aerodaas.analytics.remote.schemas import StatusOut, WaypointsIn
+from aerodaas.analytics.wire_items import pack
+from aerodaas.config.model import EnvironmentConfig, RemoteConfig
+from aerodaas.config.options import RunOptions, current_options
+from aerodaas.config.overrides import located
+from aerodaas.dataflow.mission_document import MissionDocument, read_mission
+from aerodaas.environment.document.building import build_mission
+from aerodaas.environment.environment import Environment
+from aerodaas.environment.run import Run
+from aerodaas.mission.commands import AddNavigation, Answer, ReturnHome
+from aerodaas.service.flights.commands import COMMANDS
+from aerodaas.service.flights.control import ControlServer
+from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.meter import FlightMeter
+from aerodaas.service.flights.order import FlightOrder, Outcome
+from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.limits import TenantLimits, limited
+from aerodaas.service.rehearsal import rehearsal_config
+from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError
+from aerodaas.types.status import Message
+
+__all__ = ["Flying", "environment_of", "fly"]
+
+_USER_SECONDS = 30.0
+"""Wall seconds for the user's side to connect before take-off."""
+_LOOK_SECONDS = 0.1
+"""Wall seconds between two looks at the drones."""
+
+
+def fly(path: Path) -> None:
+    """Fly the order in the folder `path`; returns when it is over and its outcome is written.
+
+    Raises MissionError if this flight has been begun before.
+    """
+    folder = FlightFolder(path)
+    order = FlightOrder.read(folder.order)
+    os.chdir(folder.path)
+    with folder.claim():
+        folder.end(Flying(folder, order).outcome())
+
+
+def environment_of(order: FlightOrder) -> EnvironmentConfig:
+    """The environment of a flight; raises ConfigError where the limits leave no room for it."""
+    config = limited(
+        located(EnvironmentConfig.load(order.fleet), order.fleet.parent),
+        order.robots,
+        tenant=TenantLimits(order.limits.max_height, order.limits.max_speed),
+        area=order.area,
+    )
+    if order.rehearsal:
+        config = rehearsal_config(config, order.battery, order.seed)
+    return config.model_copy(update={"remote": _closed_remote()})
+
+
+def _closed_remote() -> RemoteConfig:
+    """Remote control that nobody can reach: commands come by the service, with their lease.
+
+    An application's `RemoteAnalytics` runs all the same, at a free port with a token of its own.
+    """
+    with socket.create_server(("127.0.0.1", 0)) as free:
+        port: int = free.getsockname()[1]
+    return RemoteConfig(host="127.0.0.1", port=port, token=SecretStr(secrets.token_urlsafe()))
+
+
+class Flying:
+    """One flight from its order to its outcome."""
+
+    def __init__(self, folder: FlightFolder, order: FlightOrder) -> None:
+        self._folder = folder
+        self._order = order
+        self._began = time.time()
+        self._lease = LeaseWatch(order, self._come_home)
+        self._relay = HereRelay(folder.path / "here")
+        self._run: Run | None = None
+        self._environment: Environment | None = None
+        self._meter = FlightMeter()
+
+    def outcome(self) -> Outcome:
+        """Fly, and tell how it ended; a failure is an outcome, too."""
+        reason = ""
+        try:
+            self._fly()
+        except AeroDaaSError as error:
+            reason = str(error)
+        except (KeyboardInterrupt, SystemExit) as error:
+            reason = getattr(error, "reason", "") or "the flight's process was asked to end"
+        run = self._run
+        if run is not None and run.state is not None:
+            self._meter.note(run.state)
+        return Outcome(
+            landed=not reason,
+            reason=reason or self._lease.reason,
+            began=self._began,
+            ended=time.time(),
+            status=self._meter.status,
+            alerts=self._meter.alerts,
+            **self._meter.usage({} if run is None else run.reports()),
+        )
+
+    def _fly(self) -> None:
+        order, document = self._order, read_mission(self._folder.document)
+        current_options.set(
+            RunOptions(
+                environment=order.fleet,
+                config=environment_of(order),
+                speed=None if order.speed == "max" else order.speed,
+                lockstep=order.speed == "max",
+                seed=order.seed,
+                record=self._folder.recording,
+                address=order.address,
+                view=False,
+                report=not order.rehearsal,
+            )
+        )
+        environment = self._environment = Environment(order.fleet)
+        here = HereSite(self._relay.path, lossless=order.speed == "max")
+        build_mission(document, environment, self._folder.models, here)
+        server = ControlServer(self._folder, self, self._lease, self._relay)
+        try:
+            # The sockets answer from the first moment on: a launch takes seconds.
+            self._relay.start()
+            server.start()
+            self._await_user(document)
+            self._run = environment.launch()
+            if not order.rehearsal:
+                self._lease.start()
+            threading.Thread(target=self._look, args=(self._run,), daemon=True).start()
+            self._run.wait()
+        finally:
+            self._lease.stop()
+            server.close()
+            self._relay.close()
+
+    def _await_user(self, document: MissionDocument) -> None:
+        """Wait for the user's side, if the document needs it; a rehearsal goes without."""
+        needed = bool(document.here) and not self._order.rehearsal
+        if needed and not self._relay.wait_attached(_USER_SECONDS):
+            raise MissionError(
+                f"{', '.join(document.here)} run at the user's side, which did not connect within "
+                f"{_USER_SECONDS:g} s"
+            )
+
+    def _look(self, run: Run) -> None:
+        """Keep the status up to date while the run goes on."""
+        while not run.over:
+            began = time.monotonic()
+            # The thread that waits for the run meets the same error and handles it.
+            with contextlib.suppress(AeroDaaSError):
+                self._meter.note(run.look(0))
+                if self._order.rehearsal and self._meter.time > 60.0 * self._order.minutes:
+                    self._lease.end("the lease has ended")
+            time.sleep(max(0.0, began + _LOOK_SECONDS - time.monotonic()))
+
+    def _come_home(self, reason: str) -> None:
+        run = self._run
+        if run is None or run.over:
+            return
+        for robot in self._order.robots:
+            if self._navigates(robot):
+                run.command(robot, ReturnHome(reason))
+
+    def _navigates(self, robot: str) -> bool:
+        environment = self._environment
+        edges = environment.graph.navigation if environment is not None else ()
+        return robot in {edge.robot for edge in edges}
+
+    def command(self, robot: str, name: str) -> Answer:
+        """Execute a command; raises MissionError for a robot that does not fly."""
+        return self._flying(robot).command(robot, COMMANDS[name])
+
+    def fly(self, robot: str, waypoints: WaypointsIn) -> Answer:
+        """Add waypoints to a robot's queue; raises AeroDaaSError for what cannot be flown."""
+        command = AddNavigation(waypoints.navigation(), waypoints.index)
+        return self._flying(robot).command(robot, command)
+
+    def _flying(self, robot: str) -> Run:
+        if self._run is None or not self._navigates(robot):
+            raise MissionError(f"{robot} does not fly in this mission")
+        return self._run
+
+    def status(self) -> tuple[dict[str, StatusOut], list[str]]:
+        """Newest status by robot, and the newest alerts."""
+        return self._meter.status, self._meter.alerts
+
+    def reader(self, stream: str) -> _StreamReader:
+        """A reader of a stream; raises ConfigError if there is none."""
+        graph = self._environment.graph if self._environment is not None else None
+        if graph is None or stream not in graph.nodes or graph.reader is None:
+            raise ConfigError(f"no stream of this mission is called {stream!r}")
+        return _StreamReader(graph.reader(stream), stream)
+
+    @property
+    def over(self) -> bool:
+        """Whether the flight is over."""
+        return self._run is not None and self._run.over
+
+
+class _StreamReader:
+    """Reader of one stream's items as messages of the control socket."""
+
+    def __init__(self, reader: Any, stream: str) -> None:  # noqa: ANN401 - LiveReader, of Ray's side
+        self._reader = reader
+        self._stream = stream
+
+    def next_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
+        """The next item; None if there was none within `timeout` wall seconds."""
+        try:
+            message: Message[Any] = self._reader.next_message(timeout)
+        except (TimeoutError, StopIteration):
+            return None
+        item, blob = pack(message.item)
+        head = {"kind": "item", "stream": self._stream, "seq": message.seq}
+        stamps = {"stamp": message.stamp, "captured": message.captured}
+        return {**head, **stamps, "item": item, "blob": bool(blob)}, blob

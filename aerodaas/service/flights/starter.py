@@ -1,0 +1,33 @@
+"""Start of a flight's process, detached from the service."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+
+from aerodaas.service.flights.folder import FlightFolder
+
+__all__ = ["start_process"]
+
+_KEPT_OUT = "AERODAAS_"
+"""Variables of the service itself, which hold its tokens."""
+
+
+def start_process(folder: FlightFolder) -> subprocess.Popen[bytes]:
+    """Start the process of the flight in `folder`, in a session of its own.
+
+    It goes on when the service ends, and Ctrl-C at the service's terminal does not reach it.
+    """
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith(_KEPT_OUT)
+    }
+    with folder.log.open("ab") as log:
+        return subprocess.Popen(  # noqa: S603 - our own module
+            [sys.executable, "-m", "aerodaas.service.flights", str(folder.path)],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+            env=environment,
+        )

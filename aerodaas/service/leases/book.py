@@ -1,0 +1,263 @@
+"""The book of leases: who flies which drone until when."""
+
+from __future__ import annotations
+
+import math
+import secrets
+import threading
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from typing import Protocol
+
+from aerodaas.protocol.schemas import LeaseIn, LeaseState
+from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.leases.candidates import Fleet
+from aerodaas.service.leases.rules import MINUTE, grants, is_waited_for, over
+from aerodaas.service.leases.wish import check_wish, lease_of
+from aerodaas.service.store import Lease, LeaseEnd
+
+__all__ = ["LeaseBook", "Shelf"]
+
+_MOST_WAITING = 1000
+_MOST_WAITING_OF_TENANT = 50
+_LONGEST = 24 * 60
+"""Minutes of a lease with all of its extensions."""
+
+
+class Shelf(Protocol):
+    """What the book keeps its leases in: `Store.leases`."""
+
+    def live(self) -> list[Lease]:
+        """Those queued or granted, in the queue's order."""
+        ...
+
+    def put(self, *rows: Lease) -> None:
+        """Keep all of these, or none and raise StoreError."""
+        ...
+
+    def highest_number(self) -> int:
+        """The highest place in the queue that was ever given."""
+        ...
+
+
+class LeaseBook:
+    """Grants, queues and ends leases; every rule goes by an explicit now. Threads may share it.
+
+    - One granted lease holds a robot; a lease of several robots is granted as a whole.
+    - Leases are granted in the order in which they were asked for. A later one may be granted
+      before an earlier one only if they share no robot that the earlier one waits for.
+    - A lease of any one that fits waits for all that fit now: those whose charge, place or camera
+      does not suffice may go to others meanwhile.
+    - A lease that names a robot out of service waits, and holds up nobody.
+    - A drone that still comes home from an ended lease is granted when it has landed.
+    - A granted lease ends after its minutes at the latest; from then on it holds nothing, even
+      before `tick` has told so.
+
+    Each change returns the leases whose state has changed since the last one returned, in the order
+    in which they did: those that ended (whose flights are to be recalled) and those granted
+    (whose flights may start). A change that raises leaves what it has to tell to the next.
+
+    Ends hold even while the database fails; it is told of them with the next change. Requests,
+    grants and extensions are carried out only if the database has taken them.
+    """
+
+    def __init__(
+        self, shelf: Shelf, new_id: Callable[[], str] = lambda: secrets.token_hex(8)
+    ) -> None:
+        """Go on with the leases on `shelf`; call `tick` next, for some may be over.
+
+        Raises:
+            StoreError: If the database does not answer.
+        """
+        self._shelf = shelf
+        self._new_id = new_id
+        self._lock = threading.RLock()
+        self._live = {lease.id: lease for lease in shelf.live()}
+        self._number = shelf.highest_number()
+        self._unsaved: dict[str, Lease] = {}
+        self._news: list[Lease] = []
+
+    def request(
+        self, wish: LeaseIn, tenant: str, account: str, now: float, fleet: Fleet
+    ) -> tuple[Lease, tuple[Lease, ...]]:
+        """Ask for drones: granted at once if they are free and nobody waits for them, or queued.
+
+        Args:
+            wish: What is asked for.
+            tenant: Tenant of the account.
+            account: Who asks.
+            now: Moment, seconds of Unix time.
+            fleet: The drones as they are now.
+
+        Returns:
+            The new lease, and all leases changed, this one among them if it is granted.
+
+        Raises:
+            RefusedError: With status 404 for an unknown robot; 409 for one that is out of
+                service, or if no drone of the fleet has the camera that is asked for; 422 for a
+                robot named twice; 429 if the tenant, or all of them, wait for too many.
+            StoreError: If the database does not take it; nothing is asked for then.
+        """
+        check_wish(wish, fleet)
+        with self._lock:
+            self._settle(now, fleet)
+            waiting = [
+                lease.tenant for lease in self._live.values() if lease.state is LeaseState.QUEUED
+            ]
+            if waiting.count(tenant) >= _MOST_WAITING_OF_TENANT or len(waiting) >= _MOST_WAITING:
+                raise RefusedError(429, "too many leases wait: give some back")
+            # A number is used once, even by what the database may or may not have taken.
+            self._number += 1
+            lease = lease_of(
+                wish,
+                id_=self._new_id(),
+                number=self._number,
+                tenant=tenant,
+                account=account,
+                now=now,
+            )
+            self._write(now, fleet, lease)
+            return self._live[lease.id], self._told()
+
+    def extend(
+        self, id_: str, minutes: float, now: float, fleet: Fleet, allowed: float = math.inf
+    ) -> tuple[Lease, tuple[Lease, ...]]:
+        """Let a granted lease end `minutes` later.
+
+        Args:
+            id_: The lease.
+            minutes: How much later; positive and finite.
+            now: Moment, seconds of Unix time.
+            fleet: The drones as they are now.
+            allowed: Minutes that the tenant's quota leaves, for all robots together.
+
+        Returns:
+            The lease with its new end, and the leases changed.
+
+        Raises:
+            RefusedError: With status 404 for a lease that is unknown or has ended; 409 if it is
+                queued, or another waits for one of its robots; 403 if the quota is exceeded; 422
+                for minutes that are not positive, or make it longer than a day.
+            StoreError: If the database does not take it; the lease ends as before.
+        """
+        with self._lock:
+            self._settle(now, fleet)
+            lease = self._demand(id_)
+            if lease.ends is None:
+                raise RefusedError(409, f"lease {id_} is queued: extend it when it is granted")
+            if not 0 < minutes <= _LONGEST - lease.minutes:
+                raise RefusedError(422, "a lease lasts a day at most, with its extensions")
+            if is_waited_for(lease, self._live.values(), fleet):
+                raise RefusedError(409, f"another waits for a robot of lease {id_}")
+            if minutes * len(lease.robots) > allowed:
+                raise RefusedError(
+                    403, f"the quota of {lease.tenant} leaves {max(0.0, allowed):.1f} minutes"
+                )
+            longer = replace(
+                lease, minutes=lease.minutes + minutes, ends=lease.ends + minutes * MINUTE
+            )
+            self._write(now, fleet, longer)
+            return longer, self._told()
+
+    def give_back(self, id_: str, now: float, fleet: Fleet) -> tuple[Lease, ...]:
+        """End a queued or granted lease at its tenant's wish.
+
+        Raises:
+            RefusedError: With status 404 for a lease that is unknown or has ended.
+        """
+        return self._end(id_, LeaseEnd.GIVEN_BACK, "given back", now, fleet)
+
+    def revoke(self, id_: str, reason: str, now: float, fleet: Fleet) -> tuple[Lease, ...]:
+        """End a queued or granted lease at an operator's wish, or a policy's, with the reason.
+
+        Raises:
+            RefusedError: With status 404 for a lease that is unknown or has ended.
+        """
+        return self._end(id_, LeaseEnd.REVOKED, reason, now, fleet)
+
+    def tick(self, now: float, fleet: Fleet) -> tuple[Lease, ...]:
+        """End what is over, and grant what has become free; call it every second or so.
+
+        While the database fails, ends are returned, and grants wait.
+        """
+        with self._lock:
+            self._settle(now, fleet)
+            return self._told()
+
+    def live(self) -> list[Lease]:
+        """Those queued or granted, in the queue's order."""
+        with self._lock:
+            return list(self._live.values())
+
+    def get(self, id_: str) -> Lease | None:
+        """A lease that is queued or granted; None for others, which the store knows."""
+        return self._live.get(id_)
+
+    def holder(self, robot: str, now: float) -> Lease | None:
+        """The granted lease that holds a robot now; None if it is free."""
+        for lease in self.live():
+            if robot in lease.robots and lease.ends is not None and now < lease.ends:
+                return lease
+        return None
+
+    def committed(self, tenant: str, now: float) -> float:
+        """Minutes, times robots, that a tenant's leases hold from now on or wait for."""
+        total = 0.0
+        for lease in self.live():
+            if lease.tenant == tenant:
+                left = lease.minutes
+                if lease.ends is not None:
+                    left = max(0.0, lease.ends - now) / MINUTE
+                total += left * len(lease.robots or lease.wanted or ("any",))
+        return total
+
+    @property
+    def unsaved(self) -> int:
+        """Ended leases that the database has not taken yet."""
+        return len(self._unsaved)
+
+    def _end(
+        self, id_: str, end: LeaseEnd, reason: str, now: float, fleet: Fleet
+    ) -> tuple[Lease, ...]:
+        with self._lock:
+            self._drop(over(self._live.values(), now))
+            lease = self._demand(id_)
+            self._drop([replace(lease, state=LeaseState.ENDED, ended=now, end=end, reason=reason)])
+            self._settle(now, fleet)
+            return self._told()
+
+    def _demand(self, id_: str) -> Lease:
+        lease = self._live.get(id_)
+        if lease is None:
+            raise RefusedError(404, f"there is no lease {id_} that is queued or granted")
+        return lease
+
+    def _settle(self, now: float, fleet: Fleet) -> None:
+        """End what is over and grant what is free; while the database fails, nothing is granted."""
+        self._drop(over(self._live.values(), now))
+        try:
+            self._write(now, fleet)
+        except StoreError:
+            return
+
+    def _drop(self, ended: Iterable[Lease]) -> None:
+        for lease in ended:
+            del self._live[lease.id]
+            self._unsaved[lease.id] = lease
+            self._news.append(lease)
+
+    def _write(self, now: float, fleet: Fleet, *changed: Lease) -> None:
+        """Take over `changed` and what can be granted with it, if the database does."""
+        live = self._live | {lease.id: lease for lease in changed}
+        granted = grants(live.values(), now, fleet)
+        live |= {lease.id: lease for lease in granted}
+        rows = self._unsaved | {lease.id: live[lease.id] for lease in (*changed, *granted)}
+        if rows:
+            self._shelf.put(*rows.values())
+        self._unsaved.clear()
+        self._live = live
+        self._news += granted
+
+    def _told(self) -> tuple[Lease, ...]:
+        news, self._news = tuple(self._news), []
+        return news

@@ -1,0 +1,167 @@
+"""One mission on its way: rehearsed, queued for its lease, flown, over."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from aerodaas.dataflow.mission_document import MissionDocument, read_mission
+from aerodaas.protocol.schemas import MissionPhase, VerdictOut
+from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.link import FlightLink
+from aerodaas.service.flights.order import FlightOrder, Outcome
+from aerodaas.service.flights.starter import start_process
+from aerodaas.service.models import ModelShelf
+from aerodaas.service.phases import FOLLOWING, OVER
+from aerodaas.service.store import Mission
+
+__all__ = ["CANCELLED_BY", "ActiveMission", "LostFlightError"]
+
+CANCELLED_BY = "cancelled by "
+"""How the reason of a cancelled mission begins."""
+_LAST_WORDS = 300
+"""Characters of a dead process' log that are told."""
+
+
+class LostFlightError(Exception):
+    """A flight's process has died in flight: nobody here knows where its drones are."""
+
+
+class ActiveMission:
+    """A mission that is not over, with its folders and processes; for one thread at a time."""
+
+    def __init__(self, row: Mission, path: Path, save: Callable[[Mission], None]) -> None:
+        """Take up a mission.
+
+        Args:
+            row: Its row in the database.
+            path: Its folder.
+            save: Writes a changed row.
+        """
+        self.row = row
+        self._document = path / "mission.json"
+        self.flight = FlightFolder(path / "f")
+        self.rehearsal = FlightFolder(path / "r")
+        self.link: FlightLink | None = None
+        self.version = 0
+        """Counts the changes."""
+        self._save = save
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def write(self, document: MissionDocument) -> None:
+        """Keep the document."""
+        self._document.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        self._document.write_text(document.text(), encoding="utf-8")
+
+    def document(self) -> MissionDocument:
+        """The document; raises ConfigError if its file is gone."""
+        return read_mission(self._document)
+
+    @property
+    def phase(self) -> MissionPhase:
+        """Its phase."""
+        return self.row.phase
+
+    @property
+    def over(self) -> bool:
+        """Whether nothing follows any more."""
+        return self.phase in OVER
+
+    def to(self, phase: MissionPhase, reason: str = "", **changes: object) -> None:
+        """Change the phase; the database is written first."""
+        assert phase in FOLLOWING[self.phase], (self.phase, phase)  # noqa: S101 - our own order
+        row = replace(self.row, phase=phase, reason=reason, **changes)  # type: ignore[arg-type]
+        self._save(row)
+        self.row = row
+        self.version += 1
+
+    def change(self, **changes: object) -> None:
+        """Change the row within its phase."""
+        row = replace(self.row, **changes)  # type: ignore[arg-type]
+        self._save(row)
+        self.row = row
+
+    def rehearse(self, order: FlightOrder, models: ModelShelf) -> None:
+        """Start the rehearsal; one that a former service began is begun again."""
+        self.end_rehearsal()
+        shutil.rmtree(self.rehearsal.path, ignore_errors=True)
+        self._prepare(self.rehearsal, order, models)
+        self._process = start_process(self.rehearsal)
+
+    def verdict(self) -> VerdictOut | None:
+        """The rehearsal's verdict; None while it goes on."""
+        if self._process is not None and self._process.poll() is None:
+            return None
+        if self._process is None and self.rehearsal.flying:
+            return None
+        self._process = None
+        outcome = self.rehearsal.outcome()
+        if outcome is not None and outcome.verdict is not None:
+            return outcome.verdict
+        return VerdictOut(approved=False, reasons=[f"the rehearsal failed: {self._last_words()}"])
+
+    def end_rehearsal(self) -> None:
+        """End the rehearsal's process, and all that it has started."""
+        process, self._process = self._process, None
+        if process is not None and process.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+            process.wait()
+
+    def brief(self, order: FlightOrder, models: ModelShelf) -> None:
+        """Write down the flight's order, before anything of it begins."""
+        self._prepare(self.flight, order, models)
+
+    def take_off(self) -> None:
+        """Start the flight's process; one that was begun, by whatever service, begins no more."""
+        if self._process is None and not self.flight.begun:
+            self._process = start_process(self.flight)
+
+    def _prepare(self, folder: FlightFolder, order: FlightOrder, models: ModelShelf) -> None:
+        document = self.document()
+        folder.make(order, document.text())
+        models.lend(document, folder.models)
+
+    def follow(self) -> FlightLink:
+        """The link to the flight, made when it is first needed."""
+        if self.link is None:
+            self.link = FlightLink(self.flight, self._told)
+        return self.link
+
+    def flown(self) -> Outcome | None:
+        """How the flight ended; None while it goes on.
+
+        Raises LostFlightError if its process died in flight.
+        """
+        if self.flight.flying or (self._process is not None and self._process.poll() is None):
+            return None
+        outcome = self.flight.outcome()
+        if outcome is None and self.flight.begun:
+            raise LostFlightError(self._last_words())
+        if outcome is None:
+            text = f"the flight did not begin: {self._last_words()}"
+            return Outcome(landed=False, reason=text, began=0.0, ended=0.0)
+        return outcome
+
+    def close(self) -> None:
+        """Leave the mission to itself: a flight goes on."""
+        self.end_rehearsal()
+        if self.link is not None:
+            self.link.close()
+
+    def _told(self) -> None:
+        self.version += 1
+
+    def _last_words(self) -> str:
+        folder = self.flight if self.phase is MissionPhase.FLYING else self.rehearsal
+        try:
+            lines = folder.log.read_text(errors="replace").strip().splitlines()
+        except OSError:
+            lines = []
+        return lines[-1][-_LAST_WORDS:] if lines else "its process ended without a word"

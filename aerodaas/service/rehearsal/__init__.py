@@ -1,0 +1,9 @@
+"""Rehearsal of a mission in simulation: its environment, its verdict and its picture."""
+
+from __future__ import annotations
+
+from aerodaas.service.rehearsal.environment import rehearsal_config
+from aerodaas.service.rehearsal.findings import OtherArea
+from aerodaas.service.rehearsal.verdict import judge
+
+__all__ = ["OtherArea", "judge", "rehearsal_config"]

@@ -1,0 +1,227 @@
+"""Findings about a rehearsed flight: each a reason to refuse it, with its figures and place."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.recording.report.flight import RecordedFlight, RobotFlight
+from aerodaas.service.limits import Outline
+
+__all__ = ["Finding", "OtherArea", "findings_of", "landing_time"]
+
+_GROUND = ("", "idle", "preflight", "landed", "aborted")
+_BOUNDARIES = {
+    "geofence": "the fence",
+    "ceiling": "the greatest height",
+    "max_range": "the greatest range",
+}
+"""Limits of setpoints that are boundaries in space, by the names of `SetpointFilter`."""
+_FAILURES = frozenset(
+    {
+        "actor_failed",
+        "analysis_failed",
+        "analysis_hung",
+        "battery_critical",
+        "battery_low",
+        "command_failed",
+        "failsafe",
+        "no_position",
+        "refused",
+        "scheduler",
+        "scheduler_failed",
+        "unreachable_plan",
+        "vehicle",
+        "vehicle_lost",
+    }
+)
+"""Kinds of alerts that tell of a failure; all others are an application's own results, or have a
+finding of their own."""
+
+
+class OtherArea(Protocol):
+    """Area of another granted lease."""
+
+    @property
+    def id(self) -> str:
+        """Id of the lease."""
+        ...
+
+    @property
+    def area(self) -> Outline:
+        """Corners of the area."""
+        ...
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A reason to refuse a flight."""
+
+    text: str
+    """What happened, with figures, and the remedy."""
+    place: tuple[float, float] | None = None
+    """Where it happened, metres east and north."""
+
+
+def findings_of(
+    flight: RecordedFlight,
+    config: EnvironmentConfig,
+    *,
+    minutes: float,
+    others: Sequence[OtherArea] = (),
+) -> list[Finding]:
+    """All reasons to refuse a flight; empty if there is none.
+
+    Args:
+        flight: The flight in simulation.
+        config: Environment that it flew in.
+        minutes: Of the lease.
+        others: Areas of all other granted leases.
+    """
+    found: list[Finding] = []
+    known = {robot.id: robot for robot in config.robots}
+    flown = [name for name in flight.robots if name in known and flight.robots[name].bands]
+    if not flown:
+        return [Finding("no drone has flown: navigate one in the mission")]
+    for name in flown:
+        found += _RobotFindings(known[name], flight.robots[name], minutes).all(others)
+    found += _alerts(flight.alerts)
+    return found
+
+
+def landing_time(robot: RobotFlight) -> float | None:
+    """Mission seconds at which a robot had landed; None if it did not."""
+    last = robot.bands[-1] if robot.bands else None
+    return last.start if last is not None and last.state == "landed" else None
+
+
+class _RobotFindings:
+    """Findings about one robot."""
+
+    def __init__(self, robot: RobotConfig, flight: RobotFlight, minutes: float) -> None:
+        self._id = robot.id
+        self._limits = robot.limits
+        self._flight = flight
+        self._minutes = minutes
+        states = np.array(flight.state_at(flight.time))
+        self._path: NDArray[np.float64] = flight.position[~np.isin(states, _GROUND), :2]
+        """Positions in the air, shape (N, 2)."""
+
+    def all(self, others: Iterable[OtherArea]) -> Iterator[Finding]:
+        yield from self._landing()
+        yield from self._fence()
+        yield from self._waypoints()
+        yield from self._battery()
+        for other in others:
+            yield from self._separation(other)
+
+    def _landing(self) -> Iterator[Finding]:
+        end, flight = landing_time(self._flight), self._flight
+        if end is None and flight.bands[-1].state == "aborted":
+            yield Finding(f"{self._id} did not land as planned: {flight.outcome}", self._last())
+        elif end is None:
+            yield Finding(
+                f"{self._id} had not landed after {flight.bands[-1].end:.0f} s "
+                f"({flight.outcome}), and the lease is for {60 * self._minutes:.0f} s: have the "
+                "mission end by itself, or ask for a longer lease",
+                self._last(),
+            )
+        elif end > 60.0 * self._minutes:
+            yield Finding(
+                f"{self._id} landed after {end:.0f} s, and the lease is for "
+                f"{60 * self._minutes:.0f} s: ask for a longer one, or fly a shorter way",
+                self._at(60.0 * self._minutes),
+            )
+
+    def _fence(self) -> Iterator[Finding]:
+        area = Geofence(self._limits.geofence).area
+        if area is not None and len(self._path):
+            outside = shapely.distance(area, shapely.points(self._path))
+            worst = int(np.argmax(outside))
+            if (metres := float(np.max(outside))) > 0.0:
+                yield Finding(
+                    f"{self._id} left the fence by {metres:.1f} m at "
+                    f"{_place(self._path[worst])}: plan further inside it, or fly slower",
+                    _pair(self._path[worst]),
+                )
+        for limit, what in _BOUNDARIES.items():
+            count = self._flight.clipped[limit]
+            if count:
+                first = self._flight.clipped_at[limit]
+                place = self._at(first)
+                yield Finding(
+                    f"{self._id}: {what} changed {count} setpoints, first after {first:.1f} s"
+                    f"{f' at {_place(place)}' if place else ''}: plan further inside it, or lease "
+                    "a larger area",
+                    place,
+                )
+
+    def _waypoints(self) -> Iterator[Finding]:
+        for name in self._flight.given_up:
+            planned = self._flight.plan.get(name)
+            where = None if planned is None else planned[:2]
+            yield Finding(
+                f"{self._id} gave up waypoint {name}"
+                f"{f' at {_place(where)}' if where else ''}: move it within reach and inside the "
+                "fence, or leave it out",
+                where,
+            )
+
+    def _battery(self) -> Iterator[Finding]:
+        charges = self._flight.battery[np.isfinite(self._flight.battery)]
+        reserve = self._limits.battery_land
+        if len(charges) and charges[-1] < reserve:
+            yield Finding(
+                f"{self._id} began with {charges[0]:.0%} of its battery and ended with "
+                f"{charges[-1]:.0%}, below the reserve of {reserve:.0%}: fly a shorter way, or "
+                "wait until it is charged",
+                self._last(),
+            )
+
+    def _separation(self, other: OtherArea) -> Iterator[Finding]:
+        if not len(self._path):
+            return
+        away = shapely.distance(shapely.Polygon(other.area), shapely.points(self._path))
+        nearest, metres = int(np.argmin(away)), float(np.min(away))
+        wanted = self._limits.separation
+        if metres < wanted or metres <= 0.0:
+            near = "into" if metres <= 0.0 else f"to {metres:.2f} m from"
+            yield Finding(
+                f"{self._id} flew {near} the area of lease {other.id} at "
+                f"{_place(self._path[nearest])}, and {wanted:g} m are to be kept: stay away from "
+                "it, or wait for the end of that lease",
+                _pair(self._path[nearest]),
+            )
+
+    def _at(self, time: float) -> tuple[float, float] | None:
+        times = self._flight.time
+        if not len(times):
+            return None
+        index = min(int(np.searchsorted(times, time)), len(times) - 1)
+        return _pair(self._flight.position[index])
+
+    def _last(self) -> tuple[float, float] | None:
+        return _pair(self._flight.position[-1]) if len(self._flight.states) else None
+
+
+def _alerts(alerts: Iterable[tuple[float, str, str]]) -> Iterator[Finding]:
+    told = set()
+    for at, kind, text in alerts:
+        if kind in _FAILURES and (kind, text) not in told:
+            told.add((kind, text))
+            yield Finding(f"after {at:.1f} s, {kind.replace('_', ' ')}: {text}")
+
+
+def _pair(position: NDArray[np.float64]) -> tuple[float, float]:
+    return float(position[0]), float(position[1])
+
+
+def _place(position: Sequence[float] | NDArray[np.float64]) -> str:
+    return f"({position[0]:.1f}, {position[1]:.1f})"

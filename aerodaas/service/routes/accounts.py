@@ -1,0 +1,128 @@
+"""Accounts, tokens, the audit log and the accounts of use."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, ConfigDict
+
+from aerodaas.protocol.schemas import (
+    AccountIn,
+    AccountOut,
+    AuditOut,
+    Role,
+    Scope,
+    TokenIn,
+    TokenOut,
+    UsageOut,
+)
+from aerodaas.service.access import Accounts, Audit, usage_csv
+from aerodaas.service.access.principal import reaches
+from aerodaas.service.access.usage import usage_out
+from aerodaas.service.routes.admission import Admission
+from aerodaas.service.store import Store
+
+__all__ = ["AccountRoutes"]
+
+_MOST_ENTRIES = 1000
+
+
+class AccountChange(BaseModel):
+    """Changes of an account; None for none."""
+
+    model_config = ConfigDict(extra="forbid")
+
+    role: Role | None = None
+    scopes: list[Scope] | None = None
+    disabled: bool | None = None
+
+
+class AccountRoutes:
+    """Routes `/v1/accounts`, `/v1/tokens`, `/v1/audit` and `/v1/usage`."""
+
+    def __init__(
+        self, accounts: Accounts, store: Store, admission: Admission, audit: Audit
+    ) -> None:
+        """Answer from these."""
+        self._accounts = accounts
+        self._store = store
+        self._admission = admission
+        self._audit = audit
+
+    def router(self) -> APIRouter:
+        """The routes."""
+        router = APIRouter(prefix="/v1", tags=["accounts"])
+        router.add_api_route("/accounts", self.accounts)
+        router.add_api_route("/accounts", self.add, methods=["POST"], status_code=201)
+        router.add_api_route("/accounts/{name}", self.change, methods=["PATCH"])
+        router.add_api_route("/tokens", self.tokens)
+        router.add_api_route("/tokens", self.issue, methods=["POST"], status_code=201)
+        router.add_api_route("/tokens/{token}", self.revoke, methods=["DELETE"])
+        router.add_api_route("/audit", self.audit)
+        router.add_api_route("/usage", self.usage, response_model=list[UsageOut])
+        return router
+
+    def accounts(self, request: Request) -> list[AccountOut]:
+        """All accounts."""
+        self._admission.require(request, Role.ADMIN)
+        return self._accounts.all()
+
+    def add(self, account: AccountIn, request: Request) -> AccountOut:
+        """Make an account, and its tenant if it is a new one."""
+        principal = self._admission.require(request, Role.ADMIN)
+        made = self._accounts.add(account)
+        role = account.role.value
+        self._audit.write(principal, "account.add", account.name, role, accepted=True)
+        return made
+
+    def change(self, name: str, body: AccountChange, request: Request) -> AccountOut:
+        """Change an account's role or scopes, or disable it; its tokens obey at once."""
+        principal = self._admission.require(request, Role.ADMIN)
+        found = self._accounts.change(
+            name, role=body.role, scopes=body.scopes, disabled=body.disabled
+        )
+        text = body.model_dump_json(exclude_none=True)
+        self._audit.write(principal, "account.change", name, text, accepted=True)
+        return found
+
+    def tokens(self, request: Request) -> list[TokenOut]:
+        """One's own tokens; all of them for an administrator. Secrets are not among it."""
+        principal = self._admission.require(request, Role.VIEWER)
+        every = reaches(principal.role, Role.ADMIN)
+        return self._accounts.tokens(None if every else principal.account)
+
+    def issue(self, body: TokenIn, request: Request) -> TokenOut:
+        """Make a token; this answer alone has its secret."""
+        principal = self._admission.require(request, Role.ADMIN)
+        made = self._accounts.issue(body)
+        self._audit.write(principal, "token.issue", made.id, body.account, accepted=True)
+        return made
+
+    def revoke(self, token: str, request: Request) -> TokenOut:
+        """Revoke a token."""
+        principal = self._admission.require(request, Role.ADMIN)
+        found = self._accounts.revoke(token)
+        owner = found.account
+        self._audit.write(principal, "token.revoke", token, owner, accepted=True, required=False)
+        return found
+
+    def audit(
+        self, request: Request, limit: Annotated[int, Query(ge=1, le=_MOST_ENTRIES)] = 100
+    ) -> list[AuditOut]:
+        """The newest entries of the audit log."""
+        self._admission.require(request, Role.ADMIN)
+        return self._audit.newest(limit)
+
+    def usage(
+        self,
+        request: Request,
+        form: Annotated[Literal["json", "csv"], Query(alias="format")] = "json",
+    ) -> Any:  # noqa: ANN401 - JSON by its model, or CSV
+        """What missions have used: the tenant's own, or all for an operator."""
+        principal = self._admission.require(request, Role.VIEWER)
+        every = reaches(principal.role, Role.OPERATOR)
+        rows = self._store.usage.all(None if every else principal.tenant)
+        if form == "csv":
+            return Response(usage_csv(rows), media_type="text/csv")
+        return [usage_out(row) for row in rows]

@@ -1,0 +1,68 @@
+"""Admission of requests: who asks, and whether they may."""
+
+from __future__ import annotations
+
+from starlette.requests import HTTPConnection
+
+from aerodaas.protocol.schemas import Role, Scope
+from aerodaas.service.access import Access, Audit, Principal, RateLimiter, require
+from aerodaas.service.errors import RefusedError
+
+__all__ = ["Admission"]
+
+_SENDER = "aerodaas.principal"
+"""Key of the sender in a request's ASGI scope."""
+
+
+class Admission:
+    """Tells who sends a request, and whether they may; refusals are audited."""
+
+    def __init__(self, access: Access, audit: Audit, rates: RateLimiter) -> None:
+        """Admit by `access`, and no more often than `rates` allow."""
+        self._access = access
+        self._audit = audit
+        self._rates = rates
+
+    def enter(self, connection: HTTPConnection) -> None:
+        """Find out who sends a request, before its body is read; raises RefusedError."""
+        kind, _, token = connection.headers.get("authorization", "").partition(" ")
+        address = _address(connection)
+        principal: Principal | None = None
+        try:
+            principal = self._access.of(token.strip() if kind.lower() == "bearer" else "", address)
+            self._rates.admit(principal.account)
+        except RefusedError as error:
+            # A wrong token is audited where it is counted.
+            if principal is not None:
+                self._refuse(principal, connection, error)
+            raise
+        connection.scope[_SENDER] = principal
+
+    def require(
+        self, connection: HTTPConnection, role: Role, scope: Scope | None = None
+    ) -> Principal:
+        """The sender of a request; raises RefusedError if they may not do this."""
+        principal: Principal = connection.scope[_SENDER]
+        try:
+            require(principal, role, scope)
+        except RefusedError as error:
+            self._refuse(principal, connection, error)
+            raise
+        return principal
+
+    def _refuse(
+        self, principal: Principal, connection: HTTPConnection, error: RefusedError
+    ) -> None:
+        action = f"{connection.scope.get('method', 'WS')} {connection.url.path}"
+        self._audit.write(
+            principal,
+            action,
+            text=str(error),
+            accepted=False,
+            address=_address(connection),
+            required=False,
+        )
+
+
+def _address(connection: HTTPConnection) -> str:
+    return connection.client.host if connection.client is not None else ""

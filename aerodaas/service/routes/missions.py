@@ -1,0 +1,112 @@
+"""Missions: submission, commands, recordings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fastapi import APIRouter, Request
+from fastapi.responses import FileResponse
+
+from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
+from aerodaas.protocol.schemas import CommandIn, MissionIn, MissionOut, Role, Scope, Word
+from aerodaas.service.access import Audit, Principal
+from aerodaas.service.desk import MissionDesk
+from aerodaas.service.routes.admission import Admission
+
+__all__ = ["MissionRoutes"]
+
+
+class NavigationIn(WaypointsIn):
+    """Waypoints for one robot of a mission."""
+
+    robot: Word
+
+
+class MissionRoutes:
+    """Routes below `/v1/missions`."""
+
+    def __init__(self, desk: MissionDesk, admission: Admission, audit: Audit) -> None:
+        """Answer from the desk."""
+        self._desk = desk
+        self._admission = admission
+        self._audit = audit
+
+    def router(self) -> APIRouter:
+        """The routes."""
+        router = APIRouter(prefix="/v1/missions", tags=["missions"])
+        router.add_api_route("", self.submit, methods=["POST"], status_code=202)
+        router.add_api_route("", self.missions)
+        router.add_api_route("/{mission}", self.mission)
+        router.add_api_route("/{mission}", self.cancel, methods=["DELETE"])
+        router.add_api_route("/{mission}/approve", self.approve, methods=["POST"])
+        router.add_api_route("/{mission}/commands", self.command, methods=["POST"])
+        router.add_api_route("/{mission}/navigation", self.navigation, methods=["POST"])
+        files: dict[str, Any] = {"response_class": FileResponse}
+        router.add_api_route("/{mission}/recording", self.recording, **files)
+        router.add_api_route("/{mission}/rehearsal.png", self.picture, **files)
+        return router
+
+    def submit(self, wanted: MissionIn, request: Request) -> MissionOut:
+        """Submit a mission document to be rehearsed and flown."""
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        found = self._desk.submit(principal, wanted)
+        self._audit.write(principal, "mission.submit", found.id, found.name, accepted=True)
+        return found
+
+    def missions(self, request: Request) -> list[MissionOut]:
+        """All missions that the account may see, newest first."""
+        return self._desk.missions(self._admission.require(request, Role.VIEWER))
+
+    def mission(self, mission: str, request: Request) -> MissionOut:
+        """One mission with its newest state."""
+        principal = self._admission.require(request, Role.VIEWER)
+        found = self._desk.mission(principal, mission)
+        if self._desk.flies(principal, mission):
+            self._desk.hear(mission)
+        return found
+
+    def cancel(self, mission: str, request: Request) -> MissionOut:
+        """Cancel a mission; drones in flight come home."""
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        found = self._desk.cancel(principal, mission)
+        self._audit.write(principal, "mission.cancel", mission, accepted=True, required=False)
+        return found
+
+    def approve(self, mission: str, request: Request) -> MissionOut:
+        """Approve a mission that waits for an operator."""
+        principal = self._admission.require(request, Role.OPERATOR)
+        found = self._desk.approve(principal, mission)
+        self._audit.write(principal, "mission.approve", mission, accepted=True)
+        return found
+
+    def command(self, mission: str, body: CommandIn, request: Request) -> AnswerOut:
+        """Give one of the mission's robots a command; answers what the drone said."""
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        answer = self._desk.command(principal, mission, body)
+        return self._noted(principal, body.command, f"{mission}/{body.robot}", answer)
+
+    def navigation(self, mission: str, body: NavigationIn, request: Request) -> AnswerOut:
+        """Add waypoints to the queue of one of the mission's robots."""
+        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        answer = self._desk.fly(principal, mission, body.robot, body)
+        return self._noted(principal, "navigation", f"{mission}/{body.robot}", answer)
+
+    def recording(self, mission: str, request: Request) -> FileResponse:
+        """The flight's recording, an MCAP file, once it is over."""
+        principal = self._admission.require(request, Role.VIEWER, Scope.SENSE)
+        path = self._desk.file(principal, mission, "recording")
+        return FileResponse(path, media_type="application/octet-stream", filename=f"{mission}.mcap")
+
+    def picture(self, mission: str, request: Request) -> FileResponse:
+        """Picture of the rehearsed flight."""
+        principal = self._admission.require(request, Role.VIEWER)
+        return FileResponse(self._desk.file(principal, mission, "picture"), media_type="image/png")
+
+    def _noted(
+        self, principal: Principal, action: str, target: str, answer: AnswerOut
+    ) -> AnswerOut:
+        """Audit a command that the drone has answered; what is safe goes on without the log."""
+        said, accepted = answer.text, answer.accepted
+        name = f"mission.{action}"
+        self._audit.write(principal, name, target, said, accepted=accepted, required=False)
+        return answer

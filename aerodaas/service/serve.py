@@ -1,0 +1,91 @@
+"""Serving: the database, the first token, and the port."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable
+from pathlib import Path
+
+import uvicorn
+
+from aerodaas.analytics.remote.guard import is_loopback
+from aerodaas.service.access import Accounts
+from aerodaas.service.app import build_service
+from aerodaas.service.settings import ServiceSettings
+from aerodaas.service.store import Store
+from aerodaas.types.errors import ConfigError, SourceError
+
+__all__ = ["serve"]
+
+_MOST_CONNECTIONS = 1000
+_MOST_MESSAGE = 64 << 20
+"""Bytes of a WebSocket message: a picture that an analysis at the user's side answers with."""
+_PING_SECONDS = 5.0
+"""Seconds after which a watcher who does not answer is gone."""
+
+
+def serve(
+    settings: ServiceSettings,
+    *,
+    host: str = "127.0.0.1",
+    port: int = 8400,
+    database: str | None = None,
+    certificate: Path | None = None,
+    key: Path | None = None,
+    tell: Callable[[str], None] = print,
+) -> None:
+    """Serve until Ctrl-C or SIGTERM; flights under way go on without the service.
+
+    Args:
+        settings: Of the provider.
+        host: Address to listen on; beyond the loopback interface a certificate is compulsory.
+        port: Port; 0 for any free one.
+        database: URL instead of the file in the state folder.
+        certificate: File of the TLS certificate, with its chain.
+        key: File of its key.
+        tell: Tells the provider's people of what they should know.
+
+    Raises:
+        ConfigError: If it would listen to the network without TLS.
+        SourceError: If the port cannot be had.
+        StoreError: If the database cannot be used.
+    """
+    if certificate is None and not is_loopback(host):
+        raise ConfigError(
+            f"tokens do not go over a network in the clear: to listen on {host}, give "
+            "--certificate and --key, or listen on 127.0.0.1 behind a proxy that has them"
+        )
+    settings.state.mkdir(parents=True, exist_ok=True, mode=0o700)
+    settings.state.chmod(0o700)
+    listener = _bound(host, port)
+    with Store.open(database or settings.state / "service.db") as store:
+        token = Accounts(store).first_token()
+        if token is not None:
+            tell(f"the administrator's token, shown this once: {token}")
+        scheme = "https" if certificate is not None else "http"
+        where = f"[{host}]" if ":" in host else host
+        tell(f"serving {settings.config.name} at {scheme}://{where}:{listener.getsockname()[1]}")
+        config = uvicorn.Config(
+            build_service(settings, store, tell),
+            log_config=None,
+            access_log=False,
+            ssl_certfile=certificate,
+            ssl_keyfile=key,
+            limit_concurrency=_MOST_CONNECTIONS,
+            ws_max_size=_MOST_MESSAGE,
+            ws_ping_interval=_PING_SECONDS,
+            ws_ping_timeout=_PING_SECONDS,
+            timeout_graceful_shutdown=2,
+            server_header=False,
+        )
+        uvicorn.Server(config).run(sockets=[listener])
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    try:
+        return socket.create_server((host, port), family=family)
+    except OSError as error:
+        raise SourceError(
+            f"cannot listen on {host}:{port}: {error.strerror}; choose another --port"
+        ) from None

@@ -1,0 +1,47 @@
+"""Settings of one service: its fleet, its folder, and the provider's policy."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from aerodaas.config.model import EnvironmentConfig
+
+__all__ = ["ServiceSettings"]
+
+
+@dataclass(frozen=True)
+class ServiceSettings:
+    """Settings of `aerodaas serve`."""
+
+    fleet: Path
+    """The provider's environment file."""
+    config: EnvironmentConfig
+    """Its content."""
+    state: Path
+    """Folder of the database, models, and flights."""
+    rehearse: bool = True
+    """Fly each mission in simulation first."""
+    approval: bool = False
+    """An operator has to approve each mission after its rehearsal."""
+    speed: Literal["max"] | float = 1.0
+    """Of simulated drones, as `aerodaas run --speed`."""
+    address: str | None = None
+    """Ray cluster that flights join; None: each has one of its own on this machine."""
+    rehearsal_seconds: float = 300.0
+    """Most wall seconds of a rehearsal."""
+    most_flights: int = 16
+    """Most flights at once."""
+    storage: int = 20 << 30
+    """Most bytes of recordings and models; none is accepted beyond."""
+
+    @property
+    def models(self) -> Path:
+        """Folder of the models that users have brought."""
+        return self.state / "models"
+
+    @property
+    def missions(self) -> Path:
+        """Folder of the flights."""
+        return self.state / "m"

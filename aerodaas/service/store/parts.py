@@ -1,0 +1,211 @@
+"""The parts of the store, one a table, with the questions that the service asks of each."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection
+from typing import Any
+
+from sqlalchemy import ColumnElement, delete, func, insert, select, true
+
+from aerodaas.protocol.schemas import LeaseState, MissionPhase
+from aerodaas.service.store import tables
+from aerodaas.service.store.database import Database
+from aerodaas.service.store.rows import (
+    Account,
+    AuditEntry,
+    Lease,
+    Mission,
+    RobotState,
+    Tenant,
+    Token,
+    Usage,
+)
+from aerodaas.service.store.table import Rows
+
+__all__ = [
+    "Accounts",
+    "AuditLog",
+    "Leases",
+    "Missions",
+    "Robots",
+    "Tenants",
+    "Tokens",
+    "Usages",
+]
+
+_PAGE = 1000
+"""Rows that a list has, where nobody asks for another number."""
+
+
+class Tenants(Rows[Tenant]):
+    """Tenants, by name."""
+
+    _table, _kind, _what = tables.TENANTS, Tenant, "tenant"
+
+    def all(self) -> list[Tenant]:
+        """All of them, by name."""
+        return self._select()
+
+
+class Accounts(Rows[Account]):
+    """Accounts, by name."""
+
+    _table, _kind, _what = tables.ACCOUNTS, Account, "account"
+
+    def all(self, tenant: str | None = None) -> list[Account]:
+        """Those of a tenant, or all, by name."""
+        return self._select(_is(tables.ACCOUNTS.c.tenant, tenant))
+
+
+class Tokens(Rows[Token]):
+    """Tokens, by id."""
+
+    _table, _kind, _what = tables.TOKENS, Token, "token"
+
+    def all(self, account: str | None = None) -> list[Token]:
+        """Those of an account, or all, oldest first."""
+        columns = tables.TOKENS.c
+        return self._select(_is(columns.account, account), order=[columns.created])
+
+    def owned(self, id_: str) -> tuple[Token, Account] | None:
+        """A token and its account; None if there is none of this id."""
+        statement = (
+            select(tables.TOKENS, tables.ACCOUNTS)
+            .join(tables.ACCOUNTS, tables.TOKENS.c.account == tables.ACCOUNTS.c.name)
+            .where(tables.TOKENS.c.id == id_)
+        )
+        with self._database.reading() as connection:
+            found = connection.execute(statement).one_or_none()
+        if found is None:
+            return None
+        length = len(tables.TOKENS.c)
+        return Token(*found[:length]), Account(*found[length:])
+
+
+class Leases(Rows[Lease]):
+    """Leases, by id."""
+
+    _table, _kind, _what = tables.LEASES, Lease, "lease"
+
+    def live(self) -> list[Lease]:
+        """Those that are queued or granted, in the queue's order."""
+        columns = tables.LEASES.c
+        return self._select(columns.state != LeaseState.ENDED, order=[columns.number])
+
+    def all(self, tenant: str | None = None, limit: int = _PAGE) -> list[Lease]:
+        """The newest of a tenant, or of all, newest first."""
+        columns = tables.LEASES.c
+        return self._select(_is(columns.tenant, tenant), order=[columns.number.desc()], limit=limit)
+
+    def highest_number(self) -> int:
+        """The highest place in the queue that was ever given; 0 before the first."""
+        with self._database.reading() as connection:
+            return connection.execute(select(func.max(tables.LEASES.c.number))).scalar() or 0
+
+
+class Missions(Rows[Mission]):
+    """Missions, by id."""
+
+    _table, _kind, _what = tables.MISSIONS, Mission, "mission"
+
+    def all(
+        self,
+        tenant: str | None = None,
+        phases: Collection[MissionPhase] | None = None,
+        limit: int = _PAGE,
+    ) -> list[Mission]:
+        """The newest of a tenant, or of all, in these phases, or any; newest first."""
+        columns = tables.MISSIONS.c
+        among = true() if phases is None else columns.phase.in_(phases)
+        return self._select(
+            _is(columns.tenant, tenant), among, order=[columns.submitted.desc()], limit=limit
+        )
+
+
+class Robots(Rows[RobotState]):
+    """What is known of drones, by id."""
+
+    _table, _kind, _what = tables.ROBOTS, RobotState, "robot"
+
+    def all(self) -> list[RobotState]:
+        """All of them, by id."""
+        return self._select()
+
+
+class Usages(Rows[Usage]):
+    """What missions have used, by mission."""
+
+    _table, _kind, _what = tables.USAGE, Usage, "usage of mission"
+
+    def all(
+        self, tenant: str | None = None, since: float | None = None, limit: int | None = None
+    ) -> list[Usage]:
+        """Those of a tenant, or of all, that started at `since` or later; oldest first."""
+        columns = tables.USAGE.c
+        later = true() if since is None else columns.started >= since
+        return self._select(
+            _is(columns.tenant, tenant), later, order=[columns.started], limit=limit
+        )
+
+    def total(self, tenant: str, since: float) -> tuple[float, int, int]:
+        """Flight seconds, tasks and cloud calls of a tenant's missions that started since then."""
+        columns = tables.USAGE.c
+        used = (columns.flight_seconds, columns.tasks, columns.cloud_calls)
+        chosen = (columns.tenant == tenant) & (columns.started >= since)
+        statement = select(*map(func.sum, used)).where(chosen)
+        with self._database.reading() as connection:
+            flown, tasks, calls = tuple(connection.execute(statement).one())
+        return float(flown or 0), int(tasks or 0), int(calls or 0)
+
+    def stored_bytes(self, tenant: str) -> int:
+        """Bytes of a tenant's recordings that are kept."""
+        columns = tables.USAGE.c
+        chosen = (columns.tenant == tenant) & columns.kept
+        with self._database.reading() as connection:
+            total = connection.execute(select(func.sum(columns.recorded_bytes)).where(chosen))
+            return int(total.scalar() or 0)
+
+
+class AuditLog:
+    """Entries of the audit log, which only grow; see `aerodaas.service.access.Audit`."""
+
+    def __init__(self, database: Database) -> None:
+        """Keep in an open database."""
+        self._database = database
+
+    def add(self, *entries: AuditEntry) -> int:
+        """Keep entries in their order; the database numbers them.
+
+        Returns:
+            The number of the last one.
+        """
+        number = 0
+        with self._database.writing() as connection:
+            for entry in entries:
+                values = dataclasses.asdict(entry)
+                del values["number"]
+                done = connection.execute(insert(tables.AUDIT).values(values))
+                (number,) = done.inserted_primary_key or (0,)
+        return number
+
+    def all(self, tenant: str | None = None, limit: int = _PAGE) -> list[AuditEntry]:
+        """The newest of a tenant, or of all, newest first."""
+        columns = tables.AUDIT.c
+        statement = (
+            select(tables.AUDIT)
+            .where(_is(columns.tenant, tenant))
+            .order_by(columns.number.desc())
+            .limit(limit)
+        )
+        with self._database.reading() as connection:
+            return [AuditEntry(*found) for found in connection.execute(statement)]
+
+    def trim(self, below: int) -> None:
+        """Drop those whose number is below `below`."""
+        with self._database.writing() as connection:
+            connection.execute(delete(tables.AUDIT).where(tables.AUDIT.c.number < below))
+
+
+def _is(column: ColumnElement[Any], wanted: str | None) -> ColumnElement[bool]:
+    return true() if wanted is None else column == wanted

@@ -1,0 +1,145 @@
+"""Terminal output of a flight at a provider."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+
+import numpy as np
+from rich.console import Console
+from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TransferSpeedColumn
+from typing_extensions import Self
+
+from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.protocol.schemas import MissionOut, MissionPhase
+from aerodaas.terminal.live import MissionView
+from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.data import Battery, Odometry
+from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["ProvidedView", "download_view", "phase_text"]
+
+_WORDS = {
+    MissionPhase.SUBMITTED: "submitted",
+    MissionPhase.REHEARSING: "being rehearsed in simulation",
+    MissionPhase.AWAITING_APPROVAL: "waits for an operator's approval",
+    MissionPhase.QUEUED: "waits for its drones",
+}
+
+
+def phase_text(mission: MissionOut) -> str:
+    """A mission's phase and its reason, in one line."""
+    words = _WORDS.get(mission.phase, mission.phase.value)
+    return f"{words}: {mission.reason}" if mission.reason and mission.reason != words else words
+
+
+class ProvidedView:
+    """View of a mission that a provider flies, drawn as one's own flight is."""
+
+    def __init__(self, *, shown: bool, places: Mapping[str, Waypoint] | None = None) -> None:
+        """Show it, or print new alerts alone; `places` are waypoints by id, in local ENU metres."""
+        self._view = MissionView() if shown else None
+        self._places = places or {}
+        self._errors = Console(stderr=True, highlight=False, soft_wrap=True)
+        self._began = time.monotonic()
+        self._told: Counter[str] = Counter()
+        self._lock = threading.Lock()
+        self._notes: list[str] = []
+
+    def __enter__(self) -> Self:
+        """Begin to draw."""
+        if self._view is not None:
+            self._view.__enter__()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Leave the last view on the terminal."""
+        if self._view is not None:
+            self._view.__exit__(None, None, None)
+
+    def note(self, text: str) -> None:
+        """Tell of something on this side, in any thread."""
+        with self._lock:
+            self._notes.append(text)
+        if self._view is None or not self._view.live:
+            self._errors.print(text, markup=False)
+
+    def update(self, mission: MissionOut) -> None:
+        """Show the mission's present state."""
+        if self._view is None:
+            self._print_alerts(mission)
+            return
+        times = [status.time for status in mission.status.values()]
+        with self._lock:
+            notes = self._notes if self._view.live else []
+            alerts = (*mission.alerts, *notes)
+        self._view.update(
+            Snapshot(
+                title=f"{mission.name} ({mission.id})",
+                mission_time=max(times, default=0.0),
+                wall_time=time.monotonic() - self._began,
+                robots=tuple(self._robot(*one) for one in mission.status.items()),
+                alerts=alerts,
+            )
+        )
+
+    def _print_alerts(self, mission: MissionOut) -> None:
+        before, self._told = self._told, Counter(mission.alerts)
+        for text in (self._told - before).elements():
+            self._errors.print(text, markup=False)
+
+    def _robot(self, name: str, status: StatusOut) -> RobotSnapshot:
+        return RobotSnapshot(name, self._mission(status), _vehicle(status))
+
+    def _mission(self, status: StatusOut) -> MissionStatus:
+        known = {state.value: state for state in MissionState}
+        ahead = [self._places[one] for one in status.pending if one in self._places]
+        return MissionStatus(
+            stamp=round(status.time * NANOSECONDS),
+            state=known.get(status.state, MissionState.IDLE),
+            reason=status.reason,
+            target=self._places.get(status.target or ""),
+            pending=tuple(ahead),
+            visited=tuple(status.visited),
+            given_up=tuple(status.given_up),
+            distance=status.distance,
+            faults=tuple(status.faults),
+            visits=status.waypoints_visited,
+            waypoint_counts=(status.waypoints_visited, status.waypoints_known),
+        )
+
+
+def _vehicle(status: StatusOut) -> VehicleState | None:
+    if status.position is None:
+        return None
+    stamp = round(status.time * NANOSECONDS)
+    charge = math.nan if status.battery is None else status.battery
+    yaw = math.nan if status.yaw is None else status.yaw
+    odometry = Odometry(_vector(status.position), _vector(status.velocity), yaw)
+    return VehicleState(stamp, odometry, Battery(charge), VehicleMode.GUIDED, armed=True)
+
+
+def _vector(axes: list[float | None] | None) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    return np.array([math.nan if one is None else one for one in axes or [None] * 3])
+
+
+@contextmanager
+def download_view(*, shown: bool, what: str) -> Iterator[Callable[[int, int | None], None]]:
+    """Show the progress of a download on a terminal; yields what is told of it."""
+    console = Console(stderr=True)
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        DownloadColumn(),
+        TransferSpeedColumn(),
+    )
+    with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
+        task = progress.add_task(what, total=None)
+        yield lambda done, size: progress.update(task, completed=done, total=size)

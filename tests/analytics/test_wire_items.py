@@ -1,0 +1,306 @@
+"""Items over the wire: what is written is read again, and nothing else is."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import random
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from aerodaas.analytics.wire_items import ItemError, pack, unpack
+from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.types.data import (
+    Alert,
+    Battery,
+    Detection,
+    Detections,
+    Frame,
+    GpsFix,
+    Header,
+    Odometry,
+    Readings,
+)
+from aerodaas.types.geometry import CameraModel
+from aerodaas.types.guest_item import GuestItem
+from aerodaas.types.picture_size import MAX_PIXELS
+from aerodaas.types.status import Decision, MissionState, MissionStatus
+from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
+from aerodaas.types.waypoints import (
+    NavigationType,
+    SchedulingType,
+    VelocityCommand,
+    Waypoint,
+    WaypointType,
+)
+
+floats = st.floats(allow_subnormal=False)
+real = st.floats(-1e9, 1e9, allow_subnormal=False)
+words = st.text(min_size=1, max_size=8)
+stamps = st.integers(0, 2**62)
+headers = st.builds(Header, st.integers(0, 2**40), stamps, words)
+vectors = hnp.arrays(np.float64, 3, elements=floats)
+odometry = st.builds(Odometry, vectors, vectors, floats, roll=floats, pitch=floats)
+cameras = st.builds(CameraModel, *[st.integers(1, 4000)] * 2, *[real] * 4)
+waypoints = st.builds(
+    Waypoint,
+    words,
+    *[st.floats(-80, 80)] * 3,
+    waypoint_type=st.sampled_from(WaypointType),
+    yaw=st.none() | real,
+    speed=st.none() | st.floats(0.1, 9),
+    deadline=st.none() | real,
+)
+commands = st.builds(VelocityCommand, *[st.floats(-5, 5)] * 4)
+batteries = st.builds(Battery, floats, floats)
+keypoints = hnp.arrays(np.float32, st.tuples(st.integers(0, 5), st.just(3)))
+boxes = st.builds(
+    Detection,
+    st.tuples(real, real, real, real),
+    words,
+    floats,
+    track_id=st.none() | st.integers(0, 99),
+    keypoints=st.none() | keypoints,
+)
+cells = hnp.arrays(np.uint16, (3, 4))
+detections = st.builds(
+    Detections,
+    headers,
+    st.lists(boxes, max_size=3).map(tuple),
+    st.integers(1, 4000),
+    st.integers(1, 4000),
+    st.none() | cameras,
+    st.none() | odometry,
+    st.none() | cells,
+)
+states = st.builds(
+    VehicleState,
+    stamps,
+    odometry,
+    batteries,
+    st.sampled_from(VehicleMode),
+    st.booleans(),
+    gps=st.none() | st.builds(GpsFix, floats, floats, floats),
+    truth=st.none() | odometry,
+    faults=st.lists(words, max_size=2).map(tuple),
+    extra=st.dictionaries(words, floats, max_size=2),
+    ended=st.none() | st.sampled_from(FlightEnd),
+)
+statuses = st.builds(
+    MissionStatus,
+    stamps,
+    st.sampled_from(MissionState),
+    words,
+    target=st.none() | waypoints,
+    pending=st.lists(waypoints, max_size=2).map(tuple),
+    visited=st.lists(words, max_size=2).map(tuple),
+    waypoint_counts=st.tuples(st.integers(0, 9), st.integers(0, 9)),
+)
+readings = st.builds(Readings, stamps, st.dictionaries(words, floats, max_size=3))
+alerts = st.builds(Alert, headers, words, words, st.dictionaries(words, floats | words, max_size=2))
+decisions = st.builds(Decision, stamps, words, words, words, st.dictionaries(words, floats))
+plain = st.none() | st.booleans() | st.integers(-(2**70), 2**70) | real | st.text(max_size=9)
+nested = st.recursive(
+    plain,
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.lists(inner, max_size=3).map(tuple)
+        | st.dictionaries(st.text(max_size=4), inner, max_size=3)
+    ),
+    max_leaves=8,
+)
+hidden = st.builds(GuestItem, st.just("Own"), st.none() | st.text(max_size=4), st.binary())
+items: st.SearchStrategy[object] = st.one_of(
+    *(nested, headers, odometry, batteries, detections, states, statuses, readings, alerts),
+    *(decisions, waypoints, commands, hidden),
+)
+
+
+@st.composite
+def frames(draw: st.DrawFn) -> Frame:
+    """Small frames, some of them with depth."""
+    height, width = draw(st.integers(1, 12)), draw(st.integers(1, 12))
+    image = draw(hnp.arrays(np.uint8, (height, width, 3)))
+    depth = draw(st.none() | hnp.arrays(np.uint16, (height, width)))
+    return Frame(draw(headers), image, draw(st.none() | cameras), draw(st.none() | odometry), depth)
+
+
+def sent(item: object, *, lossless: bool = False) -> tuple[Any, bytes]:
+    """An item as it arrives: its JSON is strict."""
+    content, blob = pack(item, lossless=lossless)
+    return json.loads(json.dumps(content, allow_nan=False)), blob
+
+
+@given(items)
+@settings(deadline=None)
+def test_an_item_is_read_as_it_was_written(item: object) -> None:
+    """To the last digit, with numbers that JSON does not have."""
+    content, blob = sent(item)
+    found = unpack(content, blob)
+    assert type(found) is type(item)
+    assert found == item
+    assert not blob
+
+
+@given(frames())
+@settings(deadline=None)
+def test_a_lossless_frame_is_read_as_it_was_written(frame: Frame) -> None:
+    """Its pixels, depth, header and camera."""
+    assert unpack(*sent(frame, lossless=True)) == frame
+
+
+@given(frames())
+@settings(deadline=None)
+def test_a_frame_as_jpeg_keeps_all_but_its_pixels(frame: Frame) -> None:
+    """Depth is never lossy."""
+    content, blob = sent(frame)
+    assert content["format"] == "jpeg"
+    found = unpack(content, blob)
+    assert found.image.shape == frame.image.shape
+    for name in ("header", "camera", "odometry"):
+        assert getattr(found, name) == getattr(frame, name)
+    assert (found.depth is None) == (frame.depth is None)
+    if frame.depth is not None:
+        np.testing.assert_array_equal(found.depth, frame.depth)
+
+
+def test_a_grey_frame_is_grey_as_jpeg() -> None:
+    """What a compressed picture shows is what was written, within a few shades."""
+    image = np.tile(np.arange(0, 256, 4, dtype=np.uint8)[:, None, None], (1, 64, 3))
+    found = unpack(*sent(Frame(Header(1, 2, "cam"), image)))
+    assert np.abs(found.image.astype(int) - image).max() < 8
+
+
+@given(
+    st.lists(waypoints | commands, max_size=3, unique_by=lambda one: getattr(one, "id", id(one)))
+)
+@settings(deadline=None)
+def test_navigation_is_read_as_it_was_written(given_items: list[Any]) -> None:
+    """With its type, order and priority."""
+    kind = NavigationType.ANALYTICS_DRIVEN
+    navigation = AeroNavigation(kind, given_items, SchedulingType.UNORDERED, priority=2)
+    found = unpack(*sent(navigation))
+    assert list(found) == list(navigation)
+    assert (found.navigation_type, found.priority) == (kind, 2)
+    assert found.scheduling_type is SchedulingType.UNORDERED
+
+
+class Own:
+    """A class of somebody's own."""
+
+
+@pytest.mark.parametrize(
+    "item",
+    [Own(), [Own()], {1: 2}, np.array(["a"]), Readings, object()],
+    ids=["own", "own in a list", "number for a key", "texts", "class", "object"],
+)
+def test_no_other_class_goes_over_the_wire(item: object) -> None:
+    """It is refused, and never pickled."""
+    with pytest.raises(ItemError, match="no class that goes over the wire"):
+        pack(item)
+
+
+@given(items | frames(), st.randoms(use_true_random=False))
+@settings(max_examples=300, deadline=None)
+def test_a_damaged_item_is_refused_or_another_item(item: object, rng: random.Random) -> None:
+    """Whatever arrives: an item, or ItemError."""
+    content, blob = sent(item, lossless=rng.random() < 0.5)
+    places = list(_places({"": content}))
+    holder, key = rng.choice(places)
+    holder[key] = rng.choice([None, -1, 1e300, "x", [], {}, {"is": "tuple"}, rng.choice(places)[1]])
+    if blob and rng.random() < 0.5:
+        changed = bytearray(blob)
+        changed[rng.randrange(len(blob))] ^= 1 << rng.randrange(8)
+        blob = bytes(changed[: rng.randrange(len(blob) + 1)])
+    with contextlib.suppress(ItemError):
+        unpack(content, blob)
+
+
+def _places(content: Any) -> Iterator[tuple[Any, Any]]:  # noqa: ANN401 - JSON
+    if isinstance(content, dict | list):
+        for key in content if isinstance(content, dict) else range(len(content)):
+            yield content, key
+            yield from _places(content[key])
+
+
+FRAME = Frame(Header(1, 2, "cam"), np.zeros((4, 6, 3), np.uint8), depth=np.ones((4, 6), np.uint16))
+
+
+def wide(content: dict[str, Any], blob: bytes) -> bytes:
+    """A picture that claims to be huge, and whose size is told as it claims."""
+    side = 1 << 13
+    content["size"] = [side, MAX_PIXELS // side + 1]
+    sides = b"".join(int(one).to_bytes(4, "big") for one in content["size"])
+    return blob[:16] + sides + blob[24:]
+
+
+def bmp(content: dict[str, Any], blob: bytes) -> bytes:
+    """A picture of a format that no frame has."""
+    del blob
+    data = cv2.imencode(".bmp", FRAME.image)[1].tobytes()
+    content["bytes"] = [len(data), 0]
+    return data
+
+
+def flat(content: dict[str, Any], blob: bytes) -> bytes:
+    """Depth in eight bits."""
+    depth = cv2.imencode(".png", np.zeros((4, 6), np.uint8))[1].tobytes()
+    first = content["bytes"][0]
+    content["bytes"] = [first, len(depth)]
+    return blob[:first] + depth
+
+
+def told(**words: object) -> Callable[[dict[str, Any], bytes], bytes]:
+    """The frame with other parts."""
+
+    def change(content: dict[str, Any], blob: bytes) -> bytes:
+        content.update(words)
+        return blob
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (wide, "too large"),
+        (bmp, "no jpeg or png"),
+        (flat, "16 bits"),
+        (told(size=[6, 5]), "not of the size"),
+        (told(bytes=[3, 4]), "not those that it tells of"),
+        (told(format="jpeg"), "no jpeg or png"),
+        (told(header=None), "header, camera or odometry"),
+        (told(pickle="x"), "other parts"),
+        (lambda _, blob: blob + b"x", "not those that it tells of"),
+        (lambda _, blob: blob[:60] + b"\0" * (len(blob) - 60), "damaged|16 bits"),
+    ],
+)
+def test_a_malformed_frame_is_refused(
+    change: Callable[[dict[str, Any], bytes], bytes], said: str
+) -> None:
+    """Before anything large is decoded."""
+    content, blob = sent(FRAME, lossless=True)
+    blob = change(content, blob)
+    with pytest.raises(ItemError, match=said):
+        unpack(content, blob)
+
+
+def test_bytes_beside_what_is_no_picture_are_refused() -> None:
+    """They would have to be something."""
+    with pytest.raises(ItemError, match="no frame"):
+        unpack(5, b"x")
+
+
+def test_a_position_has_three_numbers() -> None:
+    """Each array is of the annotation's shape and type."""
+    content, _ = sent(Odometry(np.zeros(3), np.zeros(3), 0.0))
+    content["of"]["position"], _ = pack(np.zeros(4))
+    with pytest.raises(ItemError, match="position is of a wrong type"):
+        unpack(content)

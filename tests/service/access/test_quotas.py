@@ -1,0 +1,106 @@
+"""A tenant uses what its quotas allow in a calendar month, and the table of it harms nobody."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from datetime import datetime, timezone
+
+import pytest
+
+from aerodaas.protocol.schemas import MissionPhase
+from aerodaas.service.access import Quotas, usage_csv, usage_out
+from aerodaas.service.errors import RefusedError
+from aerodaas.service.store import Mission, Store, Tenant, Usage
+
+
+def moment(year: int, month: int, day: int) -> float:
+    """Seconds of Unix time at its beginning."""
+    return datetime(year, month, day, tzinfo=timezone.utc).timestamp()
+
+
+def fly(
+    store: Store,
+    started: float,
+    minutes: float,
+    *,
+    tasks: int = 0,
+    cloud_calls: int = 0,
+    recorded_bytes: int = 0,
+) -> None:
+    """Keep what a mission has used."""
+    id_ = f"m{len(store.missions.all())}"
+    store.missions.add(
+        Mission(id_, "survey", "farm", "pilot", MissionPhase.LANDED, ("a",), started, "")
+    )
+    store.usage.add(
+        Usage(
+            id_,
+            "farm",
+            "pilot",
+            started,
+            flight_seconds=60 * minutes,
+            tasks=tasks,
+            cloud_calls=cloud_calls,
+            recorded_bytes=recorded_bytes,
+        )
+    )
+
+
+def test_what_was_flown_this_month_counts(store: Store) -> None:
+    """From its first second on, with what is flown just now."""
+    store.tenants.put(Tenant("farm", flight_minutes=100.0, tasks=50, cloud_calls=5))
+    quotas = Quotas(store)
+    fly(store, moment(2026, 3, 1) - 1, 90.0, tasks=40)
+    fly(store, moment(2026, 3, 1), 30.0, tasks=7, cloud_calls=6)
+    march = quotas.left("farm", moment(2026, 4, 1) - 1, committed=20.0)
+    assert (march.flight_minutes, march.tasks, march.cloud_calls) == (50.0, 43, -1)
+    assert march.storage_bytes == math.inf
+    assert quotas.left("farm", moment(2026, 4, 1)).flight_minutes == 100.0
+    assert quotas.check("farm", 50.0, moment(2026, 3, 31), committed=20.0) == march
+    with pytest.raises(RefusedError, match=r"leaves 50\.0 flight minutes .* 50\.1 are") as refused:
+        quotas.check("farm", 50.1, moment(2026, 3, 31), committed=20.0)
+    assert refused.value.status == 403
+
+
+def test_a_full_storage_takes_no_mission(store: Store) -> None:
+    """Until a recording is deleted, of whatever month it is."""
+    store.tenants.put(Tenant("farm", storage_bytes=1000))
+    quotas = Quotas(store)
+    fly(store, moment(2025, 1, 1), 1.0, recorded_bytes=1000)
+    with pytest.raises(RefusedError, match="fetch and delete some"):
+        quotas.check("farm", 1.0, moment(2026, 3, 1))
+    store.usage.put(
+        Usage("m0", "farm", "pilot", moment(2025, 1, 1), recorded_bytes=1000, kept=False)
+    )
+    assert quotas.check("farm", 1.0, moment(2026, 3, 1)).storage_bytes == 1000
+
+
+def test_a_tenant_without_quotas_has_no_end(store: Store) -> None:
+    """So has one that is not known."""
+    for tenant in ("farm", "unknown"):
+        assert Quotas(store).check(tenant, 1e9, moment(2026, 3, 1)).tasks == math.inf
+
+
+def test_the_table_has_a_row_for_each_mission_and_no_formula() -> None:
+    """A name that a spreadsheet would compute is told as text."""
+    usage = Usage(
+        "=HYPERLINK(1)",
+        "farm",
+        "@pilot",
+        moment(2026, 3, 1),
+        61.5,
+        10.0,
+        0.25,
+        {"edge": 1, "e2": 2},
+    )
+    rows = list(csv.DictReader(io.StringIO(usage_csv([usage, usage]), newline="")))
+    assert len(rows) == 2
+    assert rows[0]["mission"] == "'=HYPERLINK(1)"
+    assert rows[0]["account"] == "'@pilot"
+    assert rows[0]["started"] == "2026-03-01T00:00:00+00:00"
+    assert float(rows[0]["compute_seconds"]) == 3.0
+    assert float(rows[0]["flight_seconds"]) == 61.5
+    assert usage_csv([]).count("\n") == 1
+    assert usage_out(usage).compute_seconds == {"edge": 1, "e2": 2}

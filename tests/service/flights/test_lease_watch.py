@@ -1,0 +1,99 @@
+"""The watch over a lease: its end and a silent user bring the drones home, once."""
+
+from __future__ import annotations
+
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from aerodaas.protocol.schemas import SilencePolicy
+from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.watch import LeaseWatch
+
+LONG = 3600.0
+
+
+class Drones:
+    """What the watch calls home."""
+
+    def __init__(self) -> None:
+        self.reasons: list[str] = []
+        self.called = threading.Event()
+
+    def __call__(self, reason: str) -> None:
+        """Come home."""
+        self.reasons.append(reason)
+        self.called.set()
+
+
+def watch(drones: Drones, ends: float, **changes: object) -> LeaseWatch:
+    """A watch over a lease that ends `ends` seconds from now."""
+    content = {
+        "mission": "m",
+        "lease": "l",
+        "fleet": Path("fleet.json"),
+        "robots": ["one"],
+        "ends": time.time() + ends,
+        "minutes": 1,
+        **changes,
+    }
+    return LeaseWatch(FlightOrder.model_validate(content), drones)
+
+
+def test_the_end_of_a_lease_brings_the_drones_home() -> None:
+    """Once, with the reason; afterwards it cannot be extended."""
+    drones = Drones()
+    lease = watch(drones, 0.3)
+    lease.start()
+    assert drones.called.wait(10)
+    assert drones.reasons == ["the lease has ended"] == [lease.reason]
+    assert not lease.extend(time.time() + LONG)
+    lease.end("again")
+    time.sleep(0.5)
+    assert drones.reasons == ["the lease has ended"]
+
+
+def test_a_lease_that_is_extended_goes_on() -> None:
+    """Also by a clock that was set in between."""
+    drones = Drones()
+    lease = watch(drones, 0.6)
+    assert lease.extend(time.time() + LONG)
+    lease.start()
+    assert not drones.called.wait(1.2)
+    assert lease.reason == ""
+    lease.stop()
+
+
+def test_a_clock_that_is_set_does_not_prolong_a_lease(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The end was fixed on the monotonic clock when the flight began."""
+    drones = Drones()
+    lease = watch(drones, 0.5)
+    real = time.time
+    monkeypatch.setattr(time, "time", lambda: real() - LONG)
+    lease.start()
+    assert drones.called.wait(10)
+    assert drones.reasons == ["the lease has ended"]
+
+
+@pytest.mark.parametrize(("policy", "home"), [("return", True), ("continue", False)])
+def test_silence_is_a_reason_where_the_policy_says_so(policy: str, *, home: bool) -> None:
+    """And none where it does not."""
+    drones = Drones()
+    lease = watch(drones, LONG, silence=SilencePolicy(policy), silence_seconds=0.4)
+    lease.start()
+    assert drones.called.wait(1.5) is home
+    lease.stop()
+    assert all("nothing was heard of the user" in reason for reason in drones.reasons)
+
+
+def test_a_user_who_is_heard_is_not_silent() -> None:
+    """Each word counts from its moment on."""
+    drones = Drones()
+    lease = watch(drones, LONG, silence=SilencePolicy.RETURN, silence_seconds=1.0)
+    lease.start()
+    for _ in range(8):
+        lease.hear()
+        assert not drones.called.wait(0.25)
+    assert drones.called.wait(10)

@@ -1,0 +1,157 @@
+"""Each reason to refuse a flight: with its figures, its place and a remedy, and not too early."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+from rehearsed import OtherLease
+
+from aerodaas.config.model import EnvironmentConfig, validated
+from aerodaas.recording.report.flight import Band, RecordedFlight, RobotFlight
+from aerodaas.service.rehearsal.findings import Finding, findings_of
+
+FENCE = {"polygon": [[-20, -20], [20, -20], [20, 20], [-20, 20]], "ceiling": 30}
+
+
+def field(**limits: Any) -> EnvironmentConfig:  # noqa: ANN401
+    """One drone in a square of 40 m."""
+    return validated(
+        {"robots": [{"id": "drone", "limits": {"geofence": FENCE, **limits}}]}, "the field"
+    )
+
+
+def flown(path: Sequence[tuple[float, float]], **fields: Any) -> RecordedFlight:  # noqa: ANN401
+    """A flight over these places, one each ten seconds, two metres up, that then landed."""
+    states = [
+        (10.0 * number, east, north, 2.0, 1.0 - number / 100)
+        for number, (east, north) in enumerate(path)
+    ]
+    end = states[-1][0]
+    bands = [Band("enroute", 0.0, end), Band("landed", end, end)]
+    robot = RobotFlight(states=states, bands=bands, **fields)
+    robot.states.append((end + 1.0, *states[-1][1:]))
+    flight = RecordedFlight()
+    flight.robots["drone"] = robot
+    return flight
+
+
+def reasons(
+    flight: RecordedFlight,
+    *,
+    minutes: float = 1.0,
+    others: Sequence[OtherLease] = (),
+    **limits: Any,  # noqa: ANN401
+) -> list[Finding]:
+    """Findings about a flight in the field."""
+    return findings_of(flight, field(**limits), minutes=minutes, others=others)
+
+
+ROUND = [(0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 0.0)]
+
+
+def test_a_good_flight_has_none() -> None:
+    """Landed in time, inside its fence, alone."""
+    assert reasons(flown(ROUND)) == []
+
+
+def test_a_flight_ends_within_the_lease() -> None:
+    """At 30 s sharp it is within half a minute; a second before that it is not."""
+    assert reasons(flown(ROUND), minutes=0.5) == []
+    (found,) = reasons(flown(ROUND), minutes=29 / 60)
+    assert found.text.startswith("drone landed after 30 s, and the lease is for 29 s: ask for")
+
+
+def test_a_flight_that_does_not_land_is_refused() -> None:
+    """Where it was last seen, with its state."""
+    flight = flown(ROUND)
+    flight.robots["drone"].bands = [Band("following", 0.0, 31.0, "after a vest")]
+    (found,) = reasons(flight)
+    assert "had not landed after 31 s (following: after a vest), and the lease is" in found.text
+    assert found.place == (0.0, 0.0)
+    flight.robots["drone"].bands[0] = Band("aborted", 31.0, 31.0, "take-off refused: no position")
+    (found,) = reasons(flight)
+    assert "did not land as planned: aborted: take-off refused: no position" in found.text
+
+
+@pytest.mark.parametrize(("east", "outside"), [(19.9, None), (20.0, None), (20.6, "0.6")])
+def test_the_fence_is_not_left(east: float, outside: str | None) -> None:
+    """Its edge belongs to it."""
+    found = reasons(flown([*ROUND, (east, 5.0), (0.0, 0.0)]), minutes=2)
+    assert bool(found) == (outside is not None)
+    if outside:
+        assert found[0].text.startswith(f"drone left the fence by {outside} m at (20.6, 5.0): plan")
+        assert found[0].place == (20.6, 5.0)
+
+
+@pytest.mark.parametrize(
+    ("limit", "what"),
+    [("geofence", "the fence"), ("ceiling", "the greatest height"), ("max_range", "range")],
+)
+def test_setpoints_changed_by_a_boundary_are_a_reason(limit: str, what: str) -> None:
+    """With their number and the first one's time and place; a clamped speed is none."""
+    flight = flown(
+        ROUND,
+        clipped=Counter({limit: 7, "max_speed": 90}),
+        clipped_at={limit: 20.0, "max_speed": 1.0},
+    )
+    (found,) = reasons(flight)
+    assert what in found.text
+    assert "changed 7 setpoints, first after 20.0 s at (10.0, 10.0)" in found.text
+    assert found.place == (10.0, 10.0)
+
+
+def test_a_waypoint_given_up_is_a_reason() -> None:
+    """With its place."""
+    flight = flown(ROUND, given_up=("far",), plan={"far": (15.0, 3.0, 2.0)})
+    (found,) = reasons(flight)
+    assert "gave up waypoint far at (15.0, 3.0)" in found.text
+    assert found.place == (15.0, 3.0)
+
+
+def test_the_battery_keeps_its_reserve() -> None:
+    """97 % are left: enough for a reserve of 97 %, too little for one of 98 %."""
+    assert reasons(flown(ROUND), battery_return=0.99, battery_land=0.97) == []
+    (found,) = reasons(flown(ROUND), battery_return=0.99, battery_land=0.98)
+    assert "began with 100% of its battery and ended with 97%, below the reserve of" in found.text
+
+
+def box(west: float, south: float) -> OtherLease:
+    """Another's lease of 4 m by 4 m."""
+    corners = [(west, south), (west + 4, south), (west + 4, south + 4), (west, south + 4)]
+    return OtherLease("b7", corners)
+
+
+def test_other_leases_are_kept_away_from() -> None:
+    """By the separation of the drone's limits; inside, whatever that is."""
+    assert reasons(flown(ROUND), others=[box(12.0, 8.0)], separation=2.0) == []
+    (found,) = reasons(flown(ROUND), others=[box(12.0, 8.0), box(30, 30)], separation=2.1)
+    assert "flew to 2.00 m from the area of lease b7 at (10.0, 10.0), and 2.1 m are" in found.text
+    assert found.place == (10.0, 10.0)
+    (found,) = reasons(flown(ROUND), others=[box(8.0, 8.0)], separation=0.0)
+    assert "flew into the area of lease b7 at (10.0, 10.0)" in found.text
+
+
+def test_a_drone_on_the_ground_is_nobodys_danger() -> None:
+    """It may stand within another's area after its landing."""
+    flight = flown(ROUND)
+    flight.robots["drone"].states.append((40.0, 25.0, 25.0, 0.0, 0.9))
+    assert reasons(flight, others=[box(24.0, 24.0)]) == []
+
+
+def test_alerts_of_failures_are_reasons_and_results_are_not() -> None:
+    """A fall that an analysis saw is what the mission is for; each text counts once."""
+    flight = flown(ROUND)
+    flight.alerts = [(3.0, "fallen", "a person has fallen")]
+    assert reasons(flight) == []
+    flight.alerts += [(5.0, "analysis_failed", "pose: no such model")] * 2
+    (found,) = reasons(flight)
+    assert found.text == "after 5.0 s, analysis failed: pose: no such model"
+
+
+def test_a_mission_without_a_flight_is_refused() -> None:
+    """Nothing was navigated."""
+    (found,) = reasons(RecordedFlight())
+    assert "no drone has flown" in found.text

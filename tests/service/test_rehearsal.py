@@ -1,0 +1,145 @@
+"""Missions flown in the rehearsal's environment, in lockstep, and judged by their recordings."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from flying import Flyer
+from rehearsed import OtherLease, rehearse, to_the_east
+
+from aerodaas.config.model import validated
+from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.service.rehearsal import judge, rehearsal_config
+from aerodaas.service.rehearsal.picture import draw
+from aerodaas.simulation.airframe import Airframe
+from aerodaas.types.errors import ConfigError
+
+AHEAD = OtherLease("b7", [(5.0, 4.0), (9.0, 4.0), (9.0, 9.0), (5.0, 9.0)])
+"""Another's area around the second waypoint."""
+FLEET: dict[str, Any] = {
+    "name": "fleet",
+    "robots": [
+        {
+            "id": "px4",
+            "driver": "mavlink",
+            "settings": {"url": "udpin:127.0.0.1:14540"},
+            "limits": {"endurance": 600},
+            "sensors": [
+                {
+                    "id": "cam",
+                    "driver": "video",
+                    "rate": 5,
+                    "settings": {"path": "rtsp://camera/1", "pitch": 30, "width": 320},
+                },
+                {"id": "odom", "type": "odometry"},
+            ],
+        },
+        {"id": "tello", "driver": "tello", "sensors": [{"id": "front"}]},
+        {"id": "own", "driver": "simulated", "settings": {"mass": 1.5, "battery": 0.9}},
+    ],
+    "sensors": [{"id": "phone", "type": "gps", "settings": {"path": "log.csv"}}],
+    "simulation": {"world": "campus", "seed": 3, "wind": [1, 0, 0]},
+}
+
+
+def test_the_fleet_becomes_a_simulated_one() -> None:
+    """Drivers and cameras; limits, geometry, world and wind stay; charge and seed are as given."""
+    whole = validated(FLEET, "fleet")
+    config = rehearsal_config(whole, {"px4": 0.5, "own": 0.4}, seed=8)
+    assert [robot.driver for robot in config.robots] == ["simulated"] * 3
+    assert all(config.camera_driver(one) == "simulated" for one in config.all_sensors())
+    assert config.robots[0].sensors[0].settings == {"pitch": 30, "width": 320}
+    assert config.sensors == whole.sensors
+    assert config.robots[2].settings == {"mass": 1.5, "battery": 0.4}
+    assert config.simulation == whole.simulation.model_copy(update={"seed": 8})
+    for one, other in zip(config.robots, whole.robots, strict=True):
+        assert (one.limits, one.mission, one.start) == (other.limits, other.mission, other.start)
+        vehicle = SimulatedVehicle(one, config)
+        vehicle.connect()
+        assert vehicle.read().battery.fraction == {"px4": 0.5, "tello": 1.0, "own": 0.4}[one.id]
+    assert rehearsal_config(whole, {}).simulation == whole.simulation
+
+
+def test_a_charge_beyond_full_is_refused() -> None:
+    """With the drone's name."""
+    with pytest.raises(ConfigError, match=r"the rehearsal of px4: .*battery"):
+        rehearsal_config(validated(FLEET, "fleet"), {"px4": 1.5})
+
+
+def test_a_rehearsed_battery_hovers_for_the_real_ones_endurance() -> None:
+    """Within a tenth of the ten minutes that the limits say."""
+    config = rehearsal_config(validated(FLEET, "fleet"), {})
+    vehicle = SimulatedVehicle(config.robots[0], config)
+    vehicle.connect()
+    vehicle.take_off(2.0)
+    second = 1_000_000_000
+    for now in range(1, 61):
+        vehicle.advance_to(now * second)
+    assert Airframe.model_validate(config.robots[0].settings).mass == 2.0
+    used = 1.0 - vehicle.read().battery.fraction
+    assert 60.0 / used == pytest.approx(600.0, rel=0.1)
+
+
+def test_a_good_flight_is_approved_and_the_same_one_near_another_lease_is_not(
+    flyer: Flyer, tmp_path: Path
+) -> None:
+    """One flight, judged three times; its picture shows the other's area and the place."""
+    flown = rehearse(flyer)
+    good = judge(flown.recording, flown.config, minutes=2)
+    assert good.approved
+    assert good.reasons == []
+    assert good.seconds is not None
+    assert 10.0 < good.seconds < 60.0
+    assert good.distance == pytest.approx(24.0, abs=3.0)
+    assert good.battery_used is not None
+    assert 0.005 < good.battery_used < 0.05
+    near = judge(flown.recording, flown.config, minutes=2, others=[AHEAD])
+    assert not near.approved
+    assert "flew into the area of lease b7" in near.reasons[0]
+    late = judge(flown.recording, flown.config, minutes=0.1, others=[AHEAD])
+    assert len(late.reasons) == 2
+    clear, refused = tmp_path / "clear.png", tmp_path / "refused.png"
+    draw(flown.recording, clear, flown.config, minutes=2)
+    draw(flown.recording, refused, flown.config, minutes=2, others=[AHEAD])
+    assert _vermilion(refused) > _vermilion(clear) + 500
+
+
+def _vermilion(picture: Path) -> int:
+    """Pixels in the colour of other leases and of places of refusal."""
+    image = cv2.imread(str(picture))
+    assert image is not None
+    assert min(image.shape[:2]) > 500
+    return int((np.abs(image.astype(int) - (0, 94, 213)).max(axis=2) < 30).sum())
+
+
+def test_a_flight_that_the_fence_stops_is_refused(flyer: Flyer) -> None:
+    """Steered against it by an analysis: it stays inside, and what stopped it is told."""
+    fence = {"polygon": [(-5, -5), (8, -5), (8, 5), (-5, 5)], "ceiling": 20}
+    flown = rehearse(flyer, to_the_east, limits={"geofence": fence, "command_timeout": 0.5})
+    verdict = judge(flown.recording, flown.config, minutes=5)
+    assert not verdict.approved
+    (reason,) = verdict.reasons
+    assert "the fence changed" in reason
+    assert "plan further inside it, or lease a larger area" in reason
+
+
+def test_a_battery_too_low_for_the_way_is_refused(flyer: Flyer) -> None:
+    """With the present charge the drone turns round before its end."""
+    flown = rehearse(flyer, driver="mavlink", battery=0.257, limits={"battery_land": 0.25})
+    verdict = judge(flown.recording, flown.config, minutes=5)
+    assert not verdict.approved
+    assert any("battery low" in reason for reason in verdict.reasons)
+    assert any("ended with 25%, below the reserve of 25%" in one for one in verdict.reasons)
+
+
+def test_a_drone_that_does_not_take_off_is_refused(flyer: Flyer) -> None:
+    """Its own words are the reason."""
+    flown = rehearse(flyer, battery=0.1)
+    verdict = judge(flown.recording, flown.config, minutes=5)
+    assert not verdict.approved
+    assert "did not land as planned: aborted: take-off refused" in verdict.reasons[0]
+    assert verdict.seconds is None

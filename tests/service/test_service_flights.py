@@ -1,0 +1,208 @@
+"""Missions flown by a provider's service, in processes of its own: their lives and their ends."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+from served import Served, document, fleet, robot
+
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
+
+FAR = ((25.0, 0.0), (25.0, 25.0), (0.0, 25.0))
+"""A way of 40 seconds, and 12 back."""
+
+
+@pytest.fixture(scope="module")
+def provider() -> Iterator[Served]:
+    """Two drones in real time, without rehearsals."""
+    with Served(fleet(robot("one"), robot("two", 10)), "--no-rehearse") as served:
+        yield served
+
+
+def submitted(provider: Served, name: str, *places: tuple[float, float], **more: object) -> str:
+    """Submit a mission; returns its id."""
+    body = {"document": document(name, *places), **more}
+    answer = provider.ask("POST", "/v1/missions", body)
+    assert isinstance(answer, dict), answer
+    return str(answer["id"])
+
+
+def state_of(mission: dict[str, Any], name: str) -> str:
+    """State of a mission's drone."""
+    return str(mission["status"].get(name, {}).get("state", ""))
+
+
+def flying(provider: Served, id_: str, name: str, *states: str) -> None:
+    """Wait until the mission's drone is in one of these states."""
+    wanted = states or ("enroute",)
+    provider.until(lambda: state_of(provider.mission(id_), name) in wanted)
+
+
+def process_of(provider: Served, id_: str) -> psutil.Process:
+    """The process of a mission's flight."""
+    words = str(provider.folder / "s" / "m" / id_)
+    for process in psutil.process_iter(["cmdline"]):
+        line = process.info["cmdline"] or []
+        if "aerodaas.service.flights" in line and line[-1].startswith(words):
+            return process
+    raise AssertionError(id_)
+
+
+def test_commands_reach_the_drone_and_answers_come_back(provider: Served) -> None:
+    """Pause holds it, waypoints join its queue, and what it refuses is told with the reason."""
+    id_ = submitted(provider, "one", *FAR)
+    command = f"/v1/missions/{id_}/commands"
+    flying(provider, id_, "one")
+    assert provider.ask("POST", command, {"robot": "one", "command": "pause"})["accepted"]
+    flying(provider, id_, "one", "paused")
+    place = {"id": "more", "x": 3.0, "y": 3.0, "z": 2.0, "waypoint_type": "local"}
+    more = {"robot": "one", "waypoints": [place]}
+    answer = provider.ask("POST", f"/v1/missions/{id_}/navigation", more)
+    assert answer["accepted"], answer
+    outside = {"robot": "one", "waypoints": [{**place, "id": "outside", "x": 500.0}]}
+    refused = provider.ask("POST", f"/v1/missions/{id_}/navigation", outside)
+    assert not refused["accepted"]
+    assert "outside" in refused["refused"]
+    nobody = provider.ask("POST", command, {"robot": "two", "command": "land"})
+    assert not nobody["accepted"]
+    assert provider.ask("POST", command, {"robot": "one", "command": "resume"})["accepted"]
+    ended = provider.until_phase(id_)
+    assert ended["phase"] == "landed"
+    assert set(ended["status"]["one"]["visited"]) == {"wp0", "wp1", "wp2", "more"}
+    late = provider.ask("POST", command, {"robot": "one", "command": "pause"})
+    assert late == (409, f"{id_} is over: landed")
+
+
+def test_a_service_that_is_killed_finds_its_flights_again(provider: Served) -> None:
+    """They fly on meanwhile, and none is begun twice."""
+    id_ = submitted(provider, "one", *FAR)
+    flying(provider, id_, "one")
+    process = process_of(provider, id_)
+    provider.stop(signal.SIGKILL)
+    time.sleep(2.0)
+    assert process.is_running()
+    provider.start()
+    found = provider.mission(id_)
+    assert found["phase"] == "flying"
+    provider.until(lambda: state_of(provider.mission(id_), "one") != "")
+    assert process_of(provider, id_) == process
+    answer = provider.ask(
+        "POST", f"/v1/missions/{id_}/commands", {"robot": "one", "command": "pause"}
+    )
+    assert answer["accepted"], answer
+    provider.ask("POST", f"/v1/missions/{id_}/commands", {"robot": "one", "command": "resume"})
+    ended = provider.until_phase(id_)
+    assert ended["phase"] == "landed"
+    assert ended["status"]["one"]["visited"] == ["wp0", "wp1", "wp2"]
+
+
+def test_what_ended_while_the_service_was_away_is_told(provider: Served) -> None:
+    """A flight writes its outcome into its folder, which the next service reads."""
+    id_ = submitted(provider, "one", (3.0, 0.0))
+    flying(provider, id_, "one", "taking_off", "enroute")
+    process = process_of(provider, id_)
+    provider.stop(signal.SIGKILL)
+    process.wait(120)
+    provider.start()
+    ended = provider.until_phase(id_)
+    assert ended["phase"] == "landed"
+    assert ended["status"]["one"]["visited"] == ["wp0"]
+    assert [one["mission"] for one in provider.ask("GET", "/v1/usage")].count(id_) == 1
+
+
+def test_a_lost_flight_takes_its_drone_out_of_service(provider: Served) -> None:
+    """Nobody knows where it is, so nobody gets it before an operator has looked."""
+    id_ = submitted(provider, "two", *((one[0] + 10, one[1]) for one in FAR))
+    flying(provider, id_, "two")
+    os.kill(process_of(provider, id_).pid, signal.SIGKILL)
+    ended = provider.until_phase(id_)
+    assert ended["phase"] == "failed"
+    assert "out of service until an operator has looked" in ended["reason"]
+    refused = provider.ask("POST", "/v1/missions", {"document": document("two", (12, 0))})
+    assert refused[0] == 409
+    assert provider.send("PATCH", "/v1/robots/two", {"enabled": True})[0] == 204
+    again = submitted(provider, "two", (12.0, 0.0))
+    assert provider.until_phase(again)["phase"] == "landed"
+
+
+def test_a_lease_that_ends_brings_the_drone_home(provider: Served) -> None:
+    """It expires by the flight's own clock; afterwards its user commands no more."""
+    pilot = provider.user("late", "growers")
+    body = {"document": document("one", *FAR), "minutes": 0.7}
+    id_ = provider.ask("POST", "/v1/missions", body, pilot)["id"]
+    flying(provider, id_, "one")
+    flying(provider, id_, "one", "returning", "landing", "landed")
+    pause = {"robot": "one", "command": "pause"}
+    late = provider.ask("POST", f"/v1/missions/{id_}/commands", pause, pilot)
+    assert late["text"].startswith("the drones come home: the lease has ended")
+    ended = provider.until_phase(id_)
+    assert "the lease has ended" in ended["reason"]
+    assert len(ended["status"]["one"]["visited"]) < 3
+
+
+def test_a_revoked_lease_brings_the_drone_home(provider: Served) -> None:
+    """At once, and with whose wish it was."""
+    lease = provider.ask("POST", "/v1/leases", {"robots": ["one"], "minutes": 10})
+    id_ = submitted(provider, "one", *FAR, lease=lease["id"])
+    flying(provider, id_, "one")
+    provider.ask("DELETE", f"/v1/leases/{lease['id']}")
+    ended = provider.until_phase(id_)
+    assert "the lease has ended" in ended["reason"]
+    assert len(ended["status"]["one"]["visited"]) < 3
+
+
+def test_a_silent_user_is_a_reason_to_return_where_the_mission_says_so(provider: Served) -> None:
+    """Also while the service is gone: the flight's process listens for itself."""
+    id_ = submitted(provider, "one", *FAR, silence="return", silence_seconds=4)
+    flying(provider, id_, "one")
+    provider.stop(signal.SIGKILL)
+    time.sleep(6.0)
+    provider.start()
+    ended = provider.until_phase(id_)
+    assert "nothing was heard of the user for 4 s" in ended["reason"]
+    assert len(ended["status"]["one"]["visited"]) < 3
+
+
+def test_a_cancelled_mission_comes_home(provider: Served) -> None:
+    """And is told as such."""
+    id_ = submitted(provider, "one", *FAR)
+    flying(provider, id_, "one")
+    provider.ask("DELETE", f"/v1/missions/{id_}")
+    ended = provider.until_phase(id_)
+    assert ended["phase"] == "cancelled"
+    assert ended["status"]["one"]["state"] == "landed"
+
+
+def test_missions_for_one_drone_wait_for_each_other(provider: Served) -> None:
+    """The second flies when the first has landed, not when its lease has ended."""
+    first = submitted(provider, "one", (6.0, 0.0))
+    second = submitted(provider, "one", (0.0, 6.0))
+    provider.until(lambda: provider.mission(first)["phase"] == "flying")
+    assert provider.mission(second)["phase"] in {"submitted", "queued"}
+    assert provider.until_phase(first)["phase"] == "landed"
+    ended = provider.until_phase(second)
+    assert ended["phase"] == "landed"
+    assert ended["started"] >= provider.mission(first)["ended"]
+
+
+def test_the_recording_comes_back(provider: Served, tmp_path: Path) -> None:
+    """Once the flight is over, and to its own tenant."""
+    id_ = submitted(provider, "one", (2.0, 0.0))
+    assert provider.send("GET", f"/v1/missions/{id_}/recording")[0] == 404
+    provider.until_phase(id_)
+    status, content = provider.send("GET", f"/v1/missions/{id_}/recording")
+    assert status == 200
+    path = tmp_path / "flight.mcap"
+    path.write_bytes(content)
+    from aerodaas.recording.report.report import read_report  # noqa: PLC0415 - loads the plots
+
+    assert read_report(path).summary.robots["one"].waypoints_visited == 1
+    other = provider.user("other", "elsewhere")
+    assert provider.send("GET", f"/v1/missions/{id_}/recording", token=other)[0] == 404

@@ -1,0 +1,50 @@
+"""The view of a flight at a provider."""
+
+from __future__ import annotations
+
+import pytest
+from provider_stub import mission, status
+
+from aerodaas.protocol.schemas import MissionPhase
+from aerodaas.terminal.provided import ProvidedView, phase_text
+from aerodaas.types.waypoints import Waypoint
+
+
+def test_a_pipe_gets_a_line_for_each_robot(capsys: pytest.CaptureFixture[str]) -> None:
+    """State, place and charge, as of a flight of one's own; alerts once."""
+    with ProvidedView(shown=True, places={"a": Waypoint("a", 5, 0, 2)}) as view:
+        view.update(mission(alerts=["low battery"]))
+        view.note("the connection is lost")
+    captured = capsys.readouterr()
+    assert "drone enroute: flying to a, E 1.0  N 0.0  up 2.0 m, battery 90 %" in captured.out
+    assert captured.out.count("low battery") == 1
+    assert "the connection is lost" in captured.err
+
+
+def test_what_is_unknown_is_shown_as_such(capsys: pytest.CaptureFixture[str]) -> None:
+    """A drone without a position or a state that this version does not know."""
+    lost = status(position=[None, None, None], battery=None, state="somersaulting", yaw=None)
+    with ProvidedView(shown=True) as view:
+        view.update(mission(status={"drone": lost, "other": status(position=None)}))
+    shown = capsys.readouterr().out
+    assert "drone idle" in shown
+    assert "other enroute" in shown
+
+
+def test_without_a_view_new_alerts_alone_are_told(capsys: pytest.CaptureFixture[str]) -> None:
+    """Each once, though the newest ones come with every state."""
+    with ProvidedView(shown=False) as view:
+        view.update(mission(alerts=["one"]))
+        view.update(mission(alerts=["one", "two"]))
+        view.update(mission(alerts=["two", "two"]))
+    captured = capsys.readouterr()
+    assert captured.err.split() == ["one", "two", "two"]
+    assert captured.out == ""
+
+
+def test_a_phase_is_told_with_its_reason() -> None:
+    """In plain words."""
+    waiting = mission(MissionPhase.QUEUED, reason="waits for its drones")
+    assert phase_text(waiting) == "waits for its drones"
+    refused = mission(MissionPhase.REFUSED, reason="it leaves the fence")
+    assert phase_text(refused) == "refused: it leaves the fence"
