@@ -12,6 +12,8 @@ from urllib.parse import urlsplit
 
 import pytest
 from served import Served, document, fleet, robot
+from websockets.exceptions import InvalidHandshake
+from websockets.sync.client import connect
 
 AUTH = "Authorization"
 
@@ -99,6 +101,21 @@ def test_another_tenants_things_do_not_exist(
     seen = {one["id"]: one for one in provider.ask("GET", "/v1/fleet", token=stranger)["robots"]}
     assert seen["one"]["tenant"] is None
     assert provider.mission(mission)["phase"] == "awaiting_approval"
+
+
+@pytest.mark.parametrize("what", ["live", "live?streams=one/odometry", "here"])
+def test_another_tenants_streams_are_closed(
+    provider: Served, victim: dict[str, Any], stranger: str, what: str
+) -> None:
+    """To another tenant and to nobody's token alike, before anything is sent."""
+    url = provider.url.replace("http", "ws", 1) + f"/v1/missions/{victim['mission']}/{what}"
+    for token in (stranger, "aerodaas_0_0"):
+        headers = {AUTH: f"Bearer {token}"}
+        with pytest.raises(InvalidHandshake):
+            connect(url, additional_headers=headers, proxy=None)
+    with connect(url, additional_headers={AUTH: f"Bearer {victim['token']}"}, proxy=None) as socket:
+        if what != "here":
+            assert '"awaiting_approval"' in str(socket.recv(10))
 
 
 def test_another_tenants_lease_flies_nobody_elses_mission(
