@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, BackgroundTasks, Request
 from fastapi.responses import FileResponse
 
 from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
@@ -79,17 +79,23 @@ class MissionRoutes:
         self._audit.write(principal, "mission.approve", mission, accepted=True)
         return found
 
-    def command(self, mission: str, body: CommandIn, request: Request) -> AnswerOut:
+    def command(
+        self, mission: str, body: CommandIn, request: Request, later: BackgroundTasks
+    ) -> AnswerOut:
         """Give one of the mission's robots a command; answers what the drone said."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         answer = self._desk.command(principal, mission, body)
-        return self._noted(principal, body.command, f"{mission}/{body.robot}", answer)
+        later.add_task(self._note, principal, body.command, f"{mission}/{body.robot}", answer)
+        return answer
 
-    def navigation(self, mission: str, body: NavigationIn, request: Request) -> AnswerOut:
+    def navigation(
+        self, mission: str, body: NavigationIn, request: Request, later: BackgroundTasks
+    ) -> AnswerOut:
         """Add waypoints to the queue of one of the mission's robots."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         answer = self._desk.fly(principal, mission, body.robot, body)
-        return self._noted(principal, "navigation", f"{mission}/{body.robot}", answer)
+        later.add_task(self._note, principal, "navigation", f"{mission}/{body.robot}", answer)
+        return answer
 
     def recording(self, mission: str, request: Request) -> FileResponse:
         """The flight's recording, an MCAP file, once it is over."""
@@ -102,11 +108,8 @@ class MissionRoutes:
         principal = self._admission.require(request, Role.VIEWER)
         return FileResponse(self._desk.file(principal, mission, "picture"), media_type="image/png")
 
-    def _noted(
-        self, principal: Principal, action: str, target: str, answer: AnswerOut
-    ) -> AnswerOut:
-        """Audit a command that the drone has answered; what is safe goes on without the log."""
+    def _note(self, principal: Principal, action: str, target: str, answer: AnswerOut) -> None:
+        """Audit a command once it has been answered: nobody in the air waits for a disk."""
         said, accepted = answer.text, answer.accepted
         name = f"mission.{action}"
         self._audit.write(principal, name, target, said, accepted=accepted, required=False)
-        return answer
