@@ -25,11 +25,11 @@ from aerodaas.service.access import Principal, Quotas, sees
 from aerodaas.service.access.principal import reaches
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
-from aerodaas.service.errors import RefusedError
+from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.garage import Garage
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
-from aerodaas.service.models import ModelShelf
+from aerodaas.service.models import ModelShelf, require_room
 from aerodaas.service.phases import OVER
 from aerodaas.service.records import shown
 from aerodaas.service.settings import ServiceSettings
@@ -91,6 +91,7 @@ class MissionDesk:
 
         Raises RefusedError, with the reason, for one that cannot be flown here.
         """
+        require_room(self._settings.state)
         robots = self._briefing.check(principal, wanted.document)
         self._garage.require_enabled(robots)
         self._bookings.require_quota(principal.tenant, wanted.minutes * len(robots))
@@ -251,19 +252,34 @@ class MissionDesk:
     def _try(self) -> None:
         try:
             self.turn()
-        except AeroDaaSError:
-            # The database may be gone for a while; flights do not need it.
+        except Exception:  # noqa: BLE001 - see below
+            # The database may be gone for a while. Whatever it is: without this thread, no lease
+            # and no mission would ever move on again.
             _log.exception("the desk could not move on")
 
     def turn(self) -> None:
         """Move every mission on by what has happened."""
+        # First: leases end also while the database fails.
+        self._bookings.tick()
         with self._lock:
             for one in list(self._missions.values()):
-                self._step(one)
+                self._move(one)
                 if one.over:
                     one.close()
                     del self._missions[one.row.id]
-        self._bookings.tick()
+
+    def _move(self, one: ActiveMission) -> None:
+        """Move one mission on; what it meets is its own failure, unless the database is gone."""
+        try:
+            self._step(one)
+        except StoreError:
+            raise
+        except (AeroDaaSError, OSError) as error:
+            if one.phase is not MissionPhase.FLYING:
+                self._end(one, MissionPhase.REFUSED, str(error))
+            else:
+                # The flight goes on by itself; the next turn looks again.
+                _log.warning("%s: %s", one.row.id, error)
 
     def _step(self, one: ActiveMission) -> None:
         steps: dict[MissionPhase, Callable[[ActiveMission], None]] = {
@@ -284,7 +300,7 @@ class MissionDesk:
         one.to(MissionPhase.REHEARSING)
 
     def _judge(self, one: ActiveMission) -> None:
-        verdict = one.verdict()
+        verdict = one.verdict(self._settings.rehearsal_seconds)
         if verdict is None:
             return
         one.row = replace(one.row, verdict=verdict.model_dump(mode="json"))

@@ -7,6 +7,7 @@ import os
 import shutil
 import signal
 import subprocess
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -52,7 +53,10 @@ class ActiveMission:
         self.version = 0
         """Counts the changes."""
         self._save = save
-        self._process: subprocess.Popen[bytes] | None = None
+        self._rehearsing: subprocess.Popen[bytes] | None = None
+        self._flying: subprocess.Popen[bytes] | None = None
+        """Processes that this service has started; the flight's is never ended from here."""
+        self._rehearsed_since = time.monotonic()
 
     def write(self, document: MissionDocument) -> None:
         """Keep the document."""
@@ -92,15 +96,19 @@ class ActiveMission:
         self.end_rehearsal()
         shutil.rmtree(self.rehearsal.path, ignore_errors=True)
         self._prepare(self.rehearsal, order, models)
-        self._process = start_process(self.rehearsal)
+        self._rehearsing = start_process(self.rehearsal)
+        self._rehearsed_since = time.monotonic()
 
-    def verdict(self) -> VerdictOut | None:
-        """The rehearsal's verdict; None while it goes on."""
-        if self._process is not None and self._process.poll() is None:
-            return None
-        if self._process is None and self.rehearsal.flying:
-            return None
-        self._process = None
+    def verdict(self, seconds: float) -> VerdictOut | None:
+        """The rehearsal's verdict; None while it goes on, at most so many wall seconds."""
+        ended = self._rehearsing is None or self._rehearsing.poll() is not None
+        if not ended or self.rehearsal.flying:
+            if time.monotonic() - self._rehearsed_since < seconds:
+                return None
+            self.end_rehearsal()
+            text = f"its rehearsal was not over after {seconds:g} s: submit a shorter mission"
+            return VerdictOut(approved=False, reasons=[text])
+        self._rehearsing = None
         outcome = self.rehearsal.outcome()
         if outcome is not None and outcome.verdict is not None:
             return outcome.verdict
@@ -108,7 +116,7 @@ class ActiveMission:
 
     def end_rehearsal(self) -> None:
         """End the rehearsal's process, and all that it has started."""
-        process, self._process = self._process, None
+        process, self._rehearsing = self._rehearsing, None
         if process is not None and process.poll() is None:
             with contextlib.suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
@@ -120,8 +128,8 @@ class ActiveMission:
 
     def take_off(self) -> None:
         """Start the flight's process; one that was begun, by whatever service, begins no more."""
-        if self._process is None and not self.flight.begun:
-            self._process = start_process(self.flight)
+        if self._flying is None and not self.flight.begun:
+            self._flying = start_process(self.flight)
 
     def _prepare(self, folder: FlightFolder, order: FlightOrder, models: ModelShelf) -> None:
         document = self.document()
@@ -139,7 +147,7 @@ class ActiveMission:
 
         Raises LostFlightError if its process died in flight.
         """
-        if self.flight.flying or (self._process is not None and self._process.poll() is None):
+        if self.flight.flying or (self._flying is not None and self._flying.poll() is None):
             return None
         outcome = self.flight.outcome()
         if outcome is None and self.flight.begun:

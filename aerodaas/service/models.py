@@ -6,20 +6,35 @@ import contextlib
 import hashlib
 import os
 import re
+import shutil
 import tempfile
 from collections.abc import Iterator
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
 from aerodaas.analytics.models import DETECTOR
 from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.service.errors import RefusedError
 from aerodaas.types.errors import ConfigError
 
-__all__ = ["LARGEST_MODEL", "ModelShelf"]
+__all__ = ["LARGEST_MODEL", "ModelShelf", "require_room"]
 
 LARGEST_MODEL = 64 << 20
 """Bytes."""
+_LEAST_FREE = 1 << 30
+"""Bytes that stay free on the disk: flights under way are recorded there."""
 _HASH = re.compile(r"[0-9a-f]{64}")
+
+
+def require_room(folder: Path) -> None:
+    """Raise RefusedError where the disk of `folder` has no room for another flight."""
+    free = shutil.disk_usage(folder).free
+    if free < _LEAST_FREE:
+        raise RefusedError(
+            int(HTTPStatus.INSUFFICIENT_STORAGE),
+            f"the provider's disk has {free >> 20} MiB left: ask its operator to make room",
+        )
 
 
 class ModelShelf:
@@ -43,6 +58,7 @@ class ModelShelf:
             raise ConfigError(f"a model has at most {LARGEST_MODEL >> 20} MiB")
         if hashlib.sha256(content).hexdigest() != sha256:
             raise ConfigError("the content has another SHA-256 than its name")
+        require_room(self._folder)
         path = self._path(sha256)
         handle, name = tempfile.mkstemp(dir=self._folder)
         try:

@@ -33,8 +33,6 @@ class ServiceSettings:
     """Most wall seconds of a rehearsal."""
     most_flights: int = 16
     """Most flights at once."""
-    storage: int = 20 << 30
-    """Most bytes of recordings and models; none is accepted beyond."""
 
     @property
     def models(self) -> Path:

@@ -108,7 +108,8 @@ def test_what_ended_while_the_service_was_away_is_told(provider: Served) -> None
     id_ = submitted(provider, "one", (3.0, 0.0))
     flying(provider, id_, "one", "taking_off", "enroute")
     process = process_of(provider, id_)
-    provider.stop(signal.SIGKILL)
+    # Asked to end, as by Ctrl-C, it leaves its flights alone as well.
+    provider.stop(signal.SIGTERM)
     process.wait(120)
     provider.start()
     ended = provider.until_phase(id_)

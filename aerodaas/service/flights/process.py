@@ -95,6 +95,8 @@ class Flying:
         self._run: Run | None = None
         self._environment: Environment | None = None
         self._meter = FlightMeter()
+        self._called: set[str] = set()
+        """Drones that have been called home and have answered."""
 
     def outcome(self) -> Outcome:
         """Fly, and tell how it ended; a failure is an outcome, too."""
@@ -168,17 +170,24 @@ class Flying:
             # The thread that waits for the run meets the same error and handles it.
             with contextlib.suppress(AeroDaaSError):
                 self._meter.note(run.look(0))
+                if self._lease.reason:
+                    self._come_home(self._lease.reason)
                 if self._order.rehearsal and self._meter.time > 60.0 * self._order.minutes:
                     self._lease.end("the lease has ended")
             time.sleep(max(0.0, began + _LOOK_SECONDS - time.monotonic()))
 
     def _come_home(self, reason: str) -> None:
+        """Call every drone home, once; one that does not answer is called again by `_look`."""
         run = self._run
         if run is None or run.over:
             return
         for robot in self._order.robots:
-            if self._navigates(robot):
+            if robot in self._called or not self._navigates(robot):
+                continue
+            # What one drone answers, or does not, keeps no other one in the air.
+            with contextlib.suppress(AeroDaaSError):
                 run.command(robot, ReturnHome(reason))
+                self._called.add(robot)
 
     def _navigates(self, robot: str) -> bool:
         environment = self._environment

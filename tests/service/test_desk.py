@@ -1,0 +1,177 @@
+"""The desk: one mission's failure is its own, and limits of time and room are kept."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from served import document, fleet, robot
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, Role, Scope
+from aerodaas.service import mission as missions
+from aerodaas.service import models
+from aerodaas.service.access import Principal, Quotas
+from aerodaas.service.bookings import Bookings
+from aerodaas.service.desk import MissionDesk
+from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.garage import Garage
+from aerodaas.service.models import ModelShelf
+from aerodaas.service.settings import ServiceSettings
+from aerodaas.service.store import Account, Store, Tenant
+
+PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(Scope), "t")
+
+
+class Process:
+    """A process that a test ends, in the place of a flight's."""
+
+    def __init__(self) -> None:
+        self.ended: int | None = None
+
+    def poll(self) -> int | None:
+        """Its exit code; None while it runs."""
+        return self.ended
+
+
+class Desk:
+    """A desk over a fleet of two, whose processes never run."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> None:  # noqa: ANN401
+        path = folder / "fleet.json"
+        path.write_text(json.dumps(fleet(robot("one"), robot("two", 10))), encoding="utf-8")
+        self.started: list[Path] = []
+        monkeypatch.setattr(missions, "start_process", self._start)
+        config = EnvironmentConfig.load(path)
+        self.settings = ServiceSettings(path, config, folder / "s", **settings)
+        self.settings.state.mkdir()
+        self.store = Store.open(folder / "service.db")
+        self.store.tenants.add(Tenant("farm"))
+        self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
+        self.open()
+
+    def _start(self, folder: Any) -> Process:  # noqa: ANN401 - FlightFolder
+        self.started.append(folder.path)
+        return Process()
+
+    def open(self) -> None:
+        """Open the desk, as a service does when it starts."""
+        quotas, garage = Quotas(self.store), Garage(self.settings.config, self.store)
+        self.bookings = Bookings(self.settings.config, self.store, garage, quotas)
+        self.desk = MissionDesk(
+            self.settings,
+            self.store,
+            bookings=self.bookings,
+            garage=garage,
+            quotas=quotas,
+            models=ModelShelf(self.settings.models),
+        )
+
+    def submit(self, robot: str, **more: object) -> MissionOut:
+        """Submit a mission for one drone."""
+        content = {"document": document(robot, (5, 0)), **more}
+        return self.desk.submit(PILOT, MissionIn.model_validate(content))
+
+    def phase(self, mission: MissionOut) -> MissionPhase:
+        """Present phase of a mission."""
+        return self.desk.shown(mission.id).phase
+
+    def turns(self, count: int = 4) -> None:
+        """Let the desk move on."""
+        for _ in range(count):
+            self.desk.turn()
+
+
+@pytest.fixture
+def one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Desk]:
+    """A desk that rehearses nothing."""
+    made = Desk(tmp_path, monkeypatch, rehearse=False)
+    yield made
+    made.desk.close()
+    made.store.close()
+
+
+def test_what_one_mission_meets_is_its_own(one: Desk) -> None:
+    """A lease that cannot be had refuses that mission, with the reason; the next one flies."""
+    stuck = one.submit("one")
+    one.turns(1)
+    one.store.robots.put(one.store.robots.get("one") or _out("one"))
+    one.desk._garage.take_out(["one"])
+    good = one.submit("two")
+    one.turns()
+    assert one.phase(stuck) is MissionPhase.REFUSED
+    assert "out of service" in one.desk.shown(stuck.id).reason
+    assert one.phase(good) is MissionPhase.FLYING
+
+
+def _out(name: str) -> Any:  # noqa: ANN401 - a row
+    from aerodaas.service.store import RobotState  # noqa: PLC0415 - only here
+
+    return RobotState(name)
+
+
+def test_a_rehearsal_has_its_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One that does not end is refused, and not waited for."""
+    made = Desk(tmp_path, monkeypatch, rehearse=True, rehearsal_seconds=0.3)
+    ended: list[bool] = []
+    monkeypatch.setattr(
+        missions.ActiveMission, "end_rehearsal", lambda _: ended.append(True), raising=True
+    )
+    slow = made.submit("one")
+    made.turns(2)
+    assert made.phase(slow) is MissionPhase.REHEARSING
+    time.sleep(0.4)
+    made.turns(1)
+    assert made.phase(slow) is MissionPhase.REFUSED
+    assert "not over after 0.3 s" in made.desk.shown(slow.id).reason
+    assert ended
+    made.store.close()
+
+
+def test_a_full_disk_takes_no_missions(one: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The flying ones need the room that is left."""
+    monkeypatch.setattr(models, "_LEAST_FREE", 1 << 60)
+    with pytest.raises(RefusedError, match="make room") as refused:
+        one.submit("one")
+    assert refused.value.status == 507
+
+
+def test_a_mission_is_taken_up_again_by_the_next_service(one: Desk) -> None:
+    """A flight that was ordered and has not begun is begun; one that has begun is not."""
+    first, second = one.submit("one"), one.submit("two")
+    one.turns()
+    flights = {path.parent.name: path for path in one.started}
+    assert set(flights) == {first.id, second.id}
+    (flights[second.id] / "begun").touch()
+    one.started.clear()
+    # A service that ends leaves its flights alone: the stand-in has no process id to be killed by.
+    one.desk.close()
+    one.open()
+    one.turns(1)
+    assert one.started == [flights[first.id]]
+
+
+def test_leases_end_while_the_database_is_gone(one: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the desk goes on when it is back."""
+    mission = one.submit("one")
+    one.turns()
+    assert one.phase(mission) is MissionPhase.FLYING
+    ticks: list[bool] = []
+
+    def gone(*_: object) -> None:
+        raise StoreError("no database")
+
+    with monkeypatch.context() as broken:
+        broken.setattr(one.store.missions, "put", gone)
+        broken.setattr(one.bookings, "tick", lambda: ticks.append(True))
+        queued = one.desk._missions[mission.id]
+        broken.setattr(queued, "flown", gone)
+        with pytest.raises(StoreError):
+            one.turns(1)
+    assert ticks
+    one.turns(1)
+    assert one.phase(mission) is MissionPhase.FLYING
