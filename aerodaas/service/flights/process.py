@@ -29,6 +29,7 @@ from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.run import Run
 from aerodaas.mission.commands import AddNavigation, Answer, ReturnHome
+from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.commands import COMMANDS
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder
@@ -156,8 +157,9 @@ class Flying:
 
     def _await_user(self, document: MissionDocument) -> None:
         """Wait for the user's side, if the document needs it; a rehearsal goes without."""
-        needed = bool(document.here) and not self._order.rehearsal
-        if needed and not self._relay.wait_attached(_USER_SECONDS):
+        if self._order.rehearsal:
+            attach_absent_user(self._relay)
+        elif document.here and not self._relay.wait_attached(_USER_SECONDS):
             raise MissionError(
                 f"{', '.join(document.here)} run at the user's side, which did not connect within "
                 f"{_USER_SECONDS:g} s"

@@ -7,7 +7,7 @@ import contextlib
 import json
 from typing import Any
 
-from fastapi import APIRouter, WebSocket
+from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 
 from aerodaas.analytics.guests.channel import GuestError
 from aerodaas.protocol.schemas import Role, Scope
@@ -57,7 +57,7 @@ class HereRoutes:
         try:
             await self._carry(socket, mission)
         finally:
-            with contextlib.suppress(RuntimeError):
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError):
                 await socket.close()
 
     async def _carry(self, socket: WebSocket, mission: str) -> None:
