@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import logging
 import secrets
 import threading
@@ -42,6 +43,8 @@ _log = logging.getLogger(__name__)
 _OPEN = frozenset(MissionPhase) - OVER
 _TURN_SECONDS = 0.1
 _HEARD_SECONDS = 1.0
+_MOST_SHOWN = 100
+"""Most missions of a list."""
 
 
 class MissionDesk:
@@ -68,6 +71,8 @@ class MissionDesk:
         self._lock = threading.RLock()
         self._closed = threading.Event()
         self._heard: dict[str, float] = {}
+        self._texts: dict[str, tuple[int, str, bool]] = {}
+        """Version, JSON and whether it is over, by mission that is watched."""
         self._missions: dict[str, ActiveMission] = {}
         bookings.flying = self._busy
         bookings.on_end.append(self._recall)
@@ -165,18 +170,27 @@ class MissionDesk:
         return found
 
     def missions(self, principal: Principal) -> list[MissionOut]:
-        """All missions that this account may see, newest first."""
-        with self._lock:
-            found = [self._with_news(row) for row in self._store.missions.all()]
-        return [one for one in found if sees(principal, one.tenant, one.share)]
+        """The newest missions that this account may see, newest first."""
+        rows = self._store.missions.all()
+        seen = (row for row in rows if sees(principal, row.tenant, row.request.get("share", ())))
+        return [self._with_news(row) for row in itertools.islice(seen, _MOST_SHOWN)]
 
     def shown(self, mission: str) -> MissionOut:
         """A mission, whoever asks."""
-        with self._lock:
-            one = self._missions.get(mission)
-            if one is not None:
-                return shown(one)
-        return shown(self._active(self._store.missions.demand(mission)))
+        # Without the lock, which is held while flights are asked: whoever watches does not wait.
+        one = self._missions.get(mission)
+        return shown(one or self._active(self._store.missions.demand(mission)))
+
+    def text(self, mission: str) -> tuple[str, bool]:
+        """A mission as JSON, made once for all that watch it, and whether it is over."""
+        version = self.version(mission)
+        known = self._texts.get(mission)
+        if known is None or known[0] != version or version < 0:
+            found = self.shown(mission)
+            known = version, found.model_dump_json(), found.phase in OVER
+            if version >= 0:
+                self._texts[mission] = known
+        return known[1], known[2]
 
     def version(self, mission: str) -> int:
         """A number that grows with each change of a mission; -1 once it is over."""
@@ -267,6 +281,8 @@ class MissionDesk:
                 if one.over:
                     one.close()
                     del self._missions[one.row.id]
+                    self._texts.pop(one.row.id, None)
+                    self._heard.pop(one.row.id, None)
 
     def _move(self, one: ActiveMission) -> None:
         """Move one mission on; what it meets is its own failure, unless the database is gone."""

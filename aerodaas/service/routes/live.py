@@ -11,7 +11,6 @@ from fastapi import APIRouter, Query, WebSocket, WebSocketDisconnect
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.hub import StreamHub, Watcher
-from aerodaas.service.phases import OVER
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.refusals import close_refused
 from aerodaas.types.errors import AeroDaaSError
@@ -83,22 +82,21 @@ class _Session:
 
     async def state(self, rate: float, *, own: bool) -> None:
         """Send the mission's state until it is over; its own user counts as present meanwhile."""
-        sent, since = -1, 0.0
+        sent, since, heard = -1, 0.0, 0.0
         loop = asyncio.get_running_loop()
         while True:
-            version = self._desk.version(self._mission)
-            if version != sent or loop.time() - since > _IDLE_SECONDS:
-                sent, since = version, loop.time()
-                if own:
-                    await asyncio.to_thread(self._desk.hear, self._mission)
-                mission = self._desk.shown(self._mission)
-                text = mission.model_dump_json()
+            now, version = loop.time(), self._desk.version(self._mission)
+            if own and now - heard > _IDLE_SECONDS:
+                heard = now
+                await asyncio.to_thread(self._desk.hear, self._mission)
+            if version != sent or now - since > _IDLE_SECONDS:
+                sent, since = version, now
+                text, over = self._desk.text(self._mission)
                 async with self._sending:
                     await self._socket.send_text(f'{{"kind": "mission", "mission": {text}}}')
-                if mission.phase in OVER:
-                    async with self._sending:
+                    if over:
                         await self._socket.send_text('{"kind": "end"}')
-                    return
+                        return
             await asyncio.sleep(1.0 / rate)
 
     async def items(self, stream: str) -> None:
