@@ -11,6 +11,7 @@ import typer
 
 from aerodaas.cli import cluster, lab, provider, remote
 from aerodaas.cli.application import run_application, speed_option
+from aerodaas.cli.examples import ExampleGroup
 from aerodaas.cli.export import export
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
@@ -31,6 +32,7 @@ _CAUSED_BY_A_LINE = (GraphError, InvalidWaypointError, UnknownIdError)
 _PROVIDER = "At a provider"
 
 app = typer.Typer(
+    cls=ExampleGroup,
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode="markdown",

@@ -6,9 +6,12 @@ from typing import Annotated
 
 import typer
 
+from aerodaas.cli.examples import ExampleGroup
+
 __all__ = ["app"]
 
 app = typer.Typer(
+    cls=ExampleGroup,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="""Edge and cloud as one cluster.

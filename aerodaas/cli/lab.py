@@ -8,11 +8,13 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from aerodaas.cli.examples import ExampleGroup
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["app"]
 
 app = typer.Typer(
+    cls=ExampleGroup,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help="""Compare analytics schedulers in simulation: thousands of drone-minutes in seconds.

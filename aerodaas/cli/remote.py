@@ -10,10 +10,12 @@ from typing import Annotated, Any
 import typer
 
 from aerodaas.analytics.remote.client import TOKEN_VARIABLE, RemoteClient
+from aerodaas.cli.examples import ExampleGroup
 
 __all__ = ["app"]
 
 app = typer.Typer(
+    cls=ExampleGroup,
     no_args_is_help=True,
     rich_markup_mode="markdown",
     help=f"""Take part in a mission that is flying.

@@ -1,0 +1,46 @@
+"""Examples in a command's help can be copied: each stands on a line of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+import typer.main
+from rich.console import Console
+from rich.markdown import Markdown
+from typer.core import TyperCommand, TyperGroup
+
+from aerodaas.cli.app import app
+
+
+def commands(group: TyperGroup, name: str) -> Iterator[tuple[str, TyperCommand | TyperGroup]]:
+    """All commands of a group and of those within it, by their words."""
+    for word, one in group.commands.items():
+        assert isinstance(one, TyperCommand | TyperGroup)
+        yield f"{name} {word}", one
+        if isinstance(one, TyperGroup):
+            yield from commands(one, f"{name} {word}")
+
+
+ROOT = typer.main.get_command(app)
+assert isinstance(ROOT, TyperGroup)
+ALL = dict(commands(ROOT, "aerodaas"))
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_each_example_has_its_line(name: str) -> None:
+    """As in the docstring, where a terminal is wide enough."""
+    text = ALL[name].help or ""
+    console = Console(width=200)
+    with console.capture() as capture:
+        console.print(Markdown(text))
+    shown = [line.strip() for line in capture.get().splitlines()]
+    block = text.partition("```text\n")[2].partition("\n```")[0]
+    for example in block.splitlines():
+        assert example.strip() in shown
+
+
+def test_there_are_examples() -> None:
+    """Nearly every command teaches by one."""
+    taught = [name for name, one in ALL.items() if "```text" in (one.help or "")]
+    assert len(taught) > 0.8 * len(ALL), sorted(set(ALL) - set(taught))
