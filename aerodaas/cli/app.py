@@ -151,7 +151,9 @@ def run(
 @app.command("compile", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
 def compile_command(
     context: typer.Context,
-    application: Annotated[Path, typer.Argument(help="The application: a Python file.")],
+    application: Annotated[
+        Path, typer.Argument(help="The application: a Python file; or a recording.")
+    ],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="The document's file; default: printed.")
     ] = None,
@@ -161,14 +163,23 @@ def compile_command(
 ) -> None:
     """Write an application as a mission document: data, which others fly without running code.
 
-    The file runs up to `start_mission()`. Words after `--` are the application's own.
+    The file runs up to `start_mission()`. Words after `--` are the application's own. Of a
+    recording, it is the document that was flown.
 
         aerodaas compile apps/farm_survey.py -o apps/farm_survey.json
         aerodaas run apps/farm_survey.json
+        aerodaas compile flight.mcap | diff apps/farm_survey.json -
     """
-    from aerodaas.environment.document.flying import compile_application  # noqa: PLC0415
+    from aerodaas.environment.document.flying import (  # noqa: PLC0415
+        compile_application,
+        recorded_document,
+    )
 
-    text = compile_application(application, context.args, env).text()
+    if application.suffix == ".mcap":
+        document = recorded_document(application)
+    else:
+        document = compile_application(application, context.args, env)
+    text = document.text()
     if output is None:
         typer.echo(text, nl=False)
         return

@@ -94,6 +94,8 @@ class Run:
         check_served("--view-address", self.options.page)
         if self.options.page is not None:
             require_extra("remote", "--view-address")
+        # Before the plan, which has the cameras run that are only recorded.
+        document = self._document()
         plan = self._plan()
         if self.recording is not None and self.recording.exists():
             raise RecordingError(
@@ -112,7 +114,10 @@ class Run:
             cluster.connect(self.options.address)
             raise_on_termination()
             provenance = Provenance.collect(
-                app=self.options.application, config=self.config, speed=self._speed_text()
+                app=self.options.application,
+                config=self.config,
+                speed=self._speed_text(),
+                document=document,
             )
             options = self.options
             flight = Flight(plan, self.recording, provenance, options.live, options.page)
@@ -313,6 +318,16 @@ class Run:
         }
         schedulers = schedulers.model_copy(update={"tasks": {**own, **schedulers.tasks}})
         self.config = self.config.model_copy(update={"schedulers": schedulers})
+
+    def _document(self) -> str:
+        """Mission document of what flies; empty for an application that no document can hold."""
+        from aerodaas.environment.document.compiling import write_mission  # noqa: PLC0415 - a cycle
+
+        name = self.options.application.stem if self.options.application else ""
+        try:
+            return write_mission(self._environment, name, here=True).text()
+        except Exception:  # noqa: BLE001 - what is noted down keeps nobody from flying
+            return ""
 
     def _speed_text(self) -> str:
         return "max" if self.lockstep else f"{self.options.speed or 1.0:g}"

@@ -40,6 +40,8 @@ class Provenance:
     """SHA-256 of the application's file, hexadecimal."""
     app_source: str = ""
     """Source of the application, if the environment says that it is recorded."""
+    document: str = ""
+    """Mission document of the application, JSON; empty for one that no document can hold."""
     revision: str = ""
     """Git commit of the application's repository, with `+` if it had changes; or empty."""
     versions: Mapping[str, str] = field(default_factory=dict)
@@ -53,6 +55,7 @@ class Provenance:
         config: EnvironmentConfig | None = None,
         seed: int | None = None,
         speed: str = "",
+        document: str = "",
     ) -> Self:
         """Collect the provenance of a run.
 
@@ -64,6 +67,7 @@ class Provenance:
             config: Environment of the run; None for none.
             seed: Random seed; None takes the simulation's from `config`.
             speed: `--speed` as given.
+            document: Mission document of the application; empty for none.
         """
         content = app.read_bytes() if app else b""
         source = config is not None and config.recording.application_source
@@ -74,6 +78,7 @@ class Provenance:
             config=public_document(config) if config else "",
             app=app.name if app else "",
             app_sha256=hashlib.sha256(content).hexdigest() if app else "",
+            document=document,
             app_source=content.decode("utf-8", "replace") if source else "",
             revision=_revision(app.parent if app else Path.cwd()),
             versions=_versions(),

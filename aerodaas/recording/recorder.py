@@ -213,6 +213,7 @@ class FlightRecorder:
         self._writer.add_metadata("aerodaas", provenance.as_metadata())
         for name, media_type, text in (
             ("environment.json", "application/json", provenance.config),
+            ("mission.json", "application/json", provenance.document),
             (provenance.app or "app.py", "text/x-python", provenance.app_source),
         ):
             if text:

@@ -10,7 +10,11 @@ import pytest
 from flying import Flyer
 
 from aerodaas.config.options import current_options
-from aerodaas.environment.document.flying import compile_application, fly_mission
+from aerodaas.environment.document.flying import (
+    compile_application,
+    fly_mission,
+    recorded_document,
+)
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 
@@ -41,6 +45,8 @@ def test_a_document_flies_as_its_application(flyer: Flyer, name: str) -> None:
                 fly_mission(path, current_options.get())
         with Recording.open(record / "flight.mcap") as recording:
             flights.append(RecordedFlight.read(recording))
+        # Each recording holds the document, whichever way it was flown.
+        assert recorded_document(record / "flight.mcap").text() == document.text()
     (own,), (others,) = (flight.robots.values() for flight in flights)
     assert own.outcome == others.outcome
     assert own.visited == others.visited

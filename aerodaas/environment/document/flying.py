@@ -6,19 +6,24 @@ import runpy
 import sys
 from pathlib import Path
 
+from aerodaas.config.checked import checked
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.document.compiling import write_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.offering import offered, the_only
+from aerodaas.recording.decoding.messages import decode_json
+from aerodaas.recording.reader import Recording
 from aerodaas.types.errors import AeroDaaSError, ConfigError, GraphError
 
-__all__ = ["compile_application", "fly_mission"]
+__all__ = ["compile_application", "fly_mission", "recorded_document"]
 
 _MODELS = "models"
 """Folder beside a document where models lie that are not shipped."""
 _ENVIRONMENTS = "environments"
+_RECORDED = "mission.json"
+"""Attachment of a recording."""
 
 
 def compile_application(
@@ -47,6 +52,18 @@ def compile_application(
         return write_mission(the_only(found), application.stem)
     except GraphError as error:
         raise GraphError(f"{application.name} cannot be written as a document: {error}") from None
+
+
+def recorded_document(path: Path) -> MissionDocument:
+    """The mission document that a recording has flown.
+
+    Raises:
+        RecordingError: If it cannot be read, or its application was none that a document can hold.
+        ConfigError: For a document that is malformed.
+    """
+    with Recording.open(path) as recording:
+        content = decode_json(recording.attachment(_RECORDED))
+    return checked(MissionDocument, content, f"{path}: {_RECORDED}")
 
 
 def fly_mission(path: Path, options: RunOptions) -> None:
