@@ -100,7 +100,7 @@ def test_another_tenants_things_do_not_exist(
     assert provider.ask("GET", "/v1/leases", token=stranger) == []
     seen = {one["id"]: one for one in provider.ask("GET", "/v1/fleet", token=stranger)["robots"]}
     assert seen["one"]["tenant"] is None
-    assert provider.mission(mission)["phase"] == "awaiting_approval"
+    assert provider.until_phase(mission, "awaiting_approval")["phase"] == "awaiting_approval"
 
 
 @pytest.mark.parametrize("what", ["live", "live?streams=one/odometry", "here"])
@@ -115,7 +115,7 @@ def test_another_tenants_streams_are_closed(
             connect(url, additional_headers=headers, proxy=None)
     with connect(url, additional_headers={AUTH: f"Bearer {victim['token']}"}, proxy=None) as socket:
         if what != "here":
-            assert '"awaiting_approval"' in str(socket.recv(10))
+            assert '"kind": "mission"' in str(socket.recv(10))
 
 
 def test_another_tenants_lease_flies_nobody_elses_mission(
