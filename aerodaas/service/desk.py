@@ -31,7 +31,6 @@ from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.garage import Garage
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
 from aerodaas.service.models import ModelShelf, require_room
-from aerodaas.service.phases import OVER
 from aerodaas.service.records import shown
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
@@ -40,7 +39,7 @@ from aerodaas.types.errors import AeroDaaSError, MissionError
 __all__ = ["MissionDesk"]
 
 _log = logging.getLogger(__name__)
-_OPEN = frozenset(MissionPhase) - OVER
+_OPEN = frozenset(phase for phase in MissionPhase if not phase.over)
 _TURN_SECONDS = 0.1
 _HEARD_SECONDS = 1.0
 _MOST_SHOWN = 100
@@ -187,7 +186,7 @@ class MissionDesk:
         known = self._texts.get(mission)
         if known is None or known[0] != version or version < 0:
             found = self.shown(mission)
-            known = version, found.model_dump_json(), found.phase in OVER
+            known = version, found.model_dump_json(), found.phase.over
             if version >= 0:
                 self._texts[mission] = known
         return known[1], known[2]
@@ -241,7 +240,7 @@ class MissionDesk:
         found = self.mission(principal, mission)
         one = self._active(self._store.missions.demand(found.id))
         files = {"recording": one.flight.recording, "picture": one.rehearsal.picture}
-        if not files[name].is_file() or (name == "recording" and found.phase not in OVER):
+        if not files[name].is_file() or (name == "recording" and not found.phase.over):
             raise RefusedError(404, f"{mission} has no {name} yet")
         return files[name]
 

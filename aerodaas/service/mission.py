@@ -19,7 +19,7 @@ from aerodaas.service.flights.link import FlightLink
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.starter import start_process
 from aerodaas.service.models import ModelShelf
-from aerodaas.service.phases import FOLLOWING, OVER
+from aerodaas.service.phases import FOLLOWING
 from aerodaas.service.store import Mission
 
 __all__ = ["CANCELLED_BY", "ActiveMission", "LostFlightError"]
@@ -75,7 +75,7 @@ class ActiveMission:
     @property
     def over(self) -> bool:
         """Whether nothing follows any more."""
-        return self.phase in OVER
+        return self.phase.over
 
     def to(self, phase: MissionPhase, reason: str = "", **changes: object) -> None:
         """Change the phase; the database is written first."""

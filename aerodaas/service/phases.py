@@ -1,14 +1,12 @@
-"""Phases of a mission at the service, and which follows which."""
+"""Which phase of a mission may follow which."""
 
 from __future__ import annotations
 
 from aerodaas.protocol.schemas import MissionPhase
 
-__all__ = ["FOLLOWING", "OVER"]
+__all__ = ["FOLLOWING"]
 
 _P = MissionPhase
-OVER = frozenset(one for one in MissionPhase if one.over)
-"""Phases that nothing follows."""
 FOLLOWING = {
     _P.SUBMITTED: {_P.REHEARSING, _P.AWAITING_APPROVAL, _P.QUEUED, _P.REFUSED, _P.CANCELLED},
     _P.REHEARSING: {_P.AWAITING_APPROVAL, _P.QUEUED, _P.REFUSED, _P.CANCELLED},

@@ -15,7 +15,6 @@ from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.async_channel import AsyncChannel
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.phases import OVER
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.refusals import close_refused
 from aerodaas.types.errors import AeroDaaSError
@@ -62,7 +61,7 @@ class HereRoutes:
 
     async def _carry(self, socket: WebSocket, mission: str) -> None:
         """Connect the user with the mission's flight, again if need be, until it is over."""
-        while self._desk.shown(mission).phase not in OVER:
+        while not self._desk.shown(mission).phase.over:
             folder = self._desk.flight(mission)
             try:
                 if folder is not None and not await _carried(socket, folder):
