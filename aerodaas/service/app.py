@@ -51,9 +51,7 @@ def build_service(
     quotas, garage = Quotas(store), Garage(settings.config, store)
     models = ModelShelf(settings.models)
     bookings = Bookings(settings.config, store, garage, quotas)
-    desk = MissionDesk(
-        settings, store, bookings=bookings, garage=garage, quotas=quotas, models=models
-    )
+    desk = MissionDesk(settings, store, bookings=bookings, garage=garage, models=models)
     hub = StreamHub(desk.items)
     admission = Admission(access, audit, RateLimiter(_RATE, _BURST))
     shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)

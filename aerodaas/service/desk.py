@@ -22,7 +22,7 @@ from aerodaas.protocol.schemas import (
     MissionPhase,
     Role,
 )
-from aerodaas.service.access import Principal, Quotas, sees
+from aerodaas.service.access import Principal, sees
 from aerodaas.service.access.principal import reaches
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
@@ -56,7 +56,6 @@ class MissionDesk:
         *,
         bookings: Bookings,
         garage: Garage,
-        quotas: Quotas,
         models: ModelShelf,
     ) -> None:
         """Take up the missions that the database has; `start` moves them on."""
@@ -64,7 +63,6 @@ class MissionDesk:
         self._store = store
         self._bookings = bookings
         self._garage = garage
-        self._quotas = quotas
         self._models = models
         self._briefing = Briefing(settings, store, bookings, garage)
         self._lock = threading.RLock()
@@ -177,8 +175,7 @@ class MissionDesk:
     def shown(self, mission: str) -> MissionOut:
         """A mission, whoever asks."""
         # Without the lock, which is held while flights are asked: whoever watches does not wait.
-        one = self._missions.get(mission)
-        return shown(one or self._active(self._store.missions.demand(mission)))
+        return shown(self._any(mission))
 
     def text(self, mission: str) -> tuple[str, bool]:
         """A mission as JSON, made once for all that watch it, and whether it is over."""
@@ -198,10 +195,7 @@ class MissionDesk:
 
     def flying(self, robot: str) -> str | None:
         """The mission that flies a robot now; None if none does."""
-        for one in list(self._missions.values()):
-            if one.phase is MissionPhase.FLYING and robot in one.row.robots:
-                return one.row.id
-        return None
+        return next((one.row.id for one in self._flying() if robot in one.row.robots), None)
 
     def flies(self, principal: Principal, mission: str) -> bool:
         """Whether a mission is this account's own, so that its presence counts."""
@@ -237,8 +231,7 @@ class MissionDesk:
 
     def file(self, principal: Principal, mission: str, name: str) -> Path:
         """The recording or the rehearsal's picture of a mission; raises RefusedError if none."""
-        found = self.mission(principal, mission)
-        one = self._active(self._store.missions.demand(found.id))
+        found, one = self.mission(principal, mission), self._any(mission)
         files = {"recording": one.flight.recording, "picture": one.rehearsal.picture}
         if not files[name].is_file() or (name == "recording" and not found.phase.over):
             raise RefusedError(404, f"{mission} has no {name} yet")
@@ -252,8 +245,8 @@ class MissionDesk:
         self._ask_flying(lease, do="extend", ends=lease.ends)
 
     def _ask_flying(self, lease: Lease, **request: Any) -> None:  # noqa: ANN401 - JSON
-        for one in list(self._missions.values()):
-            if one.row.lease == lease.id and one.phase is MissionPhase.FLYING:
+        for one in self._flying():
+            if one.row.lease == lease.id:
                 # A flight knows the end of its lease, whether or not it can be reached.
                 with contextlib.suppress(MissionError):
                     one.follow().ask(**request)
@@ -345,15 +338,16 @@ class MissionDesk:
 
     def _has_place(self, wanted: ActiveMission) -> bool:
         """Whether a flight may begin: its drones may be on their way home from the last one."""
-        flying = [one for one in self._missions.values() if one.phase is MissionPhase.FLYING]
         free = self._busy().isdisjoint(wanted.row.robots)
-        return len(flying) < self._settings.most_flights and free
+        return len(self._flying()) < self._settings.most_flights and free
 
     def _busy(self) -> set[str]:
         """Robots in flight."""
+        return {robot for one in self._flying() for robot in one.row.robots}
+
+    def _flying(self) -> list[ActiveMission]:
         missions = list(self._missions.values())
-        flying = [one for one in missions if one.phase is MissionPhase.FLYING]
-        return {robot for one in flying for robot in one.row.robots}
+        return [one for one in missions if one.phase is MissionPhase.FLYING]
 
     def _watch(self, one: ActiveMission) -> None:
         # After a restart: a flight whose order was written may not have begun.
@@ -396,6 +390,11 @@ class MissionDesk:
             phase = self.shown(mission).phase.value
             raise RefusedError(409, f"{mission} is over: {phase}")
         return one
+
+    def _any(self, mission: str) -> ActiveMission:
+        """A mission that may be over; raises RefusedError if there is none."""
+        one = self._missions.get(mission)
+        return one or self._active(self._store.missions.demand(mission))
 
     def _with_news(self, row: Mission) -> MissionOut:
         return shown(self._missions.get(row.id) or self._active(row))

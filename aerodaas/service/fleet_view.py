@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
 from aerodaas.protocol.schemas import FleetOut, RobotOut
 from aerodaas.service.access import Principal, sees
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.garage import Garage
+from aerodaas.service.store import RobotState
 
 __all__ = ["FleetView"]
 
@@ -34,19 +35,19 @@ class FleetView:
 
     def seen_by(self, principal: Principal) -> FleetOut:
         """The fleet as this account may see it."""
-        robots = [self._robot(robot.id, principal) for robot in self._config.robots]
+        states = self._garage.states
+        robots = [self._robot(robot, states[robot.id], principal) for robot in self._config.robots]
         return FleetOut(name=self._config.name, robots=robots, environment=self._catalogue)
 
-    def _robot(self, name: str, principal: Principal) -> RobotOut:
-        state, lease = self._garage.states[name], self._bookings.holder(name)
-        config = next(robot for robot in self._config.robots if robot.id == name)
+    def _robot(self, robot: RobotConfig, state: RobotState, principal: Principal) -> RobotOut:
+        lease = self._bookings.holder(robot.id)
         mine = lease is not None and sees(principal, lease.tenant)
         return RobotOut(
-            id=name,
-            sensors=[sensor.full_id for sensor in config.sensors],
+            id=robot.id,
+            sensors=[sensor.full_id for sensor in robot.sensors],
             lease=None if lease is None else lease.id,
             tenant=lease.tenant if lease is not None and mine else None,
-            mission=self._desk.flying(name) if mine else None,
+            mission=self._desk.flying(robot.id) if mine else None,
             battery=state.battery,
             position=state.position,
             heard=state.heard,

@@ -78,18 +78,16 @@ class ActiveMission:
         return self.phase.over
 
     def to(self, phase: MissionPhase, reason: str = "", **changes: object) -> None:
-        """Change the phase; the database is written first."""
+        """Change the phase, and what else changes with it."""
         assert phase in FOLLOWING[self.phase], (self.phase, phase)  # noqa: S101 - our own order
-        row = replace(self.row, phase=phase, reason=reason, **changes)  # type: ignore[arg-type]
-        self._save(row)
-        self.row = row
-        self.version += 1
+        self.change(phase=phase, reason=reason, **changes)
 
     def change(self, **changes: object) -> None:
-        """Change the row within its phase."""
+        """Change the row; the database is written first."""
         row = replace(self.row, **changes)  # type: ignore[arg-type]
         self._save(row)
         self.row = row
+        self.version += 1
 
     def rehearse(self, order: FlightOrder, models: ModelShelf) -> None:
         """Start the rehearsal; one that a former service began is begun again."""

@@ -67,7 +67,6 @@ class Desk:
             self.store,
             bookings=self.bookings,
             garage=garage,
-            quotas=quotas,
             models=ModelShelf(self.settings.models),
         )
 
