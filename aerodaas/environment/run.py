@@ -15,7 +15,12 @@ from aerodaas.config.extras import require_extra
 from aerodaas.config.model import TaskConfig
 from aerodaas.config.options import current_options
 from aerodaas.environment.mission_run import recording_path
-from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_termination
+from aerodaas.environment.signals import (
+    INTERRUPTED,
+    TerminatedError,
+    end_of_application,
+    raise_on_signals,
+)
 from aerodaas.mission.commands import Answer, Command, End
 from aerodaas.types.clock import seconds
 from aerodaas.types.errors import (
@@ -112,7 +117,7 @@ class Run:
         with StartupView(self.options) as starting:
             starting.step("starting Ray")
             cluster.connect(self.options.address)
-            raise_on_termination()
+            raise_on_signals()
             provenance = Provenance.collect(
                 app=self.options.application,
                 config=self.config,
@@ -231,7 +236,7 @@ class Run:
         try:
             self._watch(float("inf"))
         except KeyboardInterrupt:
-            self._land("interrupted from the keyboard")
+            self._land(INTERRUPTED)
             raise
         except SystemExit as error:
             self._land(

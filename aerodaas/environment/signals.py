@@ -1,4 +1,4 @@
-"""Termination of a run, which lands first: SIGTERM and SIGHUP are handled as Ctrl-C is."""
+"""Signals that end a run, which lands first: SIGTERM and SIGHUP are handled as Ctrl-C is."""
 
 from __future__ import annotations
 
@@ -9,9 +9,11 @@ import threading
 from pathlib import Path
 from types import FrameType
 
-__all__ = ["TerminatedError", "end_of_application", "raise_on_termination"]
+__all__ = ["INTERRUPTED", "TerminatedError", "end_of_application", "raise_on_signals"]
 
-_received: TerminatedError | None = None
+INTERRUPTED = "interrupted from the keyboard"
+
+_reason = ""
 
 
 class TerminatedError(SystemExit):
@@ -25,25 +27,37 @@ class TerminatedError(SystemExit):
         self.reason = f"received {signal.Signals(number).name}"
 
 
-def raise_on_termination() -> None:
-    """Raise TerminatedError in the main thread from now on; elsewhere, change nothing.
+def raise_on_signals() -> None:
+    """Raise TerminatedError or KeyboardInterrupt in the main thread from now on.
 
-    To be called once Ray has started, for its own handlers end the process at once.
+    Called elsewhere, it changes nothing; an application's own handler of Ctrl-C is kept. To be
+    called once Ray has started, for its own handlers end the process at once.
     """
+    global _reason  # noqa: PLW0603 - a signal is sent to the whole process
+    _reason = ""
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, _raise)
+            signal.signal(number, _terminate)
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            signal.signal(signal.SIGINT, _interrupt)
 
 
 def end_of_application() -> str:
     """Reason of a flight's end for an application that has ended without waiting for it."""
-    return _received.reason if _received else "the application ended"
+    return _reason or "the application ended"
 
 
-def _raise(number: int, _: FrameType | None) -> None:
-    global _received  # noqa: PLW0603 - a signal is sent to the whole process
+def _terminate(number: int, _: FrameType | None) -> None:
+    global _reason  # noqa: PLW0603
     if number == signal.SIGHUP:
         # Output has no reader from now on, and writing to a closed terminal fails.
         sys.stdout = sys.stderr = Path(os.devnull).open("w")  # noqa: SIM115 - for good
-    _received = TerminatedError(number)
-    raise _received
+    error = TerminatedError(number)
+    _reason = error.reason
+    raise error
+
+
+def _interrupt(_: int, __: FrameType | None) -> None:
+    global _reason  # noqa: PLW0603
+    _reason = INTERRUPTED
+    raise KeyboardInterrupt

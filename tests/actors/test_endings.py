@@ -131,16 +131,26 @@ def test_an_interrupted_run_lands(
     require_gone(processes, 20.0)
 
 
-def test_terminated_in_its_own_code(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("sent", "code", "reason"),
+    [
+        (signal.SIGINT, 130, "interrupted from the keyboard"),
+        (signal.SIGTERM, 143, "received SIGTERM"),
+    ],
+    ids=["Ctrl-C", "terminated"],
+)
+def test_a_signal_in_its_own_code(
+    tmp_path: Path, sent: signal.Signals, code: int, reason: str
+) -> None:
     """A signal that comes before `wait()`, or without one, is the reason all the same."""
     with running(tmp_path, "time.sleep(300)") as process:
         airborne(process)
-        process.send_signal(signal.SIGTERM)
+        process.send_signal(sent)
         _, said = process.communicate(timeout=120)
-        assert process.returncode == 143, said
+        assert process.returncode == code, said
     flight = landed(tmp_path)
     reasons = [band.reason for band in flight.robots["drone"].bands if band.state == "landing"]
-    assert reasons == ["received SIGTERM"]
+    assert reasons == [reason]
 
 
 def test_a_second_interrupt_leaves_the_drone_to_itself(tmp_path: Path) -> None:

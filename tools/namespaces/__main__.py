@@ -13,7 +13,7 @@ from rich.console import Console
 from rich.table import Table
 
 from aerodaas.cli.app import run_typer
-from aerodaas.environment.signals import raise_on_termination
+from aerodaas.environment.signals import raise_on_signals
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.types.clock import NANOSECONDS
 from tools.namespaces.edge_cloud import EdgeCloud
@@ -56,7 +56,7 @@ def main(
     """
     shape = Shape(parse_time(rtt), parse_bandwidth(bandwidth) if bandwidth else None, loss / 100)
     network = Network.named(trace, round(period * NANOSECONDS)) if trace else None
-    raise_on_termination()
+    raise_on_signals()
     with contextlib.ExitStack() as stack:
         with _console.status("starting Ray nodes"):
             cluster = stack.enter_context(EdgeCloud(cloud, edges=edges, shape=shape, port=port))

@@ -21,7 +21,7 @@ from aerodaas.environment.provider.follower import MissionFollower, pauses
 from aerodaas.environment.provider.here import HereLink
 from aerodaas.environment.provider.streams import WireReader
 from aerodaas.environment.provider.submission import submit
-from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_termination
+from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_signals
 from aerodaas.mission.commands import Answer, Command, initial_commands
 from aerodaas.protocol.schemas import MissionOut, MissionPhase
 from aerodaas.types.errors import (
@@ -101,7 +101,7 @@ class ProvidedRun:
 
         self._require_possible()
         written = self._written()
-        raise_on_termination()
+        raise_on_signals()
         with StartupView(self.options) as starting:
             mission = submit(
                 self._client, written.document, written.models, self.options, starting.step
