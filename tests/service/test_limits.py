@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import shapely
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, LimitsConfig, validated
@@ -104,14 +104,26 @@ def narrowed(
 
 
 def within(fence: Geofence, place: tuple[float, float, float]) -> bool:
-    """Whether a fence allows a place, or one within its own tolerance of a micrometre."""
-    distance = shapely.distance(fence.area, shapely.Point(place[:2])) if fence.area else 0.0
-    return fence.contains(np.array(place)) or 0.0 < distance <= 1e-6
+    """Whether a fence allows a place, or its area lies within the tolerance of a micrometre.
+
+    The distance of a place that is rounded to the outside may be 0.
+    """
+    outside = fence.area is not None and not shapely.covers(fence.area, shapely.Point(place[:2]))
+    near = outside and shapely.distance(fence.area, shapely.Point(place[:2])) <= 1e-6
+    return fence.contains(np.array(place)) or near
 
 
 @settings(max_examples=100, deadline=None)
 @given(
     places=st.lists(st.tuples(*[st.floats(-70, 70)] * 2, st.floats(0, 70)), min_size=30), **cases
+)
+@example(
+    places=[],
+    fence=[],
+    no_fly=[[(8.0, 28.0), (15.0, 28.0), (15.0, 35.0), (8.0, 35.0)]],
+    margin=0.0,
+    area=[(10.0, 0.0), (17.92298567374695, 55.161277945118904), (-8.09, 5.87), (-8.09, -5.87)],
+    tenant=TenantLimits(),
 )
 def test_a_place_that_is_allowed_is_allowed_by_each(
     places: list[tuple[float, float, float]],
@@ -136,6 +148,15 @@ def test_a_place_that_is_allowed_is_allowed_by_each(
     target=st.tuples(*[st.floats(-90, 90)] * 2, st.floats(0, 70)),
     speed=st.floats(0.1, 15),
     **cases,
+)
+@example(
+    target=(9.0, -19.0, 0.0),
+    speed=1.0,
+    fence=[],
+    no_fly=[[(8.0, -19.0), (9.0, -19.0), (9.0, -18.0), (8.0, -18.0)]],
+    margin=0.0,
+    area=None,
+    tenant=TenantLimits(max_range=21.0),
 )
 def test_a_setpoint_sent_is_within_each(
     target: tuple[float, float, float],

@@ -90,6 +90,24 @@ class Geofence:
             east, north = (float(axis) for axis in shapely.get_coordinates(way)[0])
         return np.array([east, north, up])
 
+    def nearest_within(self, position: Vector, centre: Vector, reach: float) -> Vector | None:
+        """As `nearest_allowed`, at most `reach` metres from `centre`; None if there is none."""
+        nearest = self.nearest_allowed(position)
+        rounding = 1e-9
+        if float(np.linalg.norm(nearest - centre)) <= reach + rounding:
+            return nearest
+        upright = float(nearest[2] - centre[2])
+        if abs(upright) >= reach:
+            return None
+        # The circle's corners lie upon it, so that nothing of it is farther away.
+        level = shapely.Point(centre[:2]).buffer(math.sqrt(reach**2 - upright**2), quad_segs=64)
+        common = level if self.inner is None else shapely.intersection(self.inner, level)
+        if common.is_empty:
+            return None
+        way = shapely.shortest_line(common, shapely.Point(position[:2]))
+        east, north = (float(axis) for axis in shapely.get_coordinates(way)[0])
+        return np.array([east, north, nearest[2]])
+
     def inside(self, position: Vector) -> bool:
         """Return whether `position` lies inside the polygon, at any height."""
         return self.area is None or bool(shapely.contains_xy(self.area, position[0], position[1]))

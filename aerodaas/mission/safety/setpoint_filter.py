@@ -107,7 +107,11 @@ class SetpointFilter:
         target = self.home + limit_length(asked.position - self.home, self.limits.max_range)
         if not np.allclose(target, asked.position):
             names.append("max_range")
-        inside = self.fence.nearest_allowed(target)
+        # What the fence allows nearest to a place in range may itself be out of range.
+        inside = self.fence.nearest_within(target, self.home, self.limits.max_range)
+        if inside is None:
+            self._last = np.zeros(3)
+            return FilteredSetpoint(VelocitySetpoint(np.zeros(3)), (*names, "geofence"))
         if not np.allclose(inside, target):
             names.append("geofence")
         target = inside

@@ -57,6 +57,7 @@ def test_no_limit_is_ever_exceeded(setpoint: Setpoint, before: VelocitySetpoint)
     sent = guard.clamp(setpoint, odometry, 0.05)
     if isinstance(sent.setpoint, PositionSetpoint):
         assert guard.fence.contains(sent.setpoint.position)
+        assert np.linalg.norm(sent.setpoint.position) <= LIMITS.max_range + 1e-6
         assert sent.setpoint.speed is not None
         assert sent.setpoint.speed <= math.hypot(LIMITS.max_speed, LIMITS.max_climb) + 1e-9
         return
@@ -255,6 +256,41 @@ def test_the_nearest_allowed_place_is_allowed(x: float, y: float, z: float) -> N
     """Whatever is asked, the place that is flown to lies inside."""
     fence = Geofence(LIMITS.geofence)
     assert fence.contains(fence.nearest_allowed(np.array([x, y, z])))
+
+
+def test_a_place_out_of_a_zone_stays_within_the_range() -> None:
+    """The zone lies across the edge of the range, and its nearest side beyond it."""
+    zone = [(16.0, -10.0), (19.0, -10.0), (19.0, 10.0), (16.0, 10.0)]
+    limits = LIMITS.model_copy(
+        update={"geofence": GeofenceConfig(no_fly=[zone], ceiling=12.0, floor=1.0, margin=0.0)}
+    )
+    guard = SetpointFilter(limits, np.zeros(3))
+    sent = guard.clamp(PositionSetpoint(np.array([17.9, 0.0, 1.0])), at(0.0, 0.0, 1.0), 0.05)
+    assert isinstance(sent.setpoint, PositionSetpoint)
+    assert sent.setpoint.position == pytest.approx([16.0, 0.0, 1.0], abs=0.01)
+    assert sent.clipped_by == ("geofence",)
+
+
+def test_where_fence_and_range_leave_no_place_the_drone_stands_still() -> None:
+    """Home lies in a zone that reaches farther than the range."""
+    zone = [(-25.0, -25.0), (25.0, -25.0), (25.0, 25.0), (-25.0, 25.0)]
+    limits = LIMITS.model_copy(
+        update={"geofence": GeofenceConfig(no_fly=[zone], ceiling=12.0, floor=1.0)}
+    )
+    guard = SetpointFilter(limits, np.zeros(3))
+    sent = guard.clamp(PositionSetpoint(np.array([40.0, 0.0, 5.0])), at(0.0, 0.0, 5.0), 0.05)
+    assert isinstance(sent.setpoint, VelocitySetpoint)
+    assert not sent.setpoint.velocity.any()
+    assert sent.clipped_by == ("max_range", "geofence")
+
+
+def test_the_floor_lifts_a_place_no_farther_than_the_range() -> None:
+    """A place at the edge of the range is lifted, and comes nearer by as much."""
+    limits = LIMITS.model_copy(update={"geofence": GeofenceConfig(ceiling=12.0, floor=3.0)})
+    guard = SetpointFilter(limits, np.zeros(3))
+    sent = guard.clamp(PositionSetpoint(np.array([18.0, 0.0, 0.0])), at(0.0, 0.0, 5.0), 0.05)
+    assert isinstance(sent.setpoint, PositionSetpoint)
+    assert sent.setpoint.position == pytest.approx([math.sqrt(18.0**2 - 9.0), 0.0, 3.0], abs=0.01)
 
 
 def clamped_velocity(
