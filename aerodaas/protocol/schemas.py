@@ -6,12 +6,13 @@ Units are metres, seconds, radians and m/s; moments are seconds of Unix time; a 
 from __future__ import annotations
 
 import enum
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.protocol.commands import CommandWord
 
 __all__ = [
     "AccountIn",
@@ -253,7 +254,7 @@ class CommandIn(_In):
     """A command to one robot of a mission."""
 
     robot: Word
-    command: Literal["pause", "resume", "clear", "return-home", "land"]
+    command: CommandWord
 
 
 class AccountIn(_In):

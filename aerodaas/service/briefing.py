@@ -11,8 +11,9 @@ from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Principal, require
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.flights.order import FlightLimits, FlightOrder, OtherLease, Outcome
+from aerodaas.service.flights.order import FlightOrder, OtherLease, Outcome
 from aerodaas.service.garage import Garage
+from aerodaas.service.limits import TenantLimits
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store, Usage
 
@@ -90,7 +91,7 @@ class Briefing:
             robots=list(mission.robots),
             ends=time.time() + 60.0 * minutes if ends is None else ends,
             minutes=minutes if granted is None else granted.minutes,
-            limits=FlightLimits(max_height=tenant.max_height, max_speed=tenant.max_speed),
+            limits=TenantLimits(max_height=tenant.max_height, max_speed=tenant.max_speed),
             area=None if granted is None or granted.area is None else list(granted.area),
             silence=mission.request["silence"],
             silence_seconds=mission.request["silence_seconds"],

@@ -15,6 +15,7 @@ import shapely
 from aerodaas.config.checked import near
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, RobotConfig, validated
 from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.protocol.schemas import Positive
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["Outline", "TenantLimits", "limited"]
@@ -30,11 +31,11 @@ _CORNERS = 3
 class TenantLimits:
     """Limits of a tenant, on top of the provider's; None for no further limit."""
 
-    max_height: float | None = None
+    max_height: Positive | None = None
     """Metres above home."""
-    max_speed: float | None = None
+    max_speed: Positive | None = None
     """m/s, level and upright."""
-    max_range: float | None = None
+    max_range: Positive | None = None
     """Metres from the place of take-off."""
 
 

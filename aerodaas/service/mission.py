@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+from aerodaas.config.private_file import write_private
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.protocol.schemas import MissionPhase, VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
@@ -61,7 +62,7 @@ class ActiveMission:
     def write(self, document: MissionDocument) -> None:
         """Keep the document."""
         self._document.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        self._document.write_text(document.text(), encoding="utf-8")
+        write_private(self._document, document.text())
 
     def document(self) -> MissionDocument:
         """The document; raises ConfigError if its file is gone."""

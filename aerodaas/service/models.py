@@ -7,13 +7,13 @@ import hashlib
 import os
 import re
 import shutil
-import tempfile
 from collections.abc import Iterator
 from http import HTTPStatus
 from pathlib import Path
 from typing import Any
 
 from aerodaas.analytics.models import DETECTOR
+from aerodaas.config.private_file import write_private
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.service.errors import RefusedError
 from aerodaas.types.errors import ConfigError
@@ -59,15 +59,7 @@ class ModelShelf:
         if hashlib.sha256(content).hexdigest() != sha256:
             raise ConfigError("the content has another SHA-256 than its name")
         require_room(self._folder)
-        path = self._path(sha256)
-        handle, name = tempfile.mkstemp(dir=self._folder)
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(content)
-            Path(name).replace(path)
-        except OSError:
-            Path(name).unlink(missing_ok=True)
-            raise
+        write_private(self._path(sha256), content)
 
     def lend(self, document: MissionDocument, folder: Path) -> None:
         """Put the models of a document into `folder`; raises ConfigError for a missing one."""

@@ -2,37 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import ValidationError
 
 from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.environment.provider.client import ProviderClient
-from aerodaas.mission.commands import (
-    AddNavigation,
-    Answer,
-    ClearNavigation,
-    Command,
-    End,
-    Pause,
-    Resume,
-    ReturnHome,
-)
+from aerodaas.mission.commands import AddNavigation, Answer, Command
+from aerodaas.protocol.commands import word_for
 from aerodaas.protocol.schemas import CommandIn
 from aerodaas.types.errors import GraphError, InvalidWaypointError
 from aerodaas.types.waypoints import SchedulingType
 
 __all__ = ["send_command"]
-
-_Word = Literal["pause", "resume", "clear", "return-home", "land"]
-_WORDS: dict[type[object], _Word] = {
-    Pause: "pause",
-    Resume: "resume",
-    ClearNavigation: "clear",
-    ReturnHome: "return-home",
-    End: "land",
-}
 
 
 def send_command(client: ProviderClient, mission: str, robot: str, command: Command) -> Answer:
@@ -50,7 +31,7 @@ def send_command(client: ProviderClient, mission: str, robot: str, command: Comm
         if waypoints is None:
             return Answer(accepted=True)
         return _answer(client.add_navigation(mission, robot, waypoints))
-    word = _WORDS.get(type(command))
+    word = word_for(command)
     if word is None:
         raise GraphError(
             f"{robot} flies at a provider: streams of navigation are connected before "

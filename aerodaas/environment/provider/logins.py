@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import os
 import stat
-import tempfile
 from pathlib import Path
 from typing import Any
 
 from aerodaas.config.json_text import read_json
+from aerodaas.config.private_file import write_private
 from aerodaas.environment.provider.address import INSECURE_VARIABLE, ServiceAddress
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.types.errors import ConfigError
@@ -72,15 +72,7 @@ class Logins:
     def _write(self, content: dict[str, Any]) -> None:
         try:
             self.path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            # Made with mode 0600, and in its place only once it is whole.
-            handle, name = tempfile.mkstemp(dir=self.path.parent)
-            try:
-                with os.fdopen(handle, "w", encoding="utf-8") as file:
-                    file.write(json.dumps(content, indent=2) + "\n")
-                Path(name).replace(self.path)
-            except OSError:
-                Path(name).unlink(missing_ok=True)
-                raise
+            write_private(self.path, json.dumps(content, indent=2) + "\n")
         except OSError as error:
             raise ConfigError(f"cannot write {self.path}: {error.strerror}") from None
 

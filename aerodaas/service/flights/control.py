@@ -20,7 +20,7 @@ from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut, WaypointsIn
 from aerodaas.mission.commands import Answer
-from aerodaas.service.flights.commands import COMMANDS
+from aerodaas.protocol.commands import COMMANDS, CommandWord
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.types.errors import AeroDaaSError
@@ -46,7 +46,7 @@ class Reader(Protocol):
 class Flown(Protocol):
     """The flight as its control socket sees it; called from several threads."""
 
-    def command(self, robot: str, name: str) -> Answer:
+    def command(self, robot: str, name: CommandWord) -> Answer:
         """Execute a command of `COMMANDS`; raises AeroDaaSError."""
         ...
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import fcntl
 import os
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from pydantic import ValidationError
 
+from aerodaas.config.private_file import write_private
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.types.errors import MissionError
 
@@ -50,8 +50,8 @@ class FlightFolder:
     def make(self, order: FlightOrder, document: str) -> None:
         """Create the folder with an order and the text of a document, for this user alone."""
         self.models.mkdir(parents=True, exist_ok=True, mode=0o700)
-        self._write(self.document, document)
-        self._write(self.order, order.model_dump_json(indent=2))
+        write_private(self.document, document)
+        write_private(self.order, order.model_dump_json(indent=2))
 
     @property
     def begun(self) -> bool:
@@ -88,7 +88,7 @@ class FlightFolder:
 
     def end(self, outcome: Outcome) -> None:
         """Write how the flight ended."""
-        self._write(self._outcome, outcome.model_dump_json(indent=2))
+        write_private(self._outcome, outcome.model_dump_json(indent=2))
 
     def outcome(self) -> Outcome | None:
         """How the flight ended; None before, or where its process was killed."""
@@ -96,13 +96,3 @@ class FlightFolder:
             return Outcome.model_validate_json(self._outcome.read_bytes())
         except (OSError, ValidationError):
             return None
-
-    @staticmethod
-    def _write(path: Path, text: str) -> None:
-        """Write a file of mode 0600 whole or not at all."""
-        handle, name = tempfile.mkstemp(dir=path.parent)
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            file.write(text)
-            file.flush()
-            os.fsync(file.fileno())
-        Path(name).replace(path)

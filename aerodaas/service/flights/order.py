@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -11,19 +11,13 @@ from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.checked import checked
 from aerodaas.config.json_text import read_json
 from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
+from aerodaas.service.limits import TenantLimits
 
-__all__ = ["FlightLimits", "FlightOrder", "OtherLease", "Outcome"]
+__all__ = ["FlightOrder", "OtherLease", "Outcome"]
 
 
 class _Record(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class FlightLimits(_Record):
-    """Limits of a tenant, on top of the provider's: metres, m/s; None for no further limit."""
-
-    max_height: Annotated[float, Field(gt=0)] | None = None
-    max_speed: Annotated[float, Field(gt=0)] | None = None
 
 
 class OtherLease(_Record):
@@ -47,7 +41,7 @@ class FlightOrder(_Record):
     service."""
     minutes: float
     """Length of the lease."""
-    limits: FlightLimits = FlightLimits()
+    limits: TenantLimits = TenantLimits()
     area: Area | None = None
     silence: SilencePolicy = SilencePolicy.CONTINUE
     silence_seconds: float = 30.0

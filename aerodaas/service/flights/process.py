@@ -29,19 +29,19 @@ from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.run import Run
 from aerodaas.mission.commands import AddNavigation, Answer, ReturnHome
+from aerodaas.protocol.commands import COMMANDS, CommandWord
 from aerodaas.service.flights.absent_user import attach_absent_user
-from aerodaas.service.flights.commands import COMMANDS
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.meter import FlightMeter
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.watch import LeaseWatch
-from aerodaas.service.limits import TenantLimits, limited
+from aerodaas.service.limits import limited
 from aerodaas.service.rehearsal import rehearsal_config
 from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError
 from aerodaas.types.status import Message
 
-__all__ = ["Flying", "environment_of", "fly"]
+__all__ = ["Flying", "fly"]
 
 _USER_SECONDS = 30.0
 """Wall seconds for the user's side to connect before take-off."""
@@ -61,12 +61,12 @@ def fly(path: Path) -> None:
         folder.end(Flying(folder, order).outcome())
 
 
-def environment_of(order: FlightOrder) -> EnvironmentConfig:
+def _environment_of(order: FlightOrder) -> EnvironmentConfig:
     """The environment of a flight; raises ConfigError where the limits leave no room for it."""
     config = limited(
         located(EnvironmentConfig.load(order.fleet), order.fleet.parent),
         order.robots,
-        tenant=TenantLimits(order.limits.max_height, order.limits.max_speed),
+        tenant=order.limits,
         area=order.area,
     )
     if order.rehearsal:
@@ -94,6 +94,8 @@ class Flying:
         self._lease = LeaseWatch(order, self._come_home)
         self._relay = HereRelay(folder.path / "here")
         self._run: Run | None = None
+        self.config: EnvironmentConfig | None = None
+        """What is flown in; None before the limits have been found to leave room for the flight."""
         self._environment: Environment | None = None
         self._meter = FlightMeter()
         self._called: set[str] = set()
@@ -123,10 +125,11 @@ class Flying:
 
     def _fly(self) -> None:
         order, document = self._order, read_mission(self._folder.document)
+        self.config = _environment_of(order)
         current_options.set(
             RunOptions(
                 environment=order.fleet,
-                config=environment_of(order),
+                config=self.config,
                 speed=None if order.speed == "max" else order.speed,
                 lockstep=order.speed == "max",
                 seed=order.seed,
@@ -196,7 +199,7 @@ class Flying:
         edges = environment.graph.navigation if environment is not None else ()
         return robot in {edge.robot for edge in edges}
 
-    def command(self, robot: str, name: str) -> Answer:
+    def command(self, robot: str, name: CommandWord) -> Answer:
         """Execute a command; raises MissionError for a robot that does not fly."""
         return self._flying(robot).command(robot, COMMANDS[name])
 

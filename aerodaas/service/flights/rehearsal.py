@@ -6,11 +6,12 @@ import contextlib
 import os
 from pathlib import Path
 
+from aerodaas.config.model import EnvironmentConfig
 from aerodaas.dataflow.mission_document import read_mission
 from aerodaas.protocol.schemas import VerdictOut
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder, Outcome
-from aerodaas.service.flights.process import Flying, environment_of
+from aerodaas.service.flights.process import Flying
 from aerodaas.service.rehearsal import judge
 from aerodaas.service.rehearsal.picture import draw
 from aerodaas.types.errors import AeroDaaSError
@@ -28,18 +29,20 @@ def rehearse(path: Path) -> None:
     order = FlightOrder.read(folder.order)
     os.chdir(folder.path)
     with folder.claim():
-        outcome = Flying(folder, order).outcome()
-        verdict = _verdict(folder, order, outcome)
+        flying = Flying(folder, order)
+        outcome = flying.outcome()
+        verdict = _verdict(folder, order, flying.config, outcome)
         # The verdict and its picture are all that is kept of it.
         folder.recording.unlink(missing_ok=True)
         folder.end(outcome.model_copy(update={"verdict": verdict}))
 
 
-def _verdict(folder: FlightFolder, order: FlightOrder, outcome: Outcome) -> VerdictOut:
-    if not folder.recording.is_file():
+def _verdict(
+    folder: FlightFolder, order: FlightOrder, config: EnvironmentConfig | None, outcome: Outcome
+) -> VerdictOut:
+    if config is None or not folder.recording.is_file():
         return VerdictOut(approved=False, reasons=[outcome.reason])
     try:
-        config = environment_of(order)
         verdict = judge(folder.recording, config, minutes=order.minutes, others=order.others)
         # The picture is for people; a flight is not refused for want of it.
         with contextlib.suppress(AeroDaaSError):
