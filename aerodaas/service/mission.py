@@ -64,6 +64,10 @@ class ActiveMission:
         self._document.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         write_private(self._document, document.text())
 
+    def discard(self) -> None:
+        """Remove what `write` has kept, of a mission that is not taken in after all."""
+        shutil.rmtree(self._document.parent)
+
     def document(self) -> MissionDocument:
         """The document; raises ConfigError if its file is gone."""
         return read_mission(self._document)

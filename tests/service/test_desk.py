@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -70,10 +71,10 @@ class Desk:
             models=ModelShelf(self.settings.models),
         )
 
-    def submit(self, robot: str, **more: object) -> MissionOut:
+    def submit(self, robot: str, key: str | None = None, **more: object) -> MissionOut:
         """Submit a mission for one drone."""
         content = {"document": document(robot, (5, 0)), **more}
-        return self.desk.submit(PILOT, MissionIn.model_validate(content))
+        return self.desk.submit(PILOT, MissionIn.model_validate(content), key)
 
     def phase(self, mission: MissionOut) -> MissionPhase:
         """Present phase of a mission."""
@@ -137,6 +138,24 @@ def test_a_full_disk_takes_no_missions(one: Desk, monkeypatch: pytest.MonkeyPatc
     with pytest.raises(RefusedError, match="make room") as refused:
         one.submit("one")
     assert refused.value.status == 507
+
+
+def test_one_key_is_one_mission_however_many_send_it_at_once(one: Desk) -> None:
+    """Also while none of them is kept yet; what the others wrote is gone."""
+    with ThreadPoolExecutor(8) as pool:
+        ids = {found.id for found in pool.map(lambda _: one.submit("one", "k"), range(8))}
+    assert len(ids) == 1
+    assert [row.id for row in one.store.missions.all()] == list(ids)
+    assert {path.name for path in one.settings.missions.iterdir()} == ids
+
+
+def test_what_has_used_up_its_quota_is_still_found_by_its_key(one: Desk) -> None:
+    """The answer to a repeated submission does not depend on what happened since."""
+    first = one.submit("one", "k")
+    one.desk._garage.take_out(["one"])
+    assert one.submit("one", "k").id == first.id
+    with pytest.raises(RefusedError, match="out of service"):
+        one.submit("one", "other")
 
 
 def test_a_mission_is_taken_up_again_by_the_next_service(one: Desk) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import time
+import uuid
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -14,6 +17,7 @@ from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
 from aerodaas.environment.provider.address import ServiceAddress
 from aerodaas.environment.provider.exchange import Exchange, Method
 from aerodaas.environment.provider.live import LiveConnection
+from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
 from aerodaas.protocol.schemas import (
     AccountIn,
@@ -31,7 +35,7 @@ from aerodaas.protocol.schemas import (
     TokenOut,
     UsageOut,
 )
-from aerodaas.types.errors import ConfigError
+from aerodaas.types.errors import ConfigError, SourceError
 
 __all__ = ["LARGEST_MODEL", "ProviderClient"]
 
@@ -39,6 +43,8 @@ M = TypeVar("M")
 LARGEST_MODEL = 64 << 20
 """Bytes of a model that a service takes."""
 _ABSENT = frozenset({404})
+_RESEND_SECONDS = 30.0
+"""Seconds for which a submission is sent again, as long as a service takes to be started anew."""
 
 
 def _nothing(_done: int, _all: int | None) -> None:
@@ -125,13 +131,25 @@ class ProviderClient:
         self._exchange.send("PUT", f"/v1/models/{sha256}", content, headers)
         return sha256
 
-    def submit(self, wanted: MissionIn) -> MissionOut:
-        """Submit a mission.
+    def submit(self, wanted: MissionIn, key: str | None = None) -> MissionOut:
+        """Submit a mission, once: where the answer is lost it is sent again, with the same key.
 
-        It is never sent twice. Where the answer is lost (SourceError), `missions` tells whether it
-        has arrived.
+        Args:
+            wanted: The mission.
+            key: Idempotency key, 1 to 255 printable ASCII characters without quotation marks and
+                backslashes: for a caller that may have to repeat the call itself. None for a
+                random one.
+
+        Raises SourceError once the service has not answered for half a minute; then `missions`
+        tells whether it has arrived.
         """
-        return self._ask(MissionOut, "POST", "/v1/missions", wanted)
+        headers = {"Idempotency-Key": f'"{key or uuid.uuid4()}"'}
+        waiting, until = pauses(), time.monotonic() + _RESEND_SECONDS
+        while time.monotonic() + (pause := next(waiting)) < until:
+            with contextlib.suppress(SourceError):
+                return self._ask(MissionOut, "POST", "/v1/missions", wanted, headers)
+            time.sleep(pause)
+        return self._ask(MissionOut, "POST", "/v1/missions", wanted, headers)
 
     def missions(self) -> list[MissionOut]:
         """All missions that the account may see, newest first."""
@@ -242,9 +260,10 @@ class ProviderClient:
         method: Method,
         path: str,
         content: BaseModel | dict[str, Any] | None = None,
+        headers: dict[str, str] | None = None,
     ) -> M:
         body = content.model_dump(mode="json") if isinstance(content, BaseModel) else content
-        answer = self._exchange.ask(method, path, body)
+        answer = self._exchange.ask(method, path, body, headers)
         try:
             return TypeAdapter(kind).validate_python(answer)
         except ValidationError as error:

@@ -122,6 +122,12 @@ class Missions(Rows[Mission]):
             _is(columns.tenant, tenant), among, order=[columns.submitted.desc()], limit=limit
         )
 
+    def of_key(self, tenant: str, key: str) -> Mission | None:
+        """A tenant's mission by the idempotency key of its submission; None if there is none."""
+        columns = tables.MISSIONS.c
+        found = self._select(columns.tenant == tenant, columns.key == key, limit=1)
+        return next(iter(found), None)
+
 
 class Robots(Rows[RobotState]):
     """What is known of drones, by id."""

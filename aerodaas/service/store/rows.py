@@ -130,6 +130,10 @@ class Mission:
     """JSON of `MissionIn` without its document."""
     verdict: Mapping[str, Any] | None = None
     """JSON of `VerdictOut`."""
+    key: str | None = None
+    """Idempotency key of its submission; no two missions of a tenant have the same."""
+    fingerprint: str | None = None
+    """SHA-256 of the submission with that key, hexadecimal."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from sqlalchemy import (
     Integer,
     MetaData,
     Table,
+    UniqueConstraint,
 )
 
 from aerodaas.protocol.schemas import LeaseState, MissionPhase, Role, Scope
@@ -119,6 +120,10 @@ MISSIONS = Table(
     Column("ended", Double),
     Column("request", JsonText(), nullable=False),
     Column("verdict", JsonText()),
+    Column("key", Words),
+    Column("fingerprint", Words),
+    # Those without a key are not compared: NULL equals nothing.
+    UniqueConstraint("tenant", "key"),
     Index("missions_newest", "tenant", "submitted"),
 )
 

@@ -67,6 +67,8 @@ def test_answers_are_models(client: ProviderClient, stub: Stub) -> None:
         (429, MissionError),
         (500, MissionError),
         (503, MissionError),
+        (502, SourceError),
+        (504, SourceError),
     ],
 )
 def test_a_refusal_is_an_error_with_the_services_text(
