@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli import cluster, lab, provider, remote
+from aerodaas.cli import cluster, lab, lease, provider, remote
 from aerodaas.cli.application import run_application, speed_option
 from aerodaas.cli.examples import ExampleGroup
 from aerodaas.cli.export import export
@@ -48,6 +48,7 @@ flies a simulated drone or a Tello.
 app.add_typer(remote.app, name="remote")
 app.add_typer(lab.app, name="lab")
 app.add_typer(cluster.app, name="cluster")
+app.add_typer(lease.app, name="lease", rich_help_panel=_PROVIDER)
 
 
 @app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
@@ -227,7 +228,6 @@ for _command in (
     provider.watch,
     provider.cancel,
     provider.fetch,
-    provider.leases,
 ):
     app.command(rich_help_panel=_PROVIDER)(_command)
 app.command(
