@@ -336,6 +336,8 @@ class MissionDesk:
         one.to(MissionPhase.REHEARSING)
 
     def _judge(self, one: ActiveMission) -> None:
+        if one.rehearsal_lost:
+            one.rehearse(self._briefing.rehearsal(one.row), self._models)
         verdict = one.verdict(self._settings.rehearsal_seconds)
         if verdict is None:
             return

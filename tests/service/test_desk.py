@@ -13,13 +13,21 @@ import pytest
 from served import document, fleet, robot
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, Role, Scope
+from aerodaas.protocol.schemas import (
+    MissionIn,
+    MissionOut,
+    MissionPhase,
+    Role,
+    Scope,
+    VerdictOut,
+)
 from aerodaas.service import mission as missions
 from aerodaas.service import models
 from aerodaas.service.access import Principal, Quotas
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.flights.order import Outcome
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.settings import ServiceSettings
@@ -55,7 +63,8 @@ class Desk:
         self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
         self.open()
 
-    def _start(self, folder: Any) -> Process:  # noqa: ANN401 - FlightFolder
+    def _start(self, folder: Any, *, tied: bool) -> Process:  # noqa: ANN401 - FlightFolder
+        assert tied == (folder.path.name == "r"), "a flight outlives the service, no rehearsal does"
         self.started.append(folder.path)
         return Process()
 
@@ -171,6 +180,29 @@ def test_a_mission_is_taken_up_again_by_the_next_service(one: Desk) -> None:
     one.open()
     one.turns(1)
     assert one.started == [flights[first.id]]
+
+
+def test_a_rehearsal_that_ended_with_its_service_is_begun_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the next one; one that has a result is judged by that, and not flown twice."""
+    made = Desk(tmp_path, monkeypatch, rehearse=True)
+    lost, judged = made.submit("one"), made.submit("two")
+    made.turns(1)
+    assert len(made.started) == 2
+    outcome = Outcome(
+        landed=True, reason="", began=0.0, ended=1.0, verdict=VerdictOut(approved=True)
+    )
+    made.desk._missions[judged.id].rehearsal.end(outcome)
+    made.started.clear()
+    made.open()
+    made.turns(3)
+    assert made.started == [
+        made.desk._missions[lost.id].rehearsal.path,
+        made.desk._missions[judged.id].flight.path,
+    ]
+    assert made.phase(lost) is MissionPhase.REHEARSING
+    made.store.close()
 
 
 def test_leases_end_while_the_database_is_gone(one: Desk, monkeypatch: pytest.MonkeyPatch) -> None:
