@@ -13,13 +13,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
+from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.protocol.schemas import (
     CommandIn,
     LeaseState,
     MissionIn,
     MissionOut,
     MissionPhase,
+    NavigationIn,
     Role,
 )
 from aerodaas.service.access import Principal, sees
@@ -173,10 +174,10 @@ class MissionDesk:
         """Give a robot of a flying mission a command; raises MissionError if it is lost."""
         return self._ask(principal, mission, do=command.command, robot=command.robot)
 
-    def fly(self, principal: Principal, mission: str, robot: str, body: WaypointsIn) -> AnswerOut:
+    def fly(self, principal: Principal, mission: str, navigation: NavigationIn) -> AnswerOut:
         """Add waypoints to a flying mission; raises MissionError if it is lost."""
-        waypoints = body.model_dump(mode="json", include=set(WaypointsIn.model_fields))
-        return self._ask(principal, mission, do="fly", robot=robot, waypoints=waypoints)
+        content = navigation.model_dump(mode="json")
+        return self._ask(principal, mission, do="fly", navigation=content)
 
     def _ask(self, principal: Principal, mission: str, **request: Any) -> AnswerOut:  # noqa: ANN401
         self._require_own(principal, mission)

@@ -13,7 +13,7 @@ from urllib.parse import quote, urlencode
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
+from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.environment.provider.address import ServiceAddress
 from aerodaas.environment.provider.exchange import Exchange, Method
 from aerodaas.environment.provider.live import LiveConnection
@@ -29,6 +29,7 @@ from aerodaas.protocol.schemas import (
     LeaseOut,
     MissionIn,
     MissionOut,
+    NavigationIn,
     Role,
     Scope,
     TokenIn,
@@ -172,11 +173,10 @@ class ProviderClient:
         path = f"/v1/missions/{_part(mission)}/commands"
         return self._ask(AnswerOut, "POST", path, command)
 
-    def add_navigation(self, mission: str, robot: str, waypoints: WaypointsIn) -> AnswerOut:
-        """Add waypoints to the queue of a robot; the answer is its own."""
+    def add_navigation(self, mission: str, navigation: NavigationIn) -> AnswerOut:
+        """Add waypoints to the queue of a robot, or take its place; the answer is its own."""
         path = f"/v1/missions/{_part(mission)}/navigation"
-        content = {**waypoints.model_dump(mode="json"), "robot": robot}
-        return self._ask(AnswerOut, "POST", path, content)
+        return self._ask(AnswerOut, "POST", path, navigation)
 
     def recording(
         self,

@@ -7,20 +7,21 @@ from typing import Annotated, Any
 from fastapi import APIRouter, BackgroundTasks, Header, Request
 from fastapi.responses import FileResponse
 
-from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
-from aerodaas.protocol.schemas import CommandIn, MissionIn, MissionOut, Role, Scope, Word
+from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.protocol.schemas import (
+    CommandIn,
+    MissionIn,
+    MissionOut,
+    NavigationIn,
+    Role,
+    Scope,
+)
 from aerodaas.service.access import Audit, Principal
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.idempotency import read_key
 from aerodaas.service.routes.admission import Admission
 
 __all__ = ["MissionRoutes"]
-
-
-class NavigationIn(WaypointsIn):
-    """Waypoints for one robot of a mission."""
-
-    robot: Word
 
 
 class MissionRoutes:
@@ -106,7 +107,7 @@ class MissionRoutes:
     ) -> AnswerOut:
         """Add waypoints to the queue of one of the mission's robots."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        answer = self._desk.fly(principal, mission, body.robot, body)
+        answer = self._desk.fly(principal, mission, body)
         later.add_task(self._note, principal, "navigation", f"{mission}/{body.robot}", answer)
         return answer
 

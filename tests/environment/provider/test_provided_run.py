@@ -22,7 +22,8 @@ from aerodaas.analytics.wire_items import pack
 from aerodaas.config.options import ProviderOptions, RunOptions, current_options
 from aerodaas.environment.provider import client as client_module
 from aerodaas.environment.provider import follower, pauses
-from aerodaas.protocol.schemas import MissionPhase, VerdictOut
+from aerodaas.mission.commands import AddNavigation
+from aerodaas.protocol.schemas import MissionPhase, NavigationIn, VerdictOut
 from aerodaas.types.errors import (
     ConfigError,
     GraphError,
@@ -206,10 +207,23 @@ def test_navigation_by_a_scheduler_goes_over_the_wire(stub: Stub) -> None:
     with pytest.raises(GraphError, match="cannot be set while a provider flies"):
         environment.set_trajectory_scheduler(OrderedScheduler(environment))
     added = [json.loads(one) for one in stub.sent("POST", "/navigation")]
-    assert [(one["index"], one["waypoints"][0]["deadline"]) for one in added] == [(0, 40)]
+    assert [(one["index"], one["deadline"]) for one in added] == [(0, 40)]
     assert [json.loads(one)["command"] for one in stub.sent("POST", "/commands")] == ["clear"]
     stub.state = mission(MissionPhase.LANDED)
     environment.wait()
+
+
+def test_a_queue_is_replaced_by_one_request(stub: Stub) -> None:
+    """Between two, the drone would have nothing to fly; an empty queue is another command's."""
+    with flying(stub) as environment:
+        environment.command("drone", AddNavigation(hop((1, 1)), deadline=40, clear_first=True))
+        (sent,) = [json.loads(one) for one in stub.sent("POST", "/navigation")]
+        arrived = NavigationIn.model_validate(sent).command()
+        assert (arrived.deadline, arrived.clear_first) == (40.0, True)
+        assert [one.id for one in arrived.navigation.waypoints] == ["a0"]
+        assert stub.sent("POST", "/commands") == []
+        with pytest.raises(MissionError, match="the navigation is empty"):
+            environment.command("drone", AddNavigation(AeroNavigation()))
 
 
 def test_what_was_not_submitted_cannot_be_added(stub: Stub) -> None:

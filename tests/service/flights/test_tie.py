@@ -36,7 +36,7 @@ SECONDS = 30.0
 def gone(process: psutil.Process) -> bool:
     """Whether a process has ended; nobody may have asked how."""
     try:
-        return process.status() == psutil.STATUS_ZOMBIE
+        return bool(process.status() == psutil.STATUS_ZOMBIE)
     except psutil.NoSuchProcess:
         return True
 
