@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import re
-import socket
 import threading
 from contextlib import suppress
 
 from aerodaas.analytics.remote.guard import host_name, is_loopback, is_served
+from aerodaas.analytics.remote.listening import listen
 
 __all__ = ["WebGate"]
 
@@ -32,8 +32,7 @@ class WebGate:
 
     def __init__(self, host: str, port: int, target: tuple[str, int]) -> None:
         """Listen at `host`:`port` and pass on to `target`; raises OSError."""
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
-        self._socket = socket.create_server((host, port), family=family)
+        self._socket = listen(host, port)
         self.port: int = self._socket.getsockname()[1]
         """Port that it listens on."""
         self._host = host

@@ -6,9 +6,9 @@ import socket
 from collections.abc import Callable
 from pathlib import Path
 
-import uvicorn
-
 from aerodaas.analytics.remote.guard import is_loopback
+from aerodaas.analytics.remote.listening import listen
+from aerodaas.analytics.remote.serving import web_server
 from aerodaas.service.access import Accounts
 from aerodaas.service.app import build_service
 from aerodaas.service.settings import ServiceSettings
@@ -65,26 +65,21 @@ def serve(
         scheme = "https" if certificate is not None else "http"
         where = f"[{host}]" if ":" in host else host
         tell(f"serving {settings.config.name} at {scheme}://{where}:{listener.getsockname()[1]}")
-        config = uvicorn.Config(
+        web_server(
             build_service(settings, store, tell),
-            log_config=None,
-            access_log=False,
+            most_connections=_MOST_CONNECTIONS,
             ssl_certfile=certificate,
             ssl_keyfile=key,
-            limit_concurrency=_MOST_CONNECTIONS,
             ws_max_size=_MOST_MESSAGE,
             ws_ping_interval=_PING_SECONDS,
             ws_ping_timeout=_PING_SECONDS,
             timeout_graceful_shutdown=2,
-            server_header=False,
-        )
-        uvicorn.Server(config).run(sockets=[listener])
+        ).run(sockets=[listener])
 
 
 def _bound(host: str, port: int) -> socket.socket:
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
     try:
-        return socket.create_server((host, port), family=family)
+        return listen(host, port)
     except OSError as error:
         raise SourceError(
             f"cannot listen on {host}:{port}: {error.strerror}; choose another --port"

@@ -110,7 +110,7 @@ def within(fence: Geofence, place: tuple[float, float, float]) -> bool:
     """
     outside = fence.area is not None and not shapely.covers(fence.area, shapely.Point(place[:2]))
     near = outside and shapely.distance(fence.area, shapely.Point(place[:2])) <= 1e-6
-    return fence.contains(np.array(place)) or near
+    return fence.contains(np.array(place)) or bool(near)
 
 
 @settings(max_examples=100, deadline=None)

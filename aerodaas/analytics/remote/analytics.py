@@ -16,6 +16,7 @@ from aerodaas.analytics.base import Context, ResourceUse
 from aerodaas.analytics.commanding import CommandingAnalytics, MissionLink
 from aerodaas.analytics.remote.client import TOKEN_VARIABLE
 from aerodaas.analytics.remote.guard import Guard, is_loopback
+from aerodaas.analytics.remote.listening import listen
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import RemoteConfig
 from aerodaas.types.data import Alert, Frame, Header
@@ -105,9 +106,8 @@ class RemoteAnalytics(CommandingAnalytics):
             SourceError: If the port cannot be bound.
         """
         host, port = self._settings.host, self._settings.port
-        family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:
-            self._socket = socket.create_server((host, port), family=family)
+            self._socket = listen(host, port)
         except OSError as error:
             raise SourceError(
                 f"remote control cannot listen on {host}:{port}: {error.strerror}; "
@@ -116,23 +116,19 @@ class RemoteAnalytics(CommandingAnalytics):
 
     def begin(self, mission: MissionLink) -> None:
         """Start the server in a thread."""
-        import uvicorn  # noqa: PLC0415 - only in the actor
-
         from aerodaas.analytics.remote.app import build_app  # noqa: PLC0415 - only in the actor
+        from aerodaas.analytics.remote.serving import web_server  # noqa: PLC0415
 
         assert self._socket is not None  # noqa: S101 - open came first
         token = self._settings.token.get_secret_value() if self._settings.token else None
         app = Guard(build_app(mission, lambda: self._frame), token, _alerting(mission))
-        config = uvicorn.Config(
+        self._server = web_server(
             app,
-            log_config=None,
-            access_log=False,
+            most_connections=_MOST_CONNECTIONS,
             lifespan="off",
             timeout_graceful_shutdown=1,
-            limit_concurrency=_MOST_CONNECTIONS,
             ws_max_size=_MOST_BYTES_SENT,
         )
-        self._server = uvicorn.Server(config)
         self._thread = threading.Thread(
             target=self._server.run,
             kwargs={"sockets": [self._socket]},

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import html
-import socket
 import threading
 from collections.abc import AsyncIterator
 from dataclasses import dataclass, field
@@ -16,13 +15,14 @@ from typing import Any
 
 import cv2
 import numpy as np
-import uvicorn
 from fastapi import FastAPI, HTTPException
 from fastapi.responses import HTMLResponse, StreamingResponse
 from numpy.typing import NDArray
 from typing_extensions import Self
 
 from aerodaas.analytics.remote.guard import HostGuard
+from aerodaas.analytics.remote.listening import listen
+from aerodaas.analytics.remote.serving import web_server
 from aerodaas.recording.report.overlay import draw_detections, draw_line
 from aerodaas.types.data import Detection, Detections, Frame
 from aerodaas.types.errors import ConfigError
@@ -63,7 +63,7 @@ class CameraPage:
         if not host or not port.isdigit():
             raise ConfigError(f"the camera's page is served at host:port, not at {address!r}")
         try:
-            self._socket = socket.create_server((host, int(port)))
+            self._socket = listen(host.strip("[]"), int(port))
         except (OSError, OverflowError) as error:
             raise ConfigError(
                 f"cannot serve the camera's page at {address}: {error}; give another --view-address"
@@ -73,15 +73,12 @@ class CameraPage:
         self._cameras: dict[str, _Camera] = {}
         self._states: dict[str, str] = {}
         self._lock = threading.Lock()
-        config = uvicorn.Config(
+        self._server = web_server(
             HostGuard(self._app(), host),
-            limit_concurrency=_MOST_CONNECTIONS,
-            log_config=None,
-            access_log=False,
+            most_connections=_MOST_CONNECTIONS,
             lifespan="off",
             timeout_graceful_shutdown=1,
         )
-        self._server = uvicorn.Server(config)
         words = {"sockets": [self._socket]}
         self._thread = threading.Thread(target=self._server.run, kwargs=words, daemon=True)
         self._thread.start()

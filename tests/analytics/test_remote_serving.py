@@ -1,0 +1,152 @@
+"""Connections that ask nothing: closed in time, and nothing else is."""
+
+from __future__ import annotations
+
+import asyncio
+import select
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+
+import pytest
+from websockets.sync.client import connect
+
+from aerodaas.analytics.remote import serving
+from aerodaas.analytics.remote.guard import App, Receive, Scope, Send
+from aerodaas.analytics.remote.listening import listen
+from aerodaas.analytics.remote.serving import web_server
+
+PATIENCE = 0.5
+_MOST = 2
+_ENOUGH = 10.0
+HEAD = b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 4\r\n\r\n"
+
+
+async def application(scope: Scope, receive: Receive, send: Send) -> None:
+    """Answers a body once it is whole, `/slow` later than a client is waited for."""
+    if scope["type"] == "websocket":
+        await receive()
+        await send({"type": "websocket.accept"})
+        while (message := await receive())["type"] == "websocket.receive":
+            await send({"type": "websocket.send", "text": message["text"]})
+        return
+    body = b""
+    while True:
+        message = await receive()
+        if message["type"] != "http.request":
+            return
+        body += message["body"]
+        if not message["more_body"]:
+            break
+    if scope["path"] == "/slow":
+        await asyncio.sleep(3 * PATIENCE)
+    length = b"%d" % len(body)
+    await send(
+        {"type": "http.response.start", "status": 200, "headers": [(b"content-length", length)]}
+    )
+    await send({"type": "http.response.body", "body": body})
+
+
+@pytest.fixture
+def port(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
+    """Port of a server with short patience and two connections."""
+    monkeypatch.setattr(serving, "_HEAD_SECONDS", PATIENCE)
+    monkeypatch.setattr(serving, "_BODY_SECONDS", PATIENCE)
+    app: App = application
+    server = web_server(app, most_connections=_MOST + 1, lifespan="off", timeout_keep_alive=60)
+    with listen("127.0.0.1", 0) as listener:
+        thread = threading.Thread(target=server.run, kwargs={"sockets": [listener]})
+        thread.start()
+        yield listener.getsockname()[1]
+        server.should_exit = True
+        thread.join(_ENOUGH)
+    assert not thread.is_alive()
+
+
+def client(port: int) -> socket.socket:
+    """A connection."""
+    return socket.create_connection(("127.0.0.1", port), timeout=_ENOUGH)
+
+
+def closed_while_dripping(connection: socket.socket, drip: bytes) -> bool:
+    """Whether the server closes the connection while one sends it a byte at a time."""
+    deadline = time.monotonic() + _ENOUGH
+    with suppress(OSError):
+        while time.monotonic() < deadline:
+            connection.sendall(drip)
+            if select.select([connection], [], [], 0.1)[0] and not connection.recv(1000):
+                return True
+        return False
+    return True
+
+
+def test_a_client_that_says_nothing_is_closed(port: int) -> None:
+    """By an end of file, without an answer."""
+    with client(port) as silent:
+        assert silent.recv(100) == b""
+
+
+def test_silent_clients_make_room_for_others(port: int) -> None:
+    """Who comes when all places are taken waits no longer than they are waited for."""
+    silent = [client(port) for _ in range(_MOST)]
+    for one in silent:
+        assert one.recv(100) == b""
+        one.close()
+    with client(port) as asking:
+        asking.sendall(HEAD + b"body")
+        assert asking.recv(1000).startswith(b"HTTP/1.1 200")
+
+
+def test_headers_that_drip_are_closed(port: int) -> None:
+    """More bytes of the same request do not start the clock anew."""
+    with client(port) as slow:
+        slow.sendall(b"POST / HTTP/1.1\r\nHost: localhost\r\nX-Long: ")
+        assert closed_while_dripping(slow, b"a")
+
+
+def test_a_body_that_drips_is_closed(port: int) -> None:
+    """The request has arrived, and its body never does."""
+    with client(port) as slow:
+        slow.sendall(HEAD.replace(b"Length: 4", b"Length: 4000"))
+        assert closed_while_dripping(slow, b"b")
+
+
+def test_a_further_request_is_waited_for_no_longer(port: int) -> None:
+    """A connection that has asked once properly is not trusted more."""
+    with client(port) as slow:
+        slow.sendall(HEAD + b"body")
+        assert slow.recv(1000).startswith(b"HTTP/1.1 200")
+        slow.sendall(b"POST / HTTP/1.1\r\nX-Long: ")
+        assert closed_while_dripping(slow, b"a")
+
+
+def test_an_answer_may_take_longer(port: int) -> None:
+    """The clock is the client's, not the application's."""
+    with client(port) as patient:
+        patient.sendall(HEAD.replace(b"POST /", b"POST /slow") + b"body")
+        answer = b""
+        while chunk := patient.recv(1000):
+            answer += chunk
+            if answer.endswith(b"body"):
+                break
+        assert answer.startswith(b"HTTP/1.1 200")
+        assert answer.endswith(b"body")
+
+
+def test_a_body_within_its_time_is_taken(port: int) -> None:
+    """Headers in two pieces, and a body in two more."""
+    with client(port) as slow:
+        for piece in (HEAD[:20], HEAD[20:], b"bo", b"dy"):
+            slow.sendall(piece)
+            time.sleep(PATIENCE / 8)
+        assert slow.recv(1000).startswith(b"HTTP/1.1 200")
+
+
+def test_a_websocket_stays(port: int) -> None:
+    """It is silent for longer than a request may be."""
+    with connect(f"ws://127.0.0.1:{port}/", open_timeout=_ENOUGH) as quiet:
+        time.sleep(3 * PATIENCE)
+        quiet.send("still here")
+        assert quiet.recv(_ENOUGH) == "still here"
