@@ -196,7 +196,8 @@ class Stub:
 
     async def _follow(self, socket: WebSocket, streams: str = "") -> None:
         if "/v1/missions" in self.refusals:
-            await socket.close(1008)
+            code, content = self.refusals["/v1/missions"]
+            await socket.send_denial_response(JSONResponse(content, code))
             return
         await socket.accept()
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):

@@ -203,8 +203,7 @@ class ProviderClient:
         """
         query = urlencode({"rate": f"{rate:g}", "streams": ",".join(streams)})
         path = f"/v1/missions/{_part(mission)}/live?{query}"
-        # The handshake's refusal has no text; that of the same mission by HTTP has.
-        return LiveConnection.open(self._exchange, path, lambda: self.mission(mission))
+        return LiveConnection.open(self._exchange, path)
 
     def here(self, mission: str) -> WireConnection:
         """Connect as the user's side of a mission, which is asked by its own analyses.
@@ -212,7 +211,7 @@ class ProviderClient:
         Raises as `live`.
         """
         path = f"/v1/missions/{_part(mission)}/here"
-        return WireConnection.open(self._exchange, path, lambda: self.mission(mission))
+        return WireConnection.open(self._exchange, path)
 
     def accounts(self) -> list[AccountOut]:
         """All accounts, as an administrator."""

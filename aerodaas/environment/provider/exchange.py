@@ -154,8 +154,9 @@ class Exchange:
             "`aerodaas serve` of this version?"
         )
 
-    def refused(self, status: int, text: str) -> AeroDaaSError:
-        """The error of a refusal, with the service's text."""
+    def refusal(self, status: int, answer: bytes) -> AeroDaaSError:
+        """The error of a refusal, with the text of its answer."""
+        text = _text(answer) or f"it answered with status {status}"
         if status in _GATEWAYS:
             return self.unreachable(ConnectionError(text))
         hint = _LOGIN if status == HTTPStatus.UNAUTHORIZED else ""
@@ -185,7 +186,7 @@ class Exchange:
 
     def _require_success(self, status: int, answer: bytes) -> None:
         if not HTTPStatus.OK <= status < HTTPStatus.MULTIPLE_CHOICES:
-            raise self.refused(status, _text(answer) or f"it answered with status {status}")
+            raise self.refusal(status, answer)
 
 
 def _text(answer: bytes) -> str:

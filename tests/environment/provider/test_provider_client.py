@@ -201,10 +201,12 @@ def test_a_name_is_one_part_of_a_path(client: ProviderClient, stub: Stub) -> Non
 def test_live_connections_tell_the_mission_until_it_is_over(
     client: ProviderClient, stub: Stub
 ) -> None:
-    """A refused one is told in the service's words, as WebSockets have none."""
+    """A refused one is told in the service's words, which its handshake's answer has."""
     stub.state = mission(MissionPhase.LANDED)
     with client.live(MISSION) as live:
         assert list(live) == [stub.state]
     stub.refusals["/v1/missions"] = (403, {"text": "another tenant's"})
+    asked = len(stub.asked)
     with pytest.raises(ConfigError, match="another tenant's"):
         client.live(MISSION)
+    assert len(stub.asked) == asked, "it needs no further question"

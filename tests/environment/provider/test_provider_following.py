@@ -119,6 +119,7 @@ def test_items_of_a_stream_arrive_in_order(client: ProviderClient, stub: Stub) -
     assert isinstance(picture, Frame)
     assert picture.header == frame.header
     assert picture.image.shape == (36, 64, 3)
+    assert reader.next(SECONDS) == "text"
     assert reader.newest(SECONDS) == "text"
     assert reader.newest(0.0) == "text"
     with pytest.raises(TimeoutError):
