@@ -57,6 +57,10 @@ class Accounts(Rows[Account]):
         """Those of a tenant, or all, by name."""
         return self._select(_is(tables.ACCOUNTS.c.tenant, tenant))
 
+    def of_subject(self, subject: str) -> Account | None:
+        """The account of a subject of an issuer; None before its first request."""
+        return next(iter(self._select(tables.ACCOUNTS.c.subject == subject, limit=1)), None)
+
 
 class Tokens(Rows[Token]):
     """Tokens, by id."""

@@ -57,6 +57,8 @@ class Account:
     scopes: frozenset[Scope]
     created: float
     disabled: bool = False
+    subject: str | None = None
+    """Who it is at an OpenID Connect issuer: that one's URL and its id of them."""
 
 
 @dataclass(frozen=True, slots=True)

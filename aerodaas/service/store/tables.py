@@ -65,6 +65,7 @@ ACCOUNTS = Table(
     Column("scopes", JsonText(_scopes), nullable=False),
     Column("created", Double, nullable=False),
     Column("disabled", Boolean, nullable=False),
+    Column("subject", Words, unique=True),
 )
 
 TOKENS = Table(
