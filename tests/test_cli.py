@@ -399,7 +399,7 @@ def test_the_doctor_names_a_port_that_is_taken(
 
 def test_help_teaches_by_example(aerodaas: Commands) -> None:
     """Each command shows how it is called."""
-    assert "aerodaas run apps/farm_survey.py" in aerodaas("--help").out
+    assert "aerodaas run farm_survey" in aerodaas("--help").out
     for command in ("run", "schema", "doctor"):
         ended = aerodaas(command, "--help")
         assert ended.code == 0

@@ -11,11 +11,14 @@ import typer
 
 from aerodaas.cli import cluster, lab, provider, remote
 from aerodaas.cli.application import run_application, speed_option
-from aerodaas.cli.examples import ExampleGroup
+from aerodaas.cli.examples import examples
 from aerodaas.cli.export import export
+from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.new import new
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
 from aerodaas.cli.serve import serve
+from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.errors import (
     AeroDaaSError,
@@ -42,9 +45,12 @@ app = typer.Typer(
 An application of some 20 lines becomes a dataflow of sensing, analytics and navigation, and
 flies a simulated drone or a Tello.
 
-    aerodaas run apps/farm_survey.py --speed max
+    aerodaas run farm_survey
+    aerodaas new my_app
 """,
 )
+app.command()(new)
+app.command()(examples)
 app.add_typer(remote.app, name="remote")
 app.add_typer(lab.app, name="lab")
 app.add_typer(cluster.app, name="cluster")
@@ -54,7 +60,10 @@ app.add_typer(cluster.app, name="cluster")
 def run(
     context: typer.Context,
     application: Annotated[
-        Path, typer.Argument(help="The application: a Python file, or a mission document.")
+        Path,
+        typer.Argument(
+            help="The application: a Python file, a mission document, or the name of an example."
+        ),
     ],
     env: Annotated[
         Path | None, typer.Option(help="Environment file instead of the application's own.")
@@ -116,15 +125,16 @@ def run(
 
     Words after `--` are the application's own.
 
-        aerodaas run apps/farm_survey.py
-        aerodaas run apps/farm_survey.py --speed 5 --seed 7 --record /tmp/farm
-        aerodaas run apps/farm_survey.py --set quadrotor_base.limits.cruise_speed=1
+        aerodaas run farm_survey
+        aerodaas run my_app.py --speed 5 --seed 7 --record /tmp/farm
+        aerodaas run farm_survey --set quadrotor_base.limits.cruise_speed=1
         aerodaas run mine.py --guest theirs.py --grant theirs=sense:cam1,compute:edge
-        aerodaas run apps/watch_frames.py -- pictures/ yolov8n.onnx --rate 5
+        aerodaas run watch_frames -- pictures/ yolov8n.onnx --rate 5
     """
     from aerodaas.config.grants import parse_words  # noqa: PLC0415 - slow to load
     from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - as above
 
+    application = find_application(application)
     factor, lockstep = speed_option(speed)
     options = RunOptions(
         environment=env,
@@ -137,7 +147,7 @@ def run(
         view=view is not False,
         live=live_address if live else None,
         page=view_address if view else None,
-        guests=tuple(path.resolve() for path in guest or ()),
+        guests=tuple(find_application(path).resolve() for path in guest or ()),
         grants=parse_words(grant or ()),
         application=application.resolve(),
     )
@@ -166,9 +176,9 @@ def compile_command(
     The file runs up to `start_mission()`. Words after `--` are the application's own. Of a
     recording, it is the document that was flown.
 
-        aerodaas compile apps/farm_survey.py -o apps/farm_survey.json
-        aerodaas run apps/farm_survey.json
-        aerodaas compile flight.mcap | diff apps/farm_survey.json -
+        aerodaas compile my_app.py -o my_app.json
+        aerodaas run my_app.json
+        aerodaas compile flight.mcap | diff my_app.json -
     """
     from aerodaas.environment.document.flying import (  # noqa: PLC0415
         compile_application,
@@ -178,7 +188,7 @@ def compile_command(
     if application.suffix == ".mcap":
         document = recorded_document(application)
     else:
-        document = compile_application(application, context.args, env)
+        document = compile_application(find_application(application), context.args, env)
     text = document.text()
     if output is None:
         typer.echo(text, nl=False)

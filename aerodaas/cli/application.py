@@ -19,10 +19,8 @@ __all__ = ["run_application", "speed_option", "submit_application"]
 def run_application(application: Path, words: list[str], options: RunOptions) -> None:
     """Run `application` with the arguments `words`, as Python itself would; or fly a document.
 
-    Raises ConfigError if there is no such file, and the application's own exceptions.
+    Raises the application's own exceptions.
     """
-    if not application.is_file():
-        raise ConfigError(f"there is no application {application}")
     if application.suffix == ".json":
         from aerodaas.environment.document.flying import fly_mission  # noqa: PLC0415 - slow to load
 
