@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli import cluster, lab, provider, remote
-from aerodaas.cli.application import run_application, speed_option
+from aerodaas.cli.application import build_application, run_application, speed_option
 from aerodaas.cli.examples import examples
 from aerodaas.cli.export import export
 from aerodaas.cli.help_examples import ExampleGroup
@@ -189,7 +189,11 @@ def compile_command(
         document = recorded_document(application)
     else:
         document = compile_application(find_application(application), context.args, env)
-    text = document.text()
+    _put(document.text(), output)
+
+
+def _put(text: str, output: Path | None) -> None:
+    """Print a text, or write it into a file; raises ConfigError if that cannot be."""
     if output is None:
         typer.echo(text, nl=False)
         return
@@ -197,6 +201,31 @@ def compile_command(
         output.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"cannot write {output}: {error.strerror}") from None
+
+
+@app.command("graph", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+def graph_command(
+    context: typer.Context,
+    application: Annotated[Path, typer.Argument(help="The application, as for `aerodaas run`.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="A file; default: printed.")
+    ] = None,
+    env: Annotated[
+        Path | None, typer.Option(help="Environment file instead of the application's own.")
+    ] = None,
+) -> None:
+    """Draw an application's graph as a Mermaid flowchart; nothing flies.
+
+    Sites that show Markdown draw it, such as GitHub's; so does https://mermaid.live.
+
+        aerodaas graph farm_survey
+        aerodaas graph my_app.py -o graph.mmd
+    """
+    from aerodaas.dataflow.drawing import mermaid  # noqa: PLC0415 - slow to load
+
+    application = find_application(application)
+    options = RunOptions(application=application.resolve(), environment=env, view=False)
+    _put(mermaid(build_application(application, context.args, options).graph), output)
 
 
 @app.command()
