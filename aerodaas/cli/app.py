@@ -11,6 +11,7 @@ import typer
 
 from aerodaas.cli import cluster, lab, provider, remote
 from aerodaas.cli.application import build_application, run_application, speed_option
+from aerodaas.cli.check import check
 from aerodaas.cli.examples import examples
 from aerodaas.cli.export import export
 from aerodaas.cli.help_examples import ExampleGroup
@@ -34,10 +35,12 @@ _CAUSED_BY_A_LINE = (GraphError, InvalidWaypointError, UnknownIdError)
 """Errors reported with the application's own line."""
 _PROVIDER = "At a provider"
 
+_WORDS = {"allow_extra_args": True}
+"""Of commands whose words after `--` are the application's own; a misspelt option is none."""
+
 app = typer.Typer(
     cls=ExampleGroup,
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
     help="""Program drones as a service.
@@ -56,7 +59,7 @@ app.add_typer(lab.app, name="lab")
 app.add_typer(cluster.app, name="cluster")
 
 
-@app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+@app.command(context_settings=_WORDS)
 def run(
     context: typer.Context,
     application: Annotated[
@@ -158,7 +161,7 @@ def run(
     run_application(application, context.args, options)
 
 
-@app.command("compile", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+@app.command("compile", context_settings=_WORDS)
 def compile_command(
     context: typer.Context,
     application: Annotated[
@@ -203,7 +206,7 @@ def _put(text: str, output: Path | None) -> None:
         raise ConfigError(f"cannot write {output}: {error.strerror}") from None
 
 
-@app.command("graph", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+@app.command("graph", context_settings=_WORDS)
 def graph_command(
     context: typer.Context,
     application: Annotated[Path, typer.Argument(help="The application, as for `aerodaas run`.")],
@@ -226,6 +229,9 @@ def graph_command(
     application = find_application(application)
     options = RunOptions(application=application.resolve(), environment=env, view=False)
     _put(mermaid(build_application(application, context.args, options).graph), output)
+
+
+app.command(context_settings=_WORDS)(check)
 
 
 @app.command()
@@ -258,7 +264,7 @@ app.command()(serve)
 app.command()(report)
 app.command()(compare)
 app.command()(export)
-app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(replay)
+app.command(context_settings=_WORDS)(replay)
 for _command in (
     provider.login,
     provider.fleet,
@@ -271,7 +277,7 @@ for _command in (
     app.command(rich_help_panel=_PROVIDER)(_command)
 app.command(
     rich_help_panel=_PROVIDER,
-    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    context_settings=_WORDS,
 )(provider.submit)
 
 

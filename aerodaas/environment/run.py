@@ -102,7 +102,7 @@ class Run:
             require_extra("remote", "--view-address")
         # Before the plan, which has the cameras run that are only recorded.
         document = self._document()
-        plan = self._plan()
+        plan = self.plan()
         if self.recording is not None and self.recording.exists():
             raise RecordingError(
                 f"{self.recording} already exists and is not overwritten; "
@@ -251,7 +251,8 @@ class Run:
             self._finish()
         self._raise_problems()
 
-    def _plan(self) -> FlightPlan:
+    def plan(self) -> FlightPlan:
+        """Plan the actors of the flight; raises the errors of a graph that cannot fly."""
         from aerodaas.actors.run.plan import make_plan  # noqa: PLC0415
         from aerodaas.actors.session import Session  # noqa: PLC0415
         from aerodaas.mission.rehearsal import rehearse  # noqa: PLC0415 - loads geometry
