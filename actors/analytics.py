@@ -35,7 +35,7 @@ class AnalyticsActor(StreamActor):
         self._workers: list[Worker] = []
         self._threads: list[threading.Thread] = []
 
-    def prepare(self, variables: ProcessVariables, *nodes: NodeSpec) -> ActorInfo:
+    def prepare(self, variables: ProcessVariables | None = None, *nodes: NodeSpec) -> ActorInfo:
         """Open the analyses `nodes`; raises the exceptions of their `open`.
 
         `variables` have been set in this process by their arrival.

@@ -32,7 +32,7 @@ class Curious(Analytics[str]):
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Look, as a module that is imported with it would."""
-        self.__dict__.update(state)
+        vars(self).update(state)
         self.arrived = os.environ.get("HUB_KEY", "-")
 
     def process(self, item: Odometry, context: Context) -> str:  # noqa: ARG002

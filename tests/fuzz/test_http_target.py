@@ -6,21 +6,22 @@ from typing import Any
 
 import pytest
 
+from tools.fuzz.flight import FuzzedFlight
 from tools.fuzz.targets import http
 
 
 def _flown(data: bytes, monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """All setpoints and the states after them while `data` is run."""
     seen = []
-    turn = http.FuzzedFlight.turn
+    turn = FuzzedFlight.turn
 
-    def watched(flight: http.FuzzedFlight) -> None:
+    def watched(flight: FuzzedFlight) -> None:
         turn(flight)
         odometry = http._service()[0].drone.read().odometry
         seen.append((flight.state, *odometry.position, odometry.yaw))
 
     with monkeypatch.context() as patch:
-        patch.setattr(http.FuzzedFlight, "turn", watched)
+        patch.setattr(FuzzedFlight, "turn", watched)
         http.run(data)
     return seen
 
