@@ -1,16 +1,16 @@
-"""Limits of one input: time of the processor, time by the wall, memory."""
+"""Limits of one input: time of the processor and by the wall; memory of this process."""
 
 from __future__ import annotations
 
-import resource
 import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from types import FrameType
 
-__all__ = ["Alarm", "Limits", "TooLongError", "limit_memory", "memory"]
+import psutil
+
+__all__ = ["Alarm", "Limits", "TooLongError", "memory"]
 
 
 class TooLongError(BaseException):
@@ -62,19 +62,6 @@ class Alarm:
             raise TooLongError("the input took too long")
 
 
-def limit_memory(more: int) -> None:
-    """Let this process allocate `more` bytes and not one on top."""
-    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    resource.setrlimit(resource.RLIMIT_DATA, (_status("VmData") + more, hard))
-
-
 def memory() -> int:
     """Bytes of this process that are in memory."""
-    return _status("VmRSS")
-
-
-def _status(name: str) -> int:
-    for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
-        if line.startswith(name + ":"):
-            return int(line.split()[1]) * 1024
-    raise KeyError(name)
+    return int(psutil.Process().memory_info().rss)

@@ -12,10 +12,11 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from aerodaas.types.memory_limit import limit_memory
 from tools.fuzz.blackbox import BlackBox
 from tools.fuzz.coverage import Coverage
 from tools.fuzz.finding import Finding, by_exception
-from tools.fuzz.limits import Alarm, Limits, TooLongError, limit_memory, memory
+from tools.fuzz.limits import Alarm, Limits, TooLongError, memory
 from tools.fuzz.minimising import smaller
 from tools.fuzz.mutation import mutated
 from tools.fuzz.target import Target, load_target
