@@ -57,6 +57,19 @@ def test_a_threads_failure_is_a_finding() -> None:
     assert "RecursionError" in found.title
 
 
+def test_what_was_found_before_an_interruption_is_kept() -> None:
+    """A campaign of hours may be ended at any time."""
+
+    def stop(result: Result) -> None:
+        if result.findings:
+            raise KeyboardInterrupt
+
+    result = fuzz(f"{_TARGET}_by_luck", seconds=600.0, seed=5, progress=stop)
+    assert result.interrupted
+    assert len(result.findings) == 1
+    assert result.inputs > 0
+
+
 def test_mutation_finds_a_failure_and_tells_it_once() -> None:
     """From a harmless seed, by itself; the same seed makes the same inputs."""
     runs = [fuzz(f"{_TARGET}_by_luck", inputs=3000, seed=5) for _ in range(2)]

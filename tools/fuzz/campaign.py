@@ -41,6 +41,8 @@ class Result:
     growth: int = 0
     """Bytes by which the memory of the worker that grew most did so."""
     findings: list[Finding] = field(default_factory=list)
+    interrupted: bool = False
+    """Whether it was ended from the keyboard: what it has found until then is here."""
 
     def add(self, finding: Finding) -> None:
         """Keep a finding unless an equal one is known."""
@@ -69,6 +71,8 @@ def fuzz(
         jobs: Workers at once.
         limits: Of one input.
         progress: Called a few times a second.
+
+    Returns what was found, also if it is interrupted (Ctrl-C).
     """
     deadline = None if seconds is None else time.monotonic() + seconds
     each = None if inputs is None else -(-inputs // jobs)
@@ -114,9 +118,11 @@ def _watched(target: str, jobs: list[Job], progress: Callable[[Result], None]) -
             if len(result.findings) >= _MOST:
                 break
             time.sleep(_PERIOD)
+    except KeyboardInterrupt:
+        result.interrupted = True
+    finally:
         result.inputs = sum(watcher.number for watcher in watchers)
         result.seconds = time.monotonic() - begun
-    finally:
         for watcher in watchers:
             watcher.close()
     return result

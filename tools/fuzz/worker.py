@@ -5,6 +5,7 @@ from __future__ import annotations
 import faulthandler
 import os
 import random
+import signal
 import threading
 import time
 from collections.abc import Iterator
@@ -60,6 +61,7 @@ class Done:
 
 def work(job: Job, connection: Connection) -> None:
     """Run a job, sending each Finding and, last of all, Done."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the keyboard: for whoever watches
     with job.log.open("ab", buffering=0) as log:
         os.dup2(log.fileno(), 1)
         os.dup2(log.fileno(), 2)
