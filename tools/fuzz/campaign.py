@@ -16,7 +16,7 @@ from pathlib import Path
 
 from tools.fuzz.blackbox import BlackBox
 from tools.fuzz.finding import Finding, by_fault
-from tools.fuzz.limits import Limits
+from tools.fuzz.limits import Limits, kept_waiting
 from tools.fuzz.worker import Done, Job, work
 
 __all__ = ["Result", "fuzz", "replay"]
@@ -166,12 +166,16 @@ class _Watcher:
             return self._ended("crash", _how(self._process.exitcode))
         steps = self._box.steps
         if steps != self._steps:
-            self._steps, self._seen = steps, time.monotonic()
-        elif time.monotonic() - self._seen > (self._patience if steps != self._before else _START):
+            self._steps, self._seen = steps, self._time()
+        elif self._time() - self._seen > (self._patience if steps != self._before else _START):
             os.kill(self._process.pid or 0, signal.SIGABRT)  # its handler writes a traceback
             self._process.join(_GRACE)
             return self._ended("hang", "stuck outside Python")
         return True
+
+    def _time(self) -> float:
+        """Seconds by the wall, without those in which the worker waited for a processor."""
+        return time.monotonic() - kept_waiting(self._process.pid)
 
     def close(self) -> None:
         self._end()
@@ -179,10 +183,10 @@ class _Watcher:
 
     def _start(self) -> None:
         self._before = self._steps = self._box.steps
-        self._seen = time.monotonic()
         self._connection, theirs = _SPAWN.Pipe()
         self._process = _SPAWN.Process(target=work, args=(self._job, theirs), daemon=True)
         self._process.start()
+        self._seen = self._time()
         theirs.close()
 
     def _end(self) -> None:
