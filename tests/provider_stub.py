@@ -90,6 +90,8 @@ class Stub:
     """Status and JSON by the beginning of a path, instead of an answer."""
     asked: list[tuple[str, str, Any]] = field(default_factory=list)
     """Method, path and content of each request."""
+    keys: list[str | None] = field(default_factory=list)
+    """Idempotency key of each submission."""
     models: set[str] = field(default_factory=set)
     cuts: int = 0
     """Live connections that end after one message."""
@@ -145,6 +147,8 @@ class Stub:
     async def _admit(self, request: Request, go_on: Any) -> Response:  # noqa: ANN401
         path = request.url.path
         self.asked.append((request.method, path, await request.body()))
+        if (request.method, path) == ("POST", "/v1/missions"):
+            self.keys.append(request.headers.get("idempotency-key"))
         if self.slow is not None:
             await asyncio.to_thread(self.slow.wait, 20)
         for start, (code, content) in self.refusals.items():
@@ -192,7 +196,8 @@ class Stub:
 
     async def _follow(self, socket: WebSocket, streams: str = "") -> None:
         if "/v1/missions" in self.refusals:
-            await socket.close(1008)
+            code, content = self.refusals["/v1/missions"]
+            await socket.send_denial_response(JSONResponse(content, code))
             return
         await socket.accept()
         with contextlib.suppress(WebSocketDisconnect, RuntimeError):

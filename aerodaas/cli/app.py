@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli import cluster, lab, provider, remote
+from aerodaas.cli import cluster, lab, lease, provider, remote
 from aerodaas.cli.application import build_application, run_application, speed_option
 from aerodaas.cli.check import check
 from aerodaas.cli.examples import examples
@@ -57,6 +57,7 @@ app.command()(examples)
 app.add_typer(remote.app, name="remote")
 app.add_typer(lab.app, name="lab")
 app.add_typer(cluster.app, name="cluster")
+app.add_typer(lease.app, name="lease", rich_help_panel=_PROVIDER)
 
 
 @app.command(context_settings=_WORDS)
@@ -272,7 +273,6 @@ for _command in (
     provider.watch,
     provider.cancel,
     provider.fetch,
-    provider.leases,
 ):
     app.command(rich_help_panel=_PROVIDER)(_command)
 app.command(

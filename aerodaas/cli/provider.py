@@ -5,37 +5,20 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated
 
 import typer
 
 from aerodaas.cli.application import run_application, submit_application
+from aerodaas.cli.provider_output import At, Json, client_at, moment, print_json, print_table
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import ProviderOptions, RunOptions
 from aerodaas.types.errors import ConfigError, MissionError
 
-if TYPE_CHECKING:
-    from pydantic import BaseModel
-
-    from aerodaas.environment.provider.client import ProviderClient
-
-__all__ = ["cancel", "fetch", "fleet", "leases", "login", "missions", "submit", "watch"]
+__all__ = ["cancel", "fetch", "fleet", "login", "missions", "submit", "watch"]
 
 _LOOK_SECONDS = 0.5
-_WIDE = 1000
-"""Columns of a table that goes into a pipe."""
-At = Annotated[
-    str | None,
-    typer.Option(
-        "--at",
-        metavar="URL",
-        envvar="AERODAAS_PROVIDER",
-        help="The provider. Default: the only one that you are logged in at.",
-    ),
-]
-Json = Annotated[bool, typer.Option("--json", help="For programs.")]
 MissionId = Annotated[str, typer.Argument(metavar="MISSION", help="Its id; `missions` lists them.")]
 
 
@@ -80,9 +63,9 @@ def fleet(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
     aerodaas fleet --at https://provider.example
     aerodaas fleet --json | jq '.robots[] | select(.lease == null) | .id'
     """
-    found = _client(at).fleet()
+    found = client_at(at).fleet()
     if as_json:
-        _print_json(found)
+        print_json(found)
         return
     rows = [
         (
@@ -94,7 +77,7 @@ def fleet(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
         )
         for one in found.robots
     ]
-    _table(found.name, ("robot", "use", "battery", "where", "sensors"), rows)
+    print_table(found.name, ("robot", "use", "battery", "where", "sensors"), rows)
 
 
 def submit(
@@ -164,7 +147,7 @@ def submit(
         silence=silence,
         silence_seconds=silence_seconds,
         share=tuple(share or ()),
-        report=_print_json if as_json else None,
+        report=print_json if as_json else None,
     )
     options = RunOptions(
         provider=wanted,
@@ -178,7 +161,7 @@ def submit(
         return
     mission = submit_application(application, context.args, options)
     if as_json:
-        _print_json(mission)
+        print_json(mission)
     else:
         typer.echo(f"{mission.id} is submitted; aerodaas watch {mission.id} follows it")
 
@@ -189,9 +172,9 @@ def missions(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
     aerodaas missions
     aerodaas missions --json | jq -r '.[] | select(.phase == "flying") | .id'
     """
-    found = _client(at).missions()
+    found = client_at(at).missions()
     if as_json:
-        _print_json(found)
+        print_json(found)
         return
     rows = [
         (
@@ -200,12 +183,12 @@ def missions(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
             one.phase.value.replace("_", " "),
             ", ".join(one.robots),
             one.account,
-            _moment(one.submitted),
+            moment(one.submitted),
             one.reason,
         )
         for one in found
     ]
-    _table("missions", ("id", "name", "phase", "robots", "of", "submitted", "reason"), rows)
+    print_table("missions", ("id", "name", "phase", "robots", "of", "submitted", "reason"), rows)
 
 
 def watch(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
@@ -219,7 +202,7 @@ def watch(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # 
     from aerodaas.environment.provider.follower import MissionFollower  # noqa: PLC0415 - slow
     from aerodaas.terminal.provided import ProvidedView  # noqa: PLC0415 - slow to load
 
-    client = _client(at)
+    client = client_at(at)
     found = client.mission(mission)
     with ProvidedView(shown=not as_json) as view:
         follower = MissionFollower(client, found, view.note)
@@ -246,9 +229,9 @@ def cancel(mission: MissionId, at: At = None, as_json: Json = False) -> None:  #
 
     aerodaas cancel 3f1a6c0d9b2e
     """
-    found = _client(at).cancel(mission)
+    found = client_at(at).cancel(mission)
     if as_json:
-        _print_json(found)
+        print_json(found)
     elif found.phase.over:
         typer.echo(f"{found.id} is cancelled")
     else:
@@ -276,7 +259,7 @@ def fetch(
         raise ConfigError(f"{target} already exists and is not overwritten; name another file")
     try:
         with download_view(shown=not as_json, what=target.name) as progress:
-            _client(at).recording(mission, target, progress)
+            client_at(at).recording(mission, target, progress)
     except OSError as error:
         raise ConfigError(f"cannot write {target}: {error.strerror}") from None
     size = target.stat().st_size
@@ -286,50 +269,8 @@ def fetch(
         typer.echo(f"{target}: {size / 1e6:.1f} MB")
 
 
-def leases(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
-    """List the leases that you may see.
-
-    aerodaas leases
-    """
-    found = _client(at).leases()
-    if as_json:
-        _print_json(found)
-        return
-    rows = [
-        (
-            one.id,
-            one.state.value,
-            ", ".join(one.robots) or "any that fits",
-            f"{one.account} of {one.tenant}",
-            f"{one.minutes:g} min",
-            "-" if one.ends is None else _moment(one.ends),
-            one.reason,
-        )
-        for one in found
-    ]
-    _table("leases", ("id", "state", "robots", "of", "for", "ends", "reason"), rows)
-
-
-def _client(at: str | None) -> ProviderClient:
-    from aerodaas.environment.provider.logins import (  # noqa: PLC0415 - slow to load
-        client_for,
-        default_url,
-    )
-
-    return client_for(at or default_url())
-
-
 def _missing_token() -> str:
     raise ConfigError("no token was given: type it, or pipe it in")
-
-
-def _print_json(found: BaseModel | Sequence[BaseModel]) -> None:
-    content: Any = (
-        [one.model_dump(mode="json") for one in found]
-        if isinstance(found, list | tuple)
-        else found.model_dump(mode="json")  # type: ignore[union-attr]
-    )
-    typer.echo(json.dumps(content, indent=2))
 
 
 def _use(enabled: bool, lease: str | None, mission: str | None, tenant: str | None) -> str:  # noqa: FBT001
@@ -345,24 +286,3 @@ def _place(position: tuple[float, float, float] | None) -> str:
         return "-"
     east, north, up = (round(axis, 1) + 0.0 for axis in position)
     return f"E {east:.1f}  N {north:.1f}  up {up:.1f} m"
-
-
-def _moment(seconds: float) -> str:
-    from datetime import datetime  # noqa: PLC0415 - only for tables
-
-    return f"{datetime.fromtimestamp(seconds).astimezone():%Y-%m-%d %H:%M:%S}"
-
-
-def _table(title: str, heads: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    from rich.console import Console  # noqa: PLC0415 - only for tables
-    from rich.table import Table  # noqa: PLC0415
-    from rich.text import Text  # noqa: PLC0415
-
-    table = Table(box=None, title=Text(title), title_justify="left", header_style="dim")
-    for head in heads:
-        table.add_column(head)
-    for row in rows:
-        table.add_row(*(Text(cell) for cell in row))
-    # What reads a pipe has no width to keep to.
-    width = None if sys.stdout.isatty() else _WIDE
-    Console(highlight=False, width=width).print(table)

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from aerodaas.cli.application import speed_option
+from aerodaas.types.errors import ConfigError
+
+if TYPE_CHECKING:
+    from aerodaas.service.access import OidcSettings
 
 __all__ = ["serve"]
 
@@ -40,6 +45,28 @@ def serve(
         bool, typer.Option("--approval", help="Have an operator approve each mission.")
     ] = False,
     address: Annotated[str | None, typer.Option(help="Ray cluster that flights join.")] = None,
+    oidc_issuer: Annotated[
+        str | None,
+        typer.Option(metavar="URL", help="OpenID Connect issuer whose tokens are good, too."),
+    ] = None,
+    oidc_audience: Annotated[
+        str | None, typer.Option(help="What its tokens for this service have as `aud`.")
+    ] = None,
+    oidc_role_claim: Annotated[
+        str, typer.Option(help="Their claim with a role, or a list; dots go into objects.")
+    ] = "aerodaas_role",
+    oidc_tenant_claim: Annotated[str, typer.Option(help="Their claim with the tenant.")] = (
+        "aerodaas_tenant"
+    ),
+    oidc_role: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="VALUE=ROLE", help="Role by value of the claim. Default: roles by their names."
+        ),
+    ] = None,
+    oidc_unknown: Annotated[
+        str, typer.Option(help="Who has none of these roles: `refuse`, or is a `viewer`.")
+    ] = "refuse",
 ) -> None:
     """Offer a fleet of drones: users' applications fly on it by URL.
 
@@ -48,6 +75,7 @@ def serve(
 
         aerodaas serve environments/fleet.json --state fleet/
         AERODAAS_TOKEN=… aerodaas submit farm_survey --to http://127.0.0.1:8400
+        aerodaas serve fleet.json --state f/ --oidc-issuer https://id.example --oidc-audience drones
     """
     from aerodaas.config.extras import require_extra  # noqa: PLC0415 - only to serve
 
@@ -66,6 +94,13 @@ def serve(
         approval=approval,
         speed="max" if lockstep else factor or 1.0,
         address=address,
+        oidc=_oidc(
+            oidc_issuer,
+            oidc_audience,
+            claims=(oidc_role_claim, oidc_tenant_claim),
+            roles=oidc_role or (),
+            unknown=oidc_unknown,
+        ),
     )
     run(
         settings,
@@ -76,3 +111,36 @@ def serve(
         key=key,
         tell=typer.echo,
     )
+
+
+def _oidc(
+    issuer: str | None,
+    audience: str | None,
+    *,
+    claims: tuple[str, str],
+    roles: Iterable[str],
+    unknown: str,
+) -> OidcSettings | None:
+    """What an issuer is trusted with; raises ConfigError for options that do not fit."""
+    from aerodaas.protocol.schemas import Role  # noqa: PLC0415 - slow to load
+    from aerodaas.service.access import OidcSettings  # noqa: PLC0415 - as above
+
+    if (issuer is None) != (audience is None):
+        raise ConfigError(
+            "--oidc-issuer and --oidc-audience go together: without the second, a token for any "
+            "other service of the issuer would be good here"
+        )
+    if issuer is None or audience is None:
+        return None
+    if unknown not in {"refuse", "viewer"}:
+        raise ConfigError(f"--oidc-unknown is refuse or viewer, not {unknown!r}")
+    known = {role.value: role for role in Role}
+    mapped: dict[str, Role] = {}
+    for text in roles:
+        value, _, role = text.rpartition("=")
+        if not value or role not in known:
+            raise ConfigError(f"--oidc-role is VALUE=ROLE with {', '.join(known)}, not {text!r}")
+        mapped[value] = known[role]
+    role_claim, tenant_claim = claims
+    lowest = Role.VIEWER if unknown == "viewer" else None
+    return OidcSettings(issuer, audience, role_claim, tenant_claim, mapped, lowest)

@@ -11,7 +11,7 @@ __all__ = ["has_extra", "require_extra"]
 _PACKAGES = {
     "plots": ("matplotlib",),
     "remote": ("fastapi", "uvicorn", "websockets"),
-    "service": ("fastapi", "sqlalchemy", "uvicorn", "websockets"),
+    "service": ("fastapi", "jwt", "sqlalchemy", "uvicorn", "websockets"),
     "ros": ("mcap_ros2",),
     "routing": ("pyvrp",),
 }

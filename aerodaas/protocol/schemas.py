@@ -10,8 +10,9 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.analytics.remote.schemas import StatusOut, WaypointsIn
 from aerodaas.dataflow.mission_document import MissionDocument
+from aerodaas.mission.commands import AddNavigation
 from aerodaas.protocol.commands import CommandWord
 
 __all__ = [
@@ -27,6 +28,7 @@ __all__ = [
     "MissionIn",
     "MissionOut",
     "MissionPhase",
+    "NavigationIn",
     "RefusalOut",
     "RobotOut",
     "Role",
@@ -255,6 +257,22 @@ class CommandIn(_In):
 
     robot: Word
     command: CommandWord
+
+
+class NavigationIn(WaypointsIn):
+    """Waypoints for one robot of a mission in flight: one command, carried out whole."""
+
+    robot: Word
+    deadline: Number | None = None
+    """Seconds of mission time for waypoints that have no deadline, or a later one."""
+    clear_first: bool = False
+    """Empty the robot's queue first."""
+
+    def command(self) -> AddNavigation:
+        """The command; raises InvalidWaypointError for waypoints that cannot be flown."""
+        return AddNavigation(
+            self.navigation(), self.index, self.deadline, clear_first=self.clear_first
+        )
 
 
 class AccountIn(_In):

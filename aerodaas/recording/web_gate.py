@@ -6,7 +6,9 @@ import asyncio
 import re
 import threading
 from contextlib import suppress
+from http import HTTPStatus
 
+from aerodaas.analytics.remote.denial import answer_of
 from aerodaas.analytics.remote.guard import host_name, is_loopback, is_served
 from aerodaas.analytics.remote.listening import listen
 
@@ -20,7 +22,11 @@ _CHUNK = 1 << 16
 _VIEWERS = frozenset({b"https://app.foxglove.dev", b"file://"})
 """Origins of Foxglove in a browser and on the desktop."""
 _HEADER = re.compile(rb"^([!-9;-~]+):[ \t]*(.*?)[ \t]*\r?$", re.MULTILINE)
-_REFUSED = b"HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
+_REFUSED = answer_of(
+    HTTPStatus.FORBIDDEN,
+    "the live view answers to this machine's names and to Foxglove only: open it by the address "
+    "told",
+)
 
 
 class WebGate:

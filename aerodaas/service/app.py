@@ -10,7 +10,7 @@ from fastapi import FastAPI, Security
 from fastapi.security import HTTPBearer
 
 from aerodaas.config.redaction import catalogue
-from aerodaas.service.access import Access, Accounts, Audit, Quotas, RateLimiter
+from aerodaas.service.access import Access, Accounts, Audit, OidcVerifier, Quotas, RateLimiter
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.fleet_view import FleetView
@@ -47,7 +47,8 @@ def build_service(
         tell: Tells the provider's people of what they should look at.
     """
     audit = Audit(store)
-    accounts, access = Accounts(store), Access(store, audit, tell)
+    issuer = None if settings.oidc is None else OidcVerifier(settings.oidc)
+    accounts, access = Accounts(store), Access(store, audit, tell, issuer=issuer)
     quotas, garage = Quotas(store), Garage(settings.config, store)
     models = ModelShelf(settings.models)
     bookings = Bookings(settings.config, store, garage, quotas)

@@ -13,13 +13,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
+from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.protocol.schemas import (
     CommandIn,
     LeaseState,
     MissionIn,
     MissionOut,
     MissionPhase,
+    NavigationIn,
     Role,
 )
 from aerodaas.service.access import Principal, sees
@@ -29,6 +30,7 @@ from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.garage import Garage
+from aerodaas.service.idempotency import fingerprint
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
 from aerodaas.service.models import ModelShelf, require_room
 from aerodaas.service.records import shown
@@ -88,11 +90,16 @@ class MissionDesk:
             for one in self._missions.values():
                 one.close()
 
-    def submit(self, principal: Principal, wanted: MissionIn) -> MissionOut:
-        """Take a mission in.
+    def submit(self, principal: Principal, wanted: MissionIn, key: str | None = None) -> MissionOut:
+        """Take a mission in, or find the one that was submitted before with the same `key`.
 
-        Raises RefusedError, with the reason, for one that cannot be flown here.
+        Raises RefusedError, with the reason, for one that cannot be flown here, and with status
+        422 for another one than was submitted with this key.
         """
+        # First: what was taken in has used up its quota and its lease.
+        known = self._submitted(principal, wanted, key)
+        if known is not None:
+            return known
         require_room(self._settings.state)
         robots = self._briefing.check(principal, wanted.document)
         self._garage.require_enabled(robots)
@@ -111,13 +118,35 @@ class MissionDesk:
             submitted=time.time(),
             folder=str(self._path(name)),
             request=wanted.model_dump(mode="json", exclude={"document"}),
+            key=key,
+            fingerprint=None if key is None else fingerprint(wanted),
         )
         mission = self._active(row)
         mission.write(wanted.document)
         with self._lock:
+            # The same submission may have been sent twice at once.
+            known = self._submitted(principal, wanted, key)
+            if known is not None:
+                mission.discard()
+                return known
             self._store.missions.add(row)
             self._missions[row.id] = mission
         return shown(mission)
+
+    def _submitted(
+        self, principal: Principal, wanted: MissionIn, key: str | None
+    ) -> MissionOut | None:
+        """The mission that this submission has become; None if it was not sent before."""
+        row = None if key is None else self._store.missions.of_key(principal.tenant, key)
+        if row is None:
+            return None
+        if row.fingerprint != fingerprint(wanted):
+            raise RefusedError(
+                422,
+                f"another mission was submitted with this Idempotency-Key ({row.id}): send a "
+                "new key with each new mission",
+            )
+        return self._with_news(row)
 
     def approve(self, principal: Principal, mission: str) -> MissionOut:
         """Approve a mission that waits for it."""
@@ -145,10 +174,10 @@ class MissionDesk:
         """Give a robot of a flying mission a command; raises MissionError if it is lost."""
         return self._ask(principal, mission, do=command.command, robot=command.robot)
 
-    def fly(self, principal: Principal, mission: str, robot: str, body: WaypointsIn) -> AnswerOut:
+    def fly(self, principal: Principal, mission: str, navigation: NavigationIn) -> AnswerOut:
         """Add waypoints to a flying mission; raises MissionError if it is lost."""
-        waypoints = body.model_dump(mode="json", include=set(WaypointsIn.model_fields))
-        return self._ask(principal, mission, do="fly", robot=robot, waypoints=waypoints)
+        content = navigation.model_dump(mode="json")
+        return self._ask(principal, mission, do="fly", navigation=content)
 
     def _ask(self, principal: Principal, mission: str, **request: Any) -> AnswerOut:  # noqa: ANN401
         self._require_own(principal, mission)
@@ -308,6 +337,8 @@ class MissionDesk:
         one.to(MissionPhase.REHEARSING)
 
     def _judge(self, one: ActiveMission) -> None:
+        if one.rehearsal_lost:
+            one.rehearse(self._briefing.rehearsal(one.row), self._models)
         verdict = one.verdict(self._settings.rehearsal_seconds)
         if verdict is None:
             return

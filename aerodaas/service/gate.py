@@ -11,14 +11,13 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.models import LARGEST_MODEL
 from aerodaas.service.routes.admission import Admission
-from aerodaas.service.routes.refusals import refusal_of
+from aerodaas.service.routes.refusals import refuse
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["Gate"]
 
 _LARGEST_BODY = 4 << 20
 """Bytes of a JSON body: a document of 10,000 waypoints has 2 MB."""
-_POLICY_VIOLATION = 1008
 
 
 class Gate:
@@ -39,11 +38,7 @@ class Gate:
             most = _bound_of(connection)
             await asyncio.to_thread(self._admission.enter, connection)
         except AeroDaaSError as error:
-            if scope["type"] == "websocket":
-                reason = str(error)[:100]
-                await send({"type": "websocket.close", "code": _POLICY_VIOLATION, "reason": reason})
-            else:
-                await refusal_of(error)(scope, receive, send)
+            await refuse(scope, send, error)
             return
         await self._app(scope, _Bounded(receive, most), send)
 

@@ -64,6 +64,10 @@ class ActiveMission:
         self._document.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         write_private(self._document, document.text())
 
+    def discard(self) -> None:
+        """Remove what `write` has kept, of a mission that is not taken in after all."""
+        shutil.rmtree(self._document.parent)
+
     def document(self) -> MissionDocument:
         """The document; raises ConfigError if its file is gone."""
         return read_mission(self._document)
@@ -90,12 +94,17 @@ class ActiveMission:
         self.row = row
         self.version += 1
 
+    @property
+    def rehearsal_lost(self) -> bool:
+        """Whether a former service began the rehearsal, which ended with it, without a result."""
+        return self._rehearsing is None and self.rehearsal.outcome() is None
+
     def rehearse(self, order: FlightOrder, models: ModelShelf) -> None:
-        """Start the rehearsal; one that a former service began is begun again."""
+        """Start the rehearsal, in place of what one of a former service has left."""
         self.end_rehearsal()
         shutil.rmtree(self.rehearsal.path, ignore_errors=True)
         self._prepare(self.rehearsal, order, models)
-        self._rehearsing = start_process(self.rehearsal)
+        self._rehearsing = start_process(self.rehearsal, tied=True)
         self._rehearsed_since = time.monotonic()
 
     def verdict(self, seconds: float) -> VerdictOut | None:
@@ -128,7 +137,7 @@ class ActiveMission:
     def take_off(self) -> None:
         """Start the flight's process; one that was begun, by whatever service, begins no more."""
         if self._flying is None and not self.flight.begun:
-            self._flying = start_process(self.flight)
+            self._flying = start_process(self.flight, tied=False)
 
     def _prepare(self, folder: FlightFolder, order: FlightOrder, models: ModelShelf) -> None:
         document = self.document()

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.service.access import OidcSettings
 
 __all__ = ["ServiceSettings"]
 
@@ -29,6 +30,8 @@ class ServiceSettings:
     """Of simulated drones, as `aerodaas run --speed`."""
     address: str | None = None
     """Ray cluster that flights join; None: each has one of its own on this machine."""
+    oidc: OidcSettings | None = None
+    """OpenID Connect issuer whose tokens are good, too."""
     rehearsal_seconds: float = 300.0
     """Most wall seconds of a rehearsal."""
     most_flights: int = 16

@@ -14,7 +14,7 @@ import pytest
 from provider_stub import MISSION, TOKEN, Stub, mission
 
 from aerodaas.cli.app import main
-from aerodaas.environment.provider import follower
+from aerodaas.environment.provider import pauses
 from aerodaas.environment.provider.logins import Logins
 from aerodaas.protocol.schemas import MissionPhase
 from aerodaas.types.errors import AeroDaaSError
@@ -50,7 +50,7 @@ def aerodaas(
     monkeypatch.setenv("AERODAAS_TOKEN", TOKEN)
     monkeypatch.setenv("AERODAAS_PROVIDER", stub.url)
     monkeypatch.setattr("aerodaas.terminal.console.show_results", lambda *_, **__: None)
-    monkeypatch.setattr(follower, "_FIRST_PAUSE", 0.01)
+    monkeypatch.setattr(pauses, "_FIRST_PAUSE", 0.01)
     (tmp_path / "app.py").write_text(APP)
 
     def run(*words: str) -> Ended:
@@ -164,24 +164,6 @@ def test_a_recording_is_fetched_and_nothing_overwritten(
     assert (ended.code, "no recording yet" in ended.said) == (2, True)
 
 
-def test_leases_are_listed(aerodaas: Command, stub: Stub) -> None:
-    """With who has them until when."""
-    lease = {
-        "id": "33b5",
-        "tenant": "farmers",
-        "account": "ann",
-        "robots": ["drone"],
-        "state": "granted",
-        "minutes": 15,
-        "asked": 1.0,
-        "ends": 900.0,
-    }
-    stub.refusals["/v1/leases"] = (200, [lease])
-    shown = aerodaas("leases").out
-    assert all(word in shown for word in ("33b5", "granted", "ann of farmers", "15 min"))
-    assert json.loads(aerodaas("leases", "--json").out)[0]["ends"] == 900.0
-
-
 def test_a_login_is_tried_and_stored(
     aerodaas: Command, stub: Stub, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -223,7 +205,7 @@ def test_bad_words_are_usage_errors(aerodaas: Command, words: list[str], said: s
 
 
 @pytest.mark.parametrize(
-    "name", ["login", "fleet", "submit", "missions", "watch", "cancel", "fetch", "leases"]
+    "name", ["login", "fleet", "submit", "missions", "watch", "cancel", "fetch"]
 )
 def test_each_command_teaches_by_an_example(aerodaas: Command, name: str) -> None:
     """Its help shows itself in use."""

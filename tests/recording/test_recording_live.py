@@ -113,5 +113,6 @@ def test_a_strangers_page_does_not_watch(host: str, origin: str | None, admitted
         lines += [] if origin is None else [f"Origin: {origin}"]
         with socket.create_connection(("127.0.0.1", live.port), timeout=5) as client:
             client.sendall("\r\n".join([*lines, "", ""]).encode())
-            answer = client.recv(100)
+            answer = client.recv(1000)
     assert answer.split()[1] == (b"101" if admitted else b"403")
+    assert (b'{"text": "the live view answers to' in answer) != admitted

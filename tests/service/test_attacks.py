@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import contextlib
 import http.client
+import json
 import pickle
 from collections.abc import Iterator
 from typing import Any
@@ -12,7 +13,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from served import Served, document, fleet, robot
-from websockets.exceptions import InvalidHandshake
+from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 
 AUTH = "Authorization"
@@ -109,13 +110,34 @@ def test_another_tenants_streams_are_closed(
 ) -> None:
     """To another tenant and to nobody's token alike, before anything is sent."""
     url = provider.url.replace("http", "ws", 1) + f"/v1/missions/{victim['mission']}/{what}"
-    for token in (stranger, "aerodaas_0_0"):
+    for token, status, text in (
+        (stranger, 404, "there is no mission"),
+        ("aerodaas_0_0", 401, "wrong or missing token"),
+    ):
         headers = {AUTH: f"Bearer {token}"}
-        with pytest.raises(InvalidHandshake):
+        with pytest.raises(InvalidStatus) as refused:
             connect(url, additional_headers=headers, proxy=None)
+        assert refused.value.response.status_code in {status, 429}
+        if refused.value.response.status_code == status:
+            assert text in json.loads(refused.value.response.body or b"")["text"]
     with connect(url, additional_headers={AUTH: f"Bearer {victim['token']}"}, proxy=None) as socket:
         if what != "here":
             assert '"kind": "mission"' in str(socket.recv(10))
+
+
+def test_a_live_view_of_impossible_settings_is_refused_by_a_sentence(
+    provider: Served, victim: dict[str, Any]
+) -> None:
+    """Also where the sentence is longer than what a WebSocket's closing takes."""
+    query = "rate=500&streams=" + "x" * 3000
+    url = provider.url.replace("http", "ws", 1) + f"/v1/missions/{victim['mission']}/live?{query}"
+    with pytest.raises(InvalidStatus) as refused:
+        connect(url, additional_headers={AUTH: f"Bearer {victim['token']}"}, proxy=None)
+    answer = refused.value.response
+    assert answer.status_code == 422
+    text = json.loads(answer.body or b"")["text"]
+    assert "rate: " in text
+    assert "streams: " in text
 
 
 def test_another_tenants_lease_flies_nobody_elses_mission(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -12,13 +13,21 @@ import pytest
 from served import document, fleet, robot
 
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.protocol.schemas import MissionIn, MissionOut, MissionPhase, Role, Scope
+from aerodaas.protocol.schemas import (
+    MissionIn,
+    MissionOut,
+    MissionPhase,
+    Role,
+    Scope,
+    VerdictOut,
+)
 from aerodaas.service import mission as missions
 from aerodaas.service import models
 from aerodaas.service.access import Principal, Quotas
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.flights.order import Outcome
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.settings import ServiceSettings
@@ -54,7 +63,8 @@ class Desk:
         self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
         self.open()
 
-    def _start(self, folder: Any) -> Process:  # noqa: ANN401 - FlightFolder
+    def _start(self, folder: Any, *, tied: bool) -> Process:  # noqa: ANN401 - FlightFolder
+        assert tied == (folder.path.name == "r"), "a flight outlives the service, no rehearsal does"
         self.started.append(folder.path)
         return Process()
 
@@ -70,10 +80,10 @@ class Desk:
             models=ModelShelf(self.settings.models),
         )
 
-    def submit(self, robot: str, **more: object) -> MissionOut:
+    def submit(self, robot: str, key: str | None = None, **more: object) -> MissionOut:
         """Submit a mission for one drone."""
         content = {"document": document(robot, (5, 0)), **more}
-        return self.desk.submit(PILOT, MissionIn.model_validate(content))
+        return self.desk.submit(PILOT, MissionIn.model_validate(content), key)
 
     def phase(self, mission: MissionOut) -> MissionPhase:
         """Present phase of a mission."""
@@ -139,6 +149,24 @@ def test_a_full_disk_takes_no_missions(one: Desk, monkeypatch: pytest.MonkeyPatc
     assert refused.value.status == 507
 
 
+def test_one_key_is_one_mission_however_many_send_it_at_once(one: Desk) -> None:
+    """Also while none of them is kept yet; what the others wrote is gone."""
+    with ThreadPoolExecutor(8) as pool:
+        ids = {found.id for found in pool.map(lambda _: one.submit("one", "k"), range(8))}
+    assert len(ids) == 1
+    assert [row.id for row in one.store.missions.all()] == list(ids)
+    assert {path.name for path in one.settings.missions.iterdir()} == ids
+
+
+def test_what_has_used_up_its_quota_is_still_found_by_its_key(one: Desk) -> None:
+    """The answer to a repeated submission does not depend on what happened since."""
+    first = one.submit("one", "k")
+    one.desk._garage.take_out(["one"])
+    assert one.submit("one", "k").id == first.id
+    with pytest.raises(RefusedError, match="out of service"):
+        one.submit("one", "other")
+
+
 def test_a_mission_is_taken_up_again_by_the_next_service(one: Desk) -> None:
     """A flight that was ordered and has not begun is begun; one that has begun is not."""
     first, second = one.submit("one"), one.submit("two")
@@ -152,6 +180,29 @@ def test_a_mission_is_taken_up_again_by_the_next_service(one: Desk) -> None:
     one.open()
     one.turns(1)
     assert one.started == [flights[first.id]]
+
+
+def test_a_rehearsal_that_ended_with_its_service_is_begun_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the next one; one that has a result is judged by that, and not flown twice."""
+    made = Desk(tmp_path, monkeypatch, rehearse=True)
+    lost, judged = made.submit("one"), made.submit("two")
+    made.turns(1)
+    assert len(made.started) == 2
+    outcome = Outcome(
+        landed=True, reason="", began=0.0, ended=1.0, verdict=VerdictOut(approved=True)
+    )
+    made.desk._missions[judged.id].rehearsal.end(outcome)
+    made.started.clear()
+    made.open()
+    made.turns(3)
+    assert made.started == [
+        made.desk._missions[lost.id].rehearsal.path,
+        made.desk._missions[judged.id].flight.path,
+    ]
+    assert made.phase(lost) is MissionPhase.REHEARSING
+    made.store.close()
 
 
 def test_leases_end_while_the_database_is_gone(one: Desk, monkeypatch: pytest.MonkeyPatch) -> None:

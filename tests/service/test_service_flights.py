@@ -80,6 +80,22 @@ def test_commands_reach_the_drone_and_answers_come_back(provider: Served) -> Non
     assert late == (409, f"{id_} is over: landed")
 
 
+def test_waypoints_take_the_place_of_a_queue(provider: Served) -> None:
+    """At once, with a deadline for all of them; one that is past refuses them by name."""
+    id_ = submitted(provider, "one", *FAR)
+    navigation = f"/v1/missions/{id_}/navigation"
+    flying(provider, id_, "one")
+    place = {"id": "late", "x": 3.0, "y": 3.0, "z": 2.0, "waypoint_type": "local"}
+    late = {"robot": "one", "waypoints": [place], "deadline": 0.5}
+    answer = provider.ask("POST", navigation, late)
+    assert "its deadline of 0.5 s is past" in answer["refused"]["late"]
+    new = {"robot": "one", "waypoints": [{**place, "id": "new"}], "clear_first": True}
+    assert provider.ask("POST", navigation, {**new, "deadline": 1000.0})["accepted"]
+    ended = provider.until_phase(id_)
+    assert ended["phase"] == "landed"
+    assert ended["status"]["one"]["visited"] == ["new"]
+
+
 def test_a_service_that_is_killed_finds_its_flights_again(provider: Served) -> None:
     """They fly on meanwhile, and none is begun twice."""
     id_ = submitted(provider, "one", *FAR)

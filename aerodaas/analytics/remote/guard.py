@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
-import json
 import socket
 from collections.abc import Awaitable, Callable, MutableMapping
 from http import HTTPStatus
 from typing import Any, TypeAlias
 
 from aerodaas.analytics.remote.attempts import WrongTokens
+from aerodaas.analytics.remote.denial import deny
 
 __all__ = ["Guard", "HostGuard", "host_name", "is_loopback", "is_served"]
 
@@ -20,7 +20,6 @@ Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 App: TypeAlias = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 _MOST_BYTES = 1_000_000
-_POLICY_VIOLATION = 1008
 
 
 def is_loopback(host: str) -> bool:
@@ -58,10 +57,8 @@ class Guard:
             status, text = HTTPStatus.TOO_MANY_REQUESTS, "too many wrong tokens"
         if not status:
             await self._app(scope, receive, send)
-        elif scope["type"] == "websocket":
-            await send({"type": "websocket.close", "code": _POLICY_VIOLATION, "reason": text})
         else:
-            await _refuse(send, status, text, pause)
+            await _refuse(scope, send, status, text, pause)
 
     def _objection(self, headers: dict[bytes, bytes]) -> tuple[int, str]:
         if self._token is not None:
@@ -99,10 +96,7 @@ class HostGuard:
             same = origin is None or origin.partition(b"://")[2] == host
             if not same or not is_served(host_name(host), self._served):
                 text = "this page is served under other names only: open it by the address told"
-                if scope["type"] == "websocket":
-                    await send({"type": "websocket.close", "code": _POLICY_VIOLATION})
-                else:
-                    await _refuse(send, HTTPStatus.FORBIDDEN, text)
+                await _refuse(scope, send, HTTPStatus.FORBIDDEN, text)
                 return
         await self._app(scope, receive, send)
 
@@ -141,12 +135,9 @@ def host_name(host: bytes) -> str:
     return name.partition("]")[0].lstrip("[") if name.startswith("[") else name.partition(":")[0]
 
 
-async def _refuse(send: Send, status: int, text: str, pause: int = 0) -> None:
-    body = json.dumps({"accepted": False, "text": text, "refused": {}}).encode()
-    headers = [(b"content-type", b"application/json"), (b"content-length", b"%d" % len(body))]
-    if status == 401:  # noqa: PLR2004 - HTTP's own number
-        headers.append((b"www-authenticate", b"Bearer"))
+async def _refuse(scope: Scope, send: Send, status: int, text: str, pause: int = 0) -> None:
+    headers = [(b"www-authenticate", b"Bearer")] if status == HTTPStatus.UNAUTHORIZED else []
     if pause:
         headers.append((b"retry-after", b"%d" % pause))
-    await send({"type": "http.response.start", "status": status, "headers": headers})
-    await send({"type": "http.response.body", "body": body})
+    content = {"accepted": False, "text": text, "refused": {}}
+    await deny(scope, send, status, content, *headers)

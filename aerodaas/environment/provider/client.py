@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import time
+import uuid
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -10,10 +13,11 @@ from urllib.parse import quote, urlencode
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
+from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.environment.provider.address import ServiceAddress
 from aerodaas.environment.provider.exchange import Exchange, Method
 from aerodaas.environment.provider.live import LiveConnection
+from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
 from aerodaas.protocol.schemas import (
     AccountIn,
@@ -25,13 +29,14 @@ from aerodaas.protocol.schemas import (
     LeaseOut,
     MissionIn,
     MissionOut,
+    NavigationIn,
     Role,
     Scope,
     TokenIn,
     TokenOut,
     UsageOut,
 )
-from aerodaas.types.errors import ConfigError
+from aerodaas.types.errors import ConfigError, SourceError
 
 __all__ = ["LARGEST_MODEL", "ProviderClient"]
 
@@ -39,6 +44,8 @@ M = TypeVar("M")
 LARGEST_MODEL = 64 << 20
 """Bytes of a model that a service takes."""
 _ABSENT = frozenset({404})
+_RESEND_SECONDS = 30.0
+"""Seconds for which a submission is sent again, as long as a service takes to be started anew."""
 
 
 def _nothing(_done: int, _all: int | None) -> None:
@@ -125,13 +132,25 @@ class ProviderClient:
         self._exchange.send("PUT", f"/v1/models/{sha256}", content, headers)
         return sha256
 
-    def submit(self, wanted: MissionIn) -> MissionOut:
-        """Submit a mission.
+    def submit(self, wanted: MissionIn, key: str | None = None) -> MissionOut:
+        """Submit a mission, once: where the answer is lost it is sent again, with the same key.
 
-        It is never sent twice. Where the answer is lost (SourceError), `missions` tells whether it
-        has arrived.
+        Args:
+            wanted: The mission.
+            key: Idempotency key, 1 to 255 printable ASCII characters without quotation marks and
+                backslashes: for a caller that may have to repeat the call itself. None for a
+                random one.
+
+        Raises SourceError once the service has not answered for half a minute; then `missions`
+        tells whether it has arrived.
         """
-        return self._ask(MissionOut, "POST", "/v1/missions", wanted)
+        headers = {"Idempotency-Key": f'"{key or uuid.uuid4()}"'}
+        waiting, until = pauses(), time.monotonic() + _RESEND_SECONDS
+        while time.monotonic() + (pause := next(waiting)) < until:
+            with contextlib.suppress(SourceError):
+                return self._ask(MissionOut, "POST", "/v1/missions", wanted, headers)
+            time.sleep(pause)
+        return self._ask(MissionOut, "POST", "/v1/missions", wanted, headers)
 
     def missions(self) -> list[MissionOut]:
         """All missions that the account may see, newest first."""
@@ -154,11 +173,10 @@ class ProviderClient:
         path = f"/v1/missions/{_part(mission)}/commands"
         return self._ask(AnswerOut, "POST", path, command)
 
-    def add_navigation(self, mission: str, robot: str, waypoints: WaypointsIn) -> AnswerOut:
-        """Add waypoints to the queue of a robot; the answer is its own."""
+    def add_navigation(self, mission: str, navigation: NavigationIn) -> AnswerOut:
+        """Add waypoints to the queue of a robot, or take its place; the answer is its own."""
         path = f"/v1/missions/{_part(mission)}/navigation"
-        content = {**waypoints.model_dump(mode="json"), "robot": robot}
-        return self._ask(AnswerOut, "POST", path, content)
+        return self._ask(AnswerOut, "POST", path, navigation)
 
     def recording(
         self,
@@ -185,8 +203,7 @@ class ProviderClient:
         """
         query = urlencode({"rate": f"{rate:g}", "streams": ",".join(streams)})
         path = f"/v1/missions/{_part(mission)}/live?{query}"
-        # The handshake's refusal has no text; that of the same mission by HTTP has.
-        return LiveConnection.open(self._exchange, path, lambda: self.mission(mission))
+        return LiveConnection.open(self._exchange, path)
 
     def here(self, mission: str) -> WireConnection:
         """Connect as the user's side of a mission, which is asked by its own analyses.
@@ -194,7 +211,7 @@ class ProviderClient:
         Raises as `live`.
         """
         path = f"/v1/missions/{_part(mission)}/here"
-        return WireConnection.open(self._exchange, path, lambda: self.mission(mission))
+        return WireConnection.open(self._exchange, path)
 
     def accounts(self) -> list[AccountOut]:
         """All accounts, as an administrator."""
@@ -242,9 +259,10 @@ class ProviderClient:
         method: Method,
         path: str,
         content: BaseModel | dict[str, Any] | None = None,
+        headers: dict[str, str] | None = None,
     ) -> M:
         body = content.model_dump(mode="json") if isinstance(content, BaseModel) else content
-        answer = self._exchange.ask(method, path, body)
+        answer = self._exchange.ask(method, path, body, headers)
         try:
             return TypeAdapter(kind).validate_python(answer)
         except ValidationError as error:

@@ -37,6 +37,8 @@ _CALLERS = frozenset(
     }
 )
 """Refusals of what was asked, which asking again does not mend."""
+_GATEWAYS = frozenset({HTTPStatus.BAD_GATEWAY, HTTPStatus.GATEWAY_TIMEOUT})
+"""A proxy tells that the service behind it does not answer."""
 _LOGIN = "; is the token right? `aerodaas login` stores one"
 Method: TypeAlias = Literal["GET", "HEAD", "POST", "PUT", "PATCH", "DELETE"]
 
@@ -59,7 +61,13 @@ class Exchange:
             maxsize=_KEPT_OPEN,
         )
 
-    def ask(self, method: Method, path: str, content: Any = None) -> Any:  # noqa: ANN401 - JSON
+    def ask(
+        self,
+        method: Method,
+        path: str,
+        content: Any = None,  # noqa: ANN401 - JSON
+        headers: Mapping[str, str] | None = None,
+    ) -> Any:  # noqa: ANN401 - JSON
         """Send a request with JSON, and return the JSON of its answer, its texts printable.
 
         Raises:
@@ -69,7 +77,8 @@ class Exchange:
             SourceError: If the service cannot be reached, or does not answer in time.
         """
         data = None if content is None else json.dumps(content).encode()
-        _, answer = self.send(method, path, data, {"Content-Type": "application/json"})
+        own = {"Content-Type": "application/json", **(headers or {})}
+        _, answer = self.send(method, path, data, own)
         try:
             return printed(json.loads(answer))
         except (ValueError, RecursionError):
@@ -145,8 +154,11 @@ class Exchange:
             "`aerodaas serve` of this version?"
         )
 
-    def refused(self, status: int, text: str) -> AeroDaaSError:
-        """The error of a refusal, with the service's text."""
+    def refusal(self, status: int, answer: bytes) -> AeroDaaSError:
+        """The error of a refusal, with the text of its answer."""
+        text = _text(answer) or f"it answered with status {status}"
+        if status in _GATEWAYS:
+            return self.unreachable(ConnectionError(text))
         hint = _LOGIN if status == HTTPStatus.UNAUTHORIZED else ""
         kind = ConfigError if status in _CALLERS else MissionError
         return kind(f"{self.address.host}: {text}{hint}")
@@ -174,7 +186,7 @@ class Exchange:
 
     def _require_success(self, status: int, answer: bytes) -> None:
         if not HTTPStatus.OK <= status < HTTPStatus.MULTIPLE_CHOICES:
-            raise self.refused(status, _text(answer) or f"it answered with status {status}")
+            raise self.refusal(status, answer)
 
 
 def _text(answer: bytes) -> str:

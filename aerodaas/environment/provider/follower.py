@@ -3,29 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import random
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.live import LiveConnection
+from aerodaas.environment.provider.pauses import pauses
 from aerodaas.protocol.schemas import MissionOut
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
-__all__ = ["MissionFollower", "pauses"]
-
-_FIRST_PAUSE = 0.5
-_LONGEST_PAUSE = 10.0
-"""Seconds between two attempts to connect again."""
-
-
-def pauses() -> Iterator[float]:
-    """Yield pauses between attempts: doubled each time, and spread, so that clients do not meet."""
-    pause = _FIRST_PAUSE
-    while True:
-        yield pause * random.uniform(0.5, 1.0)
-        pause = min(2.0 * pause, _LONGEST_PAUSE)
+__all__ = ["MissionFollower"]
 
 
 class MissionFollower:

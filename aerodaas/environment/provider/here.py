@@ -9,7 +9,8 @@ from typing import Any
 
 from aerodaas.environment.here_server import HereServer
 from aerodaas.environment.provider.client import ProviderClient
-from aerodaas.environment.provider.follower import MissionFollower, pauses
+from aerodaas.environment.provider.follower import MissionFollower
+from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
 from aerodaas.types.errors import AeroDaaSError
 

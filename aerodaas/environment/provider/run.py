@@ -17,8 +17,9 @@ from aerodaas.config.options import current_options
 from aerodaas.environment.mission_run import recording_path
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.commands import send_command
-from aerodaas.environment.provider.follower import MissionFollower, pauses
+from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.here import HereLink
+from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.streams import WireReader
 from aerodaas.environment.provider.submission import submit
 from aerodaas.environment.signals import TerminatedError, end_of_application, raise_on_signals

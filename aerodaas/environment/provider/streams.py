@@ -10,8 +10,9 @@ from typing import Any
 
 from aerodaas.analytics.wire_items import ItemError, unpack
 from aerodaas.environment.provider.client import ProviderClient
-from aerodaas.environment.provider.follower import MissionFollower, pauses
+from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.live import ReceivedItem
+from aerodaas.environment.provider.pauses import pauses
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
 __all__ = ["WireReader"]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable
 from contextlib import ExitStack
 from typing import TYPE_CHECKING, Any
 
@@ -35,13 +34,17 @@ class WireConnection:
         self._sending = threading.Lock()
 
     @classmethod
-    def open(cls, exchange: Exchange, path: str, explain: Callable[[], object]) -> Self:
-        """Connect; `explain` raises why, if the service has refused.
+    def open(cls, exchange: Exchange, path: str) -> Self:
+        """Connect.
 
-        Raises ConfigError without the package for WebSockets, SourceError without a connection.
+        Raises ConfigError without the package for WebSockets, SourceError without a connection,
+        what the exchange raises for the status and text of a refusal.
         """
         require_extra("remote", "following a provider's mission")
-        from websockets.exceptions import InvalidHandshake  # noqa: PLC0415 - only to follow
+        from websockets.exceptions import (  # noqa: PLC0415 - only to follow
+            InvalidHandshake,
+            InvalidStatus,
+        )
         from websockets.sync.client import connect  # noqa: PLC0415 - as above
 
         stack = ExitStack()
@@ -57,8 +60,10 @@ class WireConnection:
                     max_size=_LARGEST,
                 )
             )
+        except InvalidStatus as error:
+            answer = error.response
+            raise exchange.refusal(answer.status_code, bytes(answer.body or b"")) from None
         except InvalidHandshake as error:
-            explain()
             raise exchange.unreachable(error) from None
         except (OSError, EOFError) as error:
             raise exchange.unreachable(error) from None

@@ -3,6 +3,7 @@
 from aerodaas.service.access.access import Access
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.audit import Audit
+from aerodaas.service.access.oidc import OidcSettings, OidcVerifier
 from aerodaas.service.access.principal import Principal, require, sees
 from aerodaas.service.access.quotas import Quotas, QuotasLeft
 from aerodaas.service.access.rates import RateLimiter
@@ -13,6 +14,8 @@ __all__ = [
     "Access",
     "Accounts",
     "Audit",
+    "OidcSettings",
+    "OidcVerifier",
     "Principal",
     "Quotas",
     "QuotasLeft",

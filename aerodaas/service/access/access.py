@@ -6,9 +6,12 @@ import threading
 import time
 from collections import OrderedDict
 from collections.abc import Callable
+from http import HTTPStatus
 
 from aerodaas.analytics.remote.attempts import WrongTokens
+from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.audit import Audit
+from aerodaas.service.access.oidc import OidcVerifier
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.tokens import digest_of, fits, parse
 from aerodaas.service.errors import RefusedError, StoreError
@@ -36,8 +39,14 @@ class Access:
         audit: Audit,
         tell: Callable[[str], None] = lambda _: None,
         clock: Callable[[], float] = time.time,
+        issuer: OidcVerifier | None = None,
     ) -> None:
-        """Look tokens up in `store`; `tell` people of many wrong ones; times are Unix time."""
+        """Look tokens up in `store`; `tell` people of many wrong ones; times are Unix time.
+
+        With an `issuer`, its tokens are good beside the store's.
+        """
+        self._issuer = issuer
+        self._accounts = Accounts(store, clock)
         self._store = store
         self._audit = audit
         self._clock = clock
@@ -55,10 +64,18 @@ class Access:
         Raises:
             RefusedError: With status 401 for a token that is missing, malformed, unknown, wrong,
                 expired or revoked, or whose account is disabled; all with the same text. With
-                429 and `retry_after` after many wrong ones from one address or overall.
+                403 for an issuer's without tenant or role. With 429 and `retry_after` after many
+                of these from one address or overall. With 503 if the issuer has to be asked and
+                does not answer.
             StoreError: If the database does not answer, and the token is not remembered.
         """
-        principal = self._look_up(token)
+        refusal = RefusedError(401, "wrong or missing token: send it as `Authorization: Bearer …`")
+        try:
+            principal = self._look_up(token)
+        except RefusedError as error:
+            if error.status != HTTPStatus.FORBIDDEN:
+                raise
+            principal, refusal = None, error
         if principal is not None:
             return principal
         with self._lock:
@@ -67,13 +84,20 @@ class Access:
             raise RefusedError(429, "too many wrong tokens", retry_after=pause)
         # So many entries as wrong tokens are answered as such, and no more: an audit log that a
         # stranger can fill tells nothing.
-        self._audit.write(None, "token.refused", accepted=False, address=address, required=False)
-        raise RefusedError(401, "wrong or missing token: send it as `Authorization: Bearer …`")
+        self._audit.write(
+            None,
+            "token.refused",
+            text="" if refusal.status == HTTPStatus.UNAUTHORIZED else refusal.text,
+            accepted=False,
+            address=address,
+            required=False,
+        )
+        raise refusal
 
     def _look_up(self, text: str) -> Principal | None:
         given = parse(text)
         if given is None:
-            return None
+            return None if self._issuer is None else self._of_issuer(text, self._issuer)
         key = digest_of(given.secret)
         try:
             found = self._store.tokens.owned(given.id)
@@ -99,12 +123,41 @@ class Access:
             scopes=token.scopes & account.scopes,
             token=token.id,
         )
+        self._remember(key, principal, token.expires)
+        return principal
+
+    def _of_issuer(self, text: str, issuer: OidcVerifier) -> Principal | None:
+        issued = issuer.issued(text)
+        if issued is None:
+            return None
+        key = digest_of(text)
+        try:
+            account = self._accounts.of_issued(issued)
+        except StoreError:
+            principal = self._remembered(key)
+            if principal is None:
+                raise
+            return principal
+        if account.disabled:
+            with self._lock:
+                self._known.pop(key, None)
+            return None
+        principal = Principal(
+            account=account.name,
+            tenant=account.tenant,
+            role=account.role,
+            scopes=account.scopes,
+            token=issued.subject,
+        )
+        self._remember(key, principal, issued.expires)
+        return principal
+
+    def _remember(self, key: str, principal: Principal, expires: float) -> None:
         with self._lock:
-            self._known[key] = (principal, min(token.expires, now + _REMEMBERED))
+            self._known[key] = (principal, min(expires, self._clock() + _REMEMBERED))
             self._known.move_to_end(key)
             if len(self._known) > _MOST_REMEMBERED:
                 self._known.popitem(last=False)
-        return principal
 
     def _remembered(self, key: str) -> Principal | None:
         with self._lock:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import hashlib
+import re
 import threading
 import time
 from collections.abc import Callable, Collection
 from dataclasses import replace
 
 from aerodaas.protocol.schemas import AccountIn, AccountOut, Role, Scope, TokenIn, TokenOut
+from aerodaas.service.access.oidc import Issued
 from aerodaas.service.access.tokens import digest_of, new_secret
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.store import Account, Store, Tenant, Token
@@ -16,6 +19,7 @@ __all__ = ["Accounts"]
 
 _FIRST = "admin"
 _FIRST_DAYS = 365.0
+_NAME_LETTERS = 40
 _MOST_TOKENS = 100
 _DAY = 86400.0
 """Seconds."""
@@ -60,10 +64,43 @@ class Accounts:
             created=now,
         )
         with self._lock:
-            if self._store.tenants.get(row.tenant) is None:
-                self._store.tenants.add(Tenant(row.tenant, created=now))
-            self._store.accounts.add(row)
+            self._add(row)
         return _account_out(row)
+
+    def of_issued(self, issued: Issued) -> Account:
+        """The account of a token's subject, with the token's tenant and role.
+
+        It is made at the first request; its scopes, and whether it is disabled, are the
+        administrator's to change.
+        """
+        row = self._store.accounts.of_subject(issued.subject)
+        if row is not None and (row.tenant, row.role) == (issued.tenant, issued.role):
+            return row
+        with self._lock:
+            row = self._store.accounts.of_subject(issued.subject)
+            if row is None:
+                row = Account(
+                    name=_name_of(issued),
+                    tenant=issued.tenant,
+                    role=issued.role,
+                    scopes=frozenset(Scope),
+                    created=self._clock(),
+                    subject=issued.subject,
+                )
+                self._add(row)
+                return row
+            self._add_tenant(issued.tenant)
+            return self._store.accounts.update(
+                row.name, lambda one: replace(one, tenant=issued.tenant, role=issued.role)
+            )
+
+    def _add(self, row: Account) -> None:
+        self._add_tenant(row.tenant)
+        self._store.accounts.add(row)
+
+    def _add_tenant(self, name: str) -> None:
+        if self._store.tenants.get(name) is None:
+            self._store.tenants.add(Tenant(name, created=self._clock()))
 
     def change(
         self,
@@ -147,6 +184,13 @@ class Accounts:
     def tokens(self, account: str | None = None) -> list[TokenOut]:
         """Tokens of an account, or all, oldest first, without their secrets."""
         return [_token_out(row) for row in self._store.tokens.all(account)]
+
+
+def _name_of(issued: Issued) -> str:
+    """A name that people can read and no other account has, whatever others are called."""
+    readable = re.sub(r"[^\w\-]", "-", issued.name)[:_NAME_LETTERS]
+    first = "" if readable[:1].isalpha() else "u"
+    return f"{first}{readable}-{hashlib.sha256(issued.subject.encode()).hexdigest()[:16]}"
 
 
 def _account_out(row: Account) -> AccountOut:

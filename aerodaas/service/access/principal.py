@@ -23,7 +23,7 @@ class Principal:
     scopes: frozenset[Scope]
     """Those of the token that its account still has."""
     token: str
-    """The token's id."""
+    """The token's id; an issuer's has its subject instead."""
 
 
 def reaches(role: Role, wanted: Role) -> bool:

@@ -7,12 +7,14 @@ from pathlib import Path
 
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.tie import end_with_starter
 
 
 def main() -> None:
     """Fly or rehearse."""
     path = Path(sys.argv[1])
     if FlightOrder.read(FlightFolder(path).order).rehearsal:
+        end_with_starter()
         from aerodaas.service.flights.rehearsal import rehearse  # noqa: PLC0415 - loads the plots
 
         rehearse(path)

@@ -18,9 +18,10 @@ from pydantic import ValidationError
 
 from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.here.relay import HereRelay
-from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut, WaypointsIn
+from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.commands import COMMANDS, CommandWord
+from aerodaas.protocol.schemas import NavigationIn
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.types.errors import AeroDaaSError
@@ -50,7 +51,7 @@ class Flown(Protocol):
         """Execute a command of `COMMANDS`; raises AeroDaaSError."""
         ...
 
-    def fly(self, robot: str, waypoints: WaypointsIn) -> Answer:
+    def fly(self, navigation: NavigationIn) -> Answer:
         """Add waypoints; raises AeroDaaSError."""
         ...
 
@@ -154,8 +155,7 @@ class ControlServer:
 
     def _commanded(self, request: dict[str, Any]) -> Answer:
         if request["do"] == "fly":
-            waypoints = WaypointsIn.model_validate(request["waypoints"])
-            return self._flown.fly(request["robot"], waypoints)
+            return self._flown.fly(NavigationIn.model_validate(request["navigation"]))
         if request["do"] not in COMMANDS:
             return Answer(accepted=False, text=f"there is no command {request['do']!r}")
         return self._flown.command(request["robot"], request["do"])

@@ -19,7 +19,7 @@ from pydantic import SecretStr
 
 from aerodaas.analytics.here.analysis import HereSite
 from aerodaas.analytics.here.relay import HereRelay
-from aerodaas.analytics.remote.schemas import StatusOut, WaypointsIn
+from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.analytics.wire_items import pack
 from aerodaas.config.model import EnvironmentConfig, RemoteConfig
 from aerodaas.config.options import RunOptions, current_options
@@ -28,8 +28,9 @@ from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.run import Run
-from aerodaas.mission.commands import AddNavigation, Answer, ReturnHome
+from aerodaas.mission.commands import Answer, ReturnHome
 from aerodaas.protocol.commands import COMMANDS, CommandWord
+from aerodaas.protocol.schemas import NavigationIn
 from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder
@@ -203,10 +204,10 @@ class Flying:
         """Execute a command; raises MissionError for a robot that does not fly."""
         return self._flying(robot).command(robot, COMMANDS[name])
 
-    def fly(self, robot: str, waypoints: WaypointsIn) -> Answer:
+    def fly(self, navigation: NavigationIn) -> Answer:
         """Add waypoints to a robot's queue; raises AeroDaaSError for what cannot be flown."""
-        command = AddNavigation(waypoints.navigation(), waypoints.index)
-        return self._flying(robot).command(robot, command)
+        robot = navigation.robot
+        return self._flying(robot).command(robot, navigation.command())
 
     def _flying(self, robot: str) -> Run:
         if self._run is None or not self._navigates(robot):

@@ -14,10 +14,11 @@ _KEPT_OUT = "AERODAAS_"
 """Variables of the service itself, which hold its tokens."""
 
 
-def start_process(folder: FlightFolder) -> subprocess.Popen[bytes]:
-    """Start the process of the flight in `folder`, in a session of its own.
+def start_process(folder: FlightFolder, *, tied: bool) -> subprocess.Popen[bytes]:
+    """Start the process of the order in `folder`, in a session of its own.
 
-    It goes on when the service ends, and Ctrl-C at the service's terminal does not reach it.
+    A flight goes on when the service ends, and Ctrl-C at the service's terminal does not reach
+    it. A rehearsal is `tied`: it ends with the service, whatever ends that (see `tie`).
     """
     environment = {
         name: value for name, value in os.environ.items() if not name.startswith(_KEPT_OUT)
@@ -25,7 +26,7 @@ def start_process(folder: FlightFolder) -> subprocess.Popen[bytes]:
     with folder.log.open("ab") as log:
         return subprocess.Popen(  # noqa: S603 - our own module
             [sys.executable, "-m", "aerodaas.service.flights", str(folder.path)],
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE if tied else subprocess.DEVNULL,
             stdout=log,
             stderr=log,
             start_new_session=True,

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from starlette.requests import HTTPConnection
 
 from aerodaas.protocol.schemas import Role, Scope
@@ -43,12 +46,18 @@ class Admission:
     ) -> Principal:
         """The sender of a request; raises RefusedError if they may not do this."""
         principal: Principal = connection.scope[_SENDER]
-        try:
+        with self.auditing(principal, connection):
             require(principal, role, scope)
+        return principal
+
+    @contextmanager
+    def auditing(self, principal: Principal, connection: HTTPConnection) -> Iterator[None]:
+        """Audit what is refused to the sender of a request meanwhile."""
+        try:
+            yield
         except RefusedError as error:
             self._refuse(principal, connection, error)
             raise
-        return principal
 
     def _refuse(
         self, principal: Principal, connection: HTTPConnection, error: RefusedError

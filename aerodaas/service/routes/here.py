@@ -16,7 +16,7 @@ from aerodaas.service.errors import RefusedError
 from aerodaas.service.flights.async_channel import AsyncChannel
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.routes.admission import Admission
-from aerodaas.service.routes.refusals import close_refused
+from aerodaas.service.routes.refusals import refuse
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["HereRoutes"]
@@ -50,7 +50,7 @@ class HereRoutes:
             if found.tenant != principal.tenant:
                 raise RefusedError(403, f"{mission} is {found.tenant}'s")
         except AeroDaaSError as error:
-            await close_refused(socket, error)
+            await refuse(socket.scope, socket.send, error)
             return
         await socket.accept()
         try:

@@ -48,7 +48,8 @@ class LeaseRoutes:
     def request(self, wish: LeaseIn, request: Request) -> LeaseOut:
         """Ask for drones: granted at once, or queued."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        lease = self._bookings.request(principal, wish)
+        with self._admission.auditing(principal, request):
+            lease = self._bookings.request(principal, wish)
         self._audit.write(principal, "lease.request", lease.id, lease.state.value, accepted=True)
         return lease_out(lease)
 
@@ -65,14 +66,16 @@ class LeaseRoutes:
     def extend(self, lease: str, body: ExtensionIn, request: Request) -> LeaseOut:
         """Let a granted lease end later, if nobody waits for its drones."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        found = self._bookings.extend(principal, lease, body.minutes)
+        with self._admission.auditing(principal, request):
+            found = self._bookings.extend(principal, lease, body.minutes)
         self._audit.write(principal, "lease.extend", lease, f"{body.minutes:g} min", accepted=True)
         return lease_out(found)
 
     def end(self, lease: str, request: Request) -> LeaseOut:
         """Give a lease back; an operator revokes anybody's. Its drones come home."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        found = self._bookings.end(principal, lease)
+        with self._admission.auditing(principal, request):
+            found = self._bookings.end(principal, lease)
         text = found.reason
         self._audit.write(principal, "lease.end", lease, text, accepted=True, required=False)
         return lease_out(found)

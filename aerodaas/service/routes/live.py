@@ -12,7 +12,7 @@ from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.hub import StreamHub, Watcher
 from aerodaas.service.routes.admission import Admission
-from aerodaas.service.routes.refusals import close_refused
+from aerodaas.service.routes.refusals import refuse
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["LiveRoutes"]
@@ -52,7 +52,7 @@ class LiveRoutes:
             await asyncio.to_thread(self._desk.mission, principal, mission)
             own = await asyncio.to_thread(self._desk.flies, principal, mission)
         except AeroDaaSError as error:
-            await close_refused(socket, error)
+            await refuse(socket.scope, socket.send, error)
             return
         await socket.accept()
         session = _Session(socket, self._desk, self._hub, mission)

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter, BackgroundTasks, Request
+from fastapi import APIRouter, BackgroundTasks, Header, Request
 from fastapi.responses import FileResponse
 
-from aerodaas.analytics.remote.schemas import AnswerOut, WaypointsIn
-from aerodaas.protocol.schemas import CommandIn, MissionIn, MissionOut, Role, Scope, Word
+from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.protocol.schemas import (
+    CommandIn,
+    MissionIn,
+    MissionOut,
+    NavigationIn,
+    Role,
+    Scope,
+)
 from aerodaas.service.access import Audit, Principal
 from aerodaas.service.desk import MissionDesk
+from aerodaas.service.idempotency import read_key
 from aerodaas.service.routes.admission import Admission
 
 __all__ = ["MissionRoutes"]
-
-
-class NavigationIn(WaypointsIn):
-    """Waypoints for one robot of a mission."""
-
-    robot: Word
 
 
 class MissionRoutes:
@@ -46,10 +48,20 @@ class MissionRoutes:
         router.add_api_route("/{mission}/rehearsal.png", self.picture, **files)
         return router
 
-    def submit(self, wanted: MissionIn, request: Request) -> MissionOut:
-        """Submit a mission document to be rehearsed and flown."""
+    def submit(
+        self,
+        wanted: MissionIn,
+        request: Request,
+        idempotency_key: Annotated[str | None, Header()] = None,
+    ) -> MissionOut:
+        """Submit a mission document to be rehearsed and flown.
+
+        The same document with the same `Idempotency-Key` is the same mission, however often it
+        is sent.
+        """
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        found = self._desk.submit(principal, wanted)
+        with self._admission.auditing(principal, request):
+            found = self._desk.submit(principal, wanted, read_key(idempotency_key))
         self._audit.write(principal, "mission.submit", found.id, found.name, accepted=True)
         return found
 
@@ -68,14 +80,16 @@ class MissionRoutes:
     def cancel(self, mission: str, request: Request) -> MissionOut:
         """Cancel a mission; drones in flight come home."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        found = self._desk.cancel(principal, mission)
+        with self._admission.auditing(principal, request):
+            found = self._desk.cancel(principal, mission)
         self._audit.write(principal, "mission.cancel", mission, accepted=True, required=False)
         return found
 
     def approve(self, mission: str, request: Request) -> MissionOut:
         """Approve a mission that waits for an operator."""
         principal = self._admission.require(request, Role.OPERATOR)
-        found = self._desk.approve(principal, mission)
+        with self._admission.auditing(principal, request):
+            found = self._desk.approve(principal, mission)
         self._audit.write(principal, "mission.approve", mission, accepted=True)
         return found
 
@@ -93,7 +107,7 @@ class MissionRoutes:
     ) -> AnswerOut:
         """Add waypoints to the queue of one of the mission's robots."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        answer = self._desk.fly(principal, mission, body.robot, body)
+        answer = self._desk.fly(principal, mission, body)
         later.add_task(self._note, principal, "navigation", f"{mission}/{body.robot}", answer)
         return answer
 

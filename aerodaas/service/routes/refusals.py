@@ -6,19 +6,18 @@ import math
 from http import HTTPStatus
 
 from fastapi import FastAPI, Request, WebSocket
-from fastapi.exceptions import RequestValidationError
-from fastapi.responses import JSONResponse
+from fastapi.exceptions import RequestValidationError, WebSocketRequestValidationError
+from fastapi.responses import Response
 from starlette.exceptions import HTTPException
+from starlette.types import Receive, Scope, Send
 
+from aerodaas.analytics.remote.denial import deny
 from aerodaas.protocol.schemas import RefusalOut
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["close_refused", "refusal_of", "register_refusals"]
+__all__ = ["refuse", "register_refusals"]
 
-_POLICY_VIOLATION = 1008
-_CLOSING_REASON = 120
-"""Bytes of a WebSocket's closing reason, of 123 (RFC 6455)."""
 _LONGEST = 2000
 
 
@@ -26,38 +25,50 @@ def register_refusals(app: FastAPI) -> None:
     """Word every refusal as `RefusalOut`."""
     for kind in (AeroDaaSError, RequestValidationError, HTTPException):
         app.add_exception_handler(kind, _handled)
+    app.add_exception_handler(WebSocketRequestValidationError, _handled_socket)
 
 
-def refusal_of(error: Exception) -> JSONResponse:
-    """The answer to a request that is refused or has failed."""
-    status, text, headers = int(HTTPStatus.UNPROCESSABLE_ENTITY), str(error), {}
+async def refuse(scope: Scope, send: Send, error: Exception) -> None:
+    """Refuse a request, or a WebSocket that is not accepted yet, with its status and reason."""
+    status, text, headers = int(HTTPStatus.UNPROCESSABLE_ENTITY), str(error), []
     if isinstance(error, RefusedError):
         status = error.status
         if status == HTTPStatus.UNAUTHORIZED:
-            headers["WWW-Authenticate"] = "Bearer"
+            headers.append((b"www-authenticate", b"Bearer"))
         if error.retry_after is not None:
-            headers["Retry-After"] = str(math.ceil(error.retry_after))
+            headers.append((b"retry-after", b"%d" % math.ceil(error.retry_after)))
     elif isinstance(error, StoreError):
         status = int(HTTPStatus.SERVICE_UNAVAILABLE)
         text = f"the service's database cannot be used: {error}"
-    elif isinstance(error, RequestValidationError):
+    elif isinstance(error, RequestValidationError | WebSocketRequestValidationError):
         status, text = _malformed(error)
     elif isinstance(error, HTTPException):
         status, text = error.status_code, str(error.detail)
-    return JSONResponse(RefusalOut(text=text[:_LONGEST]).model_dump(), status, headers)
+    await deny(scope, send, status, RefusalOut(text=text[:_LONGEST]).model_dump(), *headers)
 
 
-async def close_refused(socket: WebSocket, error: Exception) -> None:
-    """Refuse a WebSocket before it is accepted."""
-    reason = str(error).encode()[:_CLOSING_REASON].decode(errors="ignore")
-    await socket.close(_POLICY_VIOLATION, reason)
+class _Refusal(Response):
+    """Answer to a request that is refused or has failed."""
+
+    def __init__(self, error: Exception) -> None:
+        super().__init__()
+        self._error = error
+
+    async def __call__(self, scope: Scope, _: Receive, send: Send) -> None:
+        await refuse(scope, send, self._error)
 
 
-def _handled(_: Request, error: Exception) -> JSONResponse:
-    return refusal_of(error)
+def _handled(_: Request, error: Exception) -> Response:
+    return _Refusal(error)
 
 
-def _malformed(error: RequestValidationError) -> tuple[int, str]:
+async def _handled_socket(socket: WebSocket, error: Exception) -> None:
+    await refuse(socket.scope, socket.send, error)
+
+
+def _malformed(
+    error: RequestValidationError | WebSocketRequestValidationError,
+) -> tuple[int, str]:
     """Each wrong field and its place, without the input, which may hold NaN or secrets."""
     problems = error.errors()
     invalid = any(problem["type"] == "json_invalid" for problem in problems)

@@ -57,6 +57,10 @@ class Accounts(Rows[Account]):
         """Those of a tenant, or all, by name."""
         return self._select(_is(tables.ACCOUNTS.c.tenant, tenant))
 
+    def of_subject(self, subject: str) -> Account | None:
+        """The account of a subject of an issuer; None before its first request."""
+        return next(iter(self._select(tables.ACCOUNTS.c.subject == subject, limit=1)), None)
+
 
 class Tokens(Rows[Token]):
     """Tokens, by id."""
@@ -121,6 +125,12 @@ class Missions(Rows[Mission]):
         return self._select(
             _is(columns.tenant, tenant), among, order=[columns.submitted.desc()], limit=limit
         )
+
+    def of_key(self, tenant: str, key: str) -> Mission | None:
+        """A tenant's mission by the idempotency key of its submission; None if there is none."""
+        columns = tables.MISSIONS.c
+        found = self._select(columns.tenant == tenant, columns.key == key, limit=1)
+        return next(iter(found), None)
 
 
 class Robots(Rows[RobotState]):

@@ -57,6 +57,8 @@ class Account:
     scopes: frozenset[Scope]
     created: float
     disabled: bool = False
+    subject: str | None = None
+    """Who it is at an OpenID Connect issuer: that one's URL and its id of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,6 +132,10 @@ class Mission:
     """JSON of `MissionIn` without its document."""
     verdict: Mapping[str, Any] | None = None
     """JSON of `VerdictOut`."""
+    key: str | None = None
+    """Idempotency key of its submission; no two missions of a tenant have the same."""
+    fingerprint: str | None = None
+    """SHA-256 of the submission with that key, hexadecimal."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from sqlalchemy import (
     Integer,
     MetaData,
     Table,
+    UniqueConstraint,
 )
 
 from aerodaas.protocol.schemas import LeaseState, MissionPhase, Role, Scope
@@ -64,6 +65,7 @@ ACCOUNTS = Table(
     Column("scopes", JsonText(_scopes), nullable=False),
     Column("created", Double, nullable=False),
     Column("disabled", Boolean, nullable=False),
+    Column("subject", Words, unique=True),
 )
 
 TOKENS = Table(
@@ -119,6 +121,10 @@ MISSIONS = Table(
     Column("ended", Double),
     Column("request", JsonText(), nullable=False),
     Column("verdict", JsonText()),
+    Column("key", Words),
+    Column("fingerprint", Words),
+    # Those without a key are not compared: NULL equals nothing.
+    UniqueConstraint("tenant", "key"),
     Index("missions_newest", "tenant", "submitted"),
 )
 

@@ -20,8 +20,10 @@ from aerodaas.analytics.models import DETECTOR
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.analytics.wire_items import pack
 from aerodaas.config.options import ProviderOptions, RunOptions, current_options
-from aerodaas.environment.provider import follower
-from aerodaas.protocol.schemas import MissionPhase, VerdictOut
+from aerodaas.environment.provider import client as client_module
+from aerodaas.environment.provider import follower, pauses
+from aerodaas.mission.commands import AddNavigation
+from aerodaas.protocol.schemas import MissionPhase, NavigationIn, VerdictOut
 from aerodaas.types.errors import (
     ConfigError,
     GraphError,
@@ -37,7 +39,7 @@ def _quiet(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """No terminal view, no plots; recordings go to the test's own folder."""
     current_options.set(RunOptions(view=False, record=tmp_path / "out"))
     monkeypatch.setattr("aerodaas.terminal.console.show_results", lambda *_, **__: None)
-    monkeypatch.setattr(follower, "_FIRST_PAUSE", 0.01)
+    monkeypatch.setattr(pauses, "_FIRST_PAUSE", 0.01)
 
 
 def hop(*places: tuple[float, float], name: str = "a") -> AeroNavigation:
@@ -205,10 +207,23 @@ def test_navigation_by_a_scheduler_goes_over_the_wire(stub: Stub) -> None:
     with pytest.raises(GraphError, match="cannot be set while a provider flies"):
         environment.set_trajectory_scheduler(OrderedScheduler(environment))
     added = [json.loads(one) for one in stub.sent("POST", "/navigation")]
-    assert [(one["index"], one["waypoints"][0]["deadline"]) for one in added] == [(0, 40)]
+    assert [(one["index"], one["deadline"]) for one in added] == [(0, 40)]
     assert [json.loads(one)["command"] for one in stub.sent("POST", "/commands")] == ["clear"]
     stub.state = mission(MissionPhase.LANDED)
     environment.wait()
+
+
+def test_a_queue_is_replaced_by_one_request(stub: Stub) -> None:
+    """Between two, the drone would have nothing to fly; an empty queue is another command's."""
+    with flying(stub) as environment:
+        environment.command("drone", AddNavigation(hop((1, 1)), deadline=40, clear_first=True))
+        (sent,) = [json.loads(one) for one in stub.sent("POST", "/navigation")]
+        arrived = NavigationIn.model_validate(sent).command()
+        assert (arrived.deadline, arrived.clear_first) == (40.0, True)
+        assert [one.id for one in arrived.navigation.waypoints] == ["a0"]
+        assert stub.sent("POST", "/commands") == []
+        with pytest.raises(MissionError, match="the navigation is empty"):
+            environment.command("drone", AddNavigation(AeroNavigation()))
 
 
 def test_what_was_not_submitted_cannot_be_added(stub: Stub) -> None:
@@ -301,14 +316,28 @@ def test_a_start_that_is_interrupted_leaves_no_mission_behind(
     assert len(stub.sent("DELETE", MISSION)) == 1
 
 
-def test_an_answer_that_is_lost_is_told_with_the_remedy(stub: Stub) -> None:
-    """The mission may fly: it is not submitted twice."""
+def test_an_answer_that_is_lost_is_told_with_the_remedy(
+    stub: Stub, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The mission may fly: what is sent again has the same key, and the last word is how to see."""
+    monkeypatch.setattr(client_module, "_RESEND_SECONDS", 1.0)
     environment = built(stub)
     environment.provider._exchange._pool.connection_pool_kw["timeout"] = 0.3  # type: ignore[union-attr]
     stub.slow = threading.Event()
     with pytest.raises(SourceError, match="aerodaas missions"):
         environment.start_mission()
-    assert len(stub.sent("POST", "/v1/missions")) == 1
+    assert len(stub.keys) > 1
+    assert len(set(stub.keys)) == 1
+
+
+def test_each_start_has_a_key_of_its_own(stub: Stub) -> None:
+    """Two flights of one application are two missions."""
+    stub.refusals["/v1/missions"] = (409, {"text": "not now"})
+    for _ in range(2):
+        with pytest.raises(MissionError, match="not now"):
+            built(stub).start_mission()
+    assert len(set(stub.keys)) == 2
+    assert None not in stub.keys
 
 
 OWN: dict[str, Callable[[], RunOptions]] = {

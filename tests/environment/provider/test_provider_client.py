@@ -12,11 +12,10 @@ from typing import Any
 import pytest
 from provider_stub import MISSION, TOKEN, Stub, mission
 
-from aerodaas.analytics.remote.schemas import WaypointsIn
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.environment.provider import exchange
 from aerodaas.environment.provider.client import LARGEST_MODEL, ProviderClient
-from aerodaas.protocol.schemas import CommandIn, MissionPhase
+from aerodaas.protocol.schemas import CommandIn, MissionPhase, NavigationIn
 from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError, SourceError
 
 
@@ -49,8 +48,8 @@ def test_answers_are_models(client: ProviderClient, stub: Stub) -> None:
     assert client.missions() == [stub.state]
     assert client.mission(MISSION) == stub.state
     assert client.command(MISSION, CommandIn(robot="drone", command="pause")).accepted
-    waypoints = WaypointsIn(waypoints=[WaypointEntry(id="a", x=1.0, y=2.0, z=3.0)])
-    assert client.add_navigation(MISSION, "drone", waypoints).accepted
+    navigation = NavigationIn(robot="drone", waypoints=[WaypointEntry(id="a", x=1.0, y=2.0, z=3.0)])
+    assert client.add_navigation(MISSION, navigation).accepted
     assert all(TOKEN not in path for _, path, _ in stub.asked)
 
 
@@ -67,6 +66,8 @@ def test_answers_are_models(client: ProviderClient, stub: Stub) -> None:
         (429, MissionError),
         (500, MissionError),
         (503, MissionError),
+        (502, SourceError),
+        (504, SourceError),
     ],
 )
 def test_a_refusal_is_an_error_with_the_services_text(
@@ -200,10 +201,12 @@ def test_a_name_is_one_part_of_a_path(client: ProviderClient, stub: Stub) -> Non
 def test_live_connections_tell_the_mission_until_it_is_over(
     client: ProviderClient, stub: Stub
 ) -> None:
-    """A refused one is told in the service's words, as WebSockets have none."""
+    """A refused one is told in the service's words, which its handshake's answer has."""
     stub.state = mission(MissionPhase.LANDED)
     with client.live(MISSION) as live:
         assert list(live) == [stub.state]
     stub.refusals["/v1/missions"] = (403, {"text": "another tenant's"})
+    asked = len(stub.asked)
     with pytest.raises(ConfigError, match="another tenant's"):
         client.live(MISSION)
+    assert len(stub.asked) == asked, "it needs no further question"

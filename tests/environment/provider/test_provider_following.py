@@ -10,7 +10,7 @@ import pytest
 from provider_stub import MISSION, Stub, mission
 
 from aerodaas.analytics.wire_items import pack
-from aerodaas.environment.provider import follower as module
+from aerodaas.environment.provider import pauses as module
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.environment.provider.follower import MissionFollower
 from aerodaas.environment.provider.streams import WireReader
@@ -119,6 +119,7 @@ def test_items_of_a_stream_arrive_in_order(client: ProviderClient, stub: Stub) -
     assert isinstance(picture, Frame)
     assert picture.header == frame.header
     assert picture.image.shape == (36, 64, 3)
+    assert reader.next(SECONDS) == "text"
     assert reader.newest(SECONDS) == "text"
     assert reader.newest(0.0) == "text"
     with pytest.raises(TimeoutError):
