@@ -12,6 +12,7 @@ import time
 from typing import Any
 
 from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount
+from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.session import Session
 from aerodaas.actors.worker import NodeSpec, Worker
 
@@ -34,8 +35,12 @@ class AnalyticsActor(StreamActor):
         self._workers: list[Worker] = []
         self._threads: list[threading.Thread] = []
 
-    def prepare(self, *nodes: NodeSpec) -> ActorInfo:
-        """Open the analyses `nodes`; raises the exceptions of their `open`."""
+    def prepare(self, variables: ProcessVariables | None = None, *nodes: NodeSpec) -> ActorInfo:
+        """Open the analyses `nodes`; raises the exceptions of their `open`.
+
+        `variables` have been set in this process by their arrival.
+        """
+        del variables
         # Not in the constructor: Ray would keep the models in its object store for restarts.
         self._workers = [self._worker(node) for node in nodes]
         return super().prepare()

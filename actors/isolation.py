@@ -21,6 +21,7 @@ import ray
 from ray.exceptions import GetTimeoutError, RayError
 
 from aerodaas.actors.cluster.ray_cluster import Placement, nodes_at, pinned
+from aerodaas.actors.process_variables import ray_variables
 from aerodaas.config.model import RuntimeEnvConfig
 from aerodaas.config.secrets import cleaned
 from aerodaas.types.errors import ConfigError
@@ -48,8 +49,7 @@ def isolation_options(env: RuntimeEnvConfig | None, place: Placement, name: str)
     if env is None:
         return {}
     runtime_env: dict[str, Any] = {}
-    if env.env_vars:
-        variables = {key: value.get_secret_value() for key, value in env.env_vars.items()}
+    if variables := ray_variables(env):
         runtime_env["env_vars"] = variables
     if env.image_uri is not None:
         _ask_all(place, name, _find_engine, ())

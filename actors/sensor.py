@@ -7,12 +7,13 @@ from typing import Any
 from aerodaas.actors.base import ActorInfo, StreamActor, StreamCount
 from aerodaas.actors.session import Session, next_due
 from aerodaas.actors.stream_names import end_stream
-from aerodaas.cameras.base import Camera, Picture
+from aerodaas.cameras.base import Camera, Picture, most_memory
 from aerodaas.config.model import SensorConfig
 from aerodaas.config.plugins import load_plugin
 from aerodaas.mission.commands import End
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
 from aerodaas.types.data import Frame, Header
+from aerodaas.types.memory_limit import limit_memory
 from aerodaas.types.status import Message
 from aerodaas.types.vehicle import VehicleState
 
@@ -48,6 +49,9 @@ class SensorActor(StreamActor):
         environment = self.session.environment
         plugin = load_plugin("cameras", environment.camera_driver(self._sensor))
         self._camera: Camera = plugin(self._sensor, environment)
+        most = most_memory(self._camera)
+        if most is not None:
+            limit_memory(most)
         self._camera.open()
         self._frames = self.publisher(self._stream)
         self._commands = self.publisher(end_stream(self._stream))

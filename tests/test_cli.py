@@ -101,6 +101,14 @@ BAD_WORDS: dict[str, tuple[list[str], str]] = {
     "an unknown option of doctor": (["doctor", "--fast"], "No such option"),
     "a missing application": (["run", "none.py"], "there is no application none.py"),
     "a folder as application": (["run", "."], "there is no application ."),
+    "an option that is misspelt": (["run", "app.py", "--sped", "2"], "No such option: --sped"),
+    "a misspelt option of graph": (
+        ["graph", "app.py", "--outptu", "a"],
+        "No such option: --outptu",
+    ),
+    "a misspelt option of compile": (["compile", "app.py", "--evn", "a"], "No such option: --evn"),
+    "a misspelt option of submit": (["submit", "app.py", "--tto", "a"], "No such option: --tto"),
+    "a misspelt option of replay": (["replay", "a.mcap", "--ap", "b"], "No such option: --ap"),
     "a speed that is none": (["run", "app.py", "--speed", "fast"], "not 'fast'"),
     "a speed of zero": (["run", "app.py", "--speed", "0"], 'positive number or "max", not'),
     "a speed of nan": (["run", "app.py", "--speed", "nan"], "not 'nan'"),
@@ -399,7 +407,7 @@ def test_the_doctor_names_a_port_that_is_taken(
 
 def test_help_teaches_by_example(aerodaas: Commands) -> None:
     """Each command shows how it is called."""
-    assert "aerodaas run apps/farm_survey.py" in aerodaas("--help").out
+    assert "aerodaas run farm_survey" in aerodaas("--help").out
     for command in ("run", "schema", "doctor"):
         ended = aerodaas(command, "--help")
         assert ended.code == 0

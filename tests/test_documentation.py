@@ -62,6 +62,17 @@ def test_the_first_application_flies(flyer: Flyer) -> None:
 
 
 @pytest.mark.slow
+def test_its_test_passes(tmp_path: Path) -> None:
+    """The test of the first application, as printed."""
+    (environment,) = blocks("getting-started.md", "json")
+    square, _, check = blocks("getting-started.md", "python")[:3]
+    names: dict[str, Any] = {}
+    with files(tmp_path, environment__json=environment, square__py=square):
+        exec(check, names)  # noqa: S102 - our own page
+        names["test_it_comes_home"](tmp_path / "flight")
+
+
+@pytest.mark.slow
 def test_acting_in_flight_works_as_shown(flyer: Flyer, capsys: pytest.CaptureFixture[str]) -> None:
     """Reading, pausing, polling and resuming, as printed."""
     (environment,) = blocks("getting-started.md", "json")

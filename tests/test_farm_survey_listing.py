@@ -65,7 +65,7 @@ def test_the_disaster_survey_builds_as_printed(
         env = names["env"]
         assert started == [names["drone"]]
         env.place_entries()
-        plan = Run(env)._plan()
+        plan = Run(env).plan()
     nodes = {node.stream: tuple(node.inputs) for actor in plan.analyses for node in actor.nodes}
     assert nodes == {
         "quadrotor_base/monitoring": ("quadrotor_base/odom",),

@@ -16,6 +16,7 @@ import ray
 from aerodaas.actors.cluster.dead_man import leave
 from aerodaas.actors.dispatch.frame_codec import CodedFrame, decoded
 from aerodaas.actors.priority import be_nice
+from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.streams import decode_message, encode_message
 from aerodaas.analytics.base import Analytics, ComputeKind
@@ -66,8 +67,9 @@ class CloudExecutor:
         self._frames: OrderedDict[tuple[str, int], Message[Any]] = OrderedDict()
         self._unpacked = threading.Condition()
 
-    def prepare(self, analyses: dict[str, Analytics[Any]]) -> None:
-        """Open the analyses, by stream."""
+    def prepare(self, variables: ProcessVariables, analyses: dict[str, Analytics[Any]]) -> None:
+        """Open the analyses, by stream; the arrival of `variables` has set them."""
+        del variables
         if ray.is_initialized() and ray.get_runtime_context().get_actor_id():
             be_nice(_NICENESS)
         for analysis in analyses.values():

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from pydantic import SecretStr
 from ray.exceptions import RayError, RayTaskError
 
 from aerodaas.actors.dispatch.costs import ExecutionEstimates
@@ -25,6 +26,7 @@ from aerodaas.actors.dispatch.executor import (
 )
 from aerodaas.actors.dispatch.frame_codec import Codec
 from aerodaas.actors.dispatch.frame_uplink import FrameTransfer, FrameUplink
+from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.streams import UnreadableError, decode_message
 from aerodaas.schedulers.analytics.base import Task
 from aerodaas.types.clock import NANOSECONDS
@@ -55,6 +57,12 @@ class Executor:
     """Streams of these analyses."""
     slots: int
     codec: Codec
+    variables: Mapping[str, SecretStr] = field(default_factory=dict)
+    """Environment variables of its process, for its analyses."""
+
+    def prepare(self) -> Any:  # noqa: ANN401 - a Ray reference
+        """Call its actor's `prepare`, at the start or after a restart."""
+        return self.handle.prepare.remote(ProcessVariables(self.variables), *self.works)
 
 
 @dataclass(frozen=True)
@@ -229,8 +237,7 @@ class RemoteExecutor:
 
     def _prepare(self) -> None:
         if self._preparing is None or self._preparing.done():
-            works = self.executor.works[0]
-            self._preparing = self.executor.handle.prepare.remote(works).future()
+            self._preparing = self.executor.prepare().future()
 
     def _carry(self, sent: _Sent, message: Message[Any], until: float) -> None:
         """In the packing thread: encode the frame and start the execution.

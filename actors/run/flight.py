@@ -27,6 +27,7 @@ from aerodaas.actors.dispatch.remote_executor import Executor
 from aerodaas.actors.drone.actor import CHANGES, COMMANDS, DroneActor
 from aerodaas.actors.drone.robot_report import RobotReport
 from aerodaas.actors.isolation import isolation_options
+from aerodaas.actors.process_variables import ProcessVariables, private_variables
 from aerodaas.actors.run.actor_classes import actor_classes
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.run.application_process import ApplicationProcess
@@ -426,7 +427,7 @@ class Flight:
                 self._classes.analytics,
                 actor.place,
                 (self.plan.session, actor.name),
-                setup=actor.nodes,
+                setup=(ProcessVariables(private_variables(actor.runtime_env)), *actor.nodes),
                 restarts=_RESTARTS,
                 options=environments[actor.name],
             )
@@ -461,9 +462,17 @@ class Flight:
         )
         self._helpers.append(handle)
         works = ray.put(process.works)
-        self._opening.append(handle.prepare.remote(works))
-        models = frozenset(process.works)
-        return Executor(process.site, handle, [works], models, process.slots, process.codec)
+        executor = Executor(
+            process.site,
+            handle,
+            [works],
+            frozenset(process.works),
+            process.slots,
+            process.codec,
+            private_variables(process.runtime_env),
+        )
+        self._opening.append(executor.prepare())
+        return executor
 
     def _prepare(self, members: list[Member], progress: Callable[[str], None]) -> None:
         waiting = {member.handle.prepare.remote(*member.setup): member for member in members}

@@ -12,7 +12,7 @@ from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import CameraModel
 from aerodaas.types.records import valued
 
-__all__ = ["Camera", "Picture"]
+__all__ = ["Camera", "Picture", "most_memory"]
 
 
 @valued
@@ -75,3 +75,13 @@ class Camera(Protocol):
     def close(self) -> None:
         """Release the source."""
         ...
+
+
+def most_memory(camera: Camera) -> int | None:
+    """Bytes that the process of `camera` may allocate from `open` on; None for any number.
+
+    A camera that decodes what a stranger may send has an attribute `most_memory`: libraries for
+    streams take whatever memory the stream asks for.
+    """
+    most: int | None = getattr(camera, "most_memory", None)
+    return most

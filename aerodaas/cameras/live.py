@@ -36,6 +36,11 @@ _OPENING = threading.Lock()
 class LiveSource:
     """Source of the newest frame of a URL (rtsp, udp, http, …) or device (/dev/video0)."""
 
+    most_memory = 2 << 30
+    """Bytes that its process may allocate. A picture of the largest size, decoded by 16 threads
+    from 16 others, takes 0.8 GB; without a bound, a server that sends one frame without an end
+    takes all memory of the machine, and the read timeout never strikes."""
+
     def __init__(self, address: SecretUrl, *, timeout: float = _FIRST_FRAME_TIMEOUT) -> None:
         """Read from `address`; `open` waits up to `timeout` seconds for the first frame."""
         self._address = address
@@ -49,6 +54,8 @@ class LiveSource:
         """Always False: a source that times out is reconnected."""
         self.skipped = 0
         self.reconnections = 0
+        self._frames = 0
+        """Frames decoded so far."""
 
     def open(self) -> NDArray[np.uint8]:
         """Start decoding and return the first frame; raises SourceError without one."""
@@ -86,7 +93,13 @@ class LiveSource:
         wait = _SHORTEST_WAIT
         while not self._closing.is_set():
             capture = _connect(self._address.get_secret_value())
-            if self._drain(capture):
+            before = self._frames
+            try:
+                self._drain(capture)
+            except (cv2.error, MemoryError):
+                # No memory for what the stream says it sends.
+                self.skipped += 1
+            if self._frames > before:
                 wait = _SHORTEST_WAIT
             capture.release()
             if self._closing.wait(wait):
@@ -95,9 +108,8 @@ class LiveSource:
             _log.warning("%s is silent; connecting again", self._address)
             wait = min(2 * wait, _LONGEST_WAIT)
 
-    def _drain(self, capture: cv2.VideoCapture) -> bool:
-        """Read frames until the source ends or times out; returns whether there was any."""
-        any_frame = False
+    def _drain(self, capture: cv2.VideoCapture) -> None:
+        """Read frames until the source ends or times out."""
         while not self._closing.is_set() and capture.grab():
             grabbed = host_time_ns()
             width, height = map(capture.get, (cv2.CAP_PROP_FRAME_WIDTH, cv2.CAP_PROP_FRAME_HEIGHT))
@@ -107,11 +119,10 @@ class LiveSource:
             if not readable:
                 self.skipped += 1
                 continue
-            any_frame = True
             with self._lock:
                 self._frame = (np.asarray(image, np.uint8), grabbed)
+            self._frames += 1
             self._arrived.set()
-        return any_frame
 
 
 def _connect(address: str) -> cv2.VideoCapture:

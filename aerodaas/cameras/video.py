@@ -26,6 +26,7 @@ class VideoCamera:
     """
 
     settings_model = CameraConfig
+    most_memory: int | None = None
 
     def __init__(self, sensor: SensorConfig, environment: EnvironmentConfig) -> None:
         """Validate the settings of `sensor`; raises ConfigError."""
@@ -38,6 +39,8 @@ class VideoCamera:
             if _LIVE.match(path.get_secret_value())
             else VideoFile(path, sensor.rate, loop=self._settings.loop)
         )
+        if isinstance(self._source, LiveSource):
+            self.most_memory = LiveSource.most_memory
         self._model: CameraModel | None = None
 
     @property

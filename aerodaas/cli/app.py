@@ -10,12 +10,16 @@ from typing import Annotated
 import typer
 
 from aerodaas.cli import cluster, lab, lease, provider, remote
-from aerodaas.cli.application import run_application, speed_option
-from aerodaas.cli.examples import ExampleGroup
+from aerodaas.cli.application import build_application, run_application, speed_option
+from aerodaas.cli.check import check
+from aerodaas.cli.examples import examples
 from aerodaas.cli.export import export
+from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.new import new
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
 from aerodaas.cli.serve import serve
+from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.errors import (
     AeroDaaSError,
@@ -31,10 +35,12 @@ _CAUSED_BY_A_LINE = (GraphError, InvalidWaypointError, UnknownIdError)
 """Errors reported with the application's own line."""
 _PROVIDER = "At a provider"
 
+_WORDS = {"allow_extra_args": True}
+"""Of commands whose words after `--` are the application's own; a misspelt option is none."""
+
 app = typer.Typer(
     cls=ExampleGroup,
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode="markdown",
     pretty_exceptions_enable=False,
     help="""Program drones as a service.
@@ -42,20 +48,26 @@ app = typer.Typer(
 An application of some 20 lines becomes a dataflow of sensing, analytics and navigation, and
 flies a simulated drone or a Tello.
 
-    aerodaas run apps/farm_survey.py --speed max
+    aerodaas run farm_survey
+    aerodaas new my_app
 """,
 )
+app.command()(new)
+app.command()(examples)
 app.add_typer(remote.app, name="remote")
 app.add_typer(lab.app, name="lab")
 app.add_typer(cluster.app, name="cluster")
 app.add_typer(lease.app, name="lease", rich_help_panel=_PROVIDER)
 
 
-@app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+@app.command(context_settings=_WORDS)
 def run(
     context: typer.Context,
     application: Annotated[
-        Path, typer.Argument(help="The application: a Python file, or a mission document.")
+        Path,
+        typer.Argument(
+            help="The application: a Python file, a mission document, or the name of an example."
+        ),
     ],
     env: Annotated[
         Path | None, typer.Option(help="Environment file instead of the application's own.")
@@ -117,15 +129,16 @@ def run(
 
     Words after `--` are the application's own.
 
-        aerodaas run apps/farm_survey.py
-        aerodaas run apps/farm_survey.py --speed 5 --seed 7 --record /tmp/farm
-        aerodaas run apps/farm_survey.py --set quadrotor_base.limits.cruise_speed=1
+        aerodaas run farm_survey
+        aerodaas run my_app.py --speed 5 --seed 7 --record /tmp/farm
+        aerodaas run farm_survey --set quadrotor_base.limits.cruise_speed=1
         aerodaas run mine.py --guest theirs.py --grant theirs=sense:cam1,compute:edge
-        aerodaas run apps/watch_frames.py -- pictures/ yolov8n.onnx --rate 5
+        aerodaas run watch_frames -- pictures/ yolov8n.onnx --rate 5
     """
     from aerodaas.config.grants import parse_words  # noqa: PLC0415 - slow to load
     from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - as above
 
+    application = find_application(application)
     factor, lockstep = speed_option(speed)
     options = RunOptions(
         environment=env,
@@ -138,7 +151,7 @@ def run(
         view=view is not False,
         live=live_address if live else None,
         page=view_address if view else None,
-        guests=tuple(path.resolve() for path in guest or ()),
+        guests=tuple(find_application(path).resolve() for path in guest or ()),
         grants=parse_words(grant or ()),
         application=application.resolve(),
     )
@@ -149,7 +162,7 @@ def run(
     run_application(application, context.args, options)
 
 
-@app.command("compile", context_settings={"allow_extra_args": True, "ignore_unknown_options": True})
+@app.command("compile", context_settings=_WORDS)
 def compile_command(
     context: typer.Context,
     application: Annotated[
@@ -167,9 +180,9 @@ def compile_command(
     The file runs up to `start_mission()`. Words after `--` are the application's own. Of a
     recording, it is the document that was flown.
 
-        aerodaas compile apps/farm_survey.py -o apps/farm_survey.json
-        aerodaas run apps/farm_survey.json
-        aerodaas compile flight.mcap | diff apps/farm_survey.json -
+        aerodaas compile my_app.py -o my_app.json
+        aerodaas run my_app.json
+        aerodaas compile flight.mcap | diff my_app.json -
     """
     from aerodaas.environment.document.flying import (  # noqa: PLC0415
         compile_application,
@@ -179,8 +192,12 @@ def compile_command(
     if application.suffix == ".mcap":
         document = recorded_document(application)
     else:
-        document = compile_application(application, context.args, env)
-    text = document.text()
+        document = compile_application(find_application(application), context.args, env)
+    _put(document.text(), output)
+
+
+def _put(text: str, output: Path | None) -> None:
+    """Print a text, or write it into a file; raises ConfigError if that cannot be."""
     if output is None:
         typer.echo(text, nl=False)
         return
@@ -188,6 +205,34 @@ def compile_command(
         output.write_text(text, encoding="utf-8")
     except OSError as error:
         raise ConfigError(f"cannot write {output}: {error.strerror}") from None
+
+
+@app.command("graph", context_settings=_WORDS)
+def graph_command(
+    context: typer.Context,
+    application: Annotated[Path, typer.Argument(help="The application, as for `aerodaas run`.")],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", help="A file; default: printed.")
+    ] = None,
+    env: Annotated[
+        Path | None, typer.Option(help="Environment file instead of the application's own.")
+    ] = None,
+) -> None:
+    """Draw an application's graph as a Mermaid flowchart; nothing flies.
+
+    Sites that show Markdown draw it, such as GitHub's; so does https://mermaid.live.
+
+        aerodaas graph farm_survey
+        aerodaas graph my_app.py -o graph.mmd
+    """
+    from aerodaas.dataflow.drawing import mermaid  # noqa: PLC0415 - slow to load
+
+    application = find_application(application)
+    options = RunOptions(application=application.resolve(), environment=env, view=False)
+    _put(mermaid(build_application(application, context.args, options).graph), output)
+
+
+app.command(context_settings=_WORDS)(check)
 
 
 @app.command()
@@ -220,7 +265,7 @@ app.command()(serve)
 app.command()(report)
 app.command()(compare)
 app.command()(export)
-app.command(context_settings={"allow_extra_args": True, "ignore_unknown_options": True})(replay)
+app.command(context_settings=_WORDS)(replay)
 for _command in (
     provider.login,
     provider.fleet,
@@ -232,7 +277,7 @@ for _command in (
     app.command(rich_help_panel=_PROVIDER)(_command)
 app.command(
     rich_help_panel=_PROVIDER,
-    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    context_settings=_WORDS,
 )(provider.submit)
 
 

@@ -11,18 +11,17 @@ from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.errors import ConfigError
 
 if TYPE_CHECKING:
+    from aerodaas.environment.environment import Environment
     from aerodaas.protocol.schemas import MissionOut
 
-__all__ = ["run_application", "speed_option", "submit_application"]
+__all__ = ["build_application", "run_application", "speed_option", "submit_application"]
 
 
 def run_application(application: Path, words: list[str], options: RunOptions) -> None:
     """Run `application` with the arguments `words`, as Python itself would; or fly a document.
 
-    Raises ConfigError if there is no such file, and the application's own exceptions.
+    Raises the application's own exceptions.
     """
-    if not application.is_file():
-        raise ConfigError(f"there is no application {application}")
     if application.suffix == ".json":
         from aerodaas.environment.document.flying import fly_mission  # noqa: PLC0415 - slow to load
 
@@ -36,6 +35,20 @@ def run_application(application: Path, words: list[str], options: RunOptions) ->
     runpy.run_path(str(application), run_name="__main__")
 
 
+def build_application(application: Path, words: list[str], options: RunOptions) -> Environment:
+    """Run `application` up to `start_mission()`, or read a document; nothing flies.
+
+    Raises what `run_application` raises, and GraphError if it starts no mission, or several.
+    """
+    from aerodaas.environment.offering import offered, the_only  # noqa: PLC0415 - slow to load
+
+    with offered() as found:
+        run_application(application, words, options)
+    environment = the_only(found)
+    environment.place_entries()
+    return environment
+
+
 def submit_application(application: Path, words: list[str], options: RunOptions) -> MissionOut:
     """Run `application` up to `start_mission()`, or read a document, and submit what it flies.
 
@@ -44,12 +57,9 @@ def submit_application(application: Path, words: list[str], options: RunOptions)
     from aerodaas.environment.document.compiling import (  # noqa: PLC0415 - slow to load
         compile_mission,
     )
-    from aerodaas.environment.offering import offered, the_only  # noqa: PLC0415 - as above
     from aerodaas.environment.provider.submission import submit  # noqa: PLC0415 - as above
 
-    with offered() as found:
-        run_application(application, words, options)
-    environment = the_only(found)
+    environment = build_application(application, words, options)
     if environment.provider is None:
         raise ConfigError(f"{application} is flown by no provider: name one")
     written = compile_mission(environment, application.stem)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from aerodaas.cli.examples import ExampleGroup
+from aerodaas.cli.help_examples import ExampleGroup
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["app"]
@@ -23,13 +23,17 @@ app = typer.Typer(
     """,
 )
 
+_WORKLOAD = "3D-A"
+_SCHEDULERS = "ec_edf,dems,gems,margin"
+
 Names = Annotated[
-    str,
+    list[str] | None,
     typer.Option(
         "--scheduler",
         "-s",
-        help="Comma-separated: registered names (`aerodaas lab list`), `module:Class` or "
-        "`file.py:Class`. `dems_published` and the like behave as the published code.",
+        help="Comma-separated, or given several times: registered names (`aerodaas lab list`), "
+        "`module:Class` or `file.py:Class`. `dems_published` and the like behave as the published "
+        f"code. Default: {_SCHEDULERS}.",
     ),
 ]
 
@@ -38,15 +42,15 @@ Names = Annotated[
 def run(
     *,
     workload: Annotated[
-        str,
+        list[str] | None,
         typer.Option(
             "--workload",
             "-w",
-            help="Comma-separated: `3D-A` is 3 drones with all six models on one edge, `4D-P` "
-            "four models, `80D-A/7` 80 drones over 7 edges; or a JSON file; `six` for all of "
-            "the published ones.",
+            help="Comma-separated, or given several times: `3D-A` is 3 drones with all six models "
+            "on one edge, `4D-P` four models, `80D-A/7` 80 drones over 7 edges; or a JSON file; "
+            f"`six` for all of the published ones. Default: {_WORKLOAD}.",
         ),
-    ] = "3D-A",
+    ] = None,
     flown: Annotated[
         Path | None,
         typer.Option(
@@ -55,7 +59,7 @@ def run(
             "came, with the execution times observed.",
         ),
     ] = None,
-    scheduler: Names = "ec_edf,dems,gems,margin",
+    scheduler: Names = None,
     seeds: Annotated[int, typer.Option(help="Number of seeds, 0 to N-1.", min=1)] = 10,
     network: Annotated[
         str,
@@ -94,6 +98,9 @@ def run(
     json_path: Annotated[
         Path | None, typer.Option("--json", help="File for every figure and its interval.")
     ] = None,
+    csv_path: Annotated[
+        Path | None, typer.Option("--csv", help="The same, one figure to a row.")
+    ] = None,
 ) -> None:
     """Simulate schedulers on the same sample paths and compare them.
 
@@ -108,8 +115,8 @@ def run(
 
     try:
         study(
-            scheduler,
-            workload,
+            ",".join(scheduler or [_SCHEDULERS]),
+            ",".join(workload or [_WORKLOAD]),
             flown=flown,
             seeds=seeds,
             network=network,
@@ -121,6 +128,7 @@ def run(
             address=address,
             plots=plots,
             json_path=json_path,
+            csv_path=csv_path,
         )
     except AeroDaaSError as error:
         Console(stderr=True).print(f"[red]error:[/red] {error}", highlight=False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import random
 from collections.abc import Sequence
@@ -27,6 +28,7 @@ from aerodaas.schedulers.lab import (
 from aerodaas.schedulers.lab.metrics import Score, score
 from aerodaas.schedulers.lab.run import Spread
 from aerodaas.schedulers.lab.workload import SIX
+from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.types.clock import NANOSECONDS
 
 __all__ = ["registered", "study"]
@@ -50,6 +52,7 @@ def study(
     address: str | None,
     plots: Path | None,
     json_path: Path | None,
+    csv_path: Path | None,
 ) -> None:
     """Compare schedulers and print the tables; the arguments are those of `aerodaas lab run`."""
     results: list[LabResult] = []
@@ -76,11 +79,25 @@ def study(
         if as_flown is not None:
             result.scores["as flown"] = [as_flown] * seeds
         results.append(result)
-        Console().print(_result_table(result))
+        _show(result)
         if plots is not None:
             _plot(result, names, resources, plots)
     if json_path is not None:
         json_path.write_text(json.dumps([r.as_json() for r in results], indent=1))
+    if csv_path is not None:
+        _write_csv(results, csv_path)
+
+
+def _write_csv(results: list[LabResult], path: Path) -> None:
+    """Write every figure as a row of its own, as pandas and R want it."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(("workload", "network", "times", "scheduler", "figure", "mean", "margin"))
+        for result in results:
+            case = (result.workload.name, result.network.name, result.times.name)
+            for name in result.scores:
+                for figure, mean in result.figures(name).items():
+                    writer.writerow((*case, name, figure, mean.value, mean.margin))
 
 
 def registered() -> None:
@@ -91,34 +108,29 @@ def registered() -> None:
         table.add_row(name, text)
     Console().print(table)
     columns = ("benefit", "deadline ms", "edge ms", "cloud ms", "edge cost", "cloud cost", "QoE")
-    models = Table("model", title="Models of the published evaluation")
-    for column in columns:
-        models.add_column(column, justify="right")
+    models: list[Row] = []
     for name, p in PUBLISHED.items():
         clock = (p.deadline / MILLISECOND, p.edge_time / MILLISECOND, p.cloud_time / MILLISECOND)
         bonus = p.qoe.bonus if p.qoe else 0
         figures = (p.benefit, *clock, p.edge_cost, p.cloud_cost, bonus)
-        models.add_row(name, *(f"{figure:g}" for figure in figures))
-    Console().print(models)
+        models.append(Row(name, [f"{figure:g}" for figure in figures]))
+    show_figures("Models of the published evaluation", "model", columns, models)
     Console().print(f"Workloads: {', '.join(SIX)}, NNND-A/EDGES, or a JSON file", highlight=False)
 
 
-def _result_table(result: LabResult) -> Table:
-    """The table that `run` prints."""
+def _show(result: LabResult) -> None:
+    """Print the table of `run`."""
     title = (
         f"{result.workload.name}: {result.workload.duration / 1e9:g} s, "
         f"{result.network.name} network, {result.times.name} times, {len(result.seeds)} seeds"
     )
-    table = Table(title=title, title_justify="left")
-    table.add_column("scheduler")
     shares = ("completion", "late", "dropped", "migrated", "stolen", "edge use", "of bound")
     columns = ["qos per s", "of bound", "completion", "qoe per s", "late", "dropped"]
     columns += ["migrated", "stolen", "edge use", "cloud use", "cost per s"]
     if result.bounds is None:
         columns.remove("of bound")
-    for column in columns:
-        table.add_column(f"{column} %" if column in shares else column, justify="right")
     best = max(result.figures(name)["qos per s"].value for name in result.scores)
+    rows = []
     for name in result.scores:
         figures = result.figures(name)
         cells = []
@@ -127,9 +139,9 @@ def _result_table(result: LabResult) -> Table:
             mean = figures[column]
             margin = "" if isnan(mean.margin) else f" ±{mean.margin * scale:.1f}"
             cells.append(f"{mean.value * scale:.1f}{margin}")
-        style = "bold" if figures["qos per s"].value == best else None
-        table.add_row(name, *cells, style=style)
-    return table
+        rows.append(Row(name, cells, bold=figures["qos per s"].value == best))
+    headings = [f"{column} %" if column in shares else column for column in columns]
+    show_figures(title, "scheduler", headings, rows)
 
 
 def _workload(name: str, duration: float | None) -> Workload:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from aerodaas.cli.examples import ExampleGroup
+from aerodaas.cli.help_examples import ExampleGroup
 from aerodaas.cli.provider_output import At, Json, client_at, moment, print_json, print_table
 from aerodaas.types.errors import ConfigError, MissionError
 

@@ -12,6 +12,7 @@ import typer
 
 from aerodaas.cli.application import run_application, submit_application
 from aerodaas.cli.provider_output import At, Json, client_at, moment, print_json, print_table
+from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import ProviderOptions, RunOptions
 from aerodaas.types.errors import ConfigError, MissionError
 
@@ -130,14 +131,15 @@ def submit(
 
     Ctrl-C has the provider bring the drones home. Words after `--` are the application's own.
 
-        aerodaas submit apps/farm_survey.py --to https://provider.example
+        aerodaas submit farm_survey --to https://provider.example
         aerodaas submit farm.json --minutes 5 --silence return
-        aerodaas submit apps/farm_survey.py --no-wait --json | jq -r .id
+        aerodaas submit my_app.py --no-wait --json | jq -r .id
     """
     from aerodaas.environment.provider.logins import default_url  # noqa: PLC0415 - slow to load
 
     if silence not in {None, "continue", "return"}:
         raise ConfigError(f"--silence is continue or return, not {silence!r}")
+    application = find_application(application)
     wanted = ProviderOptions(
         url=to or default_url(),
         minutes=minutes,

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from aerodaas.analytics.remote.client import TOKEN_VARIABLE, RemoteClient
-from aerodaas.cli.examples import ExampleGroup
+from aerodaas.cli.help_examples import ExampleGroup
 
 __all__ = ["app"]
 

@@ -13,6 +13,7 @@ import typer
 
 from aerodaas.cli.application import run_application, speed_option
 from aerodaas.cli.report import Recorded
+from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions
 from aerodaas.config.printable import printable
 from aerodaas.types.errors import MissionError
@@ -51,7 +52,7 @@ def replay(
     No vehicle is touched. Of the recorded environment only geometry, ids, rates and calibration
     are taken. Words after `--` are the application's own.
 
-        aerodaas replay flight.mcap --app apps/farm_survey.py
+        aerodaas replay flight.mcap --app farm_survey
         aerodaas replay flight.mcap --app follow.py --model other.onnx
         aerodaas replay flight.mcap --app follow.py --scheduler gems
     """
@@ -73,6 +74,7 @@ def replay(
             + (f"{env} says what is taken instead" if env else "give them with --env FILE")
         )
     now = datetime.now().astimezone()
+    app = find_application(app)
     folder = out or Path("runs") / f"replay-{app.stem}-{now:%Y%m%d-%H%M%S}"
     factor, lockstep = speed_option(speed)
     options = RunOptions(

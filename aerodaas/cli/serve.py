@@ -74,7 +74,7 @@ def serve(
     and not the flights: they go on, and the next start finds them again.
 
         aerodaas serve environments/fleet.json --state fleet/
-        AERODAAS_TOKEN=… aerodaas submit apps/farm_survey.py --to http://127.0.0.1:8400
+        AERODAAS_TOKEN=… aerodaas submit farm_survey --to http://127.0.0.1:8400
         aerodaas serve fleet.json --state f/ --oidc-issuer https://id.example --oidc-audience drones
     """
     from aerodaas.config.extras import require_extra  # noqa: PLC0415 - only to serve

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -77,6 +78,13 @@ class RunOptions:
     """For flights on a provider's drones."""
     application: Path | None = None
     """The application's file, for relative paths and the recording's provenance."""
+
+    def beside_application(self, path: Path) -> Path:
+        """A relative path beside the application's file, else in the working directory."""
+        main = getattr(sys.modules.get("__main__"), "__file__", None)
+        application = self.application or (Path(main) if main else None)
+        beside = application.parent / path if application is not None else path
+        return beside if beside.exists() else path
 
 
 _CURRENT: ContextVar[RunOptions] = ContextVar("run_options", default=RunOptions())  # noqa: B039 - frozen

@@ -41,8 +41,9 @@ E = TypeVar("E")
 E_co = TypeVar("E_co", covariant=True)
 NodeKind = typing.Literal["sensor", "analytics", "external"]
 _PACKAGE = Path(__file__).resolve().parents[1]
-# Two of the package's folders may stand elsewhere, behind links.
+# Folders of the package may stand elsewhere, behind links.
 _OURS = (_PACKAGE, *((_PACKAGE / name).resolve() for name in ("actors", "schedulers")))
+_APPLICATIONS = (_PACKAGE / "apps").resolve()
 
 
 def application_line() -> str:
@@ -50,7 +51,8 @@ def application_line() -> str:
     frame = inspect.currentframe()
     while frame is not None:
         path = Path(frame.f_code.co_filename).resolve()
-        if not any(path.is_relative_to(folder) for folder in _OURS):
+        ours = any(path.is_relative_to(folder) for folder in _OURS)
+        if not ours or path.is_relative_to(_APPLICATIONS):
             code = linecache.getline(str(path), frame.f_lineno).strip()
             return f"{path.name}:{frame.f_lineno}: {code}"
         frame = frame.f_back

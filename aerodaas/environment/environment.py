@@ -75,6 +75,12 @@ class Environment(PaperNames, IEnvironment):
         self._dispatch_with: AnalyticsScheduler | None = None
         self._compute: list[ComputeConfig] | None = None
 
+    def _repr_mimebundle_(self, **_: object) -> dict[str, str]:
+        """The graph as JupyterLab draws it, after the last line of a cell."""
+        from aerodaas.dataflow.drawing import mermaid  # noqa: PLC0415 - only in notebooks
+
+        return {"text/vnd.mermaid": mermaid(self.graph), "text/plain": repr(self)}
+
     @property
     def run(self) -> Run | None:
         """The flight of this process' own runtime; None before it, and where a provider flies."""

@@ -14,6 +14,7 @@ from aerodaas.actors.stream_names import is_guest_actor
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import TaskConfig
 from aerodaas.config.options import current_options
+from aerodaas.config.plugins import is_built_in, load_plugin
 from aerodaas.environment.mission_run import recording_path
 from aerodaas.environment.signals import (
     INTERRUPTED,
@@ -53,7 +54,7 @@ _BEAT_AGE = 1.5
 _LANDING_SECONDS = 60.0
 """Wall seconds for the drones to land after an interruption."""
 _STEPPED = {"simulated", "replayed"}
-"""Drivers of vehicles whose time the run controls."""
+"""Our drivers of vehicles whose time the run controls; known without importing them."""
 
 
 class Run:
@@ -79,7 +80,7 @@ class Run:
     @property
     def lockstep(self) -> bool:
         """Whether mission time advances as fast as the machine can process it."""
-        simulated = all(robot.driver in _STEPPED for robot in self.config.robots)
+        simulated = all(_is_stepped(robot.driver) for robot in self.config.robots)
         wanted = self.options.lockstep
         if wanted and not simulated:
             raise ConfigError('--speed max needs every robot to be simulated; use "--speed 1"')
@@ -101,7 +102,7 @@ class Run:
             require_extra("remote", "--view-address")
         # Before the plan, which has the cameras run that are only recorded.
         document = self._document()
-        plan = self._plan()
+        plan = self.plan()
         if self.recording is not None and self.recording.exists():
             raise RecordingError(
                 f"{self.recording} already exists and is not overwritten; "
@@ -250,7 +251,8 @@ class Run:
             self._finish()
         self._raise_problems()
 
-    def _plan(self) -> FlightPlan:
+    def plan(self) -> FlightPlan:
+        """Plan the actors of the flight; raises the errors of a graph that cannot fly."""
         from aerodaas.actors.run.plan import make_plan  # noqa: PLC0415
         from aerodaas.actors.session import Session  # noqa: PLC0415
         from aerodaas.mission.rehearsal import rehearse  # noqa: PLC0415 - loads geometry
@@ -419,3 +421,10 @@ class Run:
         ]
         if problems:
             raise MissionError("; ".join(dict.fromkeys(problems)))
+
+
+def _is_stepped(driver: str) -> bool:
+    """Whether the vehicles of a driver are `SteppedVehicle`s: the run controls their time."""
+    if is_built_in("drivers", driver):
+        return driver in _STEPPED
+    return hasattr(load_plugin("drivers", driver), "advance_to")

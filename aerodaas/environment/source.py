@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,7 +49,7 @@ class EnvironmentSource:
             return cls._of_provider(url, token, {**(overrides or {}), **options.overrides})
         if token is not None and not is_url(path):
             raise ConfigError(f"a token is for a provider's address, and {path} is a file")
-        file = _find(options.environment or Path(path), options.application)
+        file = options.beside_application(options.environment or Path(path))
         settings = {**(overrides or {}), **options.overrides}
         if options.seed is not None:
             settings["simulation.seed"] = options.seed
@@ -91,15 +90,3 @@ def _url(path: str | Path, options: RunOptions) -> str | None:
         return options.provider.url
     given = options.environment or options.config or options.catalogue or options.replay
     return str(path) if given is None and is_url(path) else None
-
-
-def _find(path: Path, application: Path | None) -> Path:
-    if path.is_absolute():
-        return path
-    main = getattr(sys.modules.get("__main__"), "__file__", None)
-    beside = application or (Path(main) if main else None)
-    candidates = [beside.parent / path] if beside is not None else []
-    for candidate in [*candidates, path]:
-        if candidate.exists():
-            return candidate
-    return path

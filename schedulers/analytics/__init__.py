@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
+    Decision,
     Drop,
     Profile,
     Resources,
@@ -17,6 +18,7 @@ from aerodaas.schedulers.analytics.registry import load_scheduler, scheduler_nam
 
 __all__ = [
     "AnalyticsScheduler",
+    "Decision",
     "Drop",
     "Profile",
     "Resources",

@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-from importlib.machinery import ModuleSpec, SourceFileLoader
+from importlib.abc import Loader
+from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any, cast
 
+from aerodaas.config.options import current_options
 from aerodaas.config.plugins import load_plugin, plugin_names
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler
 from aerodaas.types.errors import SchedulerError, UnknownIdError
@@ -55,13 +57,14 @@ def _import(wanted: str) -> Any:  # noqa: ANN401 - whatever the plug-in's author
         file, _, attribute = wanted.rpartition(":")
         if not file.endswith(".py"):
             return load_plugin("analytics_schedulers", wanted)
+        file = str(current_options.get().beside_application(Path(file)))
         name = f"aerodaas_plugin_{Path(file).stem}"
-        loader = SourceFileLoader(name, file)
-        spec = importlib.util.spec_from_loader(name, loader, origin=file)
-        module = importlib.util.module_from_spec(cast("ModuleSpec", spec))
+        # With a location, from which a run reads the source that it sends to its processes.
+        spec = cast("ModuleSpec", importlib.util.spec_from_file_location(name, file))
+        module = importlib.util.module_from_spec(spec)
         # Pickling an instance looks its class up in sys.modules.
         sys.modules[name] = module
-        loader.exec_module(module)
+        cast("Loader", spec.loader).exec_module(module)
         return getattr(module, attribute)
     except UnknownIdError:
         raise

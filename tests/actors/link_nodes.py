@@ -38,8 +38,9 @@ def executor(*models: str) -> Executor:
     options = options_for(Placement("cloud"), restarts=0)
     handle = remote.options(**options, max_concurrency=6).remote()
     works = ray.put({model: Mean() for model in models})
-    ray.get(handle.prepare.remote(works), timeout=200)
-    return Executor("cloud", handle, [works], frozenset(models), 4, Codec("none"))
+    made = Executor("cloud", handle, [works], frozenset(models), 4, Codec("none"))
+    ray.get(made.prepare(), timeout=200)
+    return made
 
 
 def noise(message: Message[Frame]) -> Message[Frame]:

@@ -18,6 +18,7 @@ from aerodaas.actors.dispatch.executor import (
     UnpreparedError,
 )
 from aerodaas.actors.dispatch.frame_codec import Codec
+from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.streams import decode_message, encode_message
 from aerodaas.analytics.base import Context
 from aerodaas.types.data import Header
@@ -57,7 +58,7 @@ def result(executed: Executed) -> float:
 def executor() -> CloudExecutor:
     """One that is prepared."""
     made = CloudExecutor()
-    made.prepare({"one": Shade(), "two": Shade()})
+    made.prepare(ProcessVariables({}), {"one": Shade(), "two": Shade()})
     return made
 
 

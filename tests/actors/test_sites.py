@@ -66,8 +66,9 @@ def started(runtime: None) -> Iterator[Callable[..., Executor]]:  # noqa: ARG001
         handle = remote.options(num_cpus=0, max_concurrency=slots + 2, max_restarts=-1).remote()
         handles.append(handle)
         given = ray.put(works)
-        ray.get(handle.prepare.remote(given), timeout=120)
-        return Executor(site, handle, [given], frozenset(works), slots, codec)
+        executor = Executor(site, handle, [given], frozenset(works), slots, codec)
+        ray.get(executor.prepare(), timeout=120)
+        return executor
 
     yield start
     for handle in handles:
@@ -268,7 +269,7 @@ def _restart(executor: Executor) -> None:
     while time.monotonic() < end:
         with contextlib.suppress(RayActorError):
             if _process_of(executor) != old:
-                ray.get(executor.handle.prepare.remote(executor.works[0]))
+                ray.get(executor.prepare())
                 return
         time.sleep(0.1)
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import time
+
 import pytest
 
+from tools.fuzz import limits
 from tools.fuzz.campaign import Result, fuzz, replay
-from tools.fuzz.limits import Limits
+from tools.fuzz.limits import Limits, TooLongError
 
 _TARGET = "tests.fuzz.broken_target"
 _LIMITS = Limits(seconds=0.5, wall=1.5, memory=2**26)
@@ -55,6 +58,40 @@ def test_a_threads_failure_is_a_finding() -> None:
     """Though nothing escapes from the call itself."""
     (found,) = replay(_TARGET, [b"t"], _LIMITS).findings
     assert "RecursionError" in found.title
+
+
+@pytest.mark.parametrize("starved", [True, False])
+def test_a_busy_machine_is_no_hang(monkeypatch: pytest.MonkeyPatch, starved: bool) -> None:  # noqa: FBT001
+    """Time without a processor, though ready to run, does not count; any other does."""
+    if starved:
+        monkeypatch.setattr(limits, "kept_waiting", time.monotonic)
+    alarm = limits.Alarm(Limits(seconds=60.0, wall=0.1))
+    struck = False
+    try:
+        with alarm.set():
+            time.sleep(1.0)
+    except TooLongError:
+        struck = True
+    assert struck is not starved
+
+
+def test_time_without_a_processor_is_read() -> None:
+    """Of this process; none of one that is not there."""
+    assert limits.kept_waiting() > 0
+    assert limits.kept_waiting(2**22 + 1) == 0.0
+
+
+def test_what_was_found_before_an_interruption_is_kept() -> None:
+    """A campaign of hours may be ended at any time."""
+
+    def stop(result: Result) -> None:
+        if result.findings:
+            raise KeyboardInterrupt
+
+    result = fuzz(f"{_TARGET}_by_luck", seconds=600.0, seed=5, progress=stop)
+    assert result.interrupted
+    assert len(result.findings) == 1
+    assert result.inputs > 0
 
 
 def test_mutation_finds_a_failure_and_tells_it_once() -> None:

@@ -65,4 +65,4 @@ def test_examples_build(example: str, started: list[Robot]) -> None:
     assert isinstance(env, Environment)
     assert started == [names["drone"]]
     env.place_entries()
-    assert Run(env)._plan().drones
+    assert Run(env).plan().drones

@@ -41,8 +41,8 @@ def main(
 ) -> None:
     """Mutate valid inputs, and tell those that raise, hang, crash or exhaust memory.
 
-    Each finding is written below tests/fuzz/corpus, from where tests replay it. Ends with a JSON
-    summary, and with exit code 1 if anything was found.
+    Each finding is written below tests/fuzz/corpus, from where tests replay it. Ends, by Ctrl-C as
+    well, with a JSON summary, and with exit code 1 if anything was found.
 
         python -m tools.fuzz plan gps_track --inputs 100000
         nice -n 19 python -m tools.fuzz all --seconds 3600 --seed 7 --jobs 2
@@ -73,6 +73,8 @@ def main(
             progress=_Line(),
         )
         summary[name] = _report(result, output / name)
+        if result.interrupted:
+            break
     typer.echo(json.dumps({"seed": seed, "targets": summary}, indent=2))
     raise typer.Exit(any(one["findings"] for one in summary.values()))
 

@@ -16,7 +16,7 @@ from pathlib import Path
 
 from tools.fuzz.blackbox import BlackBox
 from tools.fuzz.finding import Finding, by_fault
-from tools.fuzz.limits import Limits
+from tools.fuzz.limits import Limits, kept_waiting
 from tools.fuzz.worker import Done, Job, work
 
 __all__ = ["Result", "fuzz", "replay"]
@@ -41,6 +41,8 @@ class Result:
     growth: int = 0
     """Bytes by which the memory of the worker that grew most did so."""
     findings: list[Finding] = field(default_factory=list)
+    interrupted: bool = False
+    """Whether it was ended from the keyboard: what it has found until then is here."""
 
     def add(self, finding: Finding) -> None:
         """Keep a finding unless an equal one is known."""
@@ -69,6 +71,8 @@ def fuzz(
         jobs: Workers at once.
         limits: Of one input.
         progress: Called a few times a second.
+
+    Returns what was found, also if it is interrupted (Ctrl-C).
     """
     deadline = None if seconds is None else time.monotonic() + seconds
     each = None if inputs is None else -(-inputs // jobs)
@@ -114,9 +118,11 @@ def _watched(target: str, jobs: list[Job], progress: Callable[[Result], None]) -
             if len(result.findings) >= _MOST:
                 break
             time.sleep(_PERIOD)
+    except KeyboardInterrupt:
+        result.interrupted = True
+    finally:
         result.inputs = sum(watcher.number for watcher in watchers)
         result.seconds = time.monotonic() - begun
-    finally:
         for watcher in watchers:
             watcher.close()
     return result
@@ -160,12 +166,16 @@ class _Watcher:
             return self._ended("crash", _how(self._process.exitcode))
         steps = self._box.steps
         if steps != self._steps:
-            self._steps, self._seen = steps, time.monotonic()
-        elif time.monotonic() - self._seen > (self._patience if steps != self._before else _START):
+            self._steps, self._seen = steps, self._time()
+        elif self._time() - self._seen > (self._patience if steps != self._before else _START):
             os.kill(self._process.pid or 0, signal.SIGABRT)  # its handler writes a traceback
             self._process.join(_GRACE)
             return self._ended("hang", "stuck outside Python")
         return True
+
+    def _time(self) -> float:
+        """Seconds by the wall, without those in which the worker waited for a processor."""
+        return time.monotonic() - kept_waiting(self._process.pid)
 
     def close(self) -> None:
         self._end()
@@ -173,10 +183,10 @@ class _Watcher:
 
     def _start(self) -> None:
         self._before = self._steps = self._box.steps
-        self._seen = time.monotonic()
         self._connection, theirs = _SPAWN.Pipe()
         self._process = _SPAWN.Process(target=work, args=(self._job, theirs), daemon=True)
         self._process.start()
+        self._seen = self._time()
         theirs.close()
 
     def _end(self) -> None:

@@ -1,16 +1,18 @@
-"""Limits of one input: time of the processor, time by the wall, memory."""
+"""Limits of one input: time of the processor and by the wall; memory of this process."""
 
 from __future__ import annotations
 
-import resource
 import signal
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
-__all__ = ["Alarm", "Limits", "TooLongError", "limit_memory", "memory"]
+import psutil
+
+__all__ = ["Alarm", "Limits", "TooLongError", "kept_waiting", "memory"]
 
 
 class TooLongError(BaseException):
@@ -24,7 +26,7 @@ class Limits:
     seconds: float = 2.0
     """Of the processor."""
     wall: float = 10.0
-    """By the wall clock, in which other programs may keep the machine busy."""
+    """By the wall clock, without the time in which other programs kept the process waiting."""
     memory: int = 512 * 2**20
     """Bytes on top of what the process has before its first input."""
 
@@ -38,13 +40,15 @@ class Alarm:
         self._limits = limits
         self._struck = False
         self._armed = False
+        self._begun = 0.0
         signal.signal(signal.SIGPROF, self._strike)
-        signal.signal(signal.SIGALRM, self._strike)
+        signal.signal(signal.SIGALRM, self._strike_by_the_wall)
 
     @contextmanager
     def set(self) -> Iterator[None]:
         """Raise TooLongError if the block takes too long, also if the block caught it."""
         self._struck, self._armed = False, True
+        self._begun = time.monotonic() - kept_waiting()
         signal.setitimer(signal.ITIMER_PROF, self._limits.seconds, self._AGAIN)
         signal.setitimer(signal.ITIMER_REAL, self._limits.wall, self._AGAIN)
         try:
@@ -56,25 +60,28 @@ class Alarm:
         if self._struck:
             raise TooLongError("the input took too long, which the target caught")
 
+    def _strike_by_the_wall(self, number: int, frame: FrameType | None) -> None:
+        if time.monotonic() - kept_waiting() - self._begun >= self._limits.wall:
+            self._strike(number, frame)
+
     def _strike(self, _signal: int, _frame: FrameType | None) -> None:
         if self._armed:
             self._struck = True
             raise TooLongError("the input took too long")
 
 
-def limit_memory(more: int) -> None:
-    """Let this process allocate `more` bytes and not one on top."""
-    _, hard = resource.getrlimit(resource.RLIMIT_DATA)
-    resource.setrlimit(resource.RLIMIT_DATA, (_status("VmData") + more, hard))
+def kept_waiting(process: int | None = None) -> float:
+    """Seconds in which a process (None: this one) was ready to run and had no processor.
+
+    Of its main thread; 0 where Linux does not tell, or once the process has ended.
+    """
+    try:
+        told = Path(f"/proc/{process or 'self'}/schedstat").read_text(encoding="ascii")
+    except OSError:
+        return 0.0
+    return int(told.split()[1]) / 1e9
 
 
 def memory() -> int:
     """Bytes of this process that are in memory."""
-    return _status("VmRSS")
-
-
-def _status(name: str) -> int:
-    for line in Path("/proc/self/status").read_text(encoding="ascii").splitlines():
-        if line.startswith(name + ":"):
-            return int(line.split()[1]) * 1024
-    raise KeyError(name)
+    return int(psutil.Process().memory_info().rss)

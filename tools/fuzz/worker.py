@@ -5,6 +5,7 @@ from __future__ import annotations
 import faulthandler
 import os
 import random
+import signal
 import threading
 import time
 from collections.abc import Iterator
@@ -12,10 +13,11 @@ from dataclasses import dataclass, field
 from multiprocessing.connection import Connection
 from pathlib import Path
 
+from aerodaas.types.memory_limit import limit_memory
 from tools.fuzz.blackbox import BlackBox
 from tools.fuzz.coverage import Coverage
 from tools.fuzz.finding import Finding, by_exception
-from tools.fuzz.limits import Alarm, Limits, TooLongError, limit_memory, memory
+from tools.fuzz.limits import Alarm, Limits, TooLongError, memory
 from tools.fuzz.minimising import smaller
 from tools.fuzz.mutation import mutated
 from tools.fuzz.target import Target, load_target
@@ -59,6 +61,7 @@ class Done:
 
 def work(job: Job, connection: Connection) -> None:
     """Run a job, sending each Finding and, last of all, Done."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # of the keyboard: for whoever watches
     with job.log.open("ab", buffering=0) as log:
         os.dup2(log.fileno(), 1)
         os.dup2(log.fileno(), 2)

@@ -106,6 +106,10 @@ class RobotFlight:
     """Number of setpoints changed by a limit, by limit."""
     clipped_at: dict[str, float] = field(default_factory=dict)
     """Mission seconds of the first setpoint changed by a limit, by limit."""
+    _array: Floats = field(
+        default_factory=lambda: np.empty((0, 5)), init=False, repr=False, compare=False
+    )
+    """The states as an array, as far as one has been asked for."""
 
     @property
     def time(self) -> Floats:
@@ -140,7 +144,11 @@ class RobotFlight:
 
     @property
     def _columns(self) -> Floats:
-        return np.array(self.states, dtype=np.float64).reshape(-1, 5)
+        # Plots ask for it at each waypoint, and an hour has 72,000 states.
+        if len(self._array) != len(self.states):
+            self._array = np.array(self.states, dtype=np.float64).reshape(-1, 5)
+            self._array.flags.writeable = False
+        return self._array
 
 
 @dataclass

@@ -7,6 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from aerodaas.actors.run.application import capture
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.options import RunOptions, current_options
+from aerodaas.dataflow.graph import Graph
 from aerodaas.schedulers.analytics.base import AnalyticsScheduler, Profile, Resources
 from aerodaas.schedulers.analytics.published.dems import Dems
 from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PUBLISHED
@@ -47,6 +51,23 @@ def test_a_file_a_module_a_class_and_an_instance_load(tmp_path: Path) -> None:
     assert isinstance(load_scheduler(Dems), Dems)
     one = Dems()
     assert load_scheduler(one) is one
+
+
+def test_a_file_travels_with_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Found beside the application, wherever that is started; its source reaches the actors."""
+    (tmp_path / "travelling.py").write_text(
+        "from aerodaas.schedulers.analytics import AnalyticsScheduler\n"
+        "class Mine(AnalyticsScheduler): ...\n"
+    )
+    monkeypatch.chdir("/")
+    config = EnvironmentConfig.model_validate({"robots": [{"id": "drone"}]})
+    token = current_options.set(RunOptions(application=tmp_path / "app.py"))
+    try:
+        found = load_scheduler("travelling.py:Mine")
+    finally:
+        current_options.reset(token)
+    sources = capture(Graph(), config, found).sources
+    assert sources[type(found).__module__].text == (tmp_path / "travelling.py").read_bytes()
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -38,6 +39,24 @@ def test_a_comparison_with_ones_own_class(tmp_path: Path) -> None:
     found = json.loads(out.read_text())[0]["schedulers"]
     assert found[f"{mine}:Mine"]["means"]["completion"]["value"] == 0
     assert len(list(plots.glob("*.png"))) == 4
+
+
+def test_options_given_several_times_all_count(tmp_path: Path) -> None:
+    """Each workload and scheduler has its rows, in the file for tables, too."""
+    out = tmp_path / "figures.csv"
+    words = ("-w", "2D-P", "-w", "2D-A,3D-P", "-s", "edf", "-s", "sjf,dems")
+    code, text = _run(
+        *("run", *words, "--seeds", "2", "--duration", "5", "--jobs", "1", "--csv", str(out))
+    )
+    assert code == 0, text
+    rows = list(csv.DictReader(out.open(encoding="utf-8")))
+    assert {(row["workload"], row["scheduler"]) for row in rows} == {
+        (workload, scheduler)
+        for workload in ("2D-P", "2D-A", "3D-P")
+        for scheduler in ("edf", "sjf", "dems")
+    }
+    assert {"qos per s", "completion", "late"} <= {row["figure"] for row in rows}
+    assert all(0.0 <= float(row["mean"]) <= 1.0 for row in rows if row["figure"] == "completion")
 
 
 def test_the_list_names_what_there_is() -> None:

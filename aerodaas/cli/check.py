@@ -1,0 +1,192 @@
+"""`aerodaas check`: everything that a flight needs, tried without flying."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from aerodaas.cli.application import build_application
+from aerodaas.cli.shipped import find_application
+from aerodaas.config.options import RunOptions
+from aerodaas.types.errors import (
+    AeroDaaSError,
+    GraphError,
+    SourceError,
+    VehicleError,
+    failure_line,
+)
+from aerodaas.types.finding import Finding
+
+if TYPE_CHECKING:
+    from aerodaas.cameras.base import Camera
+    from aerodaas.config.model import RobotConfig, SensorConfig
+    from aerodaas.dataflow.graph import Node
+    from aerodaas.environment.environment import Environment
+    from aerodaas.types.vehicle import Vehicle
+
+__all__ = ["check", "examine_application"]
+
+_CONNECTING = 5.0
+"""Wall seconds for a vehicle to answer."""
+_FIRST_PICTURE = 5.0
+"""Wall seconds for a camera's first picture."""
+
+
+def check(
+    context: typer.Context,
+    application: Annotated[Path, typer.Argument(help="The application, as for `aerodaas run`.")],
+    env: Annotated[
+        Path | None, typer.Option(help="Environment file instead of the application's own.")
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
+    ] = None,
+    connect: Annotated[  # noqa: FBT002
+        bool,
+        typer.Option(
+            "--connect/--no-connect", help="Connect to vehicles and cameras; they do not move."
+        ),
+    ] = True,
+) -> None:
+    """Try everything that a flight needs, without flying.
+
+    The graph is built and planned, models are loaded, vehicles and cameras are connected and asked.
+    The exit code is 1 if something is to be mended. Words after `--` are the application's own.
+
+        aerodaas check my_app.py
+        aerodaas check my_app.py --set drone.driver=mavlink --set drone.url=udpin:127.0.0.1:14540
+    """
+    from aerodaas.cli.doctor import show_findings  # noqa: PLC0415 - slow to load
+    from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - as above
+
+    application = find_application(application)
+    options = RunOptions(
+        application=application.resolve(),
+        environment=env,
+        overrides=dict(parse_setting(text) for text in setting or ()),
+        view=False,
+    )
+    environment = build_application(application, context.args, options)
+    findings = examine_application(environment, application.stem, connect=connect)
+    raise typer.Exit(0 if show_findings(f"aerodaas check {application.name}", findings) else 1)
+
+
+def examine_application(
+    environment: Environment, name: str, *, connect: bool = True
+) -> Iterator[Finding]:
+    """Examine an application that was built up to `start_mission()`.
+
+    Args:
+        environment: What it built.
+        name: Of the application.
+        connect: Whether vehicles and cameras are connected; never those of a provider.
+
+    Yields:
+        One finding for each part, as soon as it is known.
+
+    Raises:
+        AeroDaaSError: If the graph cannot be planned, so that no part needs looking at.
+    """
+    from aerodaas.environment.run import Run  # noqa: PLC0415 - slow to load
+
+    graph = environment.graph
+    provided = environment.provider is not None
+    if not provided:
+        Run(environment).plan()
+    flying = ", ".join(dict.fromkeys(edge.robot for edge in graph.navigation))
+    analyses = [node for node in graph.nodes.values() if node.kind != "sensor"]
+    yield Finding("graph", f"analyses: {len(analyses)}; navigated: {flying}")
+    yield _portable(environment, name)
+    for node in analyses:
+        yield _tried(node.id, partial(_analysis, node))
+    if connect and not provided:
+        yield from _hardware(environment)
+
+
+def _hardware(environment: Environment) -> Iterator[Finding]:
+    graph, config = environment.graph, environment.config
+    flying = {edge.robot for edge in graph.navigation}
+    # A vehicle's camera may need the vehicle, so all stay connected until the last was asked.
+    vehicles: dict[str, Vehicle] = {}
+    with ExitStack() as connected:
+        for robot in config.robots:
+            if robot.id in flying:
+                yield _tried(robot.id, partial(_vehicle, environment, robot, vehicles, connected))
+        for sensor in config.all_sensors():
+            if sensor.type == "camera" and sensor.full_id in graph.nodes:
+                yield _tried(sensor.full_id, partial(_camera, environment, sensor, vehicles))
+
+
+def _tried(subject: str, look: Callable[[], str]) -> Finding:
+    try:
+        return Finding(subject, look())
+    except AeroDaaSError as error:
+        return Finding(subject, str(error), ok=False)
+    except Exception as error:  # noqa: BLE001 - a user's class may raise anything
+        return Finding(subject, failure_line(error), ok=False)
+
+
+def _portable(environment: Environment, name: str) -> Finding:
+    from aerodaas.environment.document.compiling import write_mission  # noqa: PLC0415
+
+    try:
+        write_mission(environment, name)
+    except GraphError as error:
+        return Finding("document", f"flies here alone: {error}")
+    return Finding("document", "can be written as a mission document, which any provider can fly")
+
+
+def _analysis(node: Node) -> str:
+    began = time.perf_counter()
+    node.work.open()
+    with suppress(Exception):
+        node.work.close()
+    where = f" on {node.compute}" if node.compute else ""
+    return f"{type(node.work).__name__}{where} opens in {time.perf_counter() - began:.1f} s"
+
+
+def _vehicle(
+    environment: Environment,
+    robot: RobotConfig,
+    vehicles: dict[str, Vehicle],
+    connected: ExitStack,
+) -> str:
+    from aerodaas.config.plugins import load_plugin  # noqa: PLC0415 - slow to load
+
+    vehicle: Vehicle = load_plugin("drivers", robot.driver)(robot, environment.config)
+    connected.callback(vehicle.close)
+    vehicle.connect(_CONNECTING)
+    vehicles[robot.id] = vehicle
+    state = vehicle.read()
+    refused = vehicle.preflight()
+    if refused:
+        raise VehicleError(f"{robot.driver} would not take off: {'; '.join(refused)}")
+    charge = 100 * state.battery.fraction
+    return f"{robot.driver} answers: {state.mode.value}, battery {charge:.0f} %"
+
+
+def _camera(environment: Environment, sensor: SensorConfig, vehicles: dict[str, Vehicle]) -> str:
+    from aerodaas.config.plugins import load_plugin  # noqa: PLC0415 - slow to load
+
+    driver = environment.config.camera_driver(sensor)
+    camera: Camera = load_plugin("cameras", driver)(sensor, environment.config)
+    carrier = vehicles.get(sensor.robot or "")
+    truth = carrier.read().truth if carrier is not None else None
+    camera.open()
+    try:
+        until = time.monotonic() + _FIRST_PICTURE
+        while (picture := camera.capture(0, truth)) is None:
+            if camera.finished or time.monotonic() > until:
+                raise SourceError(f"{driver} gives no picture within {_FIRST_PICTURE:.0f} s")
+            time.sleep(1.0 / sensor.rate)
+    finally:
+        camera.close()
+    height, width, _ = picture.image.shape
+    return f"{driver} gives pictures of {width} x {height}"

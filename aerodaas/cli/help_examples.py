@@ -1,0 +1,35 @@
+"""Examples in the help of commands, each on a line of its own."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from typer.core import TyperGroup
+
+__all__ = ["ExampleGroup"]
+
+_BLOCK = re.compile(r"(?:^(?: {4}|aerodaas ).*(?:\n|$))+", re.MULTILINE)
+"""Examples of a docstring: lines indented by four, or commands where it is nothing but these, for
+then their indentation is everybody's and gone."""
+
+
+class ExampleGroup(TyperGroup):
+    """A group whose commands' examples are code blocks.
+
+    Typer takes the indentation of a docstring's rest away where each of its lines but the first is
+    indented, and Markdown then joins them to one paragraph. A fence has no indentation to lose.
+    """
+
+    def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - Typer's
+        super().__init__(**settings)
+        for one in (self, *self.commands.values()):
+            one.help = _fenced(one.help or "")
+
+
+def _fenced(text: str) -> str:
+    return _BLOCK.sub(lambda found: f"```text\n{_dedented(found[0])}\n```\n", text)
+
+
+def _dedented(block: str) -> str:
+    return "\n".join(line.removeprefix("    ") for line in block.rstrip("\n").split("\n"))
