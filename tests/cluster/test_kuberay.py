@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 import typer.main
-import yaml
+import yaml  # type: ignore[import-untyped]
 from packaging.requirements import Requirement
 from typer.core import TyperGroup
 
