@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from aerodaas.following.command_shaper import CommandShaper
-from aerodaas.following.follow_controller import FollowController, FollowPhase, Observation
+from aerodaas.following.follow_controller import FollowController, FollowPhase
 from aerodaas.following.follow_settings import FollowLimits, LostPolicy
+from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry

@@ -122,6 +122,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self.target: int | None = None
         """Id of the followed track."""
         self._blocked = Debounce(*_BLOCKED)
+        self._evading = False
+        """Whether the drone gave way to somebody in the last frame."""
         self._aloft = 0
         """Number of frames since the drone was high enough to choose a target."""
         self._width = target_width
@@ -143,6 +145,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         command = self.controller.step(observation(item, sighting, context, others))
         self._tell_changes(phase, item, context)
         self._tell_what_blocks(item, context)
+        self._tell_who_comes(item, context)
         if command is None:
             return None
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
@@ -286,6 +289,13 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             what = " or ".join(self.labels)
             text = f"Something stands in the way to the {what}; the drone waits."
             context.alert(Alert(item.header, "way_blocked", text))
+
+    def _tell_who_comes(self, item: Detections, context: Context) -> None:
+        evading = self.controller.guard.evading
+        if evading and not self._evading:
+            text = "Somebody comes at the drone; it gives way."
+            context.alert(Alert(item.header, "person_close", text))
+        self._evading = evading
 
     def _tell_changes(self, before: FollowPhase, item: Detections, context: Context) -> None:
         phase = self.controller.phase

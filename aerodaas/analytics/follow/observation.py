@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aerodaas.analytics.base import Context
 from aerodaas.following.clearance import surfaces
-from aerodaas.following.follow_controller import Observation
+from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.types.data import Detections
 
