@@ -22,7 +22,7 @@ from simple_pid import PID
 from aerodaas.following.approach import ApproachLimit
 from aerodaas.following.clearance import Clearance
 from aerodaas.following.command_shaper import CommandShaper
-from aerodaas.following.contact_guard import ContactGuard, room_to_stop
+from aerodaas.following.contact_guard import ContactGuard
 from aerodaas.following.follow_settings import FollowGains, FollowLimits, LostPolicy
 from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
@@ -258,10 +258,8 @@ class FollowController:
 
     def _headway(self, away: float, dt: float) -> float:
         """Distance in metres to keep: more behind a fast walker, who may turn round."""
-        limits = self.limits
         self._pace += min(1.0, dt / _PACE) * (max(away, 0.0) - self._pace)
-        room = room_to_stop(2.0 * min(self._pace, limits.forward), limits, self._delay)
-        return max(self.distance, limits.contact + room)
+        return max(self.distance, self.guard.headway(self._pace, self._delay))
 
     def _target(self, seen: Observation) -> tuple[RelativeTarget, float, float]:
         """Predicted target at present, and its velocity away and to the left, m/s."""

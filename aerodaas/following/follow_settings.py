@@ -53,9 +53,6 @@ class FollowLimits:
     evasion: float = 3.0
     """Acceleration by which the drone gives way to a person who comes at it, m/s²; commanded at
     once, without a ramp. The default is an environment's `max_acceleration`."""
-    turning: float = 6.0
-    """Standard deviation of the acceleration of a person who turns round, m/s²: from a walk to a
-    walk in the opposite direction within half a second."""
     contact: float = 0.5
     """Distance from a person's axis that the drone does not fall below, metres."""
     yaw_acceleration: float = 4.0

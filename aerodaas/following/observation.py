@@ -32,6 +32,8 @@ class Observation:
     now_stamp: int | None = None
     others: tuple[RelativeTarget, ...] = ()
     """Everybody and everything else that the drone must not fly into."""
+    people: tuple[RelativeTarget, ...] = ()
+    """Everybody who is seen, among them the target if that is a person."""
     surfaces: NDArray[np.float64] | None = None
     """Surfaces at the drone's own height, as returned by `clearance.surfaces`."""
 
@@ -50,11 +52,6 @@ class Observation:
         """Seconds from the frame's capture to the newest odometry."""
         return seconds(self.pose_stamp - self.stamp)
 
-    @property
-    def people(self) -> tuple[RelativeTarget, ...]:
-        """The target and all others."""
-        return (*(() if self.sighting is None else (self.sighting,)), *self.others)
-
     def without_nonsense(self) -> Observation:
         """Remove sightings and odometry with implausible numbers, which count as not observed."""
         return replace(
@@ -63,6 +60,7 @@ class Observation:
             at_capture=self.at_capture if _is_sane(self.at_capture) else None,
             now=self.now if _is_sane(self.now) else None,
             others=tuple(filter(_can_be, self.others)),
+            people=tuple(filter(_can_be, self.people)),
         )
 
 

@@ -301,7 +301,7 @@ def test_it_never_runs_away(gaps: list[tuple[float, float]], speed: float, seed:
     limits = follow.controller.limits
     for command in world.commands:
         if command is not None:
-            fastest = limits.backward if command.evasive else limits.forward
+            fastest = limits.forward if command.forward >= 0.0 else limits.backward
             assert np.hypot(command.forward, command.left) <= fastest + 1e-9
             assert abs(command.yaw_rate) <= limits.yaw_rate + 1e-9
     assert min(distances[: round(45 * world.rate)]) > 1.0

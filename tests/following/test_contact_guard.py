@@ -3,125 +3,218 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from aerodaas.following.contact_guard import ContactGuard, room_to_stop
+from aerodaas.following.contact_guard import ContactGuard
 from aerodaas.following.follow_settings import FollowLimits
-from aerodaas.following.relative_target import RelativeTarget
+from aerodaas.following.target_motion import seen_from
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry
+from aerodaas.types.geometry import Vector, body_to_enu, enu_to_body
 
 LIMITS = FollowLimits()
 INTERVAL = 0.1
+EAST, NORTH, UP = 0, 1, 2
+
+Walk = Callable[[float], tuple[float, float]]
+"""Metres east and north of home by seconds."""
 
 
-def pose(height: float = 1.5, forward: float = 0.0, yaw: float = 0.0) -> Odometry:
-    """A drone above the origin that flies ahead at `forward` m/s."""
-    velocity = forward * np.array([math.cos(yaw), math.sin(yaw), 0.0])
-    return Odometry(np.array([0.0, 0.0, height]), velocity, yaw)
+def straight(start: tuple[float, float], velocity: tuple[float, float]) -> Walk:
+    """Walk from `start` in metres at `velocity` in m/s, both east and north."""
+    return lambda time: (start[0] + velocity[0] * time, start[1] + velocity[1] * time)
 
 
-def watch(
-    guard: ContactGuard, speed: float, until: float, drone: Odometry, aside: float = 0.0
-) -> list[np.ndarray | None]:
-    """Somebody comes straight ahead from 6 m, `aside` metres to the left, to `until` metres."""
-    answers, distance, step = [], 6.0, 0
-    while distance > until:
-        stamp = round(step * INTERVAL * NANOSECONDS)
-        found = RelativeTarget(math.atan2(aside, distance), math.hypot(aside, distance))
-        guard.see([found], drone, stamp, INTERVAL)
-        answers.append(guard.evade(drone, stamp))
-        distance, step = distance - speed * INTERVAL, step + 1
-    return answers
+class Drone:
+    """A point that flies as it is told, with a drone's lag and acceleration, before some walkers.
+
+    All quantities are ENU; only what the guard sees and answers is turned by `yaw`.
+    """
+
+    def __init__(self, walks: Sequence[Walk], *, height: float = 1.5, yaw: float = 0.0) -> None:
+        self.guard = ContactGuard(LIMITS)
+        self.walks = walks
+        self.position = np.array([0.0, 0.0, height])
+        self.velocity = np.zeros(3)
+        self.yaw = yaw
+        self.cruise = np.zeros(3)
+        """Velocity flown while the guard is content, m/s."""
+        self.visible: Callable[[float], bool] = lambda _: True
+        self.commands: list[Vector | None] = []
+        """Of each frame, ENU m/s."""
+        self.nearest = math.inf
+        self.stamp = 0
+
+    def fly(self, duration: float) -> None:
+        """Fly for `duration` seconds, with a frame each 0.1 s that is answered at once."""
+        wanted = [self.cruise] * round(LIMITS.reply / 0.01)
+        for tick in range(round(duration / 0.01)):
+            time = tick * 0.01
+            self.stamp = round(time * NANOSECONDS)
+            if tick % round(INTERVAL / 0.01) == 0:
+                pose = Odometry(self.position.copy(), self.velocity.copy(), self.yaw)
+                places = [walk(time) for walk in self.walks] if self.visible(time) else []
+                self.guard.see(
+                    [seen_from(pose, place) for place in places], pose, self.stamp, INTERVAL
+                )
+                answer = self.guard.evade(pose, self.stamp)
+                self.commands.append(None if answer is None else body_to_enu(answer, self.yaw))
+            asked = self.commands[-1]
+            wanted.append(self.cruise if asked is None else asked)
+            change = wanted[tick] - self.velocity
+            size = float(np.linalg.norm(change))
+            self.velocity = self.velocity + change * min(1.0, LIMITS.evasion * 0.01 / max(size, 1e-9))
+            self.position = self.position + self.velocity * 0.01
+            for walk in self.walks:
+                gap = math.hypot(*(np.array(walk(time)) - self.position[:2]))
+                self.nearest = min(self.nearest, gap)
+
+    @property
+    def gave_way(self) -> list[Vector]:
+        """The commands by which it gave way."""
+        return [one for one in self.commands if one is not None]
 
 
-@given(closing=st.floats(0.0, 5.0), delay=st.floats(0.0, 0.5))
-def test_the_room_to_stop_is_what_is_lost(closing: float, delay: float) -> None:
-    """Until the drone answers at full speed, then by its acceleration; none to who goes away."""
-    room = room_to_stop(closing, LIMITS, delay)
-    assert room >= closing * (delay + LIMITS.reply)
-    assert room - closing * (delay + LIMITS.reply) == pytest.approx(closing**2 / 6.0)
-    assert room_to_stop(-closing, LIMITS, delay) == 0.0
-
-
-@pytest.mark.parametrize("speed", [0.7, 1.3, 1.8])
-@pytest.mark.parametrize("yaw", [0.0, 2.0])
-def test_who_comes_is_backed_off_from_at_full_speed(speed: float, yaw: float) -> None:
-    """Not from afar, but while there is room to stop."""
+@given(
+    pace=st.floats(-1.0, 5.0), later=st.floats(0.0, 1.0), delay=st.floats(0.0, 0.5)
+)
+def test_the_headway_is_what_a_turn_costs(pace: float, later: float, delay: float) -> None:
+    """Closing at twice the pace until the drone answers, then until it flies as fast away."""
     guard = ContactGuard(LIMITS)
-    answers = watch(guard, speed, 0.8, pose(yaw=yaw))
-    assert answers[10] is None
-    last = answers[-1]
-    assert last is not None
-    assert last[0] == pytest.approx(-LIMITS.backward, abs=0.05)
-    first = next(number for number, one in enumerate(answers) if one is not None)
-    left = 6.0 - speed * INTERVAL * first
-    assert left - room_to_stop(speed, LIMITS, 0.0) > LIMITS.contact
+    closing = 2.0 * min(max(pace, 0.0), LIMITS.forward)
+    lost = guard.headway(pace, delay) - LIMITS.contact
+    assert lost == pytest.approx(closing * (delay + LIMITS.reply) + closing**2 / 6.0)
+    assert guard.headway(pace + later, delay) >= guard.headway(pace, delay)
 
 
-def test_a_drone_that_still_flies_towards_them_gives_way_sooner() -> None:
+@pytest.mark.parametrize("speed", [0.7, 1.0, 1.3, 1.8])
+@pytest.mark.parametrize("yaw", [0.0, 2.0, -3.0])
+@pytest.mark.parametrize("bearing", [0.0, 0.5, -0.5])
+def test_who_comes_is_backed_off_from(speed: float, yaw: float, bearing: float) -> None:
+    """Straight away from them, whichever way the camera looks; not from afar."""
+    heading = yaw + bearing
+    ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+    drone = Drone([straight(tuple((6.0 * ahead)[:2]), tuple((-speed * ahead)[:2]))], yaw=yaw)
+    drone.fly(6.0 / speed)
+    assert drone.commands[10] is None
+    first = drone.gave_way[0]
+    assert first @ ahead < -0.7 * LIMITS.backward
+    assert drone.nearest > LIMITS.contact
+
+
+def test_a_drone_that_flies_towards_them_gives_way_sooner() -> None:
     """What counts is how fast both close."""
-    ahead = watch(ContactGuard(LIMITS), 1.3, 1.0, pose(forward=1.3))
-    still = watch(ContactGuard(LIMITS), 1.3, 1.0, pose())
-    assert sum(one is None for one in ahead) < sum(one is None for one in still)
+    started = []
+    for speed in (0.0, 1.3):
+        drone = Drone([straight((8.0, 0.0), (-1.3, 0.0))])
+        drone.cruise = drone.velocity = np.array([speed, 0.0, 0.0])
+        drone.fly(6.0)
+        first = next(number for number, one in enumerate(drone.commands) if one is not None)
+        started.append(8.0 - (1.3 + speed) * first * INTERVAL)
+        assert drone.nearest > LIMITS.contact
+    assert started[1] > started[0] + 0.5
 
 
-def test_where_backing_off_is_too_late_it_steps_aside() -> None:
-    """Out of the way of who comes, to the side that they do not go to."""
-    for left in (0.3, -0.3):
-        guard, drone = ContactGuard(LIMITS), pose(forward=1.5)
-        answer = None
-        for step in range(8):
-            stamp = round(step * INTERVAL * NANOSECONDS)
-            at = np.array([2.2 - 0.18 * step, left * step * INTERVAL])
-            found = RelativeTarget(math.atan2(at[1], at[0]), float(np.hypot(*at)))
-            guard.see([found], drone, stamp, INTERVAL)
-            answer = guard.evade(drone, stamp)
-        assert answer is not None
-        assert answer[1] * left < -0.1
+@pytest.mark.parametrize("yaw", [0.0, 2.0])
+@pytest.mark.parametrize("left", [0.25, -0.25])
+def test_where_backing_off_is_too_late_it_steps_aside(left: float, yaw: float) -> None:
+    """To the side that they do not go to, by whichever frame that is reckoned.
+
+    East and north are forward and left for a yaw of 0; somebody who comes west and drifts north
+    passes on the drone's left, so that it goes south, to its right.
+    """
+    turn = lambda east, north: tuple(body_to_enu(np.array([east, north, 0.0]), yaw)[:2])  # noqa: E731
+    drone = Drone([straight(turn(2.4, 0.0), turn(-1.8, left))], yaw=yaw)
+    drone.velocity = body_to_enu(np.array([1.3, 0.0, 0.0]), yaw)
+    drone.fly(0.8)
+    flown = enu_to_body(drone.gave_way[-1], yaw)
+    assert flown[1] * left < -0.2
+    assert flown[0] < -0.5
+
+
+def test_somebody_beside_is_not_stepped_into() -> None:
+    """Of two people at once, the one in the way and the one beside it both count."""
+    for side in (1.0, -1.0):
+        drone = Drone([straight((2.4, 0.0), (-1.8, 0.0)), straight((0.8, side), (0.0, 0.0))])
+        drone.velocity = np.array([1.3, 0.0, 0.0])
+        drone.fly(0.8)
+        assert all(one[NORTH] * side < 0.1 for one in drone.gave_way)
+        assert any(one[NORTH] * side < -0.5 for one in drone.gave_way)
 
 
 def test_above_the_head_it_climbs() -> None:
-    """Which is nearer than a step aside."""
-    answers = watch(ContactGuard(LIMITS), 1.8, 0.6, pose(height=2.0, forward=1.5))
-    assert answers[-1] is not None
-    assert answers[-1][2] > 1.0
-    assert abs(answers[-1][1]) < 0.1
+    """Which leaves more than a step aside; below, it would fly past a face."""
+    for height, climbs in ((2.1, True), (1.5, False), (0.6, False)):
+        drone = Drone([straight((2.0, 0.0), (-1.8, 0.0))], height=height)
+        drone.velocity = np.array([1.3, 0.0, 0.0])
+        drone.fly(0.8)
+        assert any(one[UP] > 1.0 for one in drone.gave_way) is climbs
+        assert all(one[UP] >= 0.0 for one in drone.gave_way)
 
 
-@pytest.mark.parametrize(("speed", "aside"), [(0.0, 0.0), (1.3, 1.5), (-1.0, 0.0)])
-def test_who_stands_passes_or_goes_away_is_not_given_way_to(speed: float, aside: float) -> None:
+@pytest.mark.parametrize(
+    "walk",
+    [
+        straight((1.2, 0.0), (0.0, 0.0)),
+        straight((5.0, 1.5), (-1.3, 0.0)),
+        straight((2.0, 0.0), (1.0, 0.0)),
+    ],
+    ids=["stands", "passes", "goes away"],
+)
+def test_nobody_else_is_given_way_to(walk: Walk) -> None:
     """They are the approach's business."""
-    guard, drone = ContactGuard(LIMITS), pose()
-    for step in range(40):
-        distance = max(2.0 - speed * step * INTERVAL if speed <= 0 else 5.0 - speed * step / 10, -1)
-        found = RelativeTarget(math.atan2(aside, distance), math.hypot(aside, distance))
-        stamp = round(step * INTERVAL * NANOSECONDS)
-        guard.see([found], drone, stamp, INTERVAL)
-        assert guard.evade(drone, stamp) is None
+    drone = Drone([walk])
+    drone.fly(4.0)
+    assert drone.gave_way == []
 
 
 def test_who_comes_and_is_out_of_sight_is_still_given_way_to() -> None:
-    """Too near to be seen is no reason to stop; a second later it is over."""
-    guard, drone = ContactGuard(LIMITS), pose()
-    answers = watch(guard, 1.3, 0.9, drone)
-    stamp = round(len(answers) * INTERVAL * NANOSECONDS)
-    for later, gives_way in ((0.3, True), (3.0, False)):
-        at = stamp + round(later * NANOSECONDS)
-        guard.see([], drone, at, INTERVAL)
-        assert (guard.evade(drone, at) is not None) is gives_way
+    """Too near to be seen is no reason to stop; a moment later it is over."""
+    drone = Drone([straight((4.0, 0.0), (-1.3, 0.0))])
+    drone.visible = lambda time: time < 2.0
+    drone.fly(6.0)
+    assert all(one is not None for one in drone.commands[20:27])
+    assert drone.commands[-1] is None
+    assert not drone.guard.evading
 
 
 def test_the_direction_is_kept_while_the_drone_turns() -> None:
     """Back is where they came from, whichever way the camera looks meanwhile."""
-    guard = ContactGuard(LIMITS)
-    answers = watch(guard, 1.3, 0.9, pose())
-    turned = pose(yaw=math.pi / 2)
-    answer = guard.evade(turned, round(len(answers) * INTERVAL * NANOSECONDS))
+    drone = Drone([straight((4.0, 0.0), (-1.3, 0.0))])
+    drone.fly(2.2)
+    before = drone.gave_way[-1]
+    pose = Odometry(drone.position, drone.velocity, math.pi / 2)
+    answer = drone.guard.evade(pose, drone.stamp)
     assert answer is not None
-    assert answer[1] > 1.5
-    assert abs(answer[0]) < 1.6
+    assert answer == pytest.approx(enu_to_body(before, math.pi / 2), abs=1e-9)
+    assert answer[1] > 1.0
+
+
+def test_without_odometry_what_closes_is_what_counts() -> None:
+    """The people move in relation to a drone that is taken to stand still."""
+    guard = ContactGuard(LIMITS)
+    still = Odometry(np.zeros(3), np.zeros(3), 0.0)
+    answer = None
+    for step in range(30):
+        stamp = round(step * INTERVAL * NANOSECONDS)
+        guard.see([seen_from(still, (4.0 - 1.3 * step * INTERVAL, 0.0))], None, stamp, INTERVAL)
+        answer = guard.evade(None, stamp)
+    assert answer is not None
+    assert answer[0] < -1.0
+
+
+def test_the_people_are_forgotten() -> None:
+    """With another target, the drone starts anew."""
+    drone = Drone([straight((4.0, 0.0), (-1.3, 0.0))])
+    drone.fly(2.2)
+    assert drone.guard.evading
+    drone.guard.reset()
+    assert not drone.guard.evading
+    pose = Odometry(drone.position, drone.velocity, 0.0)
+    assert drone.guard.evade(pose, drone.stamp) is None
+    assert drone.guard.away(0.0, pose, drone.stamp) == math.inf

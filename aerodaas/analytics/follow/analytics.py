@@ -40,6 +40,11 @@ from the ground, the chest of a person 3 m away is above the image, but that of 
 passer-by is not."""
 _BLOCKED = (3, 10)
 """Frames with an obstacle, of the last 10, that raise an alert."""
+_PERSON, _PERSON_SIZE = "person", TargetSize(1.7, 0.55)
+"""Label and size of a bystander."""
+_SAME_BODY = 0.8
+"""Distance in metres between the target's expected position and that of a person's box, at most,
+for the two to be the same body."""
 _WIDTH_MEMORY = 0.1
 """Weight of the newest measurement in the mean of the target's width, as arms swing."""
 
@@ -53,7 +58,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
     """
 
     falls: ClassVar[bool] = True
-    """Whether a target may fall, so that a change of its height is no motion along the ground."""
+    """Whether the target is a person, who may fall, so that a change of its height is no motion
+    along the ground, and may turn round and come at the drone."""
+    also: ClassVar[tuple[str, ...]] = (_PERSON,)
 
     def __init__(
         self,
@@ -142,7 +149,14 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         detection = self._target_in(tracked)
         sighting = None if detection is None else self._sight(detection, item)
         others = self._others(tracked, detection)
-        command = self.controller.step(observation(item, sighting, context, others))
+        bystanders = self._bystanders(item, sighting)
+        people = bystanders
+        if self.falls:
+            people += others if sighting is None else (sighting, *others)
+        others += bystanders
+        command = self.controller.step(
+            observation(item, sighting, context, others=others, people=people)
+        )
         self._tell_changes(phase, item, context)
         self._tell_what_blocks(item, context)
         self._tell_who_comes(item, context)
@@ -283,6 +297,31 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         seen = (sight(box, tracked, self.size) for box in boxes)
         return tuple(sighting for sighting in seen if sighting is not None)
 
+    def _bystanders(
+        self, item: Detections, target: RelativeTarget | None
+    ) -> tuple[RelativeTarget, ...]:
+        """Locate everybody detected who is not known by the followed labels already.
+
+        A person's box around a box with such a label shows the same body, and so does one where
+        the target is expected while that is not detected.
+        """
+        if _PERSON in self.labels:
+            return ()
+        known = [box.centre for box in item.labelled(*self.labels)]
+        odometry, expected = item.odometry, target
+        if expected is None and odometry is not None:
+            expected = self.controller.expected(odometry, item.header.stamp)
+        found = []
+        for box in item.labelled(_PERSON):
+            left, top, right, bottom = box.box
+            if any(left <= u <= right and top <= v <= bottom for u, v in known):
+                continue
+            seen = sight(box, item, _PERSON_SIZE)
+            if seen is None or (self.falls and _is_near(seen, expected)):
+                continue
+            found.append(seen)
+        return tuple(found)
+
     def _tell_what_blocks(self, item: Detections, context: Context) -> None:
         self._blocked.update(item.header.stamp, self.controller.blocked)
         if self._blocked.began:
@@ -309,6 +348,12 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             self.target = None
             text = f"The {what} was not found again; following ends."
             context.alert(Alert(item.header, "target_given_up", text))
+
+
+def _is_near(seen: RelativeTarget, expected: RelativeTarget | None) -> bool:
+    return expected is not None and bool(
+        np.linalg.norm(seen.offset - expected.offset) <= _SAME_BODY
+    )
 
 
 def _polygon(area: Sequence[tuple[float, float]]) -> Polygon:

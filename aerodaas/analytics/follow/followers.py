@@ -158,14 +158,8 @@ _CAR_CHOICE = TargetChoice(score=0.5, sure=0.3, looks=5, grounded=True, shared=0
 one."""
 _CAR_GAINS = FollowGains(distance=(0.5, 0.05, 0.0))
 _CAR_LIMITS = FollowLimits(
-    backward=0.6,
-    acceleration=0.8,
-    braking=1.5,
-    stopping=2.0,
-    reaction_time=0.5,
-    turning=0.3,
+    backward=0.6, acceleration=0.8, braking=1.5, stopping=2.0, reaction_time=0.5
 )
-"""Gentle, because a hard pitch tilts a near car out of the image. A car does not turn within a
-step."""
+"""Gentle, because a hard pitch tilts a near car out of the image."""
 _CAR_ACCELERATION = 0.3
 """Standard deviation of a car's acceleration among people, m/s^2."""
