@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.following.follow_settings import FollowLimits
-from aerodaas.following.people_tracker import PeopleTracker
+from aerodaas.following.people_tracker import PeopleTracker, Prediction
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
@@ -23,7 +24,7 @@ from aerodaas.types.geometry import Vector, enu_to_body
 
 __all__ = ["ContactGuard"]
 
-_EARLY = 0.4
+_EARLY = 0.3
 """Metres beyond the least distance by which the drone gives way too early rather than too late."""
 _CLOSING = 0.3
 """Speed in m/s from which on a person and the drone close; below, it is noise."""
@@ -31,7 +32,7 @@ _STILL_TURNING = 0.4
 """Fraction of their closing speed by which people are assumed to come faster than estimated, as
 the estimate lags behind a turn."""
 _HOLD = 0.8
-"""Seconds for which the drone goes on giving way after the last sign of danger."""
+"""Seconds for which the drone goes on giving way after the last danger, while somebody comes."""
 _CLEARLY = 0.15
 """Metres that another manoeuvre must leave more than the one begun to replace it."""
 _TURNS = tuple(math.radians(angle) for angle in (45.0, -45.0))
@@ -47,7 +48,7 @@ _TIMES: NDArray[np.float64] = np.arange(0.0, 2.01, 0.05)
 _STILL = Odometry(np.zeros(3), np.zeros(3), 0.0)
 """Pose of a drone without odometry, from which people move as they do in relation to it."""
 
-_Walk = tuple[Vector, Vector]
+_Walk: TypeAlias = tuple[Vector, Vector]
 """A person's position and velocity in the local ENU frame; their z is 0."""
 
 
@@ -91,11 +92,13 @@ class ContactGuard:
         `stamp` is the time of the drone's odometry `now`, nanoseconds.
         """
         pose = now or _STILL
-        walks, danger = self._walks(pose, stamp)
+        people = self._people.relative_to(pose, stamp)
+        walks, danger = self._walks(people, pose)
+        comes = any(away < -_CLOSING for _, away, _ in people)
         if danger is not None:
             self._velocity = self._choose(danger, walks, pose)
             self._danger_at = stamp
-        elif seconds(stamp - self._danger_at) > _HOLD:
+        elif not comes or seconds(stamp - self._danger_at) > _HOLD:
             self._velocity = None
         return None if self._velocity is None else enu_to_body(self._velocity, pose.yaw)
 
@@ -121,14 +124,16 @@ class ContactGuard:
         flown_on = closing * (delay + self.limits.reply)
         return self.limits.contact + flown_on + closing**2 / (2.0 * self.limits.evasion)
 
-    def _walks(self, pose: Odometry, stamp: int) -> tuple[list[_Walk], Vector | None]:
+    def _walks(
+        self, people: Iterable[Prediction], pose: Odometry
+    ) -> tuple[list[_Walk], Vector | None]:
         """How everybody walks, and the direction of the nearest whom backing off will not avoid.
 
         The direction is a unit vector from the drone; None without danger.
         """
         walks, danger = [], None
         flying = _velocity(pose)
-        for seen, away, left in self._people.relative_to(pose, stamp):
+        for seen, away, left in people:
             heading = pose.yaw + seen.bearing
             ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
             aside = np.array([-ahead[1], ahead[0], 0.0])

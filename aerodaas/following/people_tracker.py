@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -16,9 +17,13 @@ from aerodaas.following.target_motion import TargetMotion, place_of
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
 
-__all__ = ["PeopleTracker"]
+__all__ = ["PeopleTracker", "Prediction"]
 
-_SWERVE = 0.9
+Prediction: TypeAlias = tuple[RelativeTarget, float, float]
+"""Bearing and distance of a person, and their velocity away along the line of sight and to the left
+across it, m/s."""
+
+_SWERVE = 0.8
 """Standard deviation of the change of a person's speed from one frame to the next, m/s; somebody
 who walks at 1 m/s and turns round within a step is believed after two frames."""
 _SHORTEST = 0.1
@@ -74,14 +79,8 @@ class PeopleTracker:
             if not (sighting.bound and nearer):
                 person.motion.observe(sighting, pose, stamp)
 
-    def relative_to(
-        self, pose: Odometry, stamp: int
-    ) -> list[tuple[RelativeTarget, float, float]]:
-        """Everybody predicted for `stamp` in relation to a drone at `pose`, nearest first.
-
-        Bearing and distance, and velocity away along the line of sight and to the left across it,
-        m/s.
-        """
+    def relative_to(self, pose: Odometry, stamp: int) -> list[Prediction]:
+        """Everybody predicted for `stamp` in relation to a drone at `pose`, nearest first."""
         found = (person.motion.relative_to(pose, stamp) for person in self._people)
         return sorted(filter(None, found), key=lambda one: one[0].distance)
 

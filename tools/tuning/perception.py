@@ -53,24 +53,28 @@ def box_in_picture(
 
 
 class TruthPerception:
-    """Exact boxes with `label` of some things, with noise of their edges and misses, by seed.
+    """Exact boxes of a thing and of people around it, with noise of their edges and misses, by seed.
 
-    Who is nearer hides who is farther: a box mostly behind another person's body is not seen.
+    Who is nearer hides who is farther: a box mostly behind another's body is not seen.
     """
 
     def __init__(
         self,
-        things: Thing | Sequence[Thing],
+        thing: Thing,
         label: str,
         camera: CameraModel,
         *,
+        bystanders: Sequence[Thing] = (),
         seed: int,
         noise: float = 0.02,
         misses: float = 0.03,
     ) -> None:
-        """`noise` is a standard deviation in parts of the box's height, `misses` a share."""
-        self._things = (things,) if isinstance(things, Thing) else tuple(things)
-        self._label, self._camera = label, camera
+        """`noise` is a standard deviation in parts of the box's height, `misses` a share.
+
+        `thing` is seen with `label`, each of `bystanders` as a person.
+        """
+        self._labels = [(thing, label), *((one, "person") for one in bystanders)]
+        self._camera = camera
         self._noise, self._misses = noise, misses
         self._random = np.random.default_rng(seed)
 
@@ -81,8 +85,8 @@ class TruthPerception:
         del context
         camera, time = self._camera, seconds(header.stamp)
         items = []
-        for thing in self._things:
-            edges = box_in_picture(thing, self._label, time, camera, pose)
+        for thing, label in self._labels:
+            edges = box_in_picture(thing, label, time, camera, pose)
             errors = self._random.normal(0, self._noise, 4)
             missed = self._random.random() < self._misses
             if edges is None or missed or self._is_hidden(thing, edges, time, pose):
@@ -94,13 +98,13 @@ class TruthPerception:
             noisy = np.clip(outline + errors * (edges[3] - edges[1]), 0, size)
             left, top, right, bottom = noisy.tolist()
             if min(right - left, bottom - top) > _SMALLEST:
-                items.append(Detection((left, top, right, bottom), self._label, 0.9))
+                items.append(Detection((left, top, right, bottom), label, 0.9))
         return Detections(header, tuple(items), camera.width, camera.height, camera, believed)
 
     def _is_hidden(self, thing: Thing, edges: Edges, time: float, pose: Odometry) -> bool:
         """Whether most of a box is behind the body of somebody nearer."""
         away = _distance(thing, time, pose)
-        for other in self._things:
+        for other, _ in self._labels:
             if other is thing or _distance(other, time, pose) >= away:
                 continue
             body = box_in_picture(other, "person", time, self._camera, pose)
