@@ -149,9 +149,10 @@ def main(
     report = Report("meetings", UNITS, packages=["onnxruntime"])
     numbers = range(first_seed, first_seed + seeds)
     drawn: dict[str, Meeting] = {}
+    cases = list(product(speeds.split(","), rates.split(","), (False, True)))
     try:
         with ProcessPoolExecutor(processes) as pool:
-            for speed, rate, guarded in product(speeds.split(","), rates.split(","), (False, True)):
+            for speed, rate, guarded in cases:
                 one = Flight(case, eyes, float(speed), float(rate), latency, first_seed, guarded)
                 found = list(pool.map(Flight.fly, [replace(one, seed=seed) for seed in numbers]))
                 name = "with the guard" if guarded else "without"
@@ -168,6 +169,7 @@ def main(
     if json is not None:
         report.write(json)
     if picture is not None:
+        speed, rate, _ = cases[-1]
         title = f"{speed} m/s, {rate} frames a second, {latency:g} s of delay, seed {first_seed}"
         ways = {name: (one.turn, np.array(one.path)) for name, one in drawn.items()}
         plot_meeting(ways, title, picture)

@@ -30,10 +30,10 @@ def plot_meeting(
     figure = Figure(figsize=(10, 6), layout="constrained")
     figure.suptitle(title)
     above = figure.subplot_mosaic([[*ways], ["distance"] * len(ways)])
-    for (name, (turn, rows)), colour in zip(ways.items(), _COLOURS, strict=True):
-        time = rows[:, 0] - turn
+    for (name, (turn, flown)), colour in zip(ways.items(), _COLOURS, strict=True):
+        time = flown[:, 0] - turn
         kept = (time >= -_BEFORE) & (time <= _AFTER)
-        time, rows = time[kept], rows[kept]
+        time, rows = time[kept], flown[kept]
         axes = above[name]
         marked = np.flatnonzero(np.abs(time / _EACH - np.round(time / _EACH)) < 1e-6)  # noqa: PLR2004 - rounding
         axes.plot(rows[:, 1], rows[:, 2], color=colour, label="drone")

@@ -53,7 +53,7 @@ def box_in_picture(
 
 
 class TruthPerception:
-    """Exact boxes of a thing and of people around it, with noise of their edges and misses, by seed.
+    """Exact boxes of a thing and of people around it, with noise of edges and misses, by seed.
 
     Who is nearer hides who is farther: a box mostly behind another's body is not seen.
     """

@@ -1,4 +1,4 @@
-"""VipDetectionAnalytics: detection of the hazard vest of the person to be assisted, and of people."""
+"""VipDetectionAnalytics: detection of the hazard vest of the person assisted, and of people."""
 
 from __future__ import annotations
 

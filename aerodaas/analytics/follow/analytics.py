@@ -42,6 +42,8 @@ _BLOCKED = (3, 10)
 """Frames with an obstacle, of the last 10, that raise an alert."""
 _PERSON, _PERSON_SIZE = "person", TargetSize(1.7, 0.55)
 """Label and size of a bystander."""
+_WORN = (0.4, 1.5)
+"""Width of a part of somebody, such as a vest, in parts of the width of the body's box."""
 _SAME_BODY = 0.8
 """Distance in metres between the target's expected position and that of a person's box, at most,
 for the two to be the same body."""
@@ -307,14 +309,13 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         """
         if _PERSON in self.labels:
             return ()
-        known = [box.centre for box in item.labelled(*self.labels)]
+        known = item.labelled(*self.labels)
         odometry, expected = item.odometry, target
         if expected is None and odometry is not None:
             expected = self.controller.expected(odometry, item.header.stamp)
         found = []
         for box in item.labelled(_PERSON):
-            left, top, right, bottom = box.box
-            if any(left <= u <= right and top <= v <= bottom for u, v in known):
+            if any(_is_worn(one, box) for one in known):
                 continue
             seen = sight(box, item, _PERSON_SIZE)
             if seen is None or (self.falls and _is_near(seen, expected)):
@@ -348,6 +349,14 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             self.target = None
             text = f"The {what} was not found again; following ends."
             context.alert(Alert(item.header, "target_given_up", text))
+
+
+def _is_worn(part: Detection, body: Detection) -> bool:
+    """Whether a box, such as a vest's, is part of the body in another, by place and width."""
+    left, top, right, bottom = body.box
+    (u, v), (narrowest, widest) = part.centre, _WORN
+    width = (part.box[2] - part.box[0]) / max(right - left, 1.0)
+    return left <= u <= right and top <= v <= bottom and narrowest <= width <= widest
 
 
 def _is_near(seen: RelativeTarget, expected: RelativeTarget | None) -> bool:
