@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from aerodaas.following.contact_guard import ContactGuard
 from aerodaas.simulation.scenario import Scenario
@@ -32,7 +31,7 @@ _PACE = 0.7
 class NoGuard(ContactGuard):
     """A guard that does nothing, to compare with."""
 
-    def evade(self, now: Odometry | None, stamp: int) -> NDArray[np.float64] | None:
+    def evade(self, now: Odometry | None, stamp: int) -> None:
         """Give way to nobody."""
         del now, stamp
 
