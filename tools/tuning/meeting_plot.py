@@ -50,6 +50,6 @@ def plot_meeting(
     axes.axhline(CONTACT, color="black", linestyle=":", label="contact")
     axes.axvline(0.0, color="tab:gray", linewidth=0.8)
     axes.set(xlabel="seconds from the turn", ylabel="distance, m", ylim=(0.0, None))
-    axes.legend(loc="upper right", fontsize="small")
+    axes.legend(loc="lower right", fontsize="small")
     to.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(to, dpi=110)
