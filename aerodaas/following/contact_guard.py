@@ -103,13 +103,13 @@ class ContactGuard:
         return None if self._velocity is None else enu_to_body(self._velocity, pose.yaw)
 
     def away(self, bearing: float, now: Odometry | None, stamp: int) -> float:
-        """Least speed in m/s at which anybody in a direction goes away; infinite without them.
+        """Least speed in m/s at which anybody seen in a direction goes away; infinite without them.
 
         Believed at once, so that the drone brakes before it is sure that somebody turns round.
         """
         speeds = (
             away
-            for seen, away, _ in self._people.relative_to(now or _STILL, stamp)
+            for seen, away, _ in self._people.relative_to(now or _STILL, stamp, in_sight=True)
             if abs(math.remainder(seen.bearing - bearing, math.tau)) < _BESIDE
         )
         return min(speeds, default=math.inf)

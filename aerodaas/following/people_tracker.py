@@ -50,6 +50,8 @@ class PeopleTracker:
     def __init__(self) -> None:
         """Start without people."""
         self._people: list[_Person] = []
+        self._newest = 0
+        """Mission time of the newest frame, nanoseconds."""
 
     def reset(self) -> None:
         """Forget all people."""
@@ -63,6 +65,7 @@ class PeopleTracker:
         A person is the one predicted nearest to the sighting, or a new one. An upper bound of the
         distance is no evidence against somebody predicted nearer.
         """
+        self._newest = stamp
         self._people = [one for one in self._people if seconds(stamp - one.seen) <= _MEMORY]
         known = list(self._people)
         turning = _SWERVE / max(interval, _SHORTEST)
@@ -79,9 +82,15 @@ class PeopleTracker:
             if not (sighting.bound and nearer):
                 person.motion.observe(sighting, pose, stamp)
 
-    def relative_to(self, pose: Odometry, stamp: int) -> list[Prediction]:
-        """Everybody predicted for `stamp` in relation to a drone at `pose`, nearest first."""
-        found = (person.motion.relative_to(pose, stamp) for person in self._people)
+    def relative_to(
+        self, pose: Odometry, stamp: int, *, in_sight: bool = False
+    ) -> list[Prediction]:
+        """Everybody predicted for `stamp` in relation to a drone at `pose`, nearest first.
+
+        Or everybody `in_sight`, seen in the newest frame.
+        """
+        people = [one for one in self._people if one.seen == self._newest or not in_sight]
+        found = (person.motion.relative_to(pose, stamp) for person in people)
         return sorted(filter(None, found), key=lambda one: one[0].distance)
 
 

@@ -149,7 +149,7 @@ def test_somebody_beside_is_not_stepped_into() -> None:
 
 def test_above_the_head_it_climbs() -> None:
     """Which leaves more than a step aside; below, it would fly past a face."""
-    for height, climbs in ((2.1, True), (1.5, False), (0.6, False)):
+    for height, climbs in ((2.1, True), (1.8, False), (1.5, False), (0.6, False)):
         drone = Drone([straight((2.0, 0.0), (-1.8, 0.0))], height=height)
         drone.velocity = np.array([1.3, 0.0, 0.0])
         drone.fly(0.8)
@@ -206,6 +206,30 @@ def test_without_odometry_what_closes_is_what_counts() -> None:
         answer = guard.evade(None, stamp)
     assert answer is not None
     assert answer[0] < -1.0
+
+
+def test_what_is_predicted_is_what_a_reply_and_the_way_round_cost() -> None:
+    """Closing at 1 m/s for the reply, then until the drone flies as fast away; later by a frame."""
+    guard = ContactGuard(LIMITS)
+    pose = Odometry(np.zeros(3), np.zeros(3), 0.0)
+    guard.see([], pose, 0, INTERVAL)
+    walks = [(np.array([3.0, 0.0, 0.0]), np.array([-1.0, 0.0, 0.0]))]
+    back = np.array([-2.0, 0.0, 0.0])
+    lost = LIMITS.reply + 1.0 / (2.0 * LIMITS.evasion)
+    assert guard._room(back, walks, pose) == pytest.approx(3.0 - lost, abs=0.01)
+    later = guard._room(back, walks, pose, late=True)
+    assert later == pytest.approx(3.0 - lost - INTERVAL, abs=0.01)
+
+
+def test_how_fast_people_go_away_counts_in_sight_and_in_that_direction() -> None:
+    """Who comes is told by a negative speed; who is out of sight or elsewhere, by none."""
+    drone = Drone([straight((6.0, 0.0), (-1.3, 0.0))])
+    drone.fly(1.5)
+    pose = Odometry(drone.position, drone.velocity, 0.0)
+    assert drone.guard.away(0.0, pose, drone.stamp) == pytest.approx(-1.3, abs=0.2)
+    assert drone.guard.away(1.0, pose, drone.stamp) == math.inf
+    drone.guard.see([], pose, drone.stamp + 1, INTERVAL)
+    assert drone.guard.away(0.0, pose, drone.stamp + 1) == math.inf
 
 
 def test_the_people_are_forgotten() -> None:
