@@ -147,9 +147,23 @@ def test_somebody_beside_is_not_stepped_into() -> None:
         assert any(one[NORTH] * side < -0.5 for one in drone.gave_way)
 
 
+def test_two_who_come_side_by_side_are_both_kept_clear_of() -> None:
+    """The farther one walks where a step to that side would lead."""
+    for side in (1.0, -1.0):
+        other = straight((2.6, 0.9 * side), (-1.8, 0.0))
+        drone = Drone([straight((2.4, 0.0), (-1.8, -0.05 * side)), other])
+        drone.velocity = np.array([1.3, 0.0, 0.0])
+        drone.fly(0.8)
+        assert all(one[NORTH] * side < 0.1 for one in drone.gave_way)
+        drone = Drone([straight((2.4, 0.0), (-1.8, 0.05 * side)), other])
+        drone.velocity = np.array([1.3, 0.0, 0.0])
+        drone.fly(0.8)
+        assert any(one[NORTH] * side < -0.5 for one in drone.gave_way)
+
+
 def test_above_the_head_it_climbs() -> None:
     """Which leaves more than a step aside; below, it would fly past a face."""
-    for height, climbs in ((2.1, True), (1.8, False), (1.5, False), (0.6, False)):
+    for height, climbs in ((2.1, True), (1.88, False), (1.5, False), (0.6, False)):
         drone = Drone([straight((2.0, 0.0), (-1.8, 0.0))], height=height)
         drone.velocity = np.array([1.3, 0.0, 0.0])
         drone.fly(0.8)
