@@ -80,7 +80,7 @@ def test_a_whole_object_is_located(
         assert seen.distance == pytest.approx(distance, rel=0.05)
         leaning = 1.7 * math.sin(abs(bearing)) * math.tan(abs(pitch) + abs(tilt))
         assert seen.width is not None
-        assert 0.47 < seen.width < 0.53 + leaning
+        assert 0.47 < seen.width < 0.54 + leaning
     assert 0.6 * distance < seen.distance < 1.05 * distance
 
 
