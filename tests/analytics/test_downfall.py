@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.analytics.people.downfall import Downfall
@@ -158,6 +158,8 @@ def test_a_drone_that_moves_makes_nobody_fall(
 @pytest.mark.slow
 @LENSES
 @given(course=st.floats(-math.pi, math.pi), speed=st.floats(0.3, 2.5), height=st.floats(0.8, 3.0))
+@example(course=3.0, speed=1.0, height=1.75)
+@example(course=3.08, speed=1.69, height=1.65)
 @settings(max_examples=40, deadline=None)
 def test_walking_out_of_the_picture_is_no_fall(
     camera: CameraModel, course: float, speed: float, height: float

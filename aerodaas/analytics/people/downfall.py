@@ -25,9 +25,9 @@ __all__ = ["Downfall"]
 _STANDS = (1.3, 2.3)
 """Least and greatest height of a standing body's top, metres."""
 
-_HIGHER = 0.2
-"""Greatest height of the camera above the head in metres: in the image of a higher one, a person
-walking below it sinks, too."""
+_LOWER = 0.05
+"""Least height of the head above the camera in metres: in the image of a camera at its height, or
+higher, a person who walks up to it sinks, too."""
 
 _SEEN, _GONE = (0.5, 1.3), (0.2, 1.0)
 """Least drop of a falling body's top in metres, and its speed in m/s: sitting down or bending is
@@ -122,7 +122,7 @@ class Downfall:
         feet = feet_below(body.keypoints, view, self._least)
         if feet is None:
             return False
-        top, least = view.height_above(feet, _crown(body)), max(_STANDS[0], view.height - _HIGHER)
+        top, least = view.height_above(feet, _crown(body)), max(_STANDS[0], view.height + _LOWER)
         if not least <= top <= _STANDS[1]:
             return False
         place = body_to_enu(np.array([*feet, 0.0]), seen.odometry.yaw) + seen.odometry.position
