@@ -405,6 +405,20 @@ def test_the_doctor_names_a_port_that_is_taken(
     assert f"ss -ulpn 'sport = :{port}'" in shown
 
 
+def test_a_shell_completes_commands() -> None:
+    """As the script of `--install-completion` asks."""
+    words = {"_AERODAAS_COMPLETE": "complete_bash", "COMP_WORDS": "aerodaas re", "COMP_CWORD": "1"}
+    command = "from aerodaas.cli.app import app; app(prog_name='aerodaas')"
+    ended = subprocess.run(
+        [sys.executable, "-c", command],
+        env={**os.environ, **words},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert ended.stdout.split() == ["report", "replay", "remote"]
+
+
 def test_help_teaches_by_example(aerodaas: Commands) -> None:
     """Each command shows how it is called."""
     assert "aerodaas run farm_survey" in aerodaas("--help").out

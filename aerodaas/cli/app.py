@@ -241,11 +241,9 @@ def schema() -> None:
 
     aerodaas schema > environment.schema.json
     """
-    import json  # noqa: PLC0415 - only here
+    from aerodaas.config.schema import environment_schema  # noqa: PLC0415 - slow to load
 
-    from aerodaas.config.model import EnvironmentConfig  # noqa: PLC0415
-
-    typer.echo(json.dumps(EnvironmentConfig.model_json_schema(by_alias=True), indent=2))
+    typer.echo(environment_schema(), nl=False)
 
 
 @app.command()

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import runpy
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from aerodaas.config.options import RunOptions, current_options
+from aerodaas.config.options import RunOptions
 from aerodaas.types.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -29,10 +27,9 @@ def run_application(application: Path, words: list[str], options: RunOptions) ->
             raise ConfigError(f"a mission document takes no arguments of its own: {words[0]!r}")
         fly_mission(application, options)
         return
-    current_options.set(options)
-    sys.argv = [str(application), *words]
-    sys.path.insert(0, str(application.resolve().parent))
-    runpy.run_path(str(application), run_name="__main__")
+    from aerodaas.environment.application_file import run_file  # noqa: PLC0415 - slow to load
+
+    run_file(application, words, options)
 
 
 def build_application(application: Path, words: list[str], options: RunOptions) -> Environment:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import keyword
 from pathlib import Path
 from typing import Annotated
@@ -70,7 +69,7 @@ def _check(name: str) -> None:
 
 def _files(template: str, name: str) -> dict[str, str]:
     """Text of each file by its name, the application's first."""
-    from aerodaas.config.model import EnvironmentConfig  # noqa: PLC0415 - slow to load
+    from aerodaas.config.schema import environment_schema  # noqa: PLC0415 - slow to load
 
     folder = TEMPLATES / template
     application = folder / f"{_NAME}.py"
@@ -84,5 +83,4 @@ def _files(template: str, name: str) -> dict[str, str]:
         file.replace(_NAME, name): path.read_text(encoding="utf-8").replace(_NAME, name)
         for file, path in sources.items()
     }
-    schema = EnvironmentConfig.model_json_schema(by_alias=True)
-    return {**texts, _SCHEMA: json.dumps(schema, indent=2) + "\n"}
+    return {**texts, _SCHEMA: environment_schema()}

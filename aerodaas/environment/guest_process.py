@@ -8,7 +8,6 @@ of the same guest decodes.
 from __future__ import annotations
 
 import pickle
-import runpy
 import sys
 import traceback
 import types
@@ -25,9 +24,10 @@ from aerodaas.analytics.guests.document import (
 )
 from aerodaas.analytics.guests.works import Works
 from aerodaas.analytics.item_json import encoded
-from aerodaas.config.options import RunOptions, current_options
+from aerodaas.config.options import RunOptions
 from aerodaas.dataflow.graph import NavigationEdge, Node, application_line
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.environment.application_file import run_file
 from aerodaas.environment.offering import offered, the_only
 from aerodaas.recording.encoding import plain
 from aerodaas.types.errors import AeroDaaSError, GraphError, failure_line
@@ -88,12 +88,10 @@ def _revealed(item: GuestItem) -> object:
 
 def _built(catalogue: Catalogue, application: Path) -> tuple[dict[str, Any], bytes]:
     """Run the guest's file; returns its document and program, or what is wrong with it."""
-    current_options.set(RunOptions(application=application, catalogue=catalogue, view=False))
-    sys.argv = [str(application)]
-    sys.path.insert(0, str(application.parent))
+    options = RunOptions(application=application, catalogue=catalogue, view=False)
     try:
         with offered() as found:
-            namespace = runpy.run_path(str(application), run_name="__main__")
+            namespace = run_file(application, [], options)
         environment = the_only(found)
         document = _document(environment)
         program = _program(environment, namespace)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import runpy
-import sys
 from pathlib import Path
 
 from aerodaas.config.checked import checked
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
+from aerodaas.environment.application_file import run_file
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.document.compiling import write_mission
 from aerodaas.environment.environment import Environment
@@ -43,11 +42,8 @@ def compile_application(
     if not application.is_file():
         raise ConfigError(f"there is no application {application}")
     options = RunOptions(application=application.resolve(), environment=environment, view=False)
-    current_options.set(options)
-    sys.argv = [str(application), *words]
-    sys.path.insert(0, str(application.resolve().parent))
     with offered() as found:
-        runpy.run_path(str(application), run_name="__main__")
+        run_file(application, words, options)
     try:
         return write_mission(the_only(found), application.stem)
     except GraphError as error:

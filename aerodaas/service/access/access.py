@@ -9,6 +9,7 @@ from collections.abc import Callable
 from http import HTTPStatus
 
 from aerodaas.analytics.remote.attempts import WrongTokens
+from aerodaas.protocol.schemas import Scope
 from aerodaas.service.access.accounts import Accounts
 from aerodaas.service.access.audit import Audit
 from aerodaas.service.access.oidc import OidcVerifier
@@ -16,6 +17,7 @@ from aerodaas.service.access.principal import Principal
 from aerodaas.service.access.tokens import digest_of, fits, parse
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.store import Store
+from aerodaas.service.store.rows import Account
 
 __all__ = ["Access"]
 
@@ -113,18 +115,10 @@ class Access:
         now = self._clock()
         valid = not token.revoked and now < token.expires and not account.disabled
         if not fits(given.secret, token.digest) or not valid:
-            with self._lock:
-                self._known.pop(key, None)
+            self._forget(key)
             return None
-        principal = Principal(
-            account=account.name,
-            tenant=account.tenant,
-            role=account.role,
-            scopes=token.scopes & account.scopes,
-            token=token.id,
-        )
-        self._remember(key, principal, token.expires)
-        return principal
+        scopes = token.scopes & account.scopes
+        return self._admitted(key, account, scopes, token.id, token.expires)
 
     def _of_issuer(self, text: str, issuer: OidcVerifier) -> Principal | None:
         issued = issuer.issued(text)
@@ -139,25 +133,36 @@ class Access:
                 raise
             return principal
         if account.disabled:
-            with self._lock:
-                self._known.pop(key, None)
+            self._forget(key)
             return None
+        return self._admitted(key, account, account.scopes, issued.subject, issued.expires)
+
+    def _admitted(
+        self,
+        key: str,
+        account: Account,
+        scopes: frozenset[Scope],
+        token: str,
+        expires: float,
+    ) -> Principal:
+        """Who sends a valid token of an account; remembered while the database does not answer."""
         principal = Principal(
             account=account.name,
             tenant=account.tenant,
             role=account.role,
-            scopes=account.scopes,
-            token=issued.subject,
+            scopes=scopes,
+            token=token,
         )
-        self._remember(key, principal, issued.expires)
-        return principal
-
-    def _remember(self, key: str, principal: Principal, expires: float) -> None:
         with self._lock:
             self._known[key] = (principal, min(expires, self._clock() + _REMEMBERED))
             self._known.move_to_end(key)
             if len(self._known) > _MOST_REMEMBERED:
                 self._known.popitem(last=False)
+        return principal
+
+    def _forget(self, key: str) -> None:
+        with self._lock:
+            self._known.pop(key, None)
 
     def _remembered(self, key: str) -> Principal | None:
         with self._lock:
