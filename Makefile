@@ -2,6 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+SLOWEST := $(if $(CI),--durations=25 --durations-min=20)
 
 .PHONY: fly test lint docs training lock audit licences matrix clean
 
@@ -11,10 +12,10 @@ fly: $(VENV)/.installed
 # One worker for each of two cores, with a Ray of its own. Slow tests run where CI is set, as
 # continuous integration does; those that go by the wall clock afterwards, in two halves that leave
 # each other time (tests/conftest.py). There one that met a busy machine is run once more, named, and
-# counted as a rerun.
+# counted as a rerun. Each half ends with its slowest tests, before one of them meets its time-out.
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest --numprocesses 2 -m "$(if $(CI),not (slow and wall_clock),not slow)"
-	$(if $(CI),$(BIN)/python -m pytest --numprocesses 2 -m "slow and wall_clock")
+	$(BIN)/python -m pytest --numprocesses 2 -m "$(if $(CI),not (slow and wall_clock),not slow)" $(SLOWEST)
+	$(if $(CI),$(BIN)/python -m pytest --numprocesses 2 -m "slow and wall_clock" $(SLOWEST))
 
 lint: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
