@@ -35,6 +35,9 @@ _SAME = 1.2
 """Distance in metres between a person's predicted and detected position, at most."""
 _MEMORY = 1.0
 """Seconds for which a person out of sight is assumed to go on; who is too near is out of sight."""
+_LOOKS = 3
+"""Number of frames in a row that must show somebody new, as a detector's false and loose boxes of
+people last a frame or two."""
 
 
 @dataclass
@@ -42,6 +45,13 @@ class _Person:
     motion: TargetMotion
     seen: int
     """Mission time of the last detection, nanoseconds."""
+    looks: int = 0
+    """Number of frames that showed them."""
+
+    @property
+    def sure(self) -> bool:
+        """Whether enough frames showed them."""
+        return self.looks >= _LOOKS
 
 
 class PeopleTracker:
@@ -65,8 +75,12 @@ class PeopleTracker:
         A person is the one predicted nearest to the sighting, or a new one. An upper bound of the
         distance is no evidence against somebody predicted nearer.
         """
-        self._newest = stamp
-        self._people = [one for one in self._people if seconds(stamp - one.seen) <= _MEMORY]
+        last, self._newest = self._newest, stamp
+        self._people = [
+            one
+            for one in self._people
+            if seconds(stamp - one.seen) <= _MEMORY and (one.sure or one.seen == last)
+        ]
         known = list(self._people)
         turning = _SWERVE / max(interval, _SHORTEST)
         for sighting in sorted(people, key=lambda one: one.distance):
@@ -77,6 +91,7 @@ class PeopleTracker:
             else:
                 known.remove(person)
             person.seen, person.motion.acceleration = stamp, turning
+            person.looks += 1
             predicted = person.motion.relative_to(pose, stamp)
             nearer = predicted is not None and predicted[0].distance <= sighting.distance
             if not (sighting.bound and nearer):
@@ -85,11 +100,12 @@ class PeopleTracker:
     def relative_to(
         self, pose: Odometry, stamp: int, *, in_sight: bool = False
     ) -> list[Prediction]:
-        """Everybody predicted for `stamp` in relation to a drone at `pose`, nearest first.
+        """Everybody surely there, predicted for `stamp` relative to `pose`, nearest first.
 
         Or everybody `in_sight`, seen in the newest frame.
         """
-        people = [one for one in self._people if one.seen == self._newest or not in_sight]
+        sure = (one for one in self._people if one.sure)
+        people = [one for one in sure if one.seen == self._newest or not in_sight]
         found = (person.motion.relative_to(pose, stamp) for person in people)
         return sorted(filter(None, found), key=lambda one: one[0].distance)
 

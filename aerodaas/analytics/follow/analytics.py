@@ -42,8 +42,12 @@ _BLOCKED = (3, 10)
 """Frames with an obstacle, of the last 10, that raise an alert."""
 _PERSON, _PERSON_SIZE = "person", TargetSize(1.7, 0.55)
 """Label and size of a bystander."""
-_WORN = (0.4, 1.5)
-"""Width of a part of somebody, such as a vest, in parts of the width of the body's box."""
+_WORN = 0.8
+"""Share of a box, such as a vest's or a body's, within another person's box from which on both show
+the same body. Somebody else in front would hide the vest, so that it would not be detected."""
+_AS_FAR = 0.6
+"""Least height of such a box in parts of the height that it has at the distance of the other; a
+smaller one is behind, not worn."""
 _SAME_BODY = 0.8
 """Distance in metres between the target's expected position and that of a person's box, at most,
 for the two to be the same body."""
@@ -309,13 +313,20 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         """
         if _PERSON in self.labels:
             return ()
-        known = item.labelled(*self.labels)
+        parts = [(one, self.size.height) for one in item.labelled(*self.labels)]
+        people = sorted(item.labelled(_PERSON), key=lambda one: -one.score)
+        # A detector may find a body several times, with loose boxes around it.
+        parts += [
+            (one, _PERSON_SIZE.height)
+            for one in people
+            if any(_is_worn(part, height, one) for part, height in parts)
+        ]
         odometry, expected = item.odometry, target
         if expected is None and odometry is not None:
             expected = self.controller.expected(odometry, item.header.stamp)
         found = []
-        for box in item.labelled(_PERSON):
-            if any(_is_worn(one, box) for one in known):
+        for box in people:
+            if any(_is_worn(part, height, box) for part, height in parts):
                 continue
             seen = sight(box, item, _PERSON_SIZE)
             if seen is None or (self.falls and _is_near(seen, expected)):
@@ -351,18 +362,21 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             context.alert(Alert(item.header, "target_given_up", text))
 
 
-def _is_worn(part: Detection, body: Detection) -> bool:
-    """Whether a box, such as a vest's, is part of the body in another, by place and width."""
-    left, top, right, bottom = body.box
-    (u, v), (narrowest, widest) = part.centre, _WORN
-    width = (part.box[2] - part.box[0]) / max(right - left, 1.0)
-    return left <= u <= right and top <= v <= bottom and narrowest <= width <= widest
+def _is_worn(part: Detection, height: float, body: Detection) -> bool:
+    """Whether a box of something `height` metres high, such as a vest, shows part of a body."""
+    low = np.maximum(part.box[:2], body.box[:2])
+    high = np.minimum(part.box[2:], body.box[2:])
+    inside = float(np.clip(high - low, 0.0, None).prod()) >= _WORN * part.area
+    tall, taller = (one.box[3] - one.box[1] for one in (part, body))
+    return inside and tall >= _AS_FAR * taller * height / _PERSON_SIZE.height
 
 
 def _is_near(seen: RelativeTarget, expected: RelativeTarget | None) -> bool:
-    return expected is not None and bool(
-        np.linalg.norm(seen.offset - expected.offset) <= _SAME_BODY
-    )
+    """Whether a person's box may show the target, who if fallen lies within a body's length."""
+    if expected is None:
+        return False
+    reach = _SAME_BODY + (LYING if expected.bound else 0.0)
+    return bool(np.linalg.norm(seen.offset - expected.offset) <= reach)
 
 
 def _polygon(area: Sequence[tuple[float, float]]) -> Polygon:
