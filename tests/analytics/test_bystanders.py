@@ -114,6 +114,28 @@ def test_the_targets_own_body_is_no_stranger() -> None:
     assert watched.told == []
 
 
+@pytest.mark.parametrize("width", [1.1, 1.8])
+def test_a_loose_box_around_the_target_is_no_stranger(width: float) -> None:
+    """By its width it would be nearer than the body; it reaches out to one side."""
+    watched = Watched(VipFollowAnalytics())
+    left = width / 2 - 0.275
+    for _ in range(10):
+        loose = box("person", 3.0, left, height=1.7, width=width)
+        watched.show(vest(3.0, 0.0), person(3.0, 0.0), loose)
+    known = watched.follow.controller.guard._people.relative_to(POSE, round(0.9 * NANOSECONDS))
+    assert len(known) == 1
+
+
+@pytest.mark.parametrize(("frames", "believed"), [(2, False), (3, True)])
+def test_a_stranger_is_believed_after_three_frames(frames: int, *, believed: bool) -> None:
+    """False boxes of people last a frame or two."""
+    watched = Watched(VipFollowAnalytics())
+    for number in range(10):
+        watched.show(vest(2.0, -1.2), *([person(4.0, 1.0)] * (number >= 10 - frames)))
+    known = watched.follow.controller.guard._people.relative_to(POSE, round(0.9 * NANOSECONDS))
+    assert (len(known) == 2) is believed
+
+
 def test_another_with_the_followed_label_counts_once() -> None:
     """By the vest; the box of the body around it adds nobody."""
     watched = Watched(VipFollowAnalytics())
