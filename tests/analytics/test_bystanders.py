@@ -11,7 +11,8 @@ from follow_world import TELLO, Snapshot
 from aerodaas.analytics import CarFollowAnalytics, PersonFollowAnalytics, VipFollowAnalytics
 from aerodaas.analytics.boxes import shipped_detector
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.analytics.follow.analytics import FollowAnalytics
+from aerodaas.analytics.follow.analytics import FollowAnalytics, _is_near
+from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Alert, Detection, Detections, Header, Odometry
 from aerodaas.types.waypoints import VelocityCommand
@@ -134,6 +135,23 @@ def test_a_stranger_is_believed_after_three_frames(frames: int, *, believed: boo
         watched.show(vest(2.0, -1.2), *([person(4.0, 1.0)] * (number >= 10 - frames)))
     known = watched.follow.controller.guard._people.relative_to(POSE, round(0.9 * NANOSECONDS))
     assert (len(known) == 2) is believed
+
+
+def test_a_stranger_in_every_other_frame_is_not_believed() -> None:
+    """The frames must follow one another."""
+    watched = Watched(VipFollowAnalytics())
+    for number in range(11):
+        watched.show(vest(2.0, -1.2), *([person(4.0, 1.0)] * (number % 2 == 0)))
+    known = watched.follow.controller.guard._people.relative_to(POSE, NANOSECONDS)
+    assert len(known) == 1
+
+
+@pytest.mark.parametrize("fallen", [False, True])
+def test_who_has_fallen_lies_within_a_bodys_length(*, fallen: bool) -> None:
+    """So a person's box there may show the target; around one who stands, less room is theirs."""
+    expected = RelativeTarget(0.0, 3.5, bound=fallen)
+    assert _is_near(RelativeTarget(0.0, 2.0), expected) is fallen
+    assert not _is_near(RelativeTarget(0.0, 1.0), expected)
 
 
 def test_another_with_the_followed_label_counts_once() -> None:
