@@ -307,12 +307,13 @@ class Run:
 
     def _change_models(self) -> None:
         """Set the command line's model in every detector."""
-        from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415 - only here
+        if self.options.model is None:
+            return
+        from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415 - 20 MB
 
-        if self.options.model is not None:
-            for node in self.graph.nodes.values():
-                if isinstance(node.work, OnnxDetector):
-                    node.work = node.work.with_model(self.options.model)
+        for node in self.graph.nodes.values():
+            if isinstance(node.work, OnnxDetector):
+                node.work = node.work.with_model(self.options.model)
 
     def _take_tasks(self) -> None:
         """Merge the application's task profiles into those of the environment file."""
