@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from aerodaas.dataflow.plans.numbers import LatLon
+from aerodaas.dataflow.plans.numbers import LatLon, finite_or_none, place
 
 __all__ = ["MOST_ITEMS", "FenceCircle", "FencePolygon", "Notice", "Plan", "PlanHome", "PlanItem"]
 
@@ -43,6 +43,21 @@ class PlanHome:
     latitude: float
     longitude: float
     altitude: float | None
+
+    @classmethod
+    def given(cls, latitude: object, longitude: object, altitude: object) -> PlanHome | None:
+        """Read a file's home; None for one that was never set.
+
+        Writers that know no home, or not its altitude, put null or zeros, which would lift what is
+        above the sea by as much as the ground lies above it.
+
+        Raises:
+            ConfigError: If it is no place, or its altitude no finite number.
+        """
+        if not latitude and not longitude:
+            return None
+        height = finite_or_none(altitude, "home: altitude")
+        return cls(*place(latitude, longitude, "home"), height or None)
 
 
 @dataclass(frozen=True)

@@ -41,6 +41,8 @@ def parse_qgroundcontrol(content: object) -> Plan:
     kind = whole_plan.get("fileType", "Plan")
     if kind != "Plan":
         raise ConfigError(f"fileType is {str(kind)[:40]!r}, not 'Plan': {_SAVE_AGAIN}")
+    if whole_plan.get("version", 1) != 1:
+        raise ConfigError(f"version is {str(whole_plan['version'])[:40]}, not 1: {_SAVE_AGAIN}")
     mission = _object(whole_plan.get("mission"), "mission")
     version = mission.get("version", _VERSION)
     if version != _VERSION:
@@ -113,17 +115,13 @@ def _simple(item: dict[str, Any], number: int) -> PlanItem:
 
 
 def _home(value: object) -> PlanHome | None:
-    """The planned home; null for a place that was never set."""
     if value is None:
         return None
     entries = _entries(value, "plannedHomePosition")
     if len(entries) not in {2, 3}:
         raise ConfigError("plannedHomePosition must be latitude, longitude and altitude")
-    if entries[0] is None or entries[1] is None:
-        return None
-    latitude, longitude = place(entries[0], entries[1], "plannedHomePosition")
-    altitude = finite_or_none([*entries, None][2], "plannedHomePosition: altitude")
-    return PlanHome(latitude, longitude, altitude)
+    latitude, longitude, altitude = [*entries, None][:3]
+    return PlanHome.given(latitude, longitude, altitude)
 
 
 def _fence(value: object, notices: list[Notice]) -> Iterator[FencePolygon | FenceCircle]:

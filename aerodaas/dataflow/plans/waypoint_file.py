@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from aerodaas.dataflow.plans.numbers import finite, place
+from aerodaas.dataflow.plans.numbers import finite
 from aerodaas.dataflow.plans.plan import MOST_ITEMS, Plan, PlanHome, PlanItem
 from aerodaas.types.errors import ConfigError
 
@@ -27,7 +27,8 @@ def parse_waypoint_file(text: str) -> Plan:
         raise ConfigError(f"its first line is not {HEADER!r}: save it again as that")
     items = list(_items(lines))
     if items and items[0].number == 0:
-        return Plan(tuple(items[1:]), home=_home(items[0]), ardupilot=True)
+        home = PlanHome.given(items[0].x, items[0].y, items[0].z)
+        return Plan(tuple(items[1:]), home=home, ardupilot=True)
     raise ConfigError("its first item is not number 0, which is home: save it again")
 
 
@@ -60,14 +61,6 @@ def _items(lines: list[str]) -> Iterator[PlanItem]:
             _whole(fields[11], f"{where}: autocontinue") != 0,
         )
         expected += 1
-
-
-def _home(item: PlanItem) -> PlanHome | None:
-    """Home of the first line; zeros, where a writer knew none."""
-    if not item.x and not item.y:
-        return None
-    latitude, longitude = place(item.x, item.y, "home (item 0)")
-    return PlanHome(latitude, longitude, item.z)
 
 
 def _whole(text: str, what: str) -> int:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-__all__ = ["HOME", "item", "lines", "plan", "survey", "waypoint"]
+__all__ = ["HOME", "item", "lines", "mavwp", "plan", "survey", "waypoint"]
+
+mavwp: Any = importlib.import_module("pymavlink.mavwp")
+"""pymavlink's own reader and writer of waypoint files. It has no types."""
 
 HOME = (47.0, 8.0, 488.0)
 
@@ -30,7 +34,7 @@ def survey(*items: dict[str, Any], kind: str = "survey") -> dict[str, Any]:
 
 
 def plan(path: Path, *items: dict[str, Any], home: Any = HOME, **more: Any) -> Path:  # noqa: ANN401
-    """Write a `.plan` of these items; `more` are keys of the file, or of its mission by `mission`."""
+    """Write a `.plan` of these items; `more` are keys of the file, `mission` of its mission."""
     mission = {"version": 2, "plannedHomePosition": home, "items": list(items), "firmwareType": 12}
     content = {"fileType": "Plan", "version": 1, "mission": mission | more.pop("mission", {})}
     path.write_text(json.dumps(content | more))
@@ -40,7 +44,6 @@ def plan(path: Path, *items: dict[str, Any], home: Any = HOME, **more: Any) -> P
 def lines(path: Path, *rows: str, home: str = "47.0 8.0 488.0") -> Path:
     """Write a `.waypoints` file: each row is frame, command, four values and a place."""
     numbered = [f"0 1 0 16 0 0 0 0 {home} 1", *[f"{i} 0 {r} 1" for i, r in enumerate(rows, 1)]]
-    path.write_text(
-        "\n".join(["QGC WPL 110", *[row.replace(" ", "\t") for row in numbered]]) + "\n"
-    )
+    fields = [row.replace(" ", "\t") for row in numbered]
+    path.write_text("\n".join(["QGC WPL 110", *fields, ""]))
     return path

@@ -115,7 +115,7 @@ def test_a_structure_scan_is_flown_around_the_structure(tmp_path: Path) -> None:
     assert heights == [60, *[7.0] * 5, *[17.0] * 5, *[27.0] * 5, *[37.0] * 5, 60]
     assert [one.id for one in waypoints][:4] == ["item1", "item3", "item5", "item6"]
     places = [HOME.to_local(one.x, one.y, HOME.altitude)[:2] for one in waypoints]
-    block = shapely.Polygon([HOME.to_local(*at, HOME.altitude)[:2] for at in SQUARE])
+    block = shapely.Polygon([HOME.to_local(a, b, HOME.altitude)[:2] for a, b in SQUARE])
     for index in range(4):
         ring = places[1 + 5 * index : 6 + 5 * index]
         assert ring[0] == pytest.approx(ring[-1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import warnings
@@ -11,8 +12,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from plan_files import item, lines, plan, survey, waypoint
-from pymavlink import mavwp
+from plan_files import item, lines, mavwp, plan, survey, waypoint
 
 from aerodaas import AeroNavigation, WaypointType
 from aerodaas.dataflow.plans.commands import NAV_LAST, command_name
@@ -207,7 +207,8 @@ def test_heights_above_the_sea(tmp_path: Path, frame: int) -> None:
     path = plan(tmp_path / "a.plan", waypoint(0.001, 500.0, frame))
     assert flown_plan(path)[0][0].z == pytest.approx(12.0)
     assert flown_plan(path, home_altitude=480.0)[0][0].z == pytest.approx(20.0)
-    for home in (None, [None, None, None], [47.0, 8.0, None], [47.0, 8.0]):
+    unknown = [[None, None, None], [0, 0, 0], [47.0, 8.0, None], [47.0, 8.0], [47.0, 8.0, 0]]
+    for home in (None, *unknown):
         path = plan(tmp_path / "b.plan", waypoint(0.001, 500.0, frame), home=home)
         with pytest.raises(ConfigError, match="above the sea, and that of home is not known: give"):
             flown_plan(path)
@@ -280,11 +281,12 @@ def test_numbers_without_end_are_refused(tmp_path: Path, word: str) -> None:
     ("change", "why"),
     [
         ({"fileType": "Mission"}, "fileType is 'Mission', not 'Plan': open it in a current"),
+        ({"version": 2}, "version is 2, not 1: open it in a current"),
         ({"mission": {"version": 1}}, "mission.version is 1, not 2: open it in a current"),
         ({"mission": {"items": {}}}, "mission.items must be a list"),
         ({"mission": {"items": [3]}}, "item 1 must be an object"),
         ({"mission": {"items": [item(16.5, [0] * 7)]}}, "command must be a whole number"),  # type: ignore[arg-type]
-        ({"mission": {"items": [item(True, [0] * 7)]}}, "command must be a whole number"),
+        ({"mission": {"items": [item(*(True, [0] * 7))]}}, "command must be a whole number"),
         ({"mission": {"items": [item(16, [0] * 7, "3")]}}, "frame must be a whole number"),
         ({"mission": {"items": [item(16, [0] * 7, autoContinue=1)]}}, "must be true or false"),
         ({"mission": {"items": [survey()]}}, r"item 1 \(survey\) holds no items to fly"),
@@ -325,8 +327,10 @@ def test_a_plan_has_bounds(tmp_path: Path) -> None:
             st.lists(inner, max_size=7)
             | st.dictionaries(
                 st.sampled_from(
-                    ["mission", "items", "type", "params", "plannedHomePosition", "geoFence"]
-                    + ["rallyPoints", "points", "polygons", "TransectStyleComplexItem", "Items"]
+                    [
+                        *("mission", "items", "type", "params", "plannedHomePosition", "geoFence"),
+                        *("rallyPoints", "points", "polygons", "TransectStyleComplexItem", "Items"),
+                    ]
                 ),
                 inner,
             )
@@ -338,10 +342,8 @@ def test_what_is_no_plan_is_refused(tmp_path_factory: pytest.TempPathFactory, co
     """Any JSON: ConfigError, or an empty plan."""
     path = tmp_path_factory.mktemp("plans") / "x.plan"
     path.write_text(json.dumps(content))
-    try:
+    with contextlib.suppress(ConfigError):
         assert not flown_plan(path)[0]
-    except ConfigError:
-        pass
 
 
 def test_other_files_are_told_what_they_are(tmp_path: Path) -> None:
@@ -372,9 +374,10 @@ def test_a_plan_of_mission_planner_becomes_waypoints(tmp_path: Path) -> None:
     assert [one.command for one in notices] == ["NAV_TAKEOFF"]
 
 
-def test_a_home_of_zeros_is_none(tmp_path: Path) -> None:
-    """Some writers know no home: then the sea's level is not known either."""
-    path = lines(tmp_path / "a.waypoints", *ROWS, home="0 0 0")
+@pytest.mark.parametrize("home", ["0 0 0", "47 8 0"])
+def test_a_home_of_zeros_is_none(tmp_path: Path, home: str) -> None:
+    """Some writers know no home, or not its altitude: then the sea's level is not known either."""
+    path = lines(tmp_path / "a.waypoints", *ROWS, home=home)
     with pytest.raises(ConfigError, match="item 3: its altitude is above the sea"):
         flown_plan(path)
 
@@ -392,7 +395,7 @@ def test_a_home_of_zeros_is_none(tmp_path: Path) -> None:
         ("QGC WPL 110\n0 0 3 16 0 0 x 0 47 8 9 1\n", "field 7 must be a number, not 'x'"),
         ("QGC WPL 110\n0 0 -3 16 0 0 0 0 47 8 9 1\n", "frame must be a whole number, not '-3'"),
         ("QGC WPL 110\n0 0 3 1\u0666 0 0 0 0 47 8 9 1\n", "command must be a whole number"),
-        ("QGC WPL 110\n0 0 3 16 0 0 0 0 470 8 9 1\n", r"home \(item 0\): .* is no latitude"),
+        ("QGC WPL 110\n0 0 3 16 0 0 0 0 470 8 9 1\n", "home: .* is no latitude"),
     ],
 )
 def test_lines_that_are_no_items(tmp_path: Path, text: str, why: str) -> None:
@@ -457,14 +460,12 @@ def test_parts_that_waypoints_do_not_hold_are_said(tmp_path: Path) -> None:
     ]
     assert read_plan(path).rally_points == ((47.0, 8.0, 30.0),)
     old = plan(tmp_path / "b.plan", waypoint(0.001), geoFence={"version": 1, "polygon": [[1, 2]]})
-    assert told(old) == [
-        "geofence: its version is not 2 and it is not read; open it in a current QGroundControl "
-        "and save it again"
-    ]
+    (notice,) = told(old)
+    assert notice.startswith("geofence: its version is not 2 and it is not read; open it in a")
 
 
 def test_a_warning_has_an_end(tmp_path: Path) -> None:
-    """Hundreds of triggers are one line, thousands of kinds a few; what a file says is printable."""
+    """Hundreds of triggers are one line, many kinds a few; what a file says is printable."""
     many = [item(40_000 + index, [0] * 7, 2) for index in range(100)]
     with pytest.warns(UserWarning, match=r"and 80 more: `aerodaas plan show` lists them"):
         AeroNavigation.from_plan(plan(tmp_path / "a.plan", *many))

@@ -13,8 +13,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from plan_files import HOME as PLANNED
-from plan_files import item, lines, plan, survey, waypoint
-from pymavlink import mavwp
+from plan_files import item, lines, mavwp, plan, survey, waypoint
 
 from aerodaas import AeroNavigation, VelocityCommand, Waypoint
 from aerodaas.dataflow.plans.reading import flown_plan, read_plan
@@ -107,7 +106,8 @@ def test_a_height_above_the_ellipsoid_is_written_above_home(tmp_path: Path) -> N
     above = Waypoint("a", -35.36, 149.16, 600.0, waypoint_type=WaypointType.GLOBAL)
     AeroNavigation(data=[above]).to_plan(tmp_path / "a.plan", HOME)
     (one,) = flown_plan(tmp_path / "a.plan")[0]
-    assert (one.x, one.y, one.z) == (-35.36, 149.16, pytest.approx(16.0))
+    assert (one.x, one.y) == (-35.36, 149.16)
+    assert one.z == pytest.approx(16.0)
 
 
 def test_what_a_ground_station_finds(tmp_path: Path) -> None:
@@ -180,10 +180,10 @@ def test_what_no_plan_holds_is_refused(tmp_path: Path) -> None:
         AeroNavigation(data=[]).to_plan(tmp_path / "a.kml", HOME)
     assert not list(tmp_path.iterdir())
     path.write_text("mine")
-    with pytest.raises(ConfigError, match="exists; remove it or choose another name"):
+    with pytest.raises(ConfigError, match="exists; remove it or"):
         AeroNavigation(data=[]).to_plan(path, HOME)
     assert path.read_text() == "mine"
-    with pytest.raises(ConfigError, match="cannot write .*No such file"):
+    with pytest.raises(ConfigError, match=r"cannot write .*No such file"):
         AeroNavigation(data=[]).to_plan(tmp_path / "none" / "a.plan", HOME)
 
 
