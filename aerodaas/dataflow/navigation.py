@@ -87,7 +87,9 @@ class AeroNavigation(AeroListData[NavigationItem]):
         warn_of(path, notices, stacklevel=2)
         return cls(NavigationType.DISTANCE_DRIVEN, waypoints)
 
-    def to_plan(self, path: str | Path, home: GeodeticOrigin) -> None:
+    def to_plan(
+        self, path: str | Path, home: GeodeticOrigin, *, home_altitude: float | None = None
+    ) -> None:
         """Write the waypoints as a new `.plan` or `.waypoints` file, for a ground station.
 
         It begins with a take-off and ends with a return. What the file cannot hold (a priority, a
@@ -95,7 +97,8 @@ class AeroNavigation(AeroListData[NavigationItem]):
 
         Args:
             path: The file, with the format as its suffix.
-            home: The environment's home, its altitude above the sea.
+            home: The environment's home.
+            home_altitude: Its metres above the sea, where they are known; no item needs them.
 
         Raises:
             ConfigError: If there is a waypoint relative to a take-off that is not known yet, a
@@ -107,7 +110,7 @@ class AeroNavigation(AeroListData[NavigationItem]):
 
         if self.stream is not None or self.commands:
             raise ConfigError("a plan holds waypoints alone, no streams and velocity commands")
-        plan, notices = planned(self.waypoints, home)
+        plan, notices = planned(self.waypoints, home, home_altitude)
         warn_of(path, [*notices, *write_plan(path, plan)], stacklevel=2)
 
     @property

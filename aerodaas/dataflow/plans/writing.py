@@ -37,7 +37,9 @@ _COPTER = 2
 """MAV_TYPE."""
 
 
-def planned(waypoints: Sequence[Waypoint], home: GeodeticOrigin) -> tuple[Plan, list[Notice]]:
+def planned(
+    waypoints: Sequence[Waypoint], home: GeodeticOrigin, home_altitude: float | None = None
+) -> tuple[Plan, list[Notice]]:
     """Turn waypoints into a plan that starts at `home`; with what it leaves out.
 
     Raises:
@@ -46,7 +48,7 @@ def planned(waypoints: Sequence[Waypoint], home: GeodeticOrigin) -> tuple[Plan, 
     places = [_place(waypoint, home) for waypoint in waypoints]
     items = list(_items(waypoints, places, home))
     return (
-        Plan(tuple(items), home=PlanHome(home.latitude, home.longitude, home.altitude)),
+        Plan(tuple(items), home=PlanHome(home.latitude, home.longitude, home_altitude)),
         list(_left_out(waypoints)),
     )
 
@@ -144,11 +146,15 @@ def _not_in_lines(plan: Plan) -> Iterator[Notice]:
 
 
 def _waypoint_file(plan: Plan) -> str:
-    home = plan.home
-    first = (home.latitude, home.longitude, home.altitude or 0.0) if home else (0.0, 0.0, 0.0)
-    lines = [HEADER, _line(PlanItem(0, NAV_WAYPOINT, 0, (0.0, 0.0, 0.0, None), *first))]
+    home = PlanItem(0, NAV_WAYPOINT, 0, (0.0, 0.0, 0.0, None), *_home(plan.home))
+    lines = [HEADER, _line(home)]
     lines += map(_line, plan.items)
     return "\n".join([*lines, ""])
+
+
+def _home(home: PlanHome | None) -> tuple[float, float, float]:
+    """Latitude, longitude and altitude; zeros, which mean to readers that they are not known."""
+    return (home.latitude, home.longitude, home.altitude or 0.0) if home else (0.0, 0.0, 0.0)
 
 
 def _line(item: PlanItem) -> str:
@@ -159,7 +165,6 @@ def _line(item: PlanItem) -> str:
 
 
 def _qgroundcontrol(plan: Plan) -> str:
-    home = plan.home
     content = {
         "fileType": "Plan",
         "version": 1,
@@ -171,7 +176,7 @@ def _qgroundcontrol(plan: Plan) -> str:
             "cruiseSpeed": 15,
             "hoverSpeed": 5,
             "globalPlanAltitudeMode": 1,
-            "plannedHomePosition": [home.latitude, home.longitude, home.altitude] if home else None,
+            "plannedHomePosition": _home(plan.home),
             "items": [_entry(item) for item in plan.items],
         },
         "geoFence": {

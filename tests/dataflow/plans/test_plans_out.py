@@ -101,6 +101,15 @@ def test_places_on_the_globe_come_back_to_the_last_digit(
     assert [(one.x, one.y, one.z) for one in read] == [(one.x, one.y, one.z) for one in waypoints]
 
 
+def test_a_height_above_the_ellipsoid_is_none_above_the_sea(tmp_path: Path) -> None:
+    """The altitude of the environment's home is not written as the sea's."""
+    for name in ("a.plan", "a.waypoints"):
+        AeroNavigation(data=[]).to_plan(tmp_path / name, HOME)
+        home = read_plan(tmp_path / name).home
+        assert home is not None
+        assert home.altitude is None
+
+
 def test_a_height_above_the_ellipsoid_is_written_above_home(tmp_path: Path) -> None:
     """It is what `global` waypoints have."""
     above = Waypoint("a", -35.36, 149.16, 600.0, waypoint_type=WaypointType.GLOBAL)
@@ -118,10 +127,10 @@ def test_what_a_ground_station_finds(tmp_path: Path) -> None:
         Waypoint("c", 30, 0, 12, waypoint_type="local"),
     ]
     path = tmp_path / "a.plan"
-    AeroNavigation(data=flown).to_plan(path, HOME)
+    AeroNavigation(data=flown).to_plan(path, HOME, home_altitude=584.5)
     content = json.loads(path.read_text())
     assert content["fileType"] == "Plan"
-    assert content["mission"]["plannedHomePosition"] == [-35.363262, 149.165237, 584.0]
+    assert content["mission"]["plannedHomePosition"] == [-35.363262, 149.165237, 584.5]
     items = content["mission"]["items"]
     assert [one["command"] for one in items] == [22, 178, 16, 16, 178, 16, 20]
     assert [one["doJumpId"] for one in items] == [1, 2, 3, 4, 5, 6, 7]
@@ -136,12 +145,12 @@ def test_pymavlink_reads_what_is_written(tmp_path: Path) -> None:
     """Its loader for `.waypoints`, item by item."""
     flown = [Waypoint("a", 10, 20, 12, waypoint_type="local", hover_duration=2, speed=3)]
     path = tmp_path / "a.waypoints"
-    AeroNavigation(data=flown).to_plan(path, HOME)
+    AeroNavigation(data=flown).to_plan(path, HOME, home_altitude=584.5)
     loader = mavwp.MAVWPLoader()
     assert loader.load(str(path)) == 5
     home, takeoff, speed, there, back = [loader.wp(index) for index in range(5)]
     assert (home.command, home.frame, home.current) == (16, 0, 1)
-    assert (home.x, home.y, home.z) == (-35.363262, 149.165237, 584.0)
+    assert (home.x, home.y, home.z) == (-35.363262, 149.165237, 584.5)
     assert (takeoff.command, takeoff.z) == (22, 12.0)
     assert (speed.command, speed.param1, speed.param2) == (178, 1.0, 3.0)
     assert (there.command, there.frame, there.param1, there.z) == (16, 3, 2.0, 12.0)
