@@ -1,4 +1,4 @@
-"""The page itself: three files, which ship built, under a policy that admits nothing else."""
+"""The page itself: files that ship built, under a policy that admits nothing else."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ _FOLDER = Path(__file__).parent / "page"
 _FILES = {
     "/": ("index.html", "text/html; charset=utf-8"),
     "/console.js": ("console.js", "text/javascript; charset=utf-8"),
+    "/icon.svg": ("icon.svg", "image/svg+xml"),
     "/console.css": ("console.css", "text/css; charset=utf-8"),
 }
 _HEADERS = {
