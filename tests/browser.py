@@ -116,7 +116,9 @@ class Page:
     def key(self, key: str) -> None:
         """Press a key on what has the focus."""
         for kind in ("keyDown", "keyUp"):
-            self._ask("Input.dispatchKeyEvent", type=kind, key=key, text=key if len(key) == 1 else "")
+            self._ask(
+                "Input.dispatchKeyEvent", type=kind, key=key, text=key if len(key) == 1 else ""
+            )
 
     def offline(self, *, cut: bool) -> None:
         """Cut the connection for new requests, or mend it."""

@@ -76,7 +76,8 @@ def run(
         str | None,
         typer.Option(
             help="Mission seconds per wall second, or `max`: as fast as the machine goes, "
-            "repeatable to the last digit. Default: `max` if every robot is simulated, else 1."
+            "repeatable to the last digit. Default: `max` if every robot is simulated and there "
+            "is no --console, else 1."
         ),
     ] = None,
     record: Annotated[
@@ -135,7 +136,7 @@ def run(
 
         aerodaas run farm_survey
         aerodaas run my_app.py --speed 5 --seed 7 --record /tmp/farm
-        aerodaas run farm_survey --speed 1 --console
+        aerodaas run farm_survey --console
         aerodaas run farm_survey --set quadrotor_base.limits.cruise_speed=1
         aerodaas run mine.py --guest theirs.py --grant theirs=sense:cam1,compute:edge
         aerodaas run watch_frames -- pictures/ yolov8n.onnx --rate 5
@@ -144,7 +145,8 @@ def run(
     from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - as above
 
     application = find_application(application)
-    factor, lockstep = speed_option(speed)
+    # Who looks on and commands has the clock's time, unless another speed is asked for.
+    factor, lockstep = speed_option("1" if console and speed is None else speed)
     options = RunOptions(
         environment=env,
         speed=factor,

@@ -33,7 +33,10 @@ function Chart(props: { samples: Sample[]; field: "height" | "speed" | "battery"
   useEffect(() => {
     const element = box.current;
     if (!element) return;
-    const colour = (name: string) => getComputedStyle(element).getPropertyValue(name).trim();
+    const colour = (name: string) => {
+      element.style.color = `var(${name})`;
+      return getComputedStyle(element).color;
+    };
     const axis = {
       stroke: colour("--muted"),
       grid: { stroke: colour("--line"), width: 1 },

@@ -15,6 +15,7 @@ import "./console.css";
 const THEMES = ["auto", "light", "dark"] as const;
 type Theme = (typeof THEMES)[number];
 const LOOK = 2000;
+const DARK = matchMedia("(prefers-color-scheme: dark)");
 
 interface Known {
   account: AccountOut;
@@ -28,7 +29,7 @@ function App() {
   const [missions, setMissions] = useState<MissionOut[]>([]);
   const [chosen, setChosen] = useState<string | null>(null);
   const [problem, setProblem] = useState("");
-  const [theme, setTheme] = useTheme();
+  const { choice, setChoice, theme } = useTheme();
 
   useEffect(() => {
     if (!token) return;
@@ -74,11 +75,12 @@ function App() {
   const themes = (
     <button
       type="button"
-      class="plain"
-      title="Light, dark, or as the system has it"
-      onClick={() => setTheme(THEMES[(THEMES.indexOf(theme) + 1) % THEMES.length] ?? "auto")}
+      class="plain theme"
+      title={`Colours: ${choice}. Click for the next`}
+      aria-label={`Colours: ${choice}`}
+      onClick={() => setChoice(THEMES[(THEMES.indexOf(choice) + 1) % THEMES.length] ?? "auto")}
     >
-      {theme}
+      {{ auto: "◐", light: "☀", dark: "☾" }[choice]}
     </button>
   );
   if (!token) return <SignIn problem={problem} onToken={setToken} />;
@@ -157,7 +159,7 @@ interface ConsoleProps {
   missions: MissionOut[];
   known: Known;
   token: string;
-  theme: Theme;
+  theme: string;
   themes: preact.ComponentChildren;
   onMission(id: string): void;
 }
@@ -233,6 +235,7 @@ function Console({ first, missions, known, token, theme, themes, onMission }: Co
         </p>
       )}
       <main class="panels">
+        <div class="wide">
         <FlightMap
           flight={flight}
           place={known.place}
@@ -240,8 +243,10 @@ function Console({ first, missions, known, token, theme, themes, onMission }: Co
           mayFly={may && !flight.over}
           marked={marked}
           onMark={setMarked}
-          onRobot={setRobot}
         />
+        <Charts flight={flight} robot={robot} theme={theme} />
+        </div>
+        <div class="side">
         {marked && (
           <WaypointForm
             key={marked.join()}
@@ -256,8 +261,8 @@ function Console({ first, missions, known, token, theme, themes, onMission }: Co
         {sees && <Video flight={flight} token={token} />}
         <StatePanel flight={flight} robot={robot} />
         <Commands flight={flight} robot={robot} mayFly={may} />
-        <Charts flight={flight} robot={robot} theme={theme} />
         <Alerts flight={flight} />
+        </div>
       </main>
     </div>
   );
@@ -276,14 +281,21 @@ function Connection({ flight }: { flight: Flight }) {
   );
 }
 
-function useTheme(): [Theme, (theme: Theme) => void] {
+/** The colours that were chosen, and those that are shown. */
+function useTheme(): { choice: Theme; setChoice(choice: Theme): void; theme: string } {
   const kept = localStorage.getItem("aerodaas.theme");
-  const [theme, setTheme] = useState<Theme>(THEMES.find((one) => one === kept) ?? "auto");
+  const [choice, setChoice] = useState<Theme>(THEMES.find((one) => one === kept) ?? "auto");
+  const [dark, setDark] = useState(() => DARK.matches);
   useEffect(() => {
-    localStorage.setItem("aerodaas.theme", theme);
-    document.documentElement.dataset["theme"] = theme;
-  }, [theme]);
-  return [theme, setTheme];
+    const watch = () => setDark(DARK.matches);
+    DARK.addEventListener("change", watch);
+    return () => DARK.removeEventListener("change", watch);
+  }, []);
+  useEffect(() => {
+    localStorage.setItem("aerodaas.theme", choice);
+    document.documentElement.dataset["theme"] = choice;
+  }, [choice]);
+  return { choice, setChoice, theme: choice === "auto" && dark ? "dark" : choice };
 }
 
 const root = document.getElementById("console");

@@ -19,7 +19,6 @@ export interface MapProps {
   mayFly: boolean;
   marked: Point | null;
   onMark(point: Point): void;
-  onRobot(robot: string): void;
 }
 
 const ZOOM = 1.25;
@@ -263,14 +262,10 @@ function Drone(props: Frame & { name: string; status: StatusOut; chosen: boolean
     >
       {ve != null && vn != null && <path class="speed" d={`M0 0l${ve * 14} ${-vn * 14}`} />}
       <path class="body" d="M0-14L9 10L0 5L-9 10Z" transform={`rotate(${turn})`} />
-      <text x="14" y="-8">
+      <text y="-20">
         {props.name}
+        {up != null && <tspan class="small"> {up.toFixed(1)} m</tspan>}
       </text>
-      {up != null && (
-        <text class="small" x="14" y="6">
-          {up.toFixed(1)} m
-        </text>
-      )}
     </g>
   );
 }
