@@ -1,4 +1,4 @@
-"""A real browser, driven by the DevTools protocol: pages are opened, clicked, typed into, and seen."""
+"""A real browser, driven by the DevTools protocol: pages are opened, clicked and looked at."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import json
 import subprocess
 import tempfile
 import time
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +41,13 @@ class Browser:
             assert time.monotonic() < until, "the browser does not start"
             time.sleep(0.05)
         number, path = port.read_text().split()
-        self._socket = connect(f"ws://127.0.0.1:{number}{path}", max_size=_MOST)
-        self._wire = _Wire(self._socket)
+        self._stack = ExitStack()
+        url = f"ws://127.0.0.1:{number}{path}"
+        self._wire = _Wire(self._stack.enter_context(connect(url, max_size=_MOST)))
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._socket.close()
+        self._stack.close()
         self._process.terminate()
         self._process.wait(20)
         self._profile.cleanup()
@@ -119,11 +121,6 @@ class Page:
             self._ask(
                 "Input.dispatchKeyEvent", type=kind, key=key, text=key if len(key) == 1 else ""
             )
-
-    def offline(self, *, cut: bool) -> None:
-        """Cut the connection for new requests, or mend it."""
-        rates = {"latency": 0, "downloadThroughput": -1, "uploadThroughput": -1}
-        self._ask("Network.emulateNetworkConditions", offline=cut, **rates)
 
     def picture(self, path: Path) -> None:
         """Write what the window shows as a PNG."""

@@ -32,19 +32,8 @@ def test_the_wheel_holds_the_package_its_links_and_its_data(built: Path) -> None
     names = zipfile.ZipFile(built).namelist()
     assert len(names) == len(set(names))
     package = _ROOT / "aerodaas"
-    kinds = (
-        "*.py",
-        "*.pyi",
-        "*.json",
-        "*.csv",
-        "*.md",
-        "*.onnx",
-        "*.css",
-        "*.js",
-        "*.html",
-        "*.svg",
-        "py.typed",
-    )
+    page = ("*.css", "*.js", "*.html", "*.svg")
+    kinds = ("*.py", "*.pyi", "*.json", "*.csv", "*.md", "*.onnx", "py.typed", *page)
     wanted = {
         f"aerodaas/{path.relative_to(package)}"
         for folder in (package, package / "actors", package / "apps", package / "schedulers")

@@ -1,4 +1,4 @@
-"""Flights with a console as people start them: `aerodaas run --console`, in a process of its own."""
+"""Flights with a console as people start them, by `aerodaas run --console` in its own process."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import json
 import urllib.error
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from types import SimpleNamespace
 from typing import Any
 
@@ -99,7 +99,7 @@ def ask(
     """Send a request; returns status, headers and the answer."""
     data = None if body is None else json.dumps(body).encode()
     more = {"Authorization": f"Bearer {token_of(address) if token is None else token}"}
-    request = urllib.request.Request(
+    request = urllib.request.Request(  # noqa: S310 - loopback
         address.partition("/#")[0] + path,
         data,
         {**more, "Content-Type": "application/json", **headers},
@@ -232,20 +232,17 @@ def test_a_browsers_socket_brings_its_token_as_a_subprotocol(
 
 def test_watchers_are_told_that_the_flight_is_over() -> None:
     """By the last state and an end, before the server is gone."""
-    with console() as (server, _):
+    with ExitStack() as stack:
+        server, _ = stack.enter_context(console())
         address = server.address()
         url = address.partition("/#")[0].replace("http", "ws") + "/v1/missions/own/live?rate=20"
         headers = {"Authorization": f"Bearer {token_of(address)}"}
-        socket = connect(url, additional_headers=headers)
-        socket.recv(10)
-    kinds = []
-    for text in socket:
-        message = json.loads(text)
-        kinds.append(message["kind"])
-        if message["kind"] == "mission":
-            phase = message["mission"]["phase"]
-    assert kinds[-1] == "end"
-    assert phase == "landed"
+        with connect(url, additional_headers=headers) as socket:
+            socket.recv(10)
+            stack.close()
+            messages = [json.loads(text) for text in socket]
+    assert messages[-1]["kind"] == "end"
+    assert messages[-2]["mission"]["phase"] == "landed"
 
 
 def test_what_is_no_token_is_none() -> None:
