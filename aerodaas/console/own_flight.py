@@ -35,6 +35,8 @@ class Flown(Protocol):
 
     config: EnvironmentConfig
     graph: Graph
+    state: FlightState | None
+    """What a look has found last."""
 
     def look(self, newest: int = 200) -> FlightState:
         """Its present state; raises AeroDaaSError."""
@@ -72,8 +74,8 @@ class OwnFlight:
 
     def close(self) -> None:
         """Look no more; whoever watches is told that the flight is over."""
-        with contextlib.suppress(AeroDaaSError):
-            self._take(self._run.look(0))
+        if self._run.state is not None:
+            self._take(self._run.state)
         self._closed.set()
 
     @property

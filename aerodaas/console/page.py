@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from fastapi import APIRouter
@@ -46,7 +47,7 @@ def page_routes() -> APIRouter:
     return router
 
 
-def _sender(name: str, kind: str):  # noqa: ANN202 - FastAPI reads no more than its call
+def _sender(name: str, kind: str) -> Callable[[], FileResponse]:
     def send() -> FileResponse:
         return FileResponse(_FOLDER / name, media_type=kind, headers=_HEADERS)
 

@@ -99,7 +99,9 @@ class Run:
 
         # Before Ray, which takes seconds to start: errors of the graph should appear at once.
         check_served("--live-address", self.options.live)
-        console = self._console_server()
+        check_served("--console-address", self.options.console)
+        if self.options.console is not None:
+            require_extra("remote", "--console")
         # Before the plan, which has the cameras run that are only recorded.
         document = self._document()
         plan = self.plan()
@@ -110,6 +112,7 @@ class Run:
             )
         if self.options.live and self.recording is None:
             raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
+        console = self._console_server()
         cluster.begin(self.options.address)
         from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads while Ray starts
 
@@ -129,6 +132,8 @@ class Run:
                 flight.launch(starting.step)
             except BaseException:
                 flight.stop()
+                if console is not None:
+                    console.close()
                 raise
         self._flight = flight
         self._launched = time.monotonic()
@@ -157,8 +162,6 @@ class Run:
         """The console's server, listening, if it is asked for."""
         if self.options.console is None:
             return None
-        check_served("--console-address", self.options.console)
-        require_extra("remote", "--console")
         from aerodaas.console.server import ConsoleServer  # noqa: PLC0415 - only where asked for
 
         return ConsoleServer(self.options.console)

@@ -27,7 +27,7 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
         </span>
       </header>
       <p class="why" data-testid="why">
-        {status.reason || "as planned"}
+        {status.reason || UNSAID[status.state] || "as planned"}
       </p>
       <dl>
         <Figure name="Height" unit="m" value={height?.toFixed(1)} />
@@ -58,6 +58,12 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
     </section>
   );
 }
+
+/** Why, where the mission itself sees no need to say it. */
+const UNSAID: Record<string, string> = {
+  idle: "nothing has been asked yet",
+  paused: "hovers until it is told to resume",
+};
 
 function Figure(props: {
   name: string;

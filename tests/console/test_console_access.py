@@ -42,6 +42,7 @@ class Run:
         self.config = EnvironmentConfig.model_validate(ENVIRONMENT)
         self.graph = Graph()
         self.over = False
+        self.state: Any = None
         self.commands: list[Command] = []
         self.notes: list[str] = []
 
@@ -165,7 +166,9 @@ def test_a_pilot_flies_and_people_are_told(flying: tuple[ConsoleServer, Run]) ->
     assert isinstance(pause, Pause)
     assert isinstance(visit, AddNavigation)
     assert visit.deadline == 90.0
-    assert [(one.x, one.y, one.z) for one in visit.navigation] == [(1.5, 2.5, 3.5)]
+    (place,) = visit.navigation
+    assert isinstance(place, Waypoint)
+    assert (place.x, place.y, place.z) == (1.5, 2.5, 3.5)
     assert run.notes == [
         "console_command: the console asked drone to pause: accepted: so be it",
         "console_command: the console asked drone to visit a: accepted: so be it",
