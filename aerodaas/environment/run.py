@@ -98,10 +98,7 @@ class Run:
         from aerodaas.terminal.console import StartupView  # noqa: PLC0415
 
         # Before Ray, which takes seconds to start: errors of the graph should appear at once.
-        check_served("--live-address", self.options.live)
-        check_served("--console-address", self.options.console)
-        if self.options.console is not None:
-            require_extra("remote", "--console")
+        self._check_served()
         # Before the plan, which has the cameras run that are only recorded.
         document = self._document()
         plan = self.plan()
@@ -110,8 +107,6 @@ class Run:
                 f"{self.recording} already exists and is not overwritten; "
                 "give --record another path or move the file away"
             )
-        if self.options.live and self.recording is None:
-            raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
         console = self._console_server()
         cluster.begin(self.options.address)
         from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads while Ray starts
@@ -157,6 +152,15 @@ class Run:
         if console is not None:
             self._open_console(console)
         atexit.register(self.abandon)
+
+    def _check_served(self) -> None:
+        """Raise ConfigError for what cannot be served to others while flying."""
+        check_served("--live-address", self.options.live)
+        check_served("--console-address", self.options.console)
+        if self.options.console is not None:
+            require_extra("remote", "--console")
+        if self.options.live and self.recording is None:
+            raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
 
     def _console_server(self) -> ConsoleServer | None:
         """The console's server, listening, if it is asked for."""
