@@ -91,7 +91,7 @@ class Page:
         """Wait until an expression is true, as JavaScript has it."""
         until = time.monotonic() + seconds
         while not self.run(f"Boolean({script})"):
-            shown = self.run("document.body.innerText.slice(0, 2000)")
+            shown = self.run("document.body?.innerText.slice(0, 2000)")
             assert time.monotonic() < until, f"not so: {script}\n{shown}\n{self.complaints()}"
             time.sleep(0.05)
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from browser import Browser, Page
 from flown import Proxy, Watched
+from hovering import console
 from required import needs_peer
 
 from aerodaas.recording.reader import Recording
@@ -157,11 +158,8 @@ def test_boxes_are_drawn_on_their_own_frame(browser: Browser, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize(("width", "height"), [(400, 800), (1280, 800), (2560, 1440)])
-def test_it_fits(browser: Browser, tmp_path: Path, width: int, height: int) -> None:
+def test_it_fits(browser: Browser, width: int, height: int) -> None:
     """Without a token it asks for one, in windows of a phone and of a wall; nothing is cut off."""
-    del tmp_path
-    from test_console_access import console  # noqa: PLC0415 - shares its flight
-
     with console() as (server, _):
         page = browser.open(server.address(), width, height)
         page.until("document.querySelector('.commands')")
