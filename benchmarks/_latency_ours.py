@@ -73,10 +73,10 @@ class PatternCamera:
 class StampedVehicle(SimulatedVehicle):
     """The simulated drone, in whose process stamps are taken."""
 
-    def connect(self) -> None:
+    def connect(self, timeout: float = 10.0) -> None:
         """Take stamps from now on, if asked for."""
         _stamps.install()
-        super().connect()
+        super().connect(timeout)
 
     def close(self) -> None:
         """Write the stamps."""
