@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 SLOWEST := $(if $(CI),--durations=25 --durations-min=20)
 
-.PHONY: fly test lint docs training lock audit licences matrix clean
+.PHONY: fly test lint docs console training lock audit licences matrix clean
 
 fly: $(VENV)/.installed
 	$(BIN)/aerodaas run apps/farm_survey.py --speed max
@@ -27,6 +27,12 @@ lint: $(VENV)/.installed-dev
 # The documentation with its API reference, in site/index.html.
 docs: $(VENV)/.installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+# The console's page from its source; what it says to a service is typed by the service's schema.
+# What ships is committed, so that nobody else needs Node.
+console: $(VENV)/.installed-dev
+	$(BIN)/python -m tools.wire_schema
+	cd console && npm ci --ignore-scripts --no-audit --no-fund && npm run build
 
 $(VENV)/bin/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 10) and "AeroDaaS needs Python 3.10 or newer; run: make PYTHON=python3.x")'
@@ -64,4 +70,4 @@ matrix: $(VENV)/.installed-dev
 	$(BIN)/python -m tools.matrix
 
 clean:
-	rm -rf $(VENV) runs site
+	rm -rf $(VENV) runs site console/node_modules

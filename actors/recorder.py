@@ -6,7 +6,7 @@ import itertools
 from collections import Counter, deque
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from aerodaas.actors.base import StreamActor
 from aerodaas.actors.session import Session
@@ -18,9 +18,6 @@ from aerodaas.types.errors import RecordingError
 from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.status import Message
 from aerodaas.types.vitals import Vitals
-
-if TYPE_CHECKING:
-    from aerodaas.recording.report.camera_page import CameraPage
 
 __all__ = ["RecorderActor"]
 
@@ -35,18 +32,16 @@ class RecorderActor(StreamActor):
         streams: dict[str, int],
         provenance: Provenance,
         live: str | None = None,
-        page: str | None = None,
     ) -> None:
         """Create the actor, which writes to `path`.
 
-        `live` and `page` are the addresses (`host:port`) of the live view and the camera page.
+        `live` is the address (`host:port`) of the live view.
         `streams` are queue depths by stream; further messages are dropped and counted, because
         the flight never waits.
         """
         super().__init__(session, "recorder", streams)
         self._path = path
         self._address = live
-        self._page_address = page
         self._provenance = provenance
         self._failure = ""
         self._lost: Counter[str] = Counter()
@@ -63,7 +58,6 @@ class RecorderActor(StreamActor):
         self._live = LiveServer(self._address, name) if self._address else None
         # A restarted actor keeps its predecessor's file and writes a second part.
         self._path = _unwritten(self._path)
-        self._page = _camera_page(self._page_address)
         self._recorder = FlightRecorder(
             self._path,
             config=environment.recording,
@@ -116,8 +110,6 @@ class RecorderActor(StreamActor):
         self._write(message)
 
     def _write(self, message: Message[Any]) -> None:
-        if self._page is not None:
-            self._page.put(message)
         if self._failure:
             return
         try:
@@ -138,8 +130,6 @@ class RecorderActor(StreamActor):
         self._summary = self._recorder.close()
         if self._live is not None:
             self._live.close()
-        if self._page is not None:
-            self._page.close()
 
     def _values(self) -> dict[str, Any]:
         return {"path": str(self._path), "failure": self._failure}
@@ -152,12 +142,3 @@ def _unwritten(path: Path) -> Path:
     while part.exists():
         part = path.with_suffix(f".{next(parts)}{path.suffix}")
     return part
-
-
-def _camera_page(address: str | None) -> CameraPage | None:
-    if address is None:
-        return None
-    # Imported only if used: the web server costs start-up time and memory.
-    from aerodaas.recording.report.camera_page import CameraPage  # noqa: PLC0415
-
-    return CameraPage(address)

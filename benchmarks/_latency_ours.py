@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import _stamps
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +21,7 @@ from aerodaas import (
 from aerodaas.analytics.base import Context
 from aerodaas.cameras.base import Picture
 from aerodaas.config.model import EnvironmentConfig, SensorConfig
+from aerodaas.drivers.simulated import SimulatedVehicle
 from aerodaas.types.geometry import CameraModel
 
 __all__ = [
@@ -29,6 +31,7 @@ __all__ = [
     "PatternCamera",
     "ReadFrame",
     "Reading",
+    "StampedVehicle",
     "Steer",
     "read_frame",
 ]
@@ -54,6 +57,7 @@ class PatternCamera:
 
     def open(self) -> None:
         """Draw the picture once."""
+        _stamps.install()
         generator = np.random.default_rng(self._seed)
         self._image = generator.integers(0, 255, (HEIGHT, WIDTH, 3), dtype=np.uint8)
 
@@ -62,7 +66,22 @@ class PatternCamera:
         return Picture(self._image, stamp)
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Write the stamps."""
+        _stamps.dump()
+
+
+class StampedVehicle(SimulatedVehicle):
+    """The simulated drone, in whose process stamps are taken."""
+
+    def connect(self, timeout: float = 10.0) -> None:
+        """Take stamps from now on, if asked for."""
+        _stamps.install()
+        super().connect(timeout)
+
+    def close(self) -> None:
+        """Write the stamps."""
+        super().close()
+        _stamps.dump()
 
 
 @dataclass(frozen=True)
@@ -72,7 +91,19 @@ class Reading:
     value: int
 
 
-class ReadFrame(Analytics[Reading]):
+class _Stamped:
+    """An analysis in whose process stamps are taken."""
+
+    def open(self) -> None:
+        """Take stamps from now on, if asked for."""
+        _stamps.install()
+
+    def close(self) -> None:
+        """Write the stamps."""
+        _stamps.dump()
+
+
+class ReadFrame(_Stamped, Analytics[Reading]):
     """Reads the frame; no neural network."""
 
     accepts: ClassVar[tuple[type, ...]] = (Frame,)
@@ -84,7 +115,7 @@ class ReadFrame(Analytics[Reading]):
         return Reading(read_frame(item.image))
 
 
-class Steer(NavigableAnalytics):
+class Steer(_Stamped, NavigableAnalytics):
     """Turns each reading into a velocity command."""
 
     accepts: ClassVar[tuple[type, ...]] = (Reading,)

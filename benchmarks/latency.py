@@ -24,7 +24,7 @@ import numpy as np
 import psutil
 import ray
 import typer
-from _latency_ours import HEIGHT, RATE, WIDTH, PatternCamera, ReadFrame, Steer
+from _latency_ours import HEIGHT, RATE, WIDTH, PatternCamera, ReadFrame, StampedVehicle, Steer
 from _report import Report
 from ray.cluster_utils import Cluster
 from rich.progress import Progress
@@ -63,11 +63,13 @@ def _cpu_seconds(processes: list[psutil.Process]) -> float:
 
 
 def _environment(folder: Path, *, far: bool) -> Path:
-    plugin = f"{PatternCamera.__module__}:{PatternCamera.__name__}"
+    plugin, vehicle = (
+        f"{one.__module__}:{one.__name__}" for one in (PatternCamera, StampedVehicle)
+    )
     camera = {"id": "camera", "type": "camera", "driver": plugin, "rate": RATE}
     content = {
         "name": "latency",
-        "robots": [{"id": "drone", "driver": "simulated", "sensors": [camera]}],
+        "robots": [{"id": "drone", "driver": vehicle, "sensors": [camera]}],
         "compute": [{"id": "place", "kind": "cloud" if far else "edge"}],
         "recording": {"enabled": False},
     }

@@ -50,6 +50,7 @@ PEERS = {
     "AERODAAS_BROWSER": Peer(
         "a Chromium or Chrome", ("chromium", "chromium-browser", "google-chrome")
     ),
+    "AERODAAS_NPM": Peer("Node.js' npm, with its registry in reach", ("npm",), ("node",)),
     "AERODAAS_SSHD": Peer(
         "OpenSSH's server, with ssh, ssh-keygen and rsync installed, too",
         ("/usr/sbin/sshd",),

@@ -32,7 +32,8 @@ def test_the_wheel_holds_the_package_its_links_and_its_data(built: Path) -> None
     names = zipfile.ZipFile(built).namelist()
     assert len(names) == len(set(names))
     package = _ROOT / "aerodaas"
-    kinds = ("*.py", "*.pyi", "*.json", "*.csv", "*.md", "*.onnx", "*.css", "py.typed")
+    page = ("*.css", "*.js", "*.html", "*.svg")
+    kinds = ("*.py", "*.pyi", "*.json", "*.csv", "*.md", "*.onnx", "py.typed", *page)
     wanted = {
         f"aerodaas/{path.relative_to(package)}"
         for folder in (package, package / "actors", package / "apps", package / "schedulers")
@@ -49,7 +50,7 @@ def test_the_wheel_holds_nothing_else(built: Path) -> None:
     assert {path.parts[0].partition("-")[0] for path in paths} == {"aerodaas"}
     package = [path for path in paths if path.parts[0] == "aerodaas"]
     kinds = {path.suffix for path in package if path.name != "py.typed"}
-    assert kinds <= {".py", ".pyi", ".json", ".csv", ".onnx", ".css", ".js", ".html", ".md"}
+    assert kinds <= {".py", ".pyi", ".json", ".csv", ".onnx", ".css", ".js", ".html", ".md", ".svg"}
     assert not [path for path in package if path.name.startswith((".", "test_", "conftest"))]
 
 

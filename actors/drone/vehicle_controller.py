@@ -110,11 +110,16 @@ class VehicleController:
         self._alerts: list[Alert] = []
         plugin = load_plugin("drivers", spec.robot.driver)
         self.vehicle: Vehicle = plugin(spec.robot, session.environment)
+        self._stepped: SteppedVehicle | None = None
+        self._played: PlayedVehicle | None = None
 
     def open(self, publishers: dict[str, Publisher]) -> None:
         """Connect the vehicle and create its mission; `publishers` are by stream."""
         self._publishers = publishers
         self.vehicle.connect()
+        # Once: to ask a protocol about an instance looks up all its members each time.
+        self._stepped = self.vehicle if isinstance(self.vehicle, SteppedVehicle) else None
+        self._played = self.vehicle if isinstance(self.vehicle, PlayedVehicle) else None
         robot, environment = self.spec.robot, self._session.environment
         takeoff = self.vehicle.read().odometry.position
         home = environment.home
@@ -184,8 +189,8 @@ class VehicleController:
 
     def advance_to(self, stamp: int) -> None:
         """Advance a simulated vehicle's time."""
-        if isinstance(self.vehicle, SteppedVehicle):
-            self.vehicle.advance_to(stamp)
+        if self._stepped is not None:
+            self._stepped.advance_to(stamp)
 
     def handle(self, command: Command, now: int) -> Answer:
         """Execute a command; one that raises is refused, with an alert."""
@@ -263,8 +268,7 @@ class VehicleController:
     @property
     def over(self) -> bool:
         """True after the mission has ended, landed or aborted, or the replay has finished."""
-        played = isinstance(self.vehicle, PlayedVehicle) and self.vehicle.finished
-        return self.mission.finished or played
+        return self.mission.finished or (self._played is not None and self._played.finished)
 
     @property
     def status(self) -> MissionStatus:

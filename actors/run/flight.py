@@ -84,12 +84,10 @@ class Flight:
         recording: Path | None = None,
         provenance: Provenance | None = None,
         live: str | None = None,
-        page: str | None = None,
     ) -> None:
         """Create the actors of `plan`, all at once; `recording` is the path of the MCAP file.
 
-        `live` and `page` are the addresses (`host:port`) of the recorder's live view and camera
-        page; None for none.
+        `live` is the address (`host:port`) of the recorder's live view; None for none.
         """
         self.plan = plan
         self._classes = actor_classes(plan.session)
@@ -124,7 +122,7 @@ class Flight:
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch, environments)
         if self.recording is not None and provenance is not None:
-            recorder = (session, self.recording, plan.recorded, provenance, live, page)
+            recorder = (session, self.recording, plan.recorded, provenance, live)
             self._create("recorder", self._classes.recorder, edge, recorder, restarts=_RESTARTS)
         self._reaper = self._appoint_reaper()
         self._origin = 0

@@ -245,8 +245,7 @@ class SharedWaiter:
         """Wait up to `timeout` seconds, without holding the interpreter lock."""
         self._set.wait_and_process_with_timeout(self._microseconds(max(1, int(timeout * 1e6))))
         for listener in self._listeners:
-            while listener.try_wait():
-                pass
+            listener.try_wait()  # takes all that have arrived
 
     def wake(self) -> None:
         """End the wait from another thread."""

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.cli import cluster, lab, lease, provider, remote
+from aerodaas.cli import cluster, lab, lease, plan, provider, remote
 from aerodaas.cli.application import build_application, run_application, speed_option
 from aerodaas.cli.check import check
 from aerodaas.cli.examples import examples
@@ -56,6 +56,7 @@ app.command()(new)
 app.command()(examples)
 app.add_typer(remote.app, name="remote")
 app.add_typer(lab.app, name="lab")
+app.add_typer(plan.app, name="plan")
 app.add_typer(cluster.app, name="cluster")
 app.add_typer(lease.app, name="lease", rich_help_panel=_PROVIDER)
 
@@ -76,7 +77,8 @@ def run(
         str | None,
         typer.Option(
             help="Mission seconds per wall second, or `max`: as fast as the machine goes, "
-            "repeatable to the last digit. Default: `max` if every robot is simulated, else 1."
+            "repeatable to the last digit. Default: `max` if every robot is simulated and there "
+            "is no --console, else 1."
         ),
     ] = None,
     record: Annotated[
@@ -107,16 +109,20 @@ def run(
         list[str] | None,
         typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
     ] = None,
-    view: Annotated[
-        bool | None,
+    view: Annotated[  # noqa: FBT002
+        bool, typer.Option("--view/--no-view", help="Show the flight on the terminal.")
+    ] = True,
+    console: Annotated[  # noqa: FBT002
+        bool,
         typer.Option(
-            "--view/--no-view",
-            help="Show the cameras in a browser, too. By default the terminal shows the flight; "
-            "with --no-view nothing does.",
+            "--console", help="Serve a page from which the flight is watched and commanded."
         ),
-    ] = None,
-    view_address: Annotated[
-        str, typer.Option(help="Where --view listens; on 0.0.0.0 anyone on the network may watch.")
+    ] = False,
+    console_address: Annotated[
+        str,
+        typer.Option(
+            help="Where --console listens; beyond this machine its token goes unencrypted."
+        ),
     ] = "127.0.0.1:8360",
     live: Annotated[  # noqa: FBT002
         bool, typer.Option("--live", help="Serve the flight to Foxglove while it goes on.")
@@ -131,6 +137,7 @@ def run(
 
         aerodaas run farm_survey
         aerodaas run my_app.py --speed 5 --seed 7 --record /tmp/farm
+        aerodaas run farm_survey --console
         aerodaas run farm_survey --set quadrotor_base.limits.cruise_speed=1
         aerodaas run mine.py --guest theirs.py --grant theirs=sense:cam1,compute:edge
         aerodaas run watch_frames -- pictures/ yolov8n.onnx --rate 5
@@ -139,7 +146,8 @@ def run(
     from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - as above
 
     application = find_application(application)
-    factor, lockstep = speed_option(speed)
+    # Who looks on and commands has the clock's time, unless another speed is asked for.
+    factor, lockstep = speed_option("1" if console and speed is None else speed)
     options = RunOptions(
         environment=env,
         speed=factor,
@@ -148,15 +156,13 @@ def run(
         record=record,
         address=address,
         overrides=dict(parse_setting(text) for text in setting or ()),
-        view=view is not False,
+        view=view,
         live=live_address if live else None,
-        page=view_address if view else None,
+        console=console_address if console else None,
         guests=tuple(find_application(path).resolve() for path in guest or ()),
         grants=parse_words(grant or ()),
         application=application.resolve(),
     )
-    if view:
-        typer.echo(f"view: open http://{view_address} in a browser")
     if live:
         typer.echo(f"live: open ws://{live_address} in Foxglove")
     run_application(application, context.args, options)

@@ -62,7 +62,12 @@ def add_waypoint(
     name: Annotated[str | None, typer.Option("--id", help="Default: a fresh one.")] = None,
     hover: Annotated[float, typer.Option(help="Seconds to stay there.")] = 0.0,
     kind: Annotated[
-        str, typer.Option("--type", help="relative (to take-off), local (to home) or global.")
+        str,
+        typer.Option(
+            "--type",
+            help="relative (to take-off), local (to home), global, or "
+            "global_relative (a place on the globe, metres above home).",
+        ),
     ] = "relative",
     speed: Annotated[float | None, typer.Option(help="m/s on the way there.")] = None,
     priority: Annotated[int, typer.Option(help="Smaller is more urgent and preempts.")] = 5,

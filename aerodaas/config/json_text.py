@@ -14,7 +14,7 @@ from typing import Any
 
 from aerodaas.types.errors import ConfigError
 
-__all__ = ["check_plain", "parse_json", "read_json"]
+__all__ = ["check_plain", "parse_json", "read_json", "read_text"]
 
 _MOST_BYTES = 4 << 20
 """Largest file in bytes; an environment of 100 robots has a hundredth of that."""
@@ -32,6 +32,11 @@ def read_json(path: str | Path, what: str) -> Any:  # noqa: ANN401 - any JSON
 
     `what` names the kind of file: `the environment file`.
     """
+    return parse_json(read_text(path, what, "JSON"), str(path))
+
+
+def read_text(path: str | Path, what: str, encoded: str = "a text") -> str:
+    """Read a file of at most 4 MiB of UTF-8; raises ConfigError, in which it is no `encoded`."""
     try:
         with Path(path).open("rb") as file:
             content = file.read(_MOST_BYTES + 1)
@@ -45,10 +50,9 @@ def read_json(path: str | Path, what: str) -> Any:  # noqa: ANN401 - any JSON
             "was another file meant?"
         )
     try:
-        text = content.decode("utf-8")
+        return content.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise ConfigError(f"{path} is not JSON: byte {error.start} is not UTF-8") from None
-    return parse_json(text, str(path))
+        raise ConfigError(f"{path} is not {encoded}: byte {error.start} is not UTF-8") from None
 
 
 def parse_json(text: str, place: str) -> Any:  # noqa: ANN401 - any JSON

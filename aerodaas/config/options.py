@@ -60,8 +60,8 @@ class RunOptions:
     """Write the report beside the recording."""
     live: str | None = None
     """Serve Foxglove's WebSocket at this `host:port` while flying."""
-    page: str | None = None
-    """Show the cameras to browsers at this `host:port` while flying."""
+    console: str | None = None
+    """Serve the console to browsers at this `host:port` while flying."""
     replay: Path | None = None
     """Recording to be flown again: its environment takes the place of the application's."""
     scheduler: str | None = None

@@ -89,7 +89,7 @@ class WaypointEntry(BaseModel):
     y: _Number
     z: _Number
     hover_duration: Annotated[_Number, Field(ge=0)] = 0.0
-    waypoint_type: Literal["relative", "local", "global"] = "relative"
+    waypoint_type: Literal["relative", "local", "global", "global_relative"] = "relative"
     yaw: _Number | None = None
     speed: Annotated[_Number, Field(gt=0)] | None = None
     priority: int = DEFAULT_PRIORITY

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Generic, TypeVar, cast
 
 from aerodaas.dataflow.containers import AeroListData
 from aerodaas.dataflow.graph import AeroStreamData
-from aerodaas.types.errors import InvalidWaypointError
+from aerodaas.types.errors import ConfigError, InvalidWaypointError
+from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.waypoints import (
     DEFAULT_PRIORITY,
     NavigationItem,
@@ -55,6 +57,61 @@ class AeroNavigation(AeroListData[NavigationItem]):
             super().__init__()
             return
         super().__init__(_checked(data, priority))
+
+    @classmethod
+    def from_plan(
+        cls,
+        path: str | Path,
+        *,
+        home_altitude: float | None = None,
+        ground: Callable[[float, float], float] | None = None,
+    ) -> AeroNavigation:
+        """Read the waypoints of a ground station's plan, in order.
+
+        Take-off and return are left out, for every mission has its own. What else the plan means
+        and is not done here (pictures, gimbals, fences, …) is told by one warning.
+
+        Args:
+            path: QGroundControl's `.plan`, or Mission Planner's `.waypoints`.
+            home_altitude: Metres above the sea of the environment's home, for items whose
+                altitude is so; None for the plan's own.
+            ground: Height of the ground above the sea at a latitude and longitude, for items
+                whose altitude is above ground.
+
+        Raises:
+            ConfigError: If the file is no plan, or an item cannot be flown.
+        """
+        from aerodaas.dataflow.plans.reading import flown_plan, warn_of  # noqa: PLC0415 - slow to load
+
+        waypoints, notices = flown_plan(path, home_altitude, ground)
+        warn_of(path, notices, stacklevel=2)
+        return cls(NavigationType.DISTANCE_DRIVEN, waypoints)
+
+    def to_plan(
+        self, path: str | Path, home: GeodeticOrigin, *, home_altitude: float | None = None
+    ) -> None:
+        """Write the waypoints as a new `.plan` or `.waypoints` file, for a ground station.
+
+        It begins with a take-off and ends with a return. What the file cannot hold (a priority, a
+        deadline; in `.waypoints` a yaw) is told by one warning.
+
+        Args:
+            path: The file, with the format as its suffix.
+            home: The environment's home.
+            home_altitude: Its metres above the sea, where they are known; no item needs them.
+
+        Raises:
+            ConfigError: If there is a waypoint relative to a take-off that is not known yet, a
+                velocity command or a stream; the suffix is another; or the file exists or cannot
+                be written.
+        """
+        from aerodaas.dataflow.plans.reading import warn_of  # noqa: PLC0415 - slow to load
+        from aerodaas.dataflow.plans.writing import planned, write_plan  # noqa: PLC0415
+
+        if self.stream is not None or self.commands:
+            raise ConfigError("a plan holds waypoints alone, no streams and velocity commands")
+        plan, notices = planned(self.waypoints, home, home_altitude)
+        warn_of(path, [*notices, *write_plan(path, plan)], stacklevel=2)
 
     @property
     def waypoints(self) -> list[Waypoint]:

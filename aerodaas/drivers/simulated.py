@@ -31,6 +31,9 @@ from aerodaas.types.vehicle import (
 
 __all__ = ["SimulatedVehicle"]
 
+_EXACT = SensorNoise(0.0, "")
+"""Noise of scale 0: the true motion."""
+
 
 class SimulatedVehicle:
     """A quadrotor in the embedded simulator; implements `aerodaas.types.vehicle.SteppedVehicle`.
@@ -109,7 +112,7 @@ class SimulatedVehicle:
         """Return the state at the time last advanced to."""
         self._require_connection()
         motion = self._rotor.motion((self._now - self._steps * STEP_NS) / NANOSECONDS)
-        exact = SensorNoise(0.0, "").odometry(motion)
+        exact = _EXACT.odometry(motion)
         return VehicleState(
             self._now,
             self._noise.odometry(motion),

@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from aerodaas.actors.run.application import Application
     from aerodaas.actors.run.flight import Flight, FlightState
     from aerodaas.actors.run.plan import FlightPlan
+    from aerodaas.console.server import ConsoleServer
     from aerodaas.environment.environment import Environment
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
@@ -68,6 +69,7 @@ class Run:
         self.on_end: list[Callable[[], None]] = []
         self.recording = recording_path(self.options, self.config, number)
         self.state: FlightState | None = None
+        self._console: ConsoleServer | None = None
         self._environment = environment
         self._flight: Flight | None = None
         self._over = False
@@ -96,10 +98,7 @@ class Run:
         from aerodaas.terminal.console import StartupView  # noqa: PLC0415
 
         # Before Ray, which takes seconds to start: errors of the graph should appear at once.
-        check_served("--live-address", self.options.live)
-        check_served("--view-address", self.options.page)
-        if self.options.page is not None:
-            require_extra("remote", "--view-address")
+        self._check_served()
         # Before the plan, which has the cameras run that are only recorded.
         document = self._document()
         plan = self.plan()
@@ -108,10 +107,7 @@ class Run:
                 f"{self.recording} already exists and is not overwritten; "
                 "give --record another path or move the file away"
             )
-        if (self.options.live or self.options.page) and self.recording is None:
-            raise ConfigError(
-                '--live and --view serve what is recorded; set "recording.enabled" to true'
-            )
+        console = self._console_server()
         cluster.begin(self.options.address)
         from aerodaas.actors.run.flight import Flight  # noqa: PLC0415 - loads while Ray starts
 
@@ -126,11 +122,13 @@ class Run:
                 document=document,
             )
             options = self.options
-            flight = Flight(plan, self.recording, provenance, options.live, options.page)
+            flight = Flight(plan, self.recording, provenance, options.live)
             try:
                 flight.launch(starting.step)
             except BaseException:
                 flight.stop()
+                if console is not None:
+                    console.close()
                 raise
         self._flight = flight
         self._launched = time.monotonic()
@@ -151,7 +149,39 @@ class Run:
         for callback in self.graph.on_launch:
             callback()
         threading.Thread(target=self._keep_alive, name="heartbeat", daemon=True).start()
+        if console is not None:
+            self._open_console(console)
         atexit.register(self.abandon)
+
+    def _check_served(self) -> None:
+        """Raise ConfigError for what cannot be served to others while flying."""
+        check_served("--live-address", self.options.live)
+        check_served("--console-address", self.options.console)
+        if self.options.console is not None:
+            require_extra("remote", "--console")
+        if self.options.live and self.recording is None:
+            raise ConfigError('--live serves what is recorded; set "recording.enabled" to true')
+
+    def _console_server(self) -> ConsoleServer | None:
+        """The console's server, listening, if it is asked for."""
+        if self.options.console is None:
+            return None
+        from aerodaas.console.server import ConsoleServer  # noqa: PLC0415 - only where asked for
+
+        return ConsoleServer(self.options.console)
+
+    def _open_console(self, console: ConsoleServer) -> None:
+        from aerodaas.terminal.console import show_console  # noqa: PLC0415
+
+        self._console = console
+        application = self.options.application
+        console.start(self, application.stem if application else self.config.name)
+        show_console(console.address(), console.address(viewer=True))
+
+    def note(self, kind: str, text: str) -> None:
+        """Publish an alert of this process; nothing once the run is over."""
+        if self._flight is not None and not self._finished.is_set():
+            self._flight.note(kind, text)
 
     def command(self, robot: str, command: Command) -> Answer:
         """Send a robot's mission a command; raises MissionError once the run is over."""
@@ -307,12 +337,13 @@ class Run:
 
     def _change_models(self) -> None:
         """Set the command line's model in every detector."""
-        from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415 - only here
+        if self.options.model is None:
+            return
+        from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415 - 20 MB
 
-        if self.options.model is not None:
-            for node in self.graph.nodes.values():
-                if isinstance(node.work, OnnxDetector):
-                    node.work = node.work.with_model(self.options.model)
+        for node in self.graph.nodes.values():
+            if isinstance(node.work, OnnxDetector):
+                node.work = node.work.with_model(self.options.model)
 
     def _take_tasks(self) -> None:
         """Merge the application's task profiles into those of the environment file."""
@@ -374,6 +405,8 @@ class Run:
         self._over = True
         self.graph.on_growth = None
         atexit.unregister(self.abandon)
+        if self._console is not None:
+            self._console.close()
         flown = time.monotonic() - self._launched
         with self._polling:
             if self._flight.flying:

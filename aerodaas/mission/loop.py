@@ -12,6 +12,7 @@ from aerodaas.mission.mission import Mission
 from aerodaas.mission.safety.setpoint_filter import Neighbour, SetpointFilter
 from aerodaas.types.clock import NANOSECONDS, seconds
 from aerodaas.types.errors import VehicleError
+from aerodaas.types.geometry import is_close
 from aerodaas.types.status import MissionState, SetpointRecord
 from aerodaas.types.vehicle import (
     PositionSetpoint,
@@ -136,7 +137,7 @@ class SetpointLoop:
 
 def _same(one: Setpoint, other: Setpoint) -> bool:
     if isinstance(one, VelocitySetpoint) and isinstance(other, VelocitySetpoint):
-        return np.allclose(one.velocity, other.velocity) and one.yaw_rate == other.yaw_rate
+        return is_close(one.velocity, other.velocity) and one.yaw_rate == other.yaw_rate
     if isinstance(one, PositionSetpoint) and isinstance(other, PositionSetpoint):
-        return np.allclose(one.position, other.position) and one.speed == other.speed
+        return is_close(one.position, other.position) and one.speed == other.speed
     return False

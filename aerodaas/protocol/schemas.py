@@ -34,6 +34,7 @@ __all__ = [
     "Role",
     "Scope",
     "SilencePolicy",
+    "StreamKind",
     "TokenIn",
     "TokenOut",
     "UsageOut",
@@ -61,6 +62,11 @@ class Role(str, enum.Enum):
     """See and command all missions, approve, revoke leases."""
     ADMIN = "admin"
     """Manage accounts, tokens and quotas; read the audit log."""
+
+    def reaches(self, wanted: Role) -> bool:
+        """Whether this role may do what `wanted` may."""
+        order = list(Role)
+        return order.index(self) >= order.index(wanted)
 
 
 class Scope(str, enum.Enum):
@@ -109,6 +115,13 @@ class MissionPhase(str, enum.Enum):
     def over(self) -> bool:
         """Whether nothing follows this phase."""
         return self in {self.LANDED, self.REFUSED, self.CANCELLED, self.FAILED}
+
+
+class StreamKind(str, enum.Enum):
+    """What a page can draw of a stream."""
+
+    PICTURES = "pictures"
+    DETECTIONS = "detections"
 
 
 class _In(BaseModel):
@@ -248,6 +261,8 @@ class MissionOut(_Out):
     """Newest status by robot, while it flies and afterwards."""
     alerts: list[str] = Field(default_factory=list)
     """The newest alerts, oldest first."""
+    streams: dict[str, StreamKind] = Field(default_factory=dict)
+    """Streams of pictures and of what was found in them, by name, while it flies."""
     recording: bool = False
     """Whether the recording can be fetched."""
 

@@ -10,13 +10,14 @@ from fastapi import FastAPI, Security
 from fastapi.security import HTTPBearer
 
 from aerodaas.config.redaction import catalogue
+from aerodaas.console.hub import StreamHub
+from aerodaas.console.page import page_routes
 from aerodaas.service.access import Access, Accounts, Audit, OidcVerifier, Quotas, RateLimiter
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
 from aerodaas.service.gate import Gate
-from aerodaas.service.hub import StreamHub
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.routes.accounts import AccountRoutes
 from aerodaas.service.routes.admission import Admission
@@ -84,5 +85,6 @@ def build_service(
         app.include_router(routes.router(), dependencies=secured)
     app.include_router(LiveRoutes(desk, hub, admission).router())
     app.include_router(HereRoutes(desk, admission).router())
+    app.include_router(page_routes())
     app.add_middleware(Gate, admission=admission)
     return app

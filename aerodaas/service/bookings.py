@@ -8,7 +8,6 @@ from collections.abc import Callable, Collection
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.protocol.schemas import LeaseIn, LeaseState, Role
 from aerodaas.service.access import Principal, Quotas, sees
-from aerodaas.service.access.principal import reaches
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.garage import Garage
 from aerodaas.service.leases import Candidate, Fleet, LeaseBook
@@ -105,9 +104,9 @@ class Bookings:
     def end(self, principal: Principal, lease: str) -> Lease:
         """Give a lease back, or revoke another tenant's as an operator; drones come home."""
         found = self.seen(principal, lease)
-        if found.tenant == principal.tenant and reaches(principal.role, Role.PILOT):
+        if found.tenant == principal.tenant and principal.role.reaches(Role.PILOT):
             changed = self._book.give_back(lease, time.time(), self._fleet())
-        elif reaches(principal.role, Role.OPERATOR):
+        elif principal.role.reaches(Role.OPERATOR):
             reason = f"revoked by {principal.account}"
             changed = self._book.revoke(lease, reason, time.time(), self._fleet())
         else:
@@ -131,7 +130,7 @@ class Bookings:
 
     def _own(self, principal: Principal, lease: str) -> Lease:
         found = self.seen(principal, lease)
-        if found.tenant != principal.tenant and not reaches(principal.role, Role.OPERATOR):
+        if found.tenant != principal.tenant and not principal.role.reaches(Role.OPERATOR):
             raise RefusedError(403, f"the lease {lease} is {found.tenant}'s")
         return found
 

@@ -24,7 +24,6 @@ from aerodaas.protocol.schemas import (
     Role,
 )
 from aerodaas.service.access import Principal, sees
-from aerodaas.service.access.principal import reaches
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError, StoreError
@@ -186,7 +185,7 @@ class MissionDesk:
             if one.phase is not MissionPhase.FLYING:
                 raise RefusedError(409, f"{mission} is not flying: {one.phase.value}")
             link = one.follow()
-        return link.ask(operator=reaches(principal.role, Role.OPERATOR), **request)
+        return link.ask(operator=principal.role.reaches(Role.OPERATOR), **request)
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
         """A mission that this account may see; raises RefusedError for any other."""
@@ -229,7 +228,7 @@ class MissionDesk:
     def flies(self, principal: Principal, mission: str) -> bool:
         """Whether a mission is this account's own, so that its presence counts."""
         found = self.shown(mission)
-        return found.tenant == principal.tenant and reaches(principal.role, Role.PILOT)
+        return found.tenant == principal.tenant and principal.role.reaches(Role.PILOT)
 
     def hear(self, mission: str) -> None:
         """Note that the user of a mission is there."""
@@ -433,5 +432,5 @@ class MissionDesk:
     def _require_own(self, principal: Principal, mission: str) -> None:
         """Raise RefusedError unless this account may command a mission."""
         found = self.mission(principal, mission)
-        if found.tenant != principal.tenant and not reaches(principal.role, Role.OPERATOR):
+        if found.tenant != principal.tenant and not principal.role.reaches(Role.OPERATOR):
             raise RefusedError(403, f"{mission} is {found.tenant}'s: you may watch it")

@@ -8,6 +8,7 @@ from http import HTTPStatus
 from starlette.requests import HTTPConnection
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from aerodaas.console.page import is_page
 from aerodaas.service.errors import RefusedError
 from aerodaas.service.models import LARGEST_MODEL
 from aerodaas.service.routes.admission import Admission
@@ -34,6 +35,9 @@ class Gate:
             await self._app(scope, receive, send)
             return
         connection = HTTPConnection(scope)
+        if is_page(connection):
+            await self._app(scope, _Bounded(receive, 0), send)
+            return
         try:
             most = _bound_of(connection)
             await asyncio.to_thread(self._admission.enter, connection)

@@ -35,5 +35,6 @@ def shown(one: ActiveMission) -> MissionOut:
         verdict=verdict,
         status=status,
         alerts=alerts,
+        streams=news.streams if news is not None and not one.over else {},
         recording=one.phase is not MissionPhase.FLYING and one.flight.recording.is_file(),
     )

@@ -25,7 +25,15 @@ from aerodaas.types.identifiers import is_internal
 if TYPE_CHECKING:
     from aerodaas.actors.run.flight import FlightState
 
-__all__ = ["FlightView", "StartupView", "show_headless", "show_left", "show_results", "show_speed"]
+__all__ = [
+    "FlightView",
+    "StartupView",
+    "show_console",
+    "show_headless",
+    "show_left",
+    "show_results",
+    "show_speed",
+]
 
 _ALERTS_SHOWN = 4
 
@@ -181,6 +189,13 @@ def _commands(state: FlightState) -> list[StreamSnapshot]:
                 )
             )
     return rows
+
+
+def show_console(flies: str, watches: str) -> None:
+    """Print the console's address for who flies, and the one for who only watches."""
+    console = Console(highlight=False, soft_wrap=True)
+    console.print(f"console: open {flies}", markup=False)
+    console.print(f"  to watch only: {watches}", markup=False)
 
 
 def show_speed(options: RunOptions, mission: float, wall: float, start: float) -> None:

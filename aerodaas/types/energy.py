@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.types.geometry import Vector
+from aerodaas.types.geometry import Vector, is_finite
 from aerodaas.types.records import valued
 from aerodaas.types.waypoints import Waypoint
 
@@ -115,7 +115,7 @@ class EnergyMeter:
 
     def observe(self, fraction: float, velocity: Vector, duration: float) -> None:
         """Take note of the battery's charge after flying at `velocity` for `duration` seconds."""
-        if not (math.isfinite(fraction) and np.isfinite(velocity).all()):
+        if not (math.isfinite(fraction) and is_finite(velocity)):
             return
         if self._first is None:
             self._first = fraction

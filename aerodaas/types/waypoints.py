@@ -36,6 +36,8 @@ class WaypointType(str, enum.Enum):
     """Metres east, north and up of the environment's home."""
     GLOBAL = "global"
     """Latitude and longitude in WGS84 degrees, altitude in metres above the ellipsoid."""
+    GLOBAL_RELATIVE = "global_relative"
+    """Latitude and longitude in WGS84 degrees, height in metres above the environment's home."""
 
 
 class NavigationType(str, enum.Enum):
@@ -52,6 +54,9 @@ class SchedulingType(str, enum.Enum):
 
     ORDERED = "ordered"
     UNORDERED = "unordered"
+
+
+_ON_THE_GLOBE = (WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE)
 
 
 def _require_finite(owner: str, **values: float | None) -> None:
@@ -84,7 +89,7 @@ class Waypoint:
     y: float
     """Metres north, or longitude in degrees for a global waypoint."""
     z: float
-    """Metres up, or altitude in metres for a global waypoint."""
+    """Metres up, or altitude in metres for a global waypoint; see WaypointType."""
     hover_duration: float = 0.0
     """Seconds to stay after arrival."""
     waypoint_type: WaypointType | str = WaypointType.RELATIVE
@@ -115,7 +120,7 @@ class Waypoint:
             message = f"{owner}: speed must be positive, not {self.speed}"
             raise InvalidWaypointError(message)
         north_pole, date_line = 90.0, 180.0
-        if self.waypoint_type is WaypointType.GLOBAL and (
+        if self.waypoint_type in _ON_THE_GLOBE and (
             abs(self.x) > north_pole or abs(self.y) > date_line
         ):
             message = f"{owner}: ({self.x}, {self.y}) is no latitude and longitude in degrees"
@@ -134,8 +139,12 @@ class Waypoint:
         elif origin is None:
             message = f"waypoint {self.id!r} is global, but the environment file gives no home"
             raise InvalidWaypointError(message)
-        else:
+        elif self.waypoint_type is WaypointType.GLOBAL:
             x, y, z = origin.to_local(self.x, self.y, self.z)
+        else:
+            # Height is over home's level, as barometers have it, not over its tangent plane.
+            x, y, _ = origin.to_local(self.x, self.y, origin.altitude)
+            z = self.z
         return replace(self, x=float(x), y=float(y), z=float(z), waypoint_type=WaypointType.LOCAL)
 
     @property

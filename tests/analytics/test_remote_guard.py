@@ -1,4 +1,4 @@
-"""Wrong tokens and foreign names at the doors of the remote control and the camera's page."""
+"""Wrong tokens and foreign names at the doors of the remote control and the console."""
 
 from __future__ import annotations
 

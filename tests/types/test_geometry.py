@@ -19,6 +19,8 @@ from aerodaas.types.geometry import (
     enu_to_ned,
     flu_to_frd,
     frd_to_flu,
+    is_close,
+    is_finite,
     ned_to_enu,
     rotation_from_rpy,
     wrap_angle,
@@ -155,3 +157,24 @@ def test_the_field_of_view_spans_the_picture() -> None:
     np.testing.assert_allclose(camera.ray(320, 180), [1, 0, 0], atol=1e-12)
     left = camera.ray(0, 180)
     assert math.degrees(math.atan2(left[1], left[0])) == pytest.approx(45.0)
+
+
+_numbers = st.one_of(st.floats(), st.floats(-1e3, 1e3), st.sampled_from([0.0, -0.0, 1e308, 1e-8]))
+_triples = st.tuples(_numbers, _numbers, _numbers).map(np.array)
+
+
+@given(_triples)
+def test_is_finite_agrees_with_numpy(vector: Vector) -> None:
+    """The quick test for three numbers gives numpy's answer, NaN and infinities included."""
+    assert is_finite(vector) == bool(np.isfinite(vector).all())
+
+
+@given(
+    st.tuples(*[st.floats(-1e6, 1e6)] * 3).map(np.array),
+    st.tuples(*[st.sampled_from([0.0, 1e-9, 1e-8, 2e-8, -1e-8, 1e-5, 1.0])] * 3).map(np.array),
+    st.sampled_from([0.0, 1e-5, 0.9e-5, 1.1e-5]),
+)
+def test_is_close_agrees_with_numpy(vector: Vector, shift: Vector, scale: float) -> None:
+    """The quick comparison gives that of `numpy.allclose`, up to its very tolerances."""
+    other = vector * (1 + scale) + shift
+    assert is_close(vector, other) == bool(np.allclose(vector, other))

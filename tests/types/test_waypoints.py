@@ -92,7 +92,10 @@ def test_numbers_that_are_none_are_refused_by_name(value: float, field: str) -> 
         ({"x": "1"}, "x must be a finite number, not '1'"),
         ({"hover_duration": -1}, "hover_duration must not be negative"),
         ({"speed": 0}, "speed must be positive"),
-        ({"waypoint_type": "lunar"}, "must be one of relative, local, global, not 'lunar'"),
+        (
+            {"waypoint_type": "lunar"},
+            "must be one of relative, local, global, global_relative, not 'lunar'",
+        ),
         ({"x": 91, "waypoint_type": "global"}, "is no latitude and longitude"),
         ({"y": 181, "waypoint_type": "global"}, "is no latitude and longitude"),
     ],
@@ -140,3 +143,26 @@ def test_what_is_no_navigation_is_refused() -> None:
     twice = [Waypoint("a", 1, 2, 3), Waypoint("a", 2, 2, 3)]
     with pytest.raises(InvalidWaypointError, match="two waypoints are called 'a'"):
         AeroNavigation(NavigationType.DISTANCE_DRIVEN, twice)
+
+
+@given(st.floats(-0.05, 0.05), st.floats(-0.05, 0.05), st.floats(-50, 500), st.floats(-100, 3000))
+def test_a_height_above_home_is_kept_wherever_home_lies(
+    north: float, east: float, height: float, altitude: float
+) -> None:
+    """Also kilometres away, where home's tangent plane is metres above home's level."""
+    home = GeodeticOrigin(47.0, 8.0, altitude)
+    waypoint = Waypoint("w", 47 + north, 8 + east, height, waypoint_type="global_relative")
+    local = waypoint.resolve(np.zeros(3), home)
+    assert local.waypoint_type is WaypointType.LOCAL
+    assert local.z == height
+    level = home.to_local(47 + north, 8 + east, altitude)
+    assert (local.x, local.y) == (level[0], level[1])
+
+
+@pytest.mark.parametrize("kind", ["global", "global_relative"])
+def test_places_on_the_globe_are_on_it(kind: str) -> None:
+    """Latitude and longitude in degrees, and a home to fly them from."""
+    with pytest.raises(InvalidWaypointError, match="is no latitude and longitude"):
+        Waypoint("w", 91, 8, 1, waypoint_type=kind)
+    with pytest.raises(InvalidWaypointError, match="the environment file gives no home"):
+        Waypoint("w", 47, 8, 1, waypoint_type=kind).resolve(np.zeros(3), None)

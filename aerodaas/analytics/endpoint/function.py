@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from http import HTTPStatus
 from typing import Annotated
 
-import cv2
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -100,6 +99,8 @@ class FunctionUrl:
         return Detections.of(frame, wanted)
 
     def _post(self, image: np.ndarray, budget: float | None) -> Reply:
+        import cv2  # noqa: PLC0415 - 10 MB, for those who send pictures only
+
         written, jpeg = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
         if not written:
             raise EndpointError(f"a frame of {image.shape} cannot be written as JPEG")

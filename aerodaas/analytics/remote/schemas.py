@@ -14,7 +14,7 @@ from aerodaas.mission.commands import Answer
 from aerodaas.types.clock import seconds
 from aerodaas.types.status import MissionStatus
 from aerodaas.types.vehicle import VehicleState
-from aerodaas.types.waypoints import NavigationType, SchedulingType
+from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
 
 __all__ = ["AnswerOut", "StatusOut", "WaypointsIn"]
 
@@ -90,6 +90,12 @@ class StatusOut(BaseModel):
     distance: float
     """Metres flown."""
     faults: list[str]
+    places: dict[str, tuple[float, float, float]] = Field(default_factory=dict)
+    """Waypoints by id, metres east, north and up of home: those ahead, and those known before."""
+    mode: str | None = None
+    """One of `VehicleMode`: what the vehicle itself says that it does."""
+    measured: float | None = None
+    """Mission time of position, velocity and yaw, seconds."""
     position: list[float | None] | None = None
     """Metres east, north and up of home."""
     velocity: list[float | None] | None = None
@@ -117,12 +123,15 @@ class StatusOut(BaseModel):
             waypoints_known=status.waypoint_counts[1],
             distance=status.distance,
             faults=list(status.faults),
+            places={one.id: (one.x, one.y, one.z) for one in _ahead(status)},
         )
         if vehicle is None:
             return mission
         odometry, fix = vehicle.odometry, vehicle.gps
         return mission.model_copy(
             update={
+                "mode": vehicle.mode.value,
+                "measured": seconds(vehicle.stamp),
                 "position": [_known(float(axis)) for axis in odometry.position],
                 "velocity": [_known(float(axis)) for axis in odometry.velocity],
                 "yaw": _known(odometry.yaw),
@@ -132,6 +141,11 @@ class StatusOut(BaseModel):
                 "altitude": _known(fix.altitude) if fix else None,
             }
         )
+
+
+def _ahead(status: MissionStatus) -> tuple[Waypoint, ...]:
+    """The target and what comes after it."""
+    return (status.target, *status.pending) if status.target else status.pending
 
 
 def _known(value: float) -> float | None:

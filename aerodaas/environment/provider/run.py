@@ -52,7 +52,7 @@ _ENDING_SECONDS = 60.0
 _OWN = (
     "address",
     "live",
-    "page",
+    "console",
     "replay",
     "speed",
     "lockstep",

@@ -18,7 +18,7 @@ from aerodaas.config.model import LimitsConfig
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.types.braking import braking_speed, limit_length, velocity_towards
 from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector
+from aerodaas.types.geometry import Vector, is_close, is_finite
 from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 
 __all__ = ["FilteredSetpoint", "Neighbour", "SetpointFilter"]
@@ -80,7 +80,7 @@ class SetpointFilter:
         if not _finite(setpoint):
             self._last = np.zeros(3)
             return FilteredSetpoint(VelocitySetpoint(np.zeros(3)), ("not_finite",))
-        if not (np.isfinite(odometry.position).all() and np.isfinite(odometry.velocity).all()):
+        if not (is_finite(odometry.position) and is_finite(odometry.velocity)):
             return self._blind(setpoint)
         if isinstance(setpoint, PositionSetpoint):
             return self._clamp_position(setpoint, odometry, neighbours)
@@ -106,14 +106,14 @@ class SetpointFilter:
     ) -> FilteredSetpoint:
         names: list[str] = []
         target = self.home + limit_length(asked.position - self.home, self.limits.max_range)
-        if not np.allclose(target, asked.position):
+        if not is_close(target, asked.position):
             names.append("max_range")
         # What the fence allows nearest to a place in range may itself be out of range.
         inside = self.fence.nearest_within(target, self.home, self.limits.max_range)
         if inside is None:
             self._last = np.zeros(3)
             return FilteredSetpoint(VelocitySetpoint(np.zeros(3)), (*names, "geofence"))
-        if not np.allclose(inside, target):
+        if not is_close(inside, target):
             names.append("geofence")
         target = inside
         limits = self.limits
@@ -242,6 +242,6 @@ def _level(way: Vector) -> Vector:
 
 def _finite(setpoint: Setpoint) -> bool:
     if isinstance(setpoint, VelocitySetpoint):
-        return bool(np.isfinite(setpoint.velocity).all()) and math.isfinite(setpoint.yaw_rate)
+        return is_finite(setpoint.velocity) and math.isfinite(setpoint.yaw_rate)
     scalars = [value for value in (setpoint.yaw, setpoint.speed) if value is not None]
-    return bool(np.isfinite(setpoint.position).all()) and all(map(math.isfinite, scalars))
+    return is_finite(setpoint.position) and all(map(math.isfinite, scalars))

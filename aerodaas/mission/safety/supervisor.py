@@ -6,13 +6,11 @@ import enum
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
 from aerodaas.config.model import LimitsConfig
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.types.clock import seconds
 from aerodaas.types.energy import EnergyMeter
-from aerodaas.types.geometry import Vector
+from aerodaas.types.geometry import Vector, is_finite
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 __all__ = ["CALM", "Assessment", "FailsafeAction", "Fault", "Supervisor", "has_position"]
@@ -194,9 +192,9 @@ class Supervisor:
 def has_position(state: VehicleState) -> bool:
     """Return whether the vehicle's position, velocity and yaw are known."""
     odometry = state.odometry
-    return bool(
-        np.isfinite(odometry.position).all()
-        and np.isfinite(odometry.velocity).all()
+    return (
+        is_finite(odometry.position)
+        and is_finite(odometry.velocity)
         and math.isfinite(odometry.yaw)
     )
 

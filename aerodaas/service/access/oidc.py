@@ -11,7 +11,6 @@ import jwt
 
 from aerodaas.protocol.schemas import Role
 from aerodaas.service.access.issuer_keys import IssuerKeys
-from aerodaas.service.access.principal import reaches
 from aerodaas.service.errors import RefusedError
 from aerodaas.types.errors import SourceError
 
@@ -130,7 +129,7 @@ class OidcVerifier:
         best = self._settings.unknown
         for name in names:
             role = known.get(name) if isinstance(name, str) else None
-            if role is not None and (best is None or reaches(role, best)):
+            if role is not None and (best is None or role.reaches(best)):
                 best = role
         if best is None:
             raise RefusedError(

@@ -8,9 +8,7 @@ from dataclasses import dataclass
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.errors import RefusedError
 
-__all__ = ["Principal", "reaches", "require", "sees"]
-
-_ORDER = {role: place for place, role in enumerate(Role)}
+__all__ = ["Principal", "require", "sees"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,11 +24,6 @@ class Principal:
     """The token's id; an issuer's has its subject instead."""
 
 
-def reaches(role: Role, wanted: Role) -> bool:
-    """Whether a role may do what `wanted` may."""
-    return _ORDER[role] >= _ORDER[wanted]
-
-
 def require(principal: Principal, role: Role, scope: Scope | None = None) -> None:
     """Refuse who may not.
 
@@ -42,7 +35,7 @@ def require(principal: Principal, role: Role, scope: Scope | None = None) -> Non
     Raises:
         RefusedError: With status 403.
     """
-    if not reaches(principal.role, role):
+    if not principal.role.reaches(role):
         raise RefusedError(
             403, f"this needs the role {role.value}; {principal.account} is {principal.role.value}"
         )
@@ -58,4 +51,4 @@ def sees(principal: Principal, tenant: str, share: Collection[str] = ()) -> bool
         tenant: Owner of a mission, lease or recording.
         share: Further tenants with which the owner shares it.
     """
-    return principal.tenant in {tenant, *share} or reaches(principal.role, Role.OPERATOR)
+    return principal.tenant in {tenant, *share} or principal.role.reaches(Role.OPERATOR)

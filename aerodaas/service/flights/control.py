@@ -21,7 +21,7 @@ from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.commands import COMMANDS, CommandWord
-from aerodaas.protocol.schemas import NavigationIn
+from aerodaas.protocol.schemas import NavigationIn, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.types.errors import AeroDaaSError
@@ -57,6 +57,10 @@ class Flown(Protocol):
 
     def status(self) -> tuple[dict[str, StatusOut], list[str]]:
         """Newest status by robot, and the newest alerts."""
+        ...
+
+    def streams(self) -> dict[str, StreamKind]:
+        """The streams that can be drawn, by name."""
         ...
 
     def reader(self, stream: str) -> Reader:
@@ -166,7 +170,8 @@ class ControlServer:
             status, alerts = self._flown.status()
             robots = {name: one.model_dump() for name, one in status.items()}
             over = self._flown.over
-            message = {"robots": robots, "alerts": alerts, "over": over}
+            streams = self._flown.streams()
+            message = {"robots": robots, "alerts": alerts, "streams": streams, "over": over}
             channel.send(message, timeout=_SEND_SECONDS)
             if over:
                 return

@@ -13,6 +13,7 @@ from pydantic import ValidationError
 
 from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
+from aerodaas.protocol.schemas import StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.types.errors import ConfigError, MissionError
 
@@ -32,6 +33,7 @@ class FlightNews:
     """Counts the news."""
     status: dict[str, StatusOut] = field(default_factory=dict)
     alerts: list[str] = field(default_factory=list)
+    streams: dict[str, StreamKind] = field(default_factory=dict)
 
 
 class FlightLink:
@@ -124,5 +126,6 @@ class FlightLink:
 
     def _take(self, message: dict[str, Any]) -> None:
         robots = {name: StatusOut(**one) for name, one in message["robots"].items()}
-        self.news = FlightNews(self.news.number + 1, robots, message["alerts"])
+        streams = {name: StreamKind(kind) for name, kind in message.get("streams", {}).items()}
+        self.news = FlightNews(self.news.number + 1, robots, message["alerts"], streams)
         self._told()

@@ -13,34 +13,32 @@ import socket
 import threading
 import time
 from pathlib import Path
-from typing import Any
 
 from pydantic import SecretStr
 
 from aerodaas.analytics.here.analysis import HereSite
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import StatusOut
-from aerodaas.analytics.wire_items import pack
 from aerodaas.config.model import EnvironmentConfig, RemoteConfig
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.config.overrides import located
+from aerodaas.console.meter import FlightMeter
+from aerodaas.console.packed_reader import PackedReader, drawn_streams
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.run import Run
 from aerodaas.mission.commands import Answer, ReturnHome
 from aerodaas.protocol.commands import COMMANDS, CommandWord
-from aerodaas.protocol.schemas import NavigationIn
+from aerodaas.protocol.schemas import NavigationIn, StreamKind
 from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder
-from aerodaas.service.flights.meter import FlightMeter
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.service.limits import limited
 from aerodaas.service.rehearsal import rehearsal_config
 from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError
-from aerodaas.types.status import Message
 
 __all__ = ["Flying", "fly"]
 
@@ -218,33 +216,19 @@ class Flying:
         """Newest status by robot, and the newest alerts."""
         return self._meter.status, self._meter.alerts
 
-    def reader(self, stream: str) -> _StreamReader:
+    def streams(self) -> dict[str, StreamKind]:
+        """The streams that can be drawn, by name."""
+        environment = self._environment
+        return {} if environment is None else drawn_streams(environment.graph)
+
+    def reader(self, stream: str) -> PackedReader:
         """A reader of a stream; raises ConfigError if there is none."""
         graph = self._environment.graph if self._environment is not None else None
         if graph is None or stream not in graph.nodes or graph.reader is None:
             raise ConfigError(f"no stream of this mission is called {stream!r}")
-        return _StreamReader(graph.reader(stream), stream)
+        return PackedReader(graph.reader(stream), stream)
 
     @property
     def over(self) -> bool:
         """Whether the flight is over."""
         return self._run is not None and self._run.over
-
-
-class _StreamReader:
-    """Reader of one stream's items as messages of the control socket."""
-
-    def __init__(self, reader: Any, stream: str) -> None:  # noqa: ANN401 - LiveReader, of Ray's side
-        self._reader = reader
-        self._stream = stream
-
-    def next_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
-        """The next item; None if there was none within `timeout` wall seconds."""
-        try:
-            message: Message[Any] = self._reader.next_message(timeout)
-        except (TimeoutError, StopIteration):
-            return None
-        item, blob = pack(message.item)
-        head = {"kind": "item", "stream": self._stream, "seq": message.seq}
-        stamps = {"stamp": message.stamp, "captured": message.captured}
-        return {**head, **stamps, "item": item, "blob": bool(blob)}, blob

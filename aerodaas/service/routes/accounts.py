@@ -18,7 +18,6 @@ from aerodaas.protocol.schemas import (
     UsageOut,
 )
 from aerodaas.service.access import Accounts, Audit, usage_csv
-from aerodaas.service.access.principal import reaches
 from aerodaas.service.access.usage import usage_out
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.store import Store
@@ -89,7 +88,7 @@ class AccountRoutes:
     def tokens(self, request: Request) -> list[TokenOut]:
         """One's own tokens; all of them for an administrator. Secrets are not among it."""
         principal = self._admission.require(request, Role.VIEWER)
-        every = reaches(principal.role, Role.ADMIN)
+        every = principal.role.reaches(Role.ADMIN)
         return self._accounts.tokens(None if every else principal.account)
 
     def issue(self, body: TokenIn, request: Request) -> TokenOut:
@@ -121,7 +120,7 @@ class AccountRoutes:
     ) -> Any:  # noqa: ANN401 - JSON by its model, or CSV
         """What missions have used: the tenant's own, or all for an operator."""
         principal = self._admission.require(request, Role.VIEWER)
-        every = reaches(principal.role, Role.OPERATOR)
+        every = principal.role.reaches(Role.OPERATOR)
         rows = self._store.usage.all(None if every else principal.tenant)
         if form == "csv":
             return Response(usage_csv(rows), media_type="text/csv")

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 from starlette.requests import HTTPConnection
 
+from aerodaas.console.access import bearer
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Access, Audit, Principal, RateLimiter, require
 from aerodaas.service.errors import RefusedError
@@ -28,11 +29,10 @@ class Admission:
 
     def enter(self, connection: HTTPConnection) -> None:
         """Find out who sends a request, before its body is read; raises RefusedError."""
-        kind, _, token = connection.headers.get("authorization", "").partition(" ")
         address = _address(connection)
         principal: Principal | None = None
         try:
-            principal = self._access.of(token.strip() if kind.lower() == "bearer" else "", address)
+            principal = self._access.of(bearer(connection.headers), address)
             self._rates.admit(principal.account)
         except RefusedError as error:
             # A wrong token is audited where it is counted.

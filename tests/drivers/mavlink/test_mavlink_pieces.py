@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import queue
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,11 +27,9 @@ from aerodaas.drivers.mavlink.microservices.commander import (
 )
 from aerodaas.drivers.mavlink.microservices.fence import fence_items
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
-from aerodaas.drivers.mavlink.plan_file import read_plan
 from aerodaas.drivers.mavlink.state.frames import LocalFrame, attitude_from_frd
 from aerodaas.drivers.mavlink.state.phase import FlightMode, FlightPhase
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.types.errors import ConfigError
 from aerodaas.types.geometry import GeodeticOrigin
 from aerodaas.types.vehicle import VehicleMode
 from tools.mavlink_vehicle import AutopilotOptions, Impairment
@@ -393,83 +389,3 @@ def test_a_fence_is_drawn_where_it_belongs() -> None:
     assert items[1].y > items[0].y
     assert abs(items[1].x - items[0].x) < 100
     assert items[2].x - items[0].x == pytest.approx(100 / 111_150 * 1e7, rel=0.01)
-
-
-PLAN = {
-    "fileType": "Plan",
-    "mission": {
-        "plannedHomePosition": [47.0, 8.0, 488.0],
-        "items": [
-            {"type": "SimpleItem", "command": 22, "frame": 3, "params": [0, 0, 0, None, 47, 8, 9]},
-            {
-                "type": "SimpleItem",
-                "command": 16,
-                "frame": 3,
-                "params": [4, 0, 0, None, 47.0009, 8.0, 20],
-            },
-            {"type": "SimpleItem", "command": 178, "frame": 2, "params": [1, 3, -1, 0, 0, 0, 0]},
-            {
-                "type": "ComplexItem",
-                "complexItemType": "survey",
-                "TransectStyleComplexItem": {
-                    "Items": [
-                        {
-                            "type": "SimpleItem",
-                            "command": 16,
-                            "frame": 0,
-                            "params": [0, 0, 0, 90, 47.0, 8.001, 500],
-                        }
-                    ]
-                },
-            },
-            {"type": "SimpleItem", "command": 20, "frame": 2, "params": [0, 0, 0, 0, 0, 0, 0]},
-        ],
-    },
-}
-
-
-def test_a_plan_of_qgroundcontrol_becomes_waypoints(tmp_path: Path) -> None:
-    """Local places, heights above home, hover times, speeds and headings."""
-    path = tmp_path / "survey.plan"
-    path.write_text(json.dumps(PLAN))
-    first, second = read_plan(path, GeodeticOrigin(47.0, 8.0)).waypoints
-    assert first.position == pytest.approx([0.0, 100.0, 20.0], abs=0.2)
-    assert first.hover_duration == 4.0
-    assert first.speed is None
-    assert second.position == pytest.approx([76.1, 0.0, 12.0], abs=0.2)
-    assert second.speed == 3.0
-    assert second.yaw == pytest.approx(0.0)
-
-
-@given(
-    st.recursive(
-        st.none() | st.floats() | st.text(max_size=5) | st.sampled_from(["mission", "items"]),
-        lambda inner: (
-            st.lists(inner, max_size=3)
-            | st.dictionaries(
-                st.sampled_from(["mission", "items", "type", "params", "plannedHomePosition"]),
-                inner,
-            )
-        ),
-        max_leaves=12,
-    )
-)
-def test_what_is_no_plan_is_refused(tmp_path_factory: pytest.TempPathFactory, content: Any) -> None:  # noqa: ANN401
-    """Any JSON: ConfigError, or an empty plan."""
-    path = tmp_path_factory.mktemp("plans") / "x.plan"
-    path.write_text(json.dumps(content))
-    with contextlib.suppress(ConfigError):
-        assert not read_plan(path, GeodeticOrigin(0.0, 0.0)).waypoints
-
-
-@pytest.mark.parametrize(
-    ("content", "told"),
-    [("[" * 100_000, "nested more than"), (" " * (5 << 20), "larger than 4 MiB")],
-    ids=["deep", "large"],
-)
-def test_a_plan_has_bounds(tmp_path: Path, content: str, told: str) -> None:
-    """A stranger's file is not read whole, nor followed as deep as it likes."""
-    path = tmp_path / "huge.plan"
-    path.write_text(content)
-    with pytest.raises(ConfigError, match=told):
-        read_plan(path, GeodeticOrigin(0.0, 0.0))

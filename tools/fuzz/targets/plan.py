@@ -1,15 +1,17 @@
-"""QGroundControl's `.plan` files, as navigation is made from them."""
+"""Ground stations' plans, `.plan` and `.waypoints`, as navigation is made from them."""
 
 from __future__ import annotations
 
 import atexit
 import json
+import math
 import os
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from aerodaas.drivers.mavlink.plan_file import read_plan
+from aerodaas.dataflow.plans.fences import geofence_of
+from aerodaas.dataflow.plans.reading import flown_plan, read_plan
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.geometry import GeodeticOrigin
 
@@ -22,13 +24,15 @@ atexit.register(Path(_NAME).unlink, missing_ok=True)
 
 
 def seeds() -> Iterable[bytes]:
-    """A plan of simple items and a survey."""
+    """Plans of simple items, a survey, a structure scan, a fence and rally points; lines."""
     items = [
         _item(22, [15.0, 0.0, 0.0, None, 47.0, 8.0, 10.0]),
         _item(178, [1, 5.0, -1, 0, 0, 0, 0]),
         _item(16, [2.0, 0.0, 0.0, 90.0, 47.0001, 8.0002, 12.5]),
         _item(82, [0.0, 0.0, 0.0, None, 47.0002, 8.0002, 500.0], frame=0),
         _item(19, [4.0, 0.0, 5.0, 0.0, 47.0001, 8.0001, 9.0]),
+        _item(93, [4.0, 0, 0, 0, 0, 0, 0]),
+        _item(206, [25.0, 0, 1, 0, 0, 0, 0]),
         _item(20, [0, 0, 0, 0, 0, 0, 0]),
     ]
     yield _plan(items)
@@ -38,15 +42,50 @@ def seeds() -> Iterable[bytes]:
         "TransectStyleComplexItem": {"Items": items[2:4]},
     }
     yield _plan([items[0], survey, items[-1]])
+    corners = [[47.0, 8.0], [47.0, 8.001], [47.001, 8.0005]]
+    scan = {
+        "type": "ComplexItem",
+        "complexItemType": "StructureScan",
+        "version": 3,
+        "CameraCalc": {
+            "DistanceToSurface": 10,
+            "AdjustedFootprintFrontal": 10,
+            "AdjustedFootprintSide": 10,
+        },
+        "EntranceAltitude": 40,
+        "ScanBottomAlt": 2,
+        "StructureHeight": 30,
+        "Layers": 3,
+        "polygon": corners,
+    }
+    fence = {
+        "version": 2,
+        "polygons": [{"inclusion": True, "polygon": corners}],
+        "circles": [{"inclusion": False, "circle": {"center": corners[0], "radius": 20}}],
+    }
+    rally = {"version": 2, "points": [[47.0, 8.0, 30.0]]}
+    yield _plan([scan], geoFence=fence, rallyPoints=rally)
+    yield (
+        b"QGC WPL 110\n"
+        b"0\t1\t0\t16\t0\t0\t0\t0\t47.0\t8.0\t488.0\t1\n"
+        b"1\t0\t3\t22\t0\t0\t0\t0\t47.0\t8.0\t20.0\t1\n"
+        b"2\t0\t0\t16\t2\t0\t0\t0\t47.001\t8.0\t520.0\t1\n"
+        b"3\t0\t3\t206\t9\t0\t0\t0\t0\t0\t0\t1\n"
+        b"4\t0\t2\t20\t0\t0\t0\t0\t0\t0\t0\t1\n"
+    )
 
 
 def run(data: bytes) -> None:
-    """Read one plan; waypoints check their own numbers."""
+    """Read one plan and its fence; each waypoint lies on the globe, at a height that is finite."""
     Path(_NAME).write_bytes(data)
     try:
-        read_plan(_NAME, _HOME)
+        waypoints, _ = flown_plan(_NAME)
+        geofence_of(read_plan(_NAME).fence, _HOME)
     except AeroDaaSError:
         return
+    for one in waypoints:
+        if not all(map(math.isfinite, (one.x, one.y, one.z, one.hover_duration))):
+            raise AssertionError(f"a waypoint at {one}")
 
 
 def _item(command: int, params: list[float | None], frame: int = 3) -> dict[str, object]:
@@ -60,7 +99,7 @@ def _item(command: int, params: list[float | None], frame: int = 3) -> dict[str,
     }
 
 
-def _plan(items: Sequence[Mapping[str, object]]) -> bytes:
+def _plan(items: Sequence[Mapping[str, object]], **parts: object) -> bytes:
     content = {
         "fileType": "Plan",
         "groundStation": "QGroundControl",
@@ -71,4 +110,4 @@ def _plan(items: Sequence[Mapping[str, object]]) -> bytes:
             "version": 2,
         },
     }
-    return json.dumps(content).encode()
+    return json.dumps(content | parts).encode()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+from collections import OrderedDict, defaultdict
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.types.clock import seconds
@@ -16,8 +16,11 @@ if TYPE_CHECKING:
 
 __all__ = ["FlightMeter"]
 
+_Place: TypeAlias = tuple[float, float, float]
 _ALERTS = 50
 """Most alerts told, the newest ones."""
+_PLACES = 200
+"""Most waypoints of a robot whose places are told, unless more lie ahead."""
 _GROUND = {MissionState.IDLE, MissionState.PREFLIGHT, MissionState.LANDED, MissionState.ABORTED}
 
 
@@ -28,6 +31,7 @@ class FlightMeter:
         self.status: dict[str, StatusOut] = {}
         """By robot; replaced and never changed, because other threads read it."""
         self.alerts: list[str] = []
+        self._places: dict[str, OrderedDict[str, _Place]] = defaultdict(OrderedDict)
         self._flown: dict[str, float] = defaultdict(float)
         self._charges: dict[str, tuple[float, float]] = {}
         """First and newest known charge by robot."""
@@ -44,13 +48,24 @@ class FlightMeter:
             if before is not None and report.status.state not in _GROUND:
                 self._flown[name] += max(0.0, now - before.time)
         self.status = {
-            name: StatusOut.of(report.status, report.state) for name, report in state.robots.items()
+            name: self._remembering(name, StatusOut.of(report.status, report.state))
+            for name, report in state.robots.items()
         }
         for name, status in self.status.items():
             if status.battery is not None:
                 first, _ = self._charges.get(name, (status.battery, status.battery))
                 self._charges[name] = first, status.battery
         self.alerts = [f"{one.kind}: {one.text}" for one in state.alerts[-_ALERTS:]]
+
+    def _remembering(self, name: str, status: StatusOut) -> StatusOut:
+        """A status with the places of waypoints that lie behind, too: those known last."""
+        known = self._places[name]
+        for waypoint, place in status.places.items():
+            known[waypoint] = place
+            known.move_to_end(waypoint)
+        while len(known) > max(_PLACES, len(status.places)):
+            known.popitem(last=False)
+        return status.model_copy(update={"places": dict(known)})
 
     def usage(self, reports: Mapping[str, ActorReport]) -> dict[str, Any]:
         """What the flight has used, as `Outcome` has it; `reports` are its actors'."""

@@ -1,0 +1,112 @@
+"""`aerodaas plan`: what ground stations' plans hold, and what of it is flown."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.config.printable import printable
+from aerodaas.types.errors import ConfigError
+
+if TYPE_CHECKING:
+    from aerodaas.types.geometry import GeodeticOrigin
+
+__all__ = ["app"]
+
+File = Annotated[Path, typer.Argument(metavar="PLAN", help="A .plan or .waypoints file.")]
+HomeAltitude = Annotated[
+    float | None,
+    typer.Option(help="Metres above the sea of the environment's home. Default: the plan's own."),
+]
+
+app = typer.Typer(
+    cls=ExampleGroup,
+    no_args_is_help=True,
+    rich_markup_mode="markdown",
+    help="""Read and write the plans of QGroundControl and Mission Planner.
+
+    aerodaas plan show survey.plan
+    aerodaas plan convert mission.waypoints mission.plan
+    aerodaas plan fence survey.plan --home 47.3977,8.5456
+""",
+)
+
+
+@app.command()
+def show(plan: File, home_altitude: HomeAltitude = None) -> None:
+    """List the waypoints that would be flown, and what the plan means and is not done.
+
+    aerodaas plan show survey.plan
+    """
+    from aerodaas.dataflow.plans.reading import flown_plan  # noqa: PLC0415 - slow to load
+
+    waypoints, notices = flown_plan(plan, home_altitude)
+    for one in waypoints:
+        speed = "" if one.speed is None else f", {one.speed:g} m/s"
+        hover = f", hovers {one.hover_duration:g} s" if one.hover_duration else ""
+        typer.echo(f"{one.id:>8}  {one.x:.7f}, {one.y:.7f}, {one.z:g} m above home{speed}{hover}")
+    for notice in notices:
+        typer.echo(printable(f"not done: {notice}"))
+    typer.echo(f"{plan}: waypoints: {len(waypoints)}, not done: {len(notices)}")
+
+
+@app.command()
+def convert(
+    plan: File,
+    output: Annotated[Path, typer.Argument(help="A new .plan or .waypoints file.")],
+) -> None:
+    """Write a plan in the other format, item for item; complex items become their waypoints.
+
+    aerodaas plan convert mission.waypoints mission.plan
+    """
+    from aerodaas.dataflow.plans.reading import read_plan  # noqa: PLC0415 - slow to load
+    from aerodaas.dataflow.plans.writing import write_plan  # noqa: PLC0415
+
+    read = read_plan(plan)
+    for notice in [*read.notices, *write_plan(output, read)]:
+        typer.echo(printable(f"left out: {notice}"))
+    typer.echo(str(output))
+
+
+@app.command()
+def fence(
+    plan: File,
+    home: Annotated[
+        str | None,
+        typer.Option(metavar="LAT,LON", help="The environment's home. Default: the plan's own."),
+    ] = None,
+) -> None:
+    """Print a plan's geofence as a robot's `limits.geofence` of an environment file.
+
+    aerodaas plan fence survey.plan --home 47.3977,8.5456
+    """
+    from aerodaas.dataflow.plans.fences import geofence_of  # noqa: PLC0415 - slow to load
+    from aerodaas.dataflow.plans.reading import read_plan  # noqa: PLC0415
+    from aerodaas.types.geometry import GeodeticOrigin  # noqa: PLC0415
+
+    read = read_plan(plan)
+    if not read.fence:
+        raise ConfigError(f"{plan} has no geofence; draw one in QGroundControl")
+    if home is not None:
+        origin = _home(home)
+    elif read.home is not None:
+        origin = GeodeticOrigin(read.home.latitude, read.home.longitude)
+    else:
+        raise ConfigError(f"{plan} does not know its home: give --home LAT,LON")
+    content = geofence_of(read.fence, origin).model_dump(include={"polygon", "no_fly"})
+    typer.echo(json.dumps(content, indent=2))
+
+
+def _home(text: str) -> GeodeticOrigin:
+    from aerodaas.dataflow.plans.numbers import place  # noqa: PLC0415 - as above
+    from aerodaas.types.geometry import GeodeticOrigin  # noqa: PLC0415
+
+    try:
+        latitude, longitude = (float(one) for one in text.split(","))
+    except ValueError:
+        raise ConfigError(f"--home must be LAT,LON in degrees, not {text!r}") from None
+    return GeodeticOrigin(*place(latitude, longitude, "--home"))

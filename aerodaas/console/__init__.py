@@ -1,0 +1,1 @@
+"""The console: one web page from which flights are watched and commanded."""

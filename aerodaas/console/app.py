@@ -1,0 +1,141 @@
+"""The console of one's own flight: the page, and the service's routes for this one mission."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, FastAPI, HTTPException, Query, Request, WebSocket
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import JSONResponse
+from starlette.exceptions import HTTPException as AnyHTTPException
+
+from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.redaction import catalogue
+from aerodaas.console.access import role_of
+from aerodaas.console.hub import StreamHub
+from aerodaas.console.live import LiveSession, wanted_streams
+from aerodaas.console.own_flight import OWN, OwnFlight
+from aerodaas.console.page import page_routes
+from aerodaas.protocol.commands import COMMANDS
+from aerodaas.protocol.schemas import (
+    AccountOut,
+    CommandIn,
+    FleetOut,
+    MissionOut,
+    NavigationIn,
+    RefusalOut,
+    RobotOut,
+    Role,
+    Scope,
+)
+from aerodaas.types.errors import AeroDaaSError
+
+__all__ = ["build_console"]
+
+
+def build_console(flight: OwnFlight, config: EnvironmentConfig) -> FastAPI:
+    """The application that shows `flight`, flown in `config`; a guard stands before it."""
+    app = FastAPI(title="AeroDaaS console", docs_url=None, redoc_url=None, openapi_url=None)
+    for kind in (AeroDaaSError, RequestValidationError, AnyHTTPException):
+        app.add_exception_handler(kind, _refused)
+    app.include_router(page_routes())
+    app.include_router(_Routes(flight, config).router())
+    return app
+
+
+class _Routes:
+    """The service's routes that the page asks, with the same answers."""
+
+    def __init__(self, flight: OwnFlight, config: EnvironmentConfig) -> None:
+        self._flight = flight
+        self._hub = StreamHub(flight.items)
+        self._fleet = FleetOut(
+            name=config.name,
+            robots=[
+                RobotOut(id=robot.id, sensors=[one.full_id for one in robot.sensors], mission=OWN)
+                for robot in config.robots
+            ],
+            environment=catalogue(config).model_dump(mode="json", by_alias=True),
+        )
+
+    def router(self) -> APIRouter:
+        """The routes."""
+        router = APIRouter(prefix="/v1")
+        router.add_api_route("/me", self.me)
+        router.add_api_route("/fleet", self.fleet)
+        router.add_api_route("/missions", self.missions)
+        router.add_api_route("/missions/{mission}", self.mission)
+        router.add_api_route("/missions/{mission}/commands", self.command, methods=["POST"])
+        router.add_api_route("/missions/{mission}/navigation", self.navigation, methods=["POST"])
+        router.add_api_websocket_route("/missions/{mission}/live", self.live)
+        return router
+
+    def me(self, request: Request) -> AccountOut:
+        """Who asks."""
+        role = role_of(request)
+        scopes = [Scope.SENSE] if role is Role.VIEWER else list(Scope)
+        return AccountOut(name=role.value, tenant=OWN, role=role, scopes=scopes, created=0.0)
+
+    def fleet(self) -> FleetOut:
+        """The drones, and what may be known of where they fly."""
+        return self._fleet
+
+    def missions(self) -> list[MissionOut]:
+        """The one flight."""
+        return [self._flight.mission()]
+
+    def mission(self, mission: str) -> MissionOut:
+        """The one flight."""
+        _require_known(mission)
+        return self._flight.mission()
+
+    def command(self, mission: str, body: CommandIn, request: Request) -> AnswerOut:
+        """Give a robot a command; answers what the drone said."""
+        _require_known(mission)
+        _require_pilot(request)
+        command = COMMANDS[body.command]
+        return AnswerOut.of(self._flight.command(body.robot, command, body.command))
+
+    def navigation(self, mission: str, body: NavigationIn, request: Request) -> AnswerOut:
+        """Add waypoints to a robot's queue; answers what the drone said."""
+        _require_known(mission)
+        _require_pilot(request)
+        ids = ", ".join(waypoint.id for waypoint in body.waypoints)
+        return AnswerOut.of(self._flight.command(body.robot, body.command(), f"visit {ids}"))
+
+    async def live(
+        self,
+        socket: WebSocket,
+        mission: str,
+        rate: Annotated[float, Query(gt=0, le=20, allow_inf_nan=False)] = 5.0,
+        streams: Annotated[str, Query(max_length=2000)] = "",
+    ) -> None:
+        """Send the flight's state, at most `rate` times a second, and items of `streams`."""
+        _require_known(mission)
+        session = LiveSession(socket, self._flight, self._hub, mission)
+        await session.run(rate, wanted_streams(streams), own=False)
+
+
+def _require_known(mission: str) -> None:
+    if mission != OWN:
+        raise HTTPException(404, f"there is no mission {mission}: this one is called {OWN}")
+
+
+def _require_pilot(request: Request) -> None:
+    role = role_of(request)
+    if not role.reaches(Role.PILOT):
+        raise HTTPException(403, f"this needs the role pilot; you are {role.value}")
+
+
+def _refused(_: Request, error: Exception) -> JSONResponse:
+    """Word a refusal as the service does."""
+    status, text = 409, str(error)
+    if isinstance(error, RequestValidationError):
+        # Each wrong field and its place, without the input, which may hold NaN.
+        said: list[Any] = list(error.errors())
+        status = 422
+        text = "; ".join(f"{'.'.join(map(str, one['loc'][1:]))}: {one['msg']}" for one in said)
+    elif isinstance(error, AnyHTTPException):
+        status, text = error.status_code, str(error.detail)
+    return JSONResponse(RefusalOut(text=text).model_dump(), status)

@@ -1,0 +1,120 @@
+"""Live view of a mission: its state at each change, and the items of its streams."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Sequence
+from typing import Protocol
+
+from fastapi import WebSocket, WebSocketDisconnect
+
+from aerodaas.console.access import SUBPROTOCOL
+from aerodaas.console.hub import StreamHub, Watcher
+from aerodaas.types.clock import host_time_ns
+
+__all__ = ["LiveSession", "Shown", "wanted_streams"]
+
+_MOST_STREAMS = 16
+_IDLE_SECONDS = 1.0
+"""Most seconds between two messages of a mission that does not change."""
+
+
+class Shown(Protocol):
+    """Missions as a live view sees them; called in any thread."""
+
+    def version(self, mission: str) -> int:
+        """A number that grows with each change of a mission; -1 once it is over."""
+        ...
+
+    def text(self, mission: str) -> tuple[str, bool]:
+        """A mission as JSON, and whether it is over."""
+        ...
+
+    def hear(self, mission: str) -> None:
+        """Note that the user of a mission is there."""
+        ...
+
+
+def wanted_streams(streams: str) -> list[str]:
+    """Names in a comma-separated list, as many as one view may have."""
+    return [name for name in streams.split(",") if name][:_MOST_STREAMS]
+
+
+class LiveSession:
+    """One watcher's connection."""
+
+    def __init__(self, socket: WebSocket, shown: Shown, hub: StreamHub, mission: str) -> None:
+        """Show a mission to the one behind `socket`, which is not accepted yet."""
+        self._socket = socket
+        self._shown = shown
+        self._hub = hub
+        self._mission = mission
+        # An item's two messages stay together.
+        self._sending = asyncio.Lock()
+
+    async def run(self, rate: float, streams: Sequence[str], *, own: bool) -> None:
+        """Accept the watcher, and send until the mission is over or the watcher has gone.
+
+        Args:
+            rate: Most messages of the mission's state a second.
+            streams: Whose items are sent, too.
+            own: Whether the watcher counts as the mission's user, who is heard of so.
+        """
+        offered = self._socket.scope.get("subprotocols", ())
+        await self._socket.accept(SUBPROTOCOL if SUBPROTOCOL in offered else None)
+        state = asyncio.create_task(self._state(rate, own=own))
+        gone = asyncio.create_task(self._read())
+        jobs = [state, gone, *(asyncio.create_task(self._items(name)) for name in streams)]
+        try:
+            await asyncio.wait((state, gone), return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for job in jobs:
+                job.cancel()
+            await asyncio.gather(*jobs, return_exceptions=True)
+            with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+                await self._socket.close()
+
+    async def _state(self, rate: float, *, own: bool) -> None:
+        """Send the mission's state until it is over; its own user counts as present meanwhile."""
+        sent, since, heard = -1, 0.0, 0.0
+        loop = asyncio.get_running_loop()
+        while True:
+            now, version = loop.time(), self._shown.version(self._mission)
+            if own and now - heard > _IDLE_SECONDS:
+                heard = now
+                await asyncio.to_thread(self._shown.hear, self._mission)
+            if version != sent or now - since > _IDLE_SECONDS:
+                sent, since = version, now
+                text, over = self._shown.text(self._mission)
+                head = f'"kind": "mission", "now": {host_time_ns()}'
+                async with self._sending:
+                    await self._socket.send_text(f'{{{head}, "mission": {text}}}')
+                    if over:
+                        await self._socket.send_text('{"kind": "end"}')
+                        return
+            await asyncio.sleep(1.0 / rate)
+
+    async def _items(self, stream: str) -> None:
+        """Send the items of one stream; begins again where the flight has not begun yet."""
+        while True:
+            watcher = self._hub.watch(self._mission, stream)
+            try:
+                await self._forward(watcher)
+            finally:
+                self._hub.leave(self._mission, stream, watcher)
+            await asyncio.sleep(_IDLE_SECONDS / 2)
+
+    async def _forward(self, watcher: Watcher) -> None:
+        while (found := await watcher.next()) is not None:
+            message, blob = found
+            async with self._sending:
+                await self._socket.send_json(message)
+                if blob:
+                    await self._socket.send_bytes(blob)
+
+    async def _read(self) -> None:
+        """Return when the watcher has gone; it has nothing to say."""
+        with contextlib.suppress(WebSocketDisconnect, RuntimeError):
+            while True:
+                await self._socket.receive_text()

@@ -1,0 +1,54 @@
+"""The page itself: files that ship built, under a policy that admits nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from fastapi import APIRouter
+from fastapi.responses import FileResponse
+from starlette.requests import HTTPConnection
+
+__all__ = ["is_page", "page_routes"]
+
+_FOLDER = Path(__file__).parent / "page"
+_FILES = {
+    "/": ("index.html", "text/html; charset=utf-8"),
+    "/console.js": ("console.js", "text/javascript; charset=utf-8"),
+    "/icon.svg": ("icon.svg", "image/svg+xml"),
+    "/console.css": ("console.css", "text/css; charset=utf-8"),
+}
+_HEADERS = {
+    # Nothing from elsewhere, no inline script or style, and in nobody's frame.
+    "content-security-policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
+        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "cross-origin-resource-policy": "same-origin",
+    "cache-control": "no-cache",
+}
+
+
+def is_page(connection: HTTPConnection) -> bool:
+    """Whether a request is for one of the page's own files, which hold no secret."""
+    return connection.scope["type"] == "http" and connection.url.path in _FILES
+
+
+def page_routes() -> APIRouter:
+    """Routes of the page's files."""
+    router = APIRouter()
+    for path, (name, kind) in _FILES.items():
+        router.add_api_route(
+            path, _sender(name, kind), response_class=FileResponse, include_in_schema=False
+        )
+    return router
+
+
+def _sender(name: str, kind: str) -> Callable[[], FileResponse]:
+    def send() -> FileResponse:
+        return FileResponse(_FOLDER / name, media_type=kind, headers=_HEADERS)
+
+    return send

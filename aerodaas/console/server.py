@@ -1,0 +1,88 @@
+"""Server of the console beside one's own flight, in a thread of the application's process."""
+
+from __future__ import annotations
+
+import threading
+import time
+
+from aerodaas.analytics.remote.attempts import WrongTokens
+from aerodaas.analytics.remote.guard import HostGuard
+from aerodaas.analytics.remote.listening import listen
+from aerodaas.analytics.remote.serving import web_server
+from aerodaas.console.access import FlightKeys, TokenGuard
+from aerodaas.console.app import build_console
+from aerodaas.console.own_flight import Flown, OwnFlight
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["ConsoleServer"]
+
+_STOPPING = 5.0
+_FAREWELL = 1.0
+"""Wall seconds in which watchers are told that the flight is over."""
+_MOST_CONNECTIONS = 256
+_MOST_BYTES_SENT = 4096
+"""Bytes of a WebSocket message; watchers have nothing to say."""
+_PING_SECONDS = 5.0
+
+
+class ConsoleServer:
+    """Serves the page for one flight until it is closed."""
+
+    def __init__(self, address: str) -> None:
+        """Listen.
+
+        Args:
+            address: `host:port`; port 0 selects a free one.
+
+        Raises:
+            ConfigError: If it cannot be listened on.
+        """
+        host, _, port = address.rpartition(":")
+        self._host = host
+        try:
+            self._socket = listen(host.strip("[]"), int(port))
+        except (OSError, OverflowError) as error:
+            raise ConfigError(
+                f"cannot serve the console at {address}: {error}; give another --console-address"
+            ) from None
+        self._keys = FlightKeys()
+        self._flight: OwnFlight | None = None
+        self._thread: threading.Thread | None = None
+
+    def address(self, *, viewer: bool = False) -> str:
+        """Where a browser opens the page, with the token of who flies, or of who watches only.
+
+        The token stands in the fragment, which a browser sends to nobody.
+        """
+        host = "127.0.0.1" if self._host in {"0.0.0.0", "[::]"} else self._host  # noqa: S104 - compared
+        token = self._keys.viewer if viewer else self._keys.pilot
+        return f"http://{host}:{self._socket.getsockname()[1]}/#token={token}"
+
+    def start(self, run: Flown, name: str) -> None:
+        """Show a flight that has begun, an application called `name`."""
+        flight = self._flight = OwnFlight(run, name)
+        wrong = WrongTokens(lambda text: run.note("console_wrong_tokens", text), what="the console")
+        guarded = TokenGuard(build_console(flight, run.config), self._keys, wrong)
+        self._server = web_server(
+            HostGuard(guarded, self._host),
+            most_connections=_MOST_CONNECTIONS,
+            lifespan="off",
+            timeout_graceful_shutdown=1,
+            ws_max_size=_MOST_BYTES_SENT,
+            ws_ping_interval=_PING_SECONDS,
+            ws_ping_timeout=_PING_SECONDS,
+        )
+        words = {"sockets": [self._socket]}
+        self._thread = threading.Thread(
+            target=self._server.run, kwargs=words, name="console server", daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """Tell the watchers that the flight is over, and stop serving."""
+        if self._flight is not None and self._thread is not None:
+            self._flight.close()
+            time.sleep(_FAREWELL)
+            self._server.should_exit = True
+            self._thread.join(_STOPPING)
+        self._socket.close()

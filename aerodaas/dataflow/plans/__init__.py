@@ -1,0 +1,1 @@
+"""Plans of ground stations: QGroundControl's, Mission Planner's, and areas from KML and GeoJSON."""

@@ -1,0 +1,99 @@
+"""KML 2.2: polygons of placemarks. Nothing that it links to is fetched."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from xml.etree import ElementTree as ET
+
+from aerodaas.dataflow.plans.rings import AreaReader
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["parse_kml"]
+
+_MOST_LEVELS = 40
+_MOST_ELEMENTS = 200_000
+_OTHERS = ("Point", "LineString", "Model", "Track", "NetworkLink", "GroundOverlay")
+_BOUNDARIES = {"outerBoundaryIs": 0, "innerBoundaryIs": 1}
+_LONGEST = 40
+"""Most characters of a number."""
+_PAIR = 2
+
+
+def parse_kml(text: str, reader: AreaReader) -> None:
+    """Hand the polygons of a KML text to `reader`.
+
+    Raises:
+        ConfigError: If it is no KML, declares entities, or is nested too deep.
+    """
+    root = _tree(text)
+    if _local(root) != "kml":
+        raise ConfigError(f"it is XML of the kind {_local(root)[:40]!r}, not KML")
+    for placemark in _all(root, "Placemark"):
+        name = next((one.text for one in placemark if _local(one) == "name"), None)
+        for polygon in _all(placemark, "Polygon"):
+            reader.add(name, _rings(polygon))
+    for one in root.iter():
+        if _local(one) in _OTHERS:
+            reader.others[_local(one)] += 1
+
+
+def _tree(text: str) -> ET.Element:
+    """The document's root; entities, which could grow without end, are refused unread."""
+    if "<!DOCTYPE" in text or "<!ENTITY" in text:
+        raise ConfigError("KML declares no entities; this file is not read")
+    level = elements = 0
+    root: ET.Element | None = None
+    try:
+        # Event by event, so that a bound is met before all of a deep tree is there.
+        pieces = ET.iterparse(io.StringIO(text), ["start", "end"])  # noqa: S314 - has no entities
+        for event, element in pieces:
+            root = element if root is None else root
+            level += 1 if event == "start" else -1
+            elements += event == "start"
+            if level > _MOST_LEVELS or elements > _MOST_ELEMENTS:
+                break
+    except ET.ParseError as error:
+        raise ConfigError(f"it is no XML: {error}") from None
+    if level > _MOST_LEVELS:
+        raise ConfigError(f"it is nested more than {_MOST_LEVELS} levels deep; KML needs 10")
+    if root is None or level:
+        raise ConfigError(f"it has more than {_MOST_ELEMENTS} elements: split it")
+    return root
+
+
+def _rings(polygon: ET.Element) -> list[list[list[float]]]:
+    """Outline, then holes."""
+    rings = sorted(
+        ((_BOUNDARIES[_local(one)], one) for one in polygon if _local(one) in _BOUNDARIES),
+        key=lambda ring: ring[0],
+    )
+    if [order for order, _ in rings[:2]].count(0) != 1:
+        raise ConfigError("a polygon must have one outerBoundaryIs")
+    return [[*_corners(boundary)] for _, boundary in rings]
+
+
+def _corners(boundary: ET.Element) -> Iterator[list[float]]:
+    for coordinates in _all(boundary, "coordinates"):
+        for corner in (coordinates.text or "").split():
+            fields = corner.split(",")
+            if len(fields) < _PAIR:
+                raise ConfigError(f"a corner is {corner[:_LONGEST]!r}, not longitude,latitude")
+            yield [_number(fields[0]), _number(fields[1])]
+
+
+def _number(text: str) -> float:
+    try:
+        if len(text) <= _LONGEST and "_" not in text:
+            return float(text)
+    except ValueError:
+        pass
+    raise ConfigError(f"a coordinate must be a number, not {text[:_LONGEST]!r}")
+
+
+def _all(element: ET.Element, name: str) -> Iterator[ET.Element]:
+    return (one for one in element.iter() if _local(one) == name)
+
+
+def _local(element: ET.Element) -> str:
+    return str(element.tag).rpartition("}")[2]

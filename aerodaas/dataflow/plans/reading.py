@@ -1,0 +1,66 @@
+"""Plan files of ground stations, told apart by what is in them."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+
+from aerodaas.config.json_text import parse_json, read_text
+from aerodaas.config.printable import printable
+from aerodaas.dataflow.plans.plan import Notice, Plan
+from aerodaas.dataflow.plans.qgroundcontrol import parse_qgroundcontrol
+from aerodaas.dataflow.plans.waypoint_file import HEADER, parse_waypoint_file
+from aerodaas.dataflow.plans.waypoints_in import Ground, waypoints_of
+from aerodaas.types.errors import ConfigError, InvalidWaypointError
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["flown_plan", "read_plan", "warn_of"]
+
+_MOST_NOTICES = 20
+"""Lines of a warning."""
+
+
+def read_plan(path: str | Path) -> Plan:
+    """Read QGroundControl's `.plan` or Mission Planner's `.waypoints`.
+
+    Raises:
+        ConfigError: If it cannot be read, or is no plan; with file, place and remedy.
+    """
+    text = read_text(path, "the plan").lstrip("\ufeff \t\r\n")
+    try:
+        return _parsed(text)
+    except ConfigError as error:
+        raise ConfigError(f"{path} cannot be read as a plan: {printable(str(error))}") from None
+
+
+def _parsed(text: str) -> Plan:
+    if text.startswith(HEADER[:7]):
+        return parse_waypoint_file(text)
+    if text.startswith("<"):
+        raise ConfigError("it is XML; of KML, `read_areas` reads the areas")
+    content = parse_json(text, "it")
+    if isinstance(content, dict) and "mission" not in content and "type" in content:
+        raise ConfigError("it is GeoJSON, of which `read_areas` reads the areas")
+    return parse_qgroundcontrol(content)
+
+
+def flown_plan(
+    path: str | Path, home_altitude: float | None = None, ground: Ground | None = None
+) -> tuple[list[Waypoint], list[Notice]]:
+    """Read a plan's waypoints, and what they leave out; as `AeroNavigation.from_plan`."""
+    plan = read_plan(path)
+    try:
+        return waypoints_of(plan, home_altitude, ground)
+    except (ConfigError, InvalidWaypointError) as error:
+        raise ConfigError(f"{path} cannot be flown: {error}") from None
+
+
+def warn_of(path: str | Path, notices: list[Notice], stacklevel: int) -> None:
+    """Tell what a plan means and is not done, by one warning."""
+    if not notices:
+        return
+    lines = [f"  {printable(str(notice))}" for notice in notices[:_MOST_NOTICES]]
+    more = len(notices) - _MOST_NOTICES
+    lines += [f"  and {more} more: `aerodaas plan show` lists them"] if more > 0 else []
+    told = "\n".join([f"{path}: not everything in this plan is done:", *lines])
+    warnings.warn(told, stacklevel=stacklevel + 1)

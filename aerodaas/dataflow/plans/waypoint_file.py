@@ -1,0 +1,80 @@
+"""Mission Planner's `.waypoints` files: QGC WPL 110, a line of fields for each item."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from aerodaas.dataflow.plans.numbers import finite
+from aerodaas.dataflow.plans.plan import MOST_ITEMS, Plan, PlanHome, PlanItem
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["HEADER", "parse_waypoint_file"]
+
+HEADER = "QGC WPL 110"
+_FIELDS = 12
+_LONGEST = 40
+"""Most characters of a number."""
+
+
+def parse_waypoint_file(text: str) -> Plan:
+    """Read the text of a `.waypoints` file; its line 0 is home.
+
+    Raises:
+        ConfigError: If it is none, or a line does not hold what it should.
+    """
+    first, *lines = text.lstrip("\ufeff").splitlines() or [""]
+    if first.strip() != HEADER:
+        raise ConfigError(f"its first line is not {HEADER!r}: save it again as that")
+    items = list(_items(lines))
+    if items and items[0].number == 0:
+        home = PlanHome.given(items[0].x, items[0].y, items[0].z)
+        return Plan(tuple(items[1:]), home=home, ardupilot=True)
+    raise ConfigError("its first item is not number 0, which is home: save it again")
+
+
+def _items(lines: list[str]) -> Iterator[PlanItem]:
+    expected = 0
+    for row, line in enumerate(lines, start=2):
+        if not line.strip() or line.startswith("#"):
+            continue
+        if expected > MOST_ITEMS:
+            raise ConfigError(f"has more than {MOST_ITEMS} items: split it")
+        where = f"line {row}"
+        fields = line.split()
+        if len(fields) != _FIELDS:
+            raise ConfigError(f"{where} has {len(fields)} fields, not {_FIELDS}")
+        number = _whole(fields[0], f"{where}: number")
+        if number != expected:
+            raise ConfigError(f"{where} is item {number}, not {expected}: number them in order")
+        first, second, third, fourth, x, y, z = (
+            _number(field, f"{where}: field {index}")
+            for index, field in enumerate(fields[4:11], start=5)
+        )
+        yield PlanItem(
+            number,
+            _whole(fields[3], f"{where}: command"),
+            _whole(fields[2], f"{where}: frame"),
+            (first, second, third, fourth),
+            x,
+            y,
+            z,
+            _whole(fields[11], f"{where}: autocontinue") != 0,
+        )
+        expected += 1
+
+
+def _whole(text: str, what: str) -> int:
+    # Not `isdigit`, which takes the digits of every script.
+    if len(text) > _LONGEST or not text.isascii() or not text.isdigit():
+        raise ConfigError(f"{what} must be a whole number, not {text[:_LONGEST]!r}")
+    return int(text)
+
+
+def _number(text: str, what: str) -> float:
+    try:
+        value = float(text) if len(text) <= _LONGEST and "_" not in text else None
+    except ValueError:
+        value = None
+    if value is None:
+        raise ConfigError(f"{what} must be a number, not {text[:_LONGEST]!r}")
+    return finite(value, what)

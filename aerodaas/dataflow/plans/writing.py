@@ -1,0 +1,215 @@
+"""Waypoints as a plan's items, and plans as files of ground stations."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from aerodaas.dataflow.plans.commands import (
+    DO_CHANGE_SPEED,
+    FRAME_MISSION,
+    FRAME_RELATIVE,
+    NAV_LAST,
+    NAV_RETURN_TO_LAUNCH,
+    NAV_TAKEOFF,
+    NAV_WAYPOINT,
+)
+from aerodaas.dataflow.plans.plan import FenceCircle, FencePolygon, Notice, Plan, PlanHome, PlanItem
+from aerodaas.dataflow.plans.waypoint_file import HEADER
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import GeodeticOrigin, yaw_enu_to_ned
+from aerodaas.types.waypoints import DEFAULT_PRIORITY, Waypoint, WaypointType
+
+__all__ = ["planned", "write_plan"]
+
+_LOWEST_TAKEOFF = 1.5
+"""Metres that a take-off climbs at least."""
+_DEFAULT_SPEED = -2.0
+_GROUND_SPEED = 1.0
+_PX4, _ARDUPILOT = 12, 3
+"""MAV_AUTOPILOT, by which the meaning of parameters is known."""
+_COPTER = 2
+"""MAV_TYPE."""
+
+
+def planned(
+    waypoints: Sequence[Waypoint], home: GeodeticOrigin, home_altitude: float | None = None
+) -> tuple[Plan, list[Notice]]:
+    """Turn waypoints into a plan that starts at `home`; with what it leaves out.
+
+    Raises:
+        ConfigError: If a waypoint is relative to a take-off, whose place is not known yet.
+    """
+    places = [_place(waypoint, home) for waypoint in waypoints]
+    items = list(_items(waypoints, places, home))
+    return (
+        Plan(tuple(items), home=PlanHome(home.latitude, home.longitude, home_altitude)),
+        list(_left_out(waypoints)),
+    )
+
+
+def write_plan(path: str | Path, plan: Plan) -> list[Notice]:
+    """Write a new `.plan` or `.waypoints` file, by its suffix; returns what it leaves out.
+
+    Raises:
+        ConfigError: If the suffix is another, or the file exists or cannot be written.
+    """
+    file = Path(path)
+    if file.suffix == ".plan":
+        text, notices = _qgroundcontrol(plan), []
+    elif file.suffix == ".waypoints":
+        text, notices = _waypoint_file(plan), list(_not_in_lines(plan))
+    else:
+        raise ConfigError(f"a plan is written as .plan or .waypoints, not as {file.name!r}")
+    try:
+        with file.open("x", encoding="utf-8") as opened:
+            opened.write(text)
+    except FileExistsError:
+        raise ConfigError(f"{path} exists; remove it or choose another name") from None
+    except OSError as error:
+        raise ConfigError(f"cannot write {path}: {error.strerror}") from None
+    return notices
+
+
+def _place(waypoint: Waypoint, home: GeodeticOrigin) -> tuple[float, float, float]:
+    """Latitude, longitude, and metres above home."""
+    if waypoint.waypoint_type is WaypointType.RELATIVE:
+        raise ConfigError(
+            f"waypoint {waypoint.id!r} is relative to a take-off that no plan knows; "
+            'give it waypoint_type "local", "global" or "global_relative"'
+        )
+    if waypoint.waypoint_type is WaypointType.LOCAL:
+        latitude, longitude, _ = home.to_geodetic(np.array([waypoint.x, waypoint.y, 0.0]))
+        return latitude, longitude, waypoint.z
+    above = home.altitude if waypoint.waypoint_type is WaypointType.GLOBAL else 0.0
+    return waypoint.x, waypoint.y, waypoint.z - above
+
+
+def _items(
+    waypoints: Sequence[Waypoint],
+    places: Sequence[tuple[float, float, float]],
+    home: GeodeticOrigin,
+) -> Iterator[PlanItem]:
+    climb = max(places[0][2], _LOWEST_TAKEOFF) if places else _LOWEST_TAKEOFF
+    start = (home.latitude, home.longitude, climb)
+    yield PlanItem(1, NAV_TAKEOFF, FRAME_RELATIVE, (0.0, 0.0, 0.0, None), *start)
+    number, speed = 2, None
+    for waypoint, at in zip(waypoints, places, strict=True):
+        if waypoint.speed != speed:
+            speed = waypoint.speed
+            values = (_GROUND_SPEED, _DEFAULT_SPEED if speed is None else speed, -1.0, 0.0)
+            yield PlanItem(number, DO_CHANGE_SPEED, FRAME_MISSION, values, 0.0, 0.0, 0.0)
+            number += 1
+        yaw = None if waypoint.yaw is None else math.degrees(yaw_enu_to_ned(waypoint.yaw))
+        held = (waypoint.hover_duration, 0.0, 0.0, yaw)
+        yield PlanItem(number, NAV_WAYPOINT, FRAME_RELATIVE, held, *at)
+        number += 1
+    still = (0.0, 0.0, 0.0, 0.0)
+    yield PlanItem(number, NAV_RETURN_TO_LAUNCH, FRAME_MISSION, still, 0.0, 0.0, 0.0)
+
+
+def _left_out(waypoints: Sequence[Waypoint]) -> Iterator[Notice]:
+    for what, named in (
+        ("priorities", [w.id for w in waypoints if w.priority != DEFAULT_PRIORITY]),
+        ("deadlines", [w.id for w in waypoints if w.deadline is not None]),
+    ):
+        if named:
+            yield Notice(
+                (), what, f"a plan holds none; {len(named)} waypoints had one: {named[0]}…"
+            )
+
+
+def _not_in_lines(plan: Plan) -> Iterator[Notice]:
+    unset = tuple(
+        one.number
+        for one in plan.items
+        if None in one.values[:3] or (one.values[3] is None and one.command > NAV_LAST)
+    )
+    if unset:
+        yield Notice(unset, "unset parameters", "a .waypoints file has none; they are 0 there")
+    turned = tuple(
+        one.number
+        for one in plan.items
+        if one.command == NAV_WAYPOINT and one.values[3] is not None
+    )
+    if turned and not plan.ardupilot:
+        yield Notice(turned, "NAV_WAYPOINT", "ArduPilot does not turn to a waypoint's yaw")
+    if plan.fence:
+        yield Notice((), "geofence", "a .waypoints file holds none; write a .plan")
+    if plan.rally_points:
+        yield Notice((), "rally points", "a .waypoints file holds none; write a .plan")
+
+
+def _waypoint_file(plan: Plan) -> str:
+    home = PlanItem(0, NAV_WAYPOINT, 0, (0.0, 0.0, 0.0, None), *_home(plan.home))
+    lines = [HEADER, _line(home)]
+    lines += map(_line, plan.items)
+    return "\n".join([*lines, ""])
+
+
+def _home(home: PlanHome | None) -> tuple[float, float, float]:
+    """Latitude, longitude and altitude; zeros, which mean to readers that they are not known."""
+    return (home.latitude, home.longitude, home.altitude or 0.0) if home else (0.0, 0.0, 0.0)
+
+
+def _line(item: PlanItem) -> str:
+    values = [*item.values, item.x, item.y]
+    numbers = [f"{value or 0.0:.8f}" for value in values] + [f"{item.z or 0.0:.6f}"]
+    head = [item.number, int(item.number == 0), item.frame, item.command]
+    return "\t".join([*map(str, head), *numbers, str(int(item.continues))])
+
+
+def _qgroundcontrol(plan: Plan) -> str:
+    content = {
+        "fileType": "Plan",
+        "version": 1,
+        "groundStation": "AeroDaaS",
+        "mission": {
+            "version": 2,
+            "firmwareType": _ARDUPILOT if plan.ardupilot else _PX4,
+            "vehicleType": _COPTER,
+            "cruiseSpeed": 15,
+            "hoverSpeed": 5,
+            "globalPlanAltitudeMode": 1,
+            "plannedHomePosition": _home(plan.home),
+            "items": [_entry(item) for item in plan.items],
+        },
+        "geoFence": {
+            "version": 2,
+            "polygons": [
+                {"version": 1, "inclusion": one.inclusion, "polygon": one.corners}
+                for one in plan.fence
+                if isinstance(one, FencePolygon)
+            ],
+            "circles": [
+                {
+                    "version": 1,
+                    "inclusion": one.inclusion,
+                    "circle": {"center": one.centre, "radius": one.radius},
+                }
+                for one in plan.fence
+                if isinstance(one, FenceCircle)
+            ],
+        },
+        "rallyPoints": {"version": 2, "points": plan.rally_points},
+    }
+    return json.dumps(content, indent=4) + "\n"
+
+
+def _entry(item: PlanItem) -> dict[str, Any]:
+    entry: dict[str, Any] = {
+        "type": "SimpleItem",
+        "autoContinue": item.continues,
+        "command": item.command,
+        "doJumpId": item.number,
+        "frame": item.frame,
+        "params": [*item.values, item.x, item.y, item.z],
+    }
+    if item.frame == FRAME_RELATIVE:
+        entry |= {"AMSLAltAboveTerrain": None, "Altitude": item.z, "AltitudeMode": 1}
+    return entry

@@ -1,0 +1,117 @@
+// The way to the server: requests with the token, and a live socket that comes back by itself.
+
+import type { RefusalOut } from "./wire";
+
+const TOKEN = "aerodaas.token";
+const PAUSES = [250, 500, 1000, 2000, 4000];
+
+/** The token of the address' fragment, which is taken out of sight; else the one kept in this tab. */
+export function takeToken(): string {
+  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  if (given) {
+    keepToken(given);
+    history.replaceState(null, "", location.pathname + location.search);
+  }
+  return sessionStorage.getItem(TOKEN) ?? "";
+}
+
+export function keepToken(token: string): void {
+  sessionStorage.setItem(TOKEN, token);
+}
+
+export class Refused extends Error {
+  constructor(
+    readonly status: number,
+    text: string,
+  ) {
+    super(text);
+  }
+}
+
+/** Ask the server; throws Refused with its reason. */
+export async function ask<T>(path: string, token: string, body?: unknown): Promise<T> {
+  const headers: Record<string, string> = { Authorization: `Bearer ${token}` };
+  const request: RequestInit = { headers, cache: "no-store" };
+  if (body !== undefined) {
+    headers["Content-Type"] = "application/json";
+    request.method = "POST";
+    request.body = JSON.stringify(body);
+  }
+  const answer = await fetch(new URL(path, document.baseURI), request).catch(() => {
+    throw new Refused(0, "the server does not answer");
+  });
+  if (answer.ok) return (await answer.json()) as T;
+  const said = (await answer.json().catch(() => null)) as RefusalOut | null;
+  throw new Refused(answer.status, said?.text ?? `the server answered ${answer.status}`);
+}
+
+export interface Ears {
+  text(message: Record<string, unknown>): void;
+  blob?(message: Record<string, unknown>, data: ArrayBuffer): void;
+  up(connected: boolean): void;
+}
+
+/** A WebSocket that is made again, with growing pauses, until it is closed. */
+export class LiveSocket {
+  private socket: WebSocket | undefined;
+  private tries = 0;
+  private timer = 0;
+  private closed = false;
+  private head: Record<string, unknown> | undefined;
+
+  constructor(
+    private readonly path: string,
+    private readonly token: string,
+    private readonly ears: Ears,
+  ) {
+    this.open();
+    addEventListener("online", this.again);
+  }
+
+  close(): void {
+    this.closed = true;
+    clearTimeout(this.timer);
+    removeEventListener("online", this.again);
+    this.socket?.close();
+  }
+
+  private readonly again = (): void => {
+    if (this.socket === undefined && !this.closed) this.open();
+  };
+
+  private open(): void {
+    clearTimeout(this.timer);
+    const url = new URL(this.path, document.baseURI);
+    url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+    const socket = new WebSocket(url, ["aerodaas", `bearer.${this.token}`]);
+    socket.binaryType = "arraybuffer";
+    socket.onopen = () => {
+      this.tries = 0;
+      this.ears.up(true);
+    };
+    socket.onmessage = (event: MessageEvent<string | ArrayBuffer>) => this.take(event.data);
+    socket.onclose = () => {
+      if (this.socket !== socket) return;
+      this.socket = undefined;
+      this.head = undefined;
+      this.ears.up(false);
+      if (this.closed) return;
+      const pause = PAUSES[Math.min(this.tries, PAUSES.length - 1)] ?? 4000;
+      this.tries += 1;
+      this.timer = setTimeout(this.again, pause);
+    };
+    this.socket = socket;
+  }
+
+  private take(data: string | ArrayBuffer): void {
+    if (typeof data === "string") {
+      const message = JSON.parse(data) as Record<string, unknown>;
+      this.head = message["blob"] === true ? message : undefined;
+      if (message["kind"] === "end") this.closed = true;
+      if (this.head === undefined) this.ears.text(message);
+    } else if (this.head !== undefined) {
+      this.ears.blob?.(this.head, data);
+      this.head = undefined;
+    }
+  }
+}

@@ -1,0 +1,233 @@
+// The state of one mission as the page knows it, from the live socket: newest status, trails, charts.
+
+import { Refused, LiveSocket, ask } from "./connection";
+import type { Point } from "./place";
+import type { AnswerOut, CommandIn, MissionOut, NavigationIn, StatusOut } from "./wire";
+
+const TRAIL = 3000;
+const STEP = 0.05;
+const HISTORY = 1200;
+const STALE = 2500;
+const CONFIRMING = 30000;
+
+export type Word = CommandIn["command"];
+
+export interface Sample {
+  time: number;
+  height: number | null;
+  speed: number | null;
+  battery: number | null;
+}
+
+export interface Order {
+  id: number;
+  robot: string;
+  what: string;
+  /** asked, accepted by the drone, done as seen in its state, or refused with a reason. */
+  stage: "asked" | "accepted" | "done" | "refused" | "unconfirmed";
+  text: string;
+  at: number;
+  took: number | null;
+  seen: (status: StatusOut) => string | null;
+}
+
+export interface Alert {
+  id: number;
+  kind: string;
+  text: string;
+  count: number;
+  acknowledged: boolean;
+}
+
+const GOING_HOME = ["returning", "landing", "landed"];
+const SEEN: Record<Word, (status: StatusOut) => boolean> = {
+  pause: (status) => status.state === "paused",
+  resume: (status) => status.state !== "paused",
+  clear: (status) => status.pending.length === 0 && status.target === null,
+  "return-home": (status) => GOING_HOME.includes(status.state),
+  land: (status) => ["landing", "landed", "aborted"].includes(status.state),
+};
+
+/** Milliseconds by which the viewer's clock is ahead of the server's, as far as messages tell. */
+export class ClockOffset {
+  private least = Infinity;
+
+  take(serverNs: number): void {
+    this.least = Math.min(this.least, Date.now() - serverNs / 1e6);
+  }
+
+  age(serverNs: number): number | null {
+    return this.least === Infinity ? null : Math.max(0, Date.now() - this.least - serverNs / 1e6);
+  }
+}
+
+export class Flight {
+  mission: MissionOut;
+  connected = false;
+  over = false;
+  heard = Date.now();
+  trails = new Map<string, Point[]>();
+  history = new Map<string, Sample[]>();
+  orders: Order[] = [];
+  alerts: Alert[] = [];
+  readonly clock = new ClockOffset();
+  private told: string[] = [];
+  private orderCount = 0;
+  private readonly socket: LiveSocket;
+
+  constructor(
+    mission: MissionOut,
+    private readonly token: string,
+    private readonly changed: () => void,
+  ) {
+    this.mission = mission;
+    this.take(mission);
+    this.socket = new LiveSocket(`v1/missions/${mission.id}/live?rate=10`, token, {
+      text: (message) => this.message(message),
+      up: (connected) => {
+        this.connected = connected;
+        this.changed();
+      },
+    });
+  }
+
+  close(): void {
+    this.socket.close();
+  }
+
+  /** Whether what is shown may not be so any more. */
+  get stale(): boolean {
+    return !this.over && (!this.connected || Date.now() - this.heard > STALE);
+  }
+
+  status(robot: string): StatusOut | undefined {
+    return this.mission.status[robot];
+  }
+
+  command(robot: string, command: Word): void {
+    const body: CommandIn = { robot, command };
+    this.give(robot, command, "commands", body, (status) =>
+      SEEN[command](status) ? status.state.replace("_", " ") : null,
+    );
+  }
+
+  visit(navigation: NavigationIn): void {
+    const waypoint = navigation.waypoints[0];
+    const what = `${waypoint.id}: ${waypoint.x.toFixed(1)} E, ${waypoint.y.toFixed(1)} N`;
+    this.give(navigation.robot, what, "navigation", navigation, (status) =>
+      status.visited.includes(waypoint.id) ? "visited" : null,
+    );
+  }
+
+  acknowledge(id: number | null): void {
+    for (const one of this.alerts) if (id === null || one.id === id) one.acknowledged = true;
+    this.changed();
+  }
+
+  private give(
+    robot: string,
+    what: string,
+    route: string,
+    body: CommandIn | NavigationIn,
+    seen: Order["seen"],
+  ): void {
+    const order: Order = {
+      id: (this.orderCount += 1),
+      robot,
+      what,
+      stage: "asked",
+      text: "",
+      at: Date.now(),
+      took: null,
+      seen,
+    };
+    this.orders = [order, ...this.orders].slice(0, 20);
+    this.changed();
+    ask<AnswerOut>(`v1/missions/${this.mission.id}/${route}`, this.token, body)
+      .then((answer) => {
+        if (order.stage === "asked") order.stage = answer.accepted ? "accepted" : "refused";
+        const each = Object.entries(answer.refused).map(([id, why]) => `${id}: ${why}`);
+        order.text = [answer.text, ...each].filter(Boolean).join("; ");
+      })
+      .catch((error: unknown) => {
+        order.stage = "refused";
+        order.text = error instanceof Refused ? error.message : String(error);
+      })
+      .finally(() => this.changed());
+  }
+
+  private message(message: Record<string, unknown>): void {
+    if (message["kind"] === "end") this.over = true;
+    if (message["kind"] === "mission") {
+      this.clock.take(message["now"] as number);
+      this.take(message["mission"] as MissionOut);
+    }
+    this.changed();
+  }
+
+  private take(mission: MissionOut): void {
+    this.mission = mission;
+    this.heard = Date.now();
+    this.over = ["landed", "failed", "cancelled", "refused"].includes(mission.phase);
+    for (const [robot, status] of Object.entries(mission.status)) this.follow(robot, status);
+    this.takeAlerts(mission.alerts);
+    for (const order of this.orders) this.confirm(order);
+  }
+
+  private follow(robot: string, status: StatusOut): void {
+    const [east, north, up] = status.position ?? [];
+    if (east != null && north != null) {
+      const trail = this.trails.get(robot) ?? [];
+      const last = trail[trail.length - 1];
+      if (!last || Math.hypot(last[0] - east, last[1] - north) >= STEP) trail.push([east, north]);
+      this.trails.set(robot, trail.length > TRAIL ? trail.filter((_, n) => n % 2 === 0) : trail);
+    }
+    const samples = this.history.get(robot) ?? [];
+    const newest = samples[samples.length - 1];
+    if (!newest || status.time > newest.time + 0.1) {
+      samples.push({
+        time: status.time,
+        height: up ?? null,
+        speed: speedOf(status),
+        battery: status.battery,
+      });
+    }
+    this.history.set(robot, samples.slice(-HISTORY));
+  }
+
+  /** The server tells the newest alerts; those that it told before are known by where they overlap. */
+  private takeAlerts(texts: string[]): void {
+    let shared = Math.min(texts.length, this.told.length);
+    const same = (count: number): boolean =>
+      this.told.slice(-count).every((text, place) => text === texts[place]);
+    while (shared > 0 && !same(shared)) shared -= 1;
+    for (const line of texts.slice(shared)) {
+      const [kind = "", ...rest] = line.split(": ");
+      const id = (this.alerts[0]?.id ?? 0) + 1;
+      const text = rest.join(": ") || line;
+      const before = this.alerts.find((one) => one.kind === kind && one.text === text);
+      if (before && !before.acknowledged) before.count += 1;
+      else this.alerts.unshift({ id, kind, text, count: 1, acknowledged: false });
+    }
+    this.told = texts;
+    this.alerts = this.alerts.slice(0, 100);
+  }
+
+  private confirm(order: Order): void {
+    const status = this.mission.status[order.robot];
+    if (!status || order.stage !== "accepted") return;
+    const seen = order.seen(status);
+    if (seen !== null) {
+      order.stage = "done";
+      order.text = seen;
+      order.took = Date.now() - order.at;
+    } else if (this.over && Date.now() - order.at > CONFIRMING) {
+      order.stage = "unconfirmed";
+    }
+  }
+}
+
+export function speedOf(status: StatusOut): number | null {
+  const [east, north, up] = status.velocity ?? [];
+  return east == null || north == null || up == null ? null : Math.hypot(east, north, up);
+}

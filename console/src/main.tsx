@@ -1,0 +1,302 @@
+// The console: signs in, chooses a mission, and lays out the panels.
+
+import { render } from "preact";
+import { useCallback, useEffect, useState } from "preact/hooks";
+import { Charts } from "./charts";
+import { Refused, ask, keepToken, takeToken } from "./connection";
+import { Flight } from "./flight";
+import { FlightMap } from "./map";
+import { Alerts, Commands, StatePanel, WaypointForm } from "./panels";
+import { type Place, type Point, placeOf } from "./place";
+import type { AccountOut, FleetOut, MissionOut } from "./wire";
+import { Video } from "./video";
+import "./console.css";
+
+const THEMES = ["auto", "light", "dark"] as const;
+type Theme = (typeof THEMES)[number];
+const LOOK = 2000;
+const DARK = matchMedia("(prefers-color-scheme: dark)");
+
+interface Known {
+  account: AccountOut;
+  place: Place;
+  name: string;
+}
+
+function App() {
+  const [token, setToken] = useState(takeToken);
+  const [known, setKnown] = useState<Known | null>(null);
+  const [missions, setMissions] = useState<MissionOut[]>([]);
+  const [chosen, setChosen] = useState<string | null>(null);
+  const [problem, setProblem] = useState("");
+  const { choice, setChoice, theme } = useTheme();
+
+  useEffect(() => {
+    if (!token) return;
+    let gone = false;
+    let timer = 0;
+    const look = async () => {
+      try {
+        const [account, fleet, all] = await Promise.all([
+          ask<AccountOut>("v1/me", token),
+          ask<FleetOut>("v1/fleet", token),
+          ask<MissionOut[]>("v1/missions", token),
+        ]);
+        if (gone) return;
+        setKnown((before) => before ?? { account, place: placeOf(fleet), name: fleet.name });
+        setMissions(all);
+        setProblem("");
+      } catch (error) {
+        if (gone) return;
+        setProblem(error instanceof Error ? error.message : String(error));
+        if (error instanceof Refused && error.status === 401) {
+          setKnown(null);
+          setToken("");
+          return;
+        }
+      }
+      timer = setTimeout(() => void look(), LOOK);
+    };
+    void look();
+    return () => {
+      gone = true;
+      clearTimeout(timer);
+    };
+  }, [token]);
+
+  const flying = missions.filter((one) => one.phase === "flying");
+  const shown = chosen ?? (flying.length === 1 ? flying[0]?.id : undefined) ?? null;
+  const mission = missions.find((one) => one.id === shown);
+  // A mission that is shown stays shown after it is over.
+  useEffect(() => {
+    if (chosen === null && shown !== null) setChosen(shown);
+  }, [chosen, shown]);
+
+  const themes = (
+    <button
+      type="button"
+      class="plain theme"
+      title={`Colours: ${choice}. Click for the next`}
+      aria-label={`Colours: ${choice}`}
+      onClick={() => setChoice(THEMES[(THEMES.indexOf(choice) + 1) % THEMES.length] ?? "auto")}
+    >
+      {{ auto: "◐", light: "☀", dark: "☾" }[choice]}
+    </button>
+  );
+  if (!token) return <SignIn problem={problem} onToken={setToken} />;
+  if (known && mission) {
+    return (
+      <Console
+        key={mission.id}
+        first={mission}
+        missions={missions}
+        known={known}
+        token={token}
+        theme={theme}
+        themes={themes}
+        onMission={setChosen}
+      />
+    );
+  }
+  return (
+    <main class="start">
+      <h1>AeroDaaS console</h1>
+      {problem && <p class="banner bad">{problem}</p>}
+      {known ? <Missions missions={missions} onMission={setChosen} /> : <p>connecting…</p>}
+      {themes}
+    </main>
+  );
+}
+
+function SignIn({ problem, onToken }: { problem: string; onToken(token: string): void }) {
+  return (
+    <main class="start">
+      <h1>AeroDaaS console</h1>
+      {problem && <p class="banner bad">{problem}</p>}
+      <form
+        class="card"
+        onSubmit={(event) => {
+          event.preventDefault();
+          const token = String(new FormData(event.currentTarget).get("token")).trim();
+          keepToken(token);
+          onToken(token);
+        }}
+      >
+        <label>
+          <span>Token</span>
+          <input name="token" type="password" autocomplete="off" required autoFocus />
+        </label>
+        <button type="submit" class="primary">
+          Open
+        </button>
+        <p class="hint">
+          A flight of your own tells its address with the token; a provider's administrator makes
+          yours.
+        </p>
+      </form>
+    </main>
+  );
+}
+
+function Missions(props: { missions: MissionOut[]; onMission(id: string): void }) {
+  if (props.missions.length === 0) return <p>No mission yet: this page shows the first one.</p>;
+  return (
+    <ul class="missions">
+      {props.missions.map((one) => (
+        <li key={one.id}>
+          <button type="button" onClick={() => props.onMission(one.id)}>
+            <strong>{one.name}</strong> {one.robots.join(", ")}{" "}
+            <span class="badge">{one.phase.replaceAll("_", " ")}</span>
+          </button>
+        </li>
+      ))}
+    </ul>
+  );
+}
+
+interface ConsoleProps {
+  first: MissionOut;
+  missions: MissionOut[];
+  known: Known;
+  token: string;
+  theme: string;
+  themes: preact.ComponentChildren;
+  onMission(id: string): void;
+}
+
+function Console({ first, missions, known, token, theme, themes, onMission }: ConsoleProps) {
+  const [, draw] = useState(0);
+  const [flight, setFlight] = useState<Flight | null>(null);
+  const [robot, setRobot] = useState(first.robots[0] ?? "");
+  const [marked, setMarked] = useState<Point | null>(null);
+  const changed = useCallback(() => draw((count) => count + 1), []);
+  useEffect(() => {
+    const made = new Flight(first, token, changed);
+    setFlight(made);
+    // Silence has to show, too.
+    const timer = setInterval(changed, 500);
+    return () => {
+      clearInterval(timer);
+      made.close();
+    };
+  }, [first.id, token, changed]);
+  if (!flight) return null;
+
+  const may = known.account.role !== "viewer" && known.account.scopes.includes("fly");
+  const sees = known.account.scopes.includes("sense");
+  const status = flight.status(robot);
+  const fence = known.place.fences.find((one) => one.robot === robot);
+  const height = status?.position?.[2] ?? 0;
+  return (
+    <div class="page">
+      <header class="top">
+        <h1>AeroDaaS</h1>
+        {missions.length > 1 ? (
+          <select
+            aria-label="Mission"
+            value={first.id}
+            onChange={(event) => onMission(event.currentTarget.value)}
+          >
+            {missions.map((one) => (
+              <option key={one.id} value={one.id}>
+                {one.name} · {one.phase.replaceAll("_", " ")}
+              </option>
+            ))}
+          </select>
+        ) : (
+          <strong class="name">{flight.mission.name}</strong>
+        )}
+        {flight.mission.robots.length > 1 && (
+          <select
+            aria-label="Drone"
+            value={robot}
+            onChange={(event) => setRobot(event.currentTarget.value)}
+          >
+            {flight.mission.robots.map((name) => (
+              <option key={name}>{name}</option>
+            ))}
+          </select>
+        )}
+        <span class="grow" />
+        <span class="badge">{known.account.role}</span>
+        <Connection flight={flight} />
+        {themes}
+      </header>
+      {flight.stale && (
+        <p class="banner bad" role="alert" data-testid="banner">
+          No word from the flight for {((Date.now() - flight.heard) / 1000).toFixed(0)} s: what is
+          shown is old. Connecting again…
+        </p>
+      )}
+      {flight.over && (
+        <p class="banner" role="status" data-testid="banner">
+          The flight is over: {flight.mission.phase.replaceAll("_", " ")}
+          {flight.mission.reason && `, ${flight.mission.reason}`}
+        </p>
+      )}
+      <main class="panels">
+        <div class="wide">
+        <FlightMap
+          flight={flight}
+          place={known.place}
+          robot={robot}
+          mayFly={may && !flight.over}
+          marked={marked}
+          onMark={setMarked}
+        />
+        <Charts flight={flight} robot={robot} theme={theme} />
+        </div>
+        <div class="side">
+        {marked && (
+          <WaypointForm
+            key={marked.join()}
+            flight={flight}
+            robot={robot}
+            point={marked}
+            height={height > 0.5 ? height : known.place.takeoffHeight}
+            ceiling={fence?.ceiling ?? 120}
+            onDone={() => setMarked(null)}
+          />
+        )}
+        {sees && <Video flight={flight} token={token} />}
+        <StatePanel flight={flight} robot={robot} />
+        <Commands flight={flight} robot={robot} mayFly={may} />
+        <Alerts flight={flight} />
+        </div>
+      </main>
+    </div>
+  );
+}
+
+function Connection({ flight }: { flight: Flight }) {
+  const [tone, text] = flight.over
+    ? ["", "over"]
+    : flight.stale
+      ? ["bad", "not connected"]
+      : ["good", "live"];
+  return (
+    <span class={`badge ${tone}`} data-testid="connection">
+      {text}
+    </span>
+  );
+}
+
+/** The colours that were chosen, and those that are shown. */
+function useTheme(): { choice: Theme; setChoice(choice: Theme): void; theme: string } {
+  const kept = localStorage.getItem("aerodaas.theme");
+  const [choice, setChoice] = useState<Theme>(THEMES.find((one) => one === kept) ?? "auto");
+  const [dark, setDark] = useState(() => DARK.matches);
+  useEffect(() => {
+    const watch = () => setDark(DARK.matches);
+    DARK.addEventListener("change", watch);
+    return () => DARK.removeEventListener("change", watch);
+  }, []);
+  useEffect(() => {
+    localStorage.setItem("aerodaas.theme", choice);
+    document.documentElement.dataset["theme"] = choice;
+  }, [choice]);
+  return { choice, setChoice, theme: choice === "auto" && dark ? "dark" : choice };
+}
+
+const root = document.getElementById("console");
+if (root) render(<App />, root);

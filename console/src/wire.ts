@@ -1,0 +1,194 @@
+// Made from wire.schema.json by types.mjs; not to be edited.
+
+/**
+ * What an account may do; each role may do what those before it may.
+ */
+export type Role = "viewer" | "pilot" | "operator" | "admin";
+/**
+ * What a token may be used for, within its account's role.
+ */
+export type Scope = "fly" | "sense" | "compute";
+/**
+ * State of a submitted mission at the service; its drones have states of their own.
+ */
+export type MissionPhase =
+  | "submitted"
+  | "rehearsing"
+  | "awaiting_approval"
+  | "queued"
+  | "flying"
+  | "landed"
+  | "refused"
+  | "cancelled"
+  | "failed";
+/**
+ * What a page can draw of a stream.
+ */
+export type StreamKind = "pictures" | "detections";
+
+export interface Wire {
+  AccountOut: AccountOut;
+  AnswerOut: AnswerOut;
+  CommandIn: CommandIn;
+  FleetOut: FleetOut;
+  MissionOut: MissionOut;
+  NavigationIn: NavigationIn;
+  RefusalOut: RefusalOut;
+}
+/**
+ * An account.
+ */
+export interface AccountOut {
+  created: number;
+  disabled: boolean;
+  name: string;
+  role: Role;
+  scopes: Scope[];
+  tenant: string;
+}
+/**
+ * Answer of the mission, or of the service on its behalf, to a command.
+ */
+export interface AnswerOut {
+  accepted: boolean;
+  refused: {
+    [k: string]: string;
+  };
+  text: string;
+}
+/**
+ * A command to one robot of a mission.
+ */
+export interface CommandIn {
+  command: "pause" | "resume" | "clear" | "return-home" | "land";
+  robot: string;
+}
+/**
+ * The fleet, and the environment that an application's graph is built against.
+ */
+export interface FleetOut {
+  environment: {
+    [k: string]: unknown;
+  };
+  name: string;
+  robots: RobotOut[];
+}
+/**
+ * One drone of the fleet.
+ */
+export interface RobotOut {
+  battery: number | null;
+  enabled: boolean;
+  heard: number | null;
+  id: string;
+  lease: string | null;
+  mission: string | null;
+  position: [number, number, number] | null;
+  sensors: string[];
+  tenant: string | null;
+}
+/**
+ * A mission and its newest state.
+ */
+export interface MissionOut {
+  account: string;
+  alerts: string[];
+  ended: number | null;
+  id: string;
+  lease: string | null;
+  name: string;
+  phase: MissionPhase;
+  reason: string;
+  recording: boolean;
+  robots: string[];
+  share: string[];
+  started: number | null;
+  status: {
+    [k: string]: StatusOut;
+  };
+  streams: {
+    [k: string]: StreamKind;
+  };
+  submitted: number;
+  tenant: string;
+  verdict: VerdictOut | null;
+}
+/**
+ * Status of mission and vehicle at one time; unknown values are null.
+ */
+export interface StatusOut {
+  altitude: number | null;
+  battery: number | null;
+  distance: number;
+  faults: string[];
+  given_up: string[];
+  latitude: number | null;
+  longitude: number | null;
+  measured: number | null;
+  mode: string | null;
+  pending: string[];
+  places: {
+    /**
+     * @minItems 3
+     * @maxItems 3
+     */
+    [k: string]: [number, number, number];
+  };
+  position: (number | null)[] | null;
+  reason: string;
+  state: string;
+  target: string | null;
+  time: number;
+  velocity: (number | null)[] | null;
+  visited: string[];
+  waypoints_known: number;
+  waypoints_visited: number;
+  yaw: number | null;
+}
+/**
+ * Result of the rehearsal in simulation.
+ */
+export interface VerdictOut {
+  approved: boolean;
+  battery_used: number | null;
+  distance: number | null;
+  picture: string | null;
+  reasons: string[];
+  seconds: number | null;
+}
+/**
+ * Waypoints for one robot of a mission in flight: one command, carried out whole.
+ */
+export interface NavigationIn {
+  clear_first?: boolean;
+  deadline?: number | null;
+  index?: number | null;
+  ordered?: boolean;
+  robot: string;
+  /**
+   * @minItems 1
+   * @maxItems 1000
+   */
+  waypoints: [WaypointEntry, ...WaypointEntry[]];
+}
+/**
+ * One waypoint, as in `aerodaas.Waypoint`: metres, seconds, radians, m/s.
+ */
+export interface WaypointEntry {
+  deadline?: number | null;
+  hover_duration?: number;
+  id: string;
+  priority?: number;
+  speed?: number | null;
+  waypoint_type?: "relative" | "local" | "global";
+  x: number;
+  y: number;
+  yaw?: number | null;
+  z: number;
+}
+/**
+ * Answer to each request that is not carried out, with the HTTP status.
+ */
+export interface RefusalOut {
+  text: string;
+}

@@ -1,0 +1,170 @@
+"""A real browser, driven by the DevTools protocol: pages are opened, clicked and looked at."""
+
+from __future__ import annotations
+
+import base64
+import itertools
+import json
+import subprocess
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from required import peer
+from typing_extensions import Self
+from websockets.sync.client import ClientConnection, connect
+
+__all__ = ["Browser", "Page"]
+
+_WORDS = (
+    "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--remote-debugging-port=0",
+)  # fmt: skip
+_START_SECONDS = 60.0
+_WAIT_SECONDS = 60.0
+_MOST = 64 << 20
+
+
+class Browser:
+    """A browser with a profile of its own, which ends with it."""
+
+    def __enter__(self) -> Self:
+        self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        folder = Path(self._profile.name)
+        command = [peer("AERODAAS_BROWSER"), *_WORDS, f"--user-data-dir={folder}", "about:blank"]
+        self._process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        port, until = folder / "DevToolsActivePort", time.monotonic() + _START_SECONDS
+        while not port.is_file() or len(port.read_text().split()) < 2:
+            assert time.monotonic() < until, "the browser does not start"
+            time.sleep(0.05)
+        number, path = port.read_text().split()
+        self._stack = ExitStack()
+        url = f"ws://127.0.0.1:{number}{path}"
+        self._wire = _Wire(self._stack.enter_context(connect(url, max_size=_MOST)))
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stack.close()
+        self._process.terminate()
+        self._process.wait(20)
+        self._profile.cleanup()
+
+    def open(self, url: str, width: int = 1280, height: int = 900) -> Page:
+        """A tab of its own, without what other tabs have stored."""
+        context = self._wire.ask("Target.createBrowserContext")["browserContextId"]
+        target = self._wire.ask("Target.createTarget", url="about:blank", browserContextId=context)
+        words = {"targetId": target["targetId"], "flatten": True}
+        session = self._wire.ask("Target.attachToTarget", **words)["sessionId"]
+        return Page(self._wire, session, url, width, height)
+
+
+class Page:
+    """One tab."""
+
+    def __init__(self, wire: _Wire, session: str, url: str, width: int, height: int) -> None:
+        self._wire = wire
+        self._session = session
+        self._complaints: list[str] = []
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self._ask(f"{domain}.enable")
+        self.resize(width, height)
+        self._ask("Page.navigate", url=url)
+
+    def resize(self, width: int, height: int, scheme: str = "light") -> None:
+        """Show it in a window of this size, in a light or dark scheme."""
+        size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
+        self._ask("Emulation.setDeviceMetricsOverride", **size)
+        features = [{"name": "prefers-color-scheme", "value": scheme}]
+        self._ask("Emulation.setEmulatedMedia", features=features)
+
+    def run(self, script: str) -> Any:  # noqa: ANN401 - JSON
+        """The value of an expression, awaited."""
+        words = {"expression": script, "awaitPromise": True, "returnByValue": True}
+        answer = self._ask("Runtime.evaluate", **words)
+        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        return answer["result"].get("value")
+
+    def until(self, script: str, seconds: float = _WAIT_SECONDS) -> None:
+        """Wait until an expression is true, as JavaScript has it."""
+        until = time.monotonic() + seconds
+        while not self.run(f"Boolean({script})"):
+            shown = self.run("document.body?.innerText.slice(0, 2000)")
+            assert time.monotonic() < until, f"not so: {script}\n{shown}\n{self.complaints()}"
+            time.sleep(0.05)
+
+    def text(self, selector: str) -> str:
+        """The text of an element; empty where there is none."""
+        return str(self.run(f"document.querySelector({json.dumps(selector)})?.innerText ?? ''"))
+
+    def click(self, x: float, y: float) -> None:
+        """Press and release the mouse at a point of the window."""
+        for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
+            words = {"type": kind, "x": x, "y": y, "button": "left", "clickCount": 1}
+            self._ask("Input.dispatchMouseEvent", **words)
+
+    def press(self, selector: str) -> None:
+        """Click the middle of an element, which comes into view first."""
+        place = json.dumps(selector)
+        self.run(f"document.querySelector({place}).scrollIntoView({{block: 'center'}})")
+        at = self.run(
+            f"(b => [b.x + b.width / 2, b.y + b.height / 2])"
+            f"(document.querySelector({place}).getBoundingClientRect())"
+        )
+        self.click(*at)
+
+    def key(self, key: str) -> None:
+        """Press a key on what has the focus."""
+        for kind in ("keyDown", "keyUp"):
+            self._ask(
+                "Input.dispatchKeyEvent", type=kind, key=key, text=key if len(key) == 1 else ""
+            )
+
+    def picture(self, path: Path) -> None:
+        """Write what the window shows as a PNG."""
+        path.write_bytes(base64.b64decode(self._ask("Page.captureScreenshot")["data"]))
+
+    def complaints(self) -> list[str]:
+        """Errors that the browser has told since the page was opened."""
+        self.run("0")
+        for event in self._wire.take_events(self._session):
+            said = event["params"]
+            if event["method"] == "Runtime.exceptionThrown":
+                self._complaints.append(json.dumps(said["exceptionDetails"]))
+            if event["method"] == "Log.entryAdded" and said["entry"]["level"] == "error":
+                self._complaints.append(said["entry"]["text"])
+        return self._complaints
+
+    def _ask(self, method: str, **words: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
+        return self._wire.ask(method, self._session, **words)
+
+
+class _Wire:
+    """Requests and answers by number; events are kept for their session."""
+
+    def __init__(self, socket: ClientConnection) -> None:
+        self._socket = socket
+        self._numbers = itertools.count(1)
+        self._events: list[dict[str, Any]] = []
+
+    def ask(self, method: str, session: str = "", **words: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
+        number = next(self._numbers)
+        question: dict[str, Any] = {"id": number, "method": method, "params": words}
+        if session:
+            question["sessionId"] = session
+        self._socket.send(json.dumps(question))
+        while True:
+            answer: dict[str, Any] = json.loads(self._socket.recv(_WAIT_SECONDS))
+            if answer.get("id") == number:
+                assert "error" not in answer, (method, answer["error"])
+                found: dict[str, Any] = answer["result"]
+                return found
+            if answer.get("method") in {"Runtime.exceptionThrown", "Log.entryAdded"}:
+                self._events.append(answer)
+
+    def take_events(self, session: str) -> list[dict[str, Any]]:
+        mine = [one for one in self._events if one.get("sessionId") == session]
+        self._events = [one for one in self._events if one.get("sessionId") != session]
+        return mine

@@ -1,0 +1,75 @@
+"""A console without a flight behind it: of a drone that is always on its way to one waypoint."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.console.server import ConsoleServer
+from aerodaas.dataflow.graph import Graph
+from aerodaas.mission.commands import Answer, Command
+from aerodaas.types.data import Battery, Odometry
+from aerodaas.types.errors import MissionError
+from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["Run", "console"]
+
+ENVIRONMENT = {
+    "name": "field",
+    "robots": [{"id": "drone", "driver": "simulated"}],
+    "compute": [{"id": "edge", "kind": "edge"}],
+}
+
+
+class Run:
+    """A flight that hovers before one waypoint, and remembers what it was told."""
+
+    def __init__(self) -> None:
+        self.config = EnvironmentConfig.model_validate(ENVIRONMENT)
+        self.graph = Graph()
+        self.over = False
+        self.state: Any = None
+        self.commands: list[Command] = []
+        self.notes: list[str] = []
+
+    def look(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
+        """Enroute to a waypoint."""
+        del newest
+        target = Waypoint("wp1", 3, 4, 2, waypoint_type="local")
+        still = np.zeros(3)
+        odometry = Odometry(np.array([1.0, 2.0, 3.0]), still, 0.0)
+        vehicle = VehicleState(1, odometry, Battery(0.5), VehicleMode.GUIDED, armed=True)
+        status = MissionStatus(10**9, MissionState.ENROUTE, "flying to wp1", target)
+        return SimpleNamespace(
+            robots={"drone": SimpleNamespace(status=status, state=vehicle)}, alerts=[]
+        )
+
+    def command(self, robot: str, command: Command) -> Answer:
+        """Remember it."""
+        if robot != "drone":
+            raise MissionError(f"{robot} does not fly")
+        self.commands.append(command)
+        return Answer(accepted=True, text="so be it")
+
+    def note(self, kind: str, text: str) -> None:
+        """Remember it."""
+        self.notes.append(f"{kind}: {text}")
+
+
+@contextmanager
+def console() -> Iterator[tuple[ConsoleServer, Run]]:
+    """The console of a flight that never ends."""
+    run = Run()
+    server = ConsoleServer("127.0.0.1:0")
+    server.start(run, "survey")
+    try:
+        yield server, run
+    finally:
+        server.close()

@@ -1,0 +1,206 @@
+"""Who may do what at the console of one's own flight, and what its answers are."""
+
+from __future__ import annotations
+
+import json
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+from hovering import Run, console
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+from aerodaas.console.access import bearer
+from aerodaas.console.server import ConsoleServer
+from aerodaas.mission.commands import AddNavigation, Pause
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.waypoints import Waypoint
+
+HOVER = {"robot": "drone", "command": "pause"}
+
+
+@pytest.fixture(scope="module")
+def flying() -> Iterator[tuple[ConsoleServer, Run]]:
+    """One for all tests here."""
+    with console() as both:
+        yield both
+
+
+def token_of(address: str) -> str:
+    """The token in an address."""
+    return address.partition("#token=")[2]
+
+
+def ask(
+    address: str, path: str, body: object = None, token: str | None = None, **headers: str
+) -> tuple[int, dict[str, str], Any]:
+    """Send a request; returns status, headers and the answer."""
+    data = None if body is None else json.dumps(body).encode()
+    more = {"Authorization": f"Bearer {token_of(address) if token is None else token}"}
+    request = urllib.request.Request(  # noqa: S310 - loopback
+        address.partition("/#")[0] + path,
+        data,
+        {**more, "Content-Type": "application/json", **headers},
+    )
+    try:
+        with urllib.request.urlopen(request, timeout=20) as response:  # noqa: S310 - loopback
+            status, known, content = response.status, response.headers, response.read()
+    except urllib.error.HTTPError as error:
+        status, known, content = error.code, error.headers, error.read()
+    found = json.loads(content) if known.get_content_type() == "application/json" else content
+    return status, {key.lower(): value for key, value in known.items()}, found
+
+
+@pytest.mark.parametrize("path", ["/", "/console.js", "/console.css", "/icon.svg"])
+def test_the_page_needs_no_token_and_admits_nothing_from_elsewhere(
+    flying: tuple[ConsoleServer, Run], path: str
+) -> None:
+    """It holds no secret, and runs no script but its own."""
+    status, headers, content = ask(flying[0].address(), path, token="")
+    assert status == 200
+    assert content
+    policy = headers["content-security-policy"]
+    assert "default-src 'none'" in policy
+    assert "script-src 'self';" in policy
+    assert "unsafe" not in policy
+    assert "frame-ancestors 'none'" in policy
+    assert headers["x-content-type-options"] == "nosniff"
+
+
+@pytest.mark.parametrize("token", ["", "wrong", "é"])
+def test_all_else_needs_one(flying: tuple[ConsoleServer, Run], token: str) -> None:
+    """Neither state nor commands without one of the two tokens."""
+    if not token.isascii():
+        token = token.encode().decode("latin-1")
+    for path, body in (("/v1/missions", None), ("/v1/missions/own/commands", HOVER)):
+        status, _, answer = ask(flying[0].address(), path, body, token)
+        assert status == 401
+        assert "token" in answer["text"]
+    assert not flying[1].commands
+
+
+def test_a_viewer_watches_and_does_not_fly(flying: tuple[ConsoleServer, Run]) -> None:
+    """The second token sees the state; whatever it asks of the drone is refused."""
+    address = flying[0].address(viewer=True)
+    assert ask(address, "/v1/me")[2]["role"] == "viewer"
+    assert ask(address, "/v1/missions/own")[2]["name"] == "survey"
+    visit = {"robot": "drone", "waypoints": [{"id": "a", "x": 1.0, "y": 1.0, "z": 1.0}]}
+    for route, body in (("commands", HOVER), ("navigation", visit)):
+        status, _, answer = ask(address, f"/v1/missions/own/{route}", body)
+        assert (status, answer["text"]) == (403, "this needs the role pilot; you are viewer")
+    assert not flying[1].commands
+
+
+def test_a_pilot_flies_and_people_are_told(flying: tuple[ConsoleServer, Run]) -> None:
+    """Commands and waypoints reach the drone; the answer is its own, and an alert repeats it."""
+    server, run = flying
+    status, _, answer = ask(server.address(), "/v1/missions/own/commands", HOVER)
+    assert (status, answer["accepted"], answer["text"]) == (200, True, "so be it")
+    waypoint = {"id": "a", "x": 1.5, "y": 2.5, "z": 3.5, "waypoint_type": "local", "priority": 1}
+    body = {"robot": "drone", "waypoints": [waypoint], "deadline": 90.0}
+    assert ask(server.address(), "/v1/missions/own/navigation", body)[0] == 200
+    pause, visit = run.commands
+    assert isinstance(pause, Pause)
+    assert isinstance(visit, AddNavigation)
+    assert visit.deadline == 90.0
+    (place,) = visit.navigation
+    assert isinstance(place, Waypoint)
+    assert (place.x, place.y, place.z) == (1.5, 2.5, 3.5)
+    assert run.notes == [
+        "console_command: the console asked drone to pause: accepted: so be it",
+        "console_command: the console asked drone to visit a: accepted: so be it",
+    ]
+    run.commands.clear()
+
+
+@pytest.mark.parametrize(
+    ("path", "body", "status", "text"),
+    [
+        ("/v1/missions/other/commands", HOVER, 404, "own"),
+        ("/v1/missions/own/commands", {**HOVER, "robot": "ghost"}, 409, "ghost does not fly"),
+        ("/v1/missions/own/commands", {**HOVER, "command": "loop"}, 422, "command"),
+        ("/v1/missions/own/navigation", {"robot": "drone", "waypoints": []}, 422, "waypoints"),
+        ("/v1/nothing", None, 404, "Not Found"),
+    ],
+)
+def test_refusals_have_their_reason(
+    flying: tuple[ConsoleServer, Run], path: str, body: object, status: int, text: str
+) -> None:
+    """As the service's do: a status and one text."""
+    found = ask(flying[0].address(), path, body)
+    assert found[0] == status
+    assert text in found[2]["text"]
+
+
+@pytest.mark.parametrize(
+    "headers", [{"Host": "evil.example"}, {"Origin": "https://evil.example"}, {"Origin": "null"}]
+)
+def test_no_page_of_a_strangers_looks_on(
+    flying: tuple[ConsoleServer, Run], headers: dict[str, str]
+) -> None:
+    """Nor one whose name was made to resolve to this machine; not even with the token."""
+    assert ask(flying[0].address(), "/v1/missions", **headers)[0] == 403
+
+
+def test_a_body_without_end_is_not_read(flying: tuple[ConsoleServer, Run]) -> None:
+    """Its size is looked at first."""
+    words = {"Content-Length": "2000000"}
+    assert ask(flying[0].address(), "/v1/missions/own/commands", HOVER, **words)[0] == 413
+
+
+def test_a_browsers_socket_brings_its_token_as_a_subprotocol(
+    flying: tuple[ConsoleServer, Run],
+) -> None:
+    """The token itself is not sent back; the state has the waypoint's place."""
+    address = flying[0].address(viewer=True)
+    url = address.partition("/#")[0].replace("http", "ws") + "/v1/missions/own/live?rate=20"
+    words = [Subprotocol("aerodaas"), Subprotocol(f"bearer.{token_of(address)}")]
+    with connect(url, subprotocols=words) as socket:
+        assert socket.subprotocol == "aerodaas"
+        while True:
+            message = json.loads(socket.recv(10))
+            status = message["mission"]["status"].get("drone")
+            if status:
+                break
+    assert message["now"] > 10**18
+    assert status["places"] == {"wp1": [3, 4, 2]}
+    assert (status["position"], status["mode"]) == ([1, 2, 3], "guided")
+    with pytest.raises(InvalidStatus) as refused:
+        connect(url, subprotocols=[Subprotocol("aerodaas"), Subprotocol("bearer.wrong")])
+    assert refused.value.response.status_code == 401
+
+
+def test_watchers_are_told_that_the_flight_is_over() -> None:
+    """By the last state and an end, before the server is gone."""
+    with ExitStack() as stack:
+        server, _ = stack.enter_context(console())
+        address = server.address()
+        url = address.partition("/#")[0].replace("http", "ws") + "/v1/missions/own/live?rate=20"
+        headers = {"Authorization": f"Bearer {token_of(address)}"}
+        with connect(url, additional_headers=headers) as socket:
+            socket.recv(10)
+            stack.close()
+            messages = [json.loads(text) for text in socket]
+    assert messages[-1]["kind"] == "end"
+    assert messages[-2]["mission"]["phase"] == "landed"
+
+
+def test_what_is_no_token_is_none() -> None:
+    """A token as a subprotocol counts only beside the name of ours."""
+    assert bearer({"authorization": "Bearer  a "}) == "a"
+    assert bearer({"sec-websocket-protocol": "aerodaas, bearer.b"}) == "b"
+    assert bearer({"sec-websocket-protocol": "bearer.b"}) == ""
+    assert bearer({"authorization": "Basic a"}) == ""
+
+
+def test_an_address_in_use_is_named() -> None:
+    """With the option that chooses another."""
+    with console() as (server, _):
+        taken = server.address().partition("//")[2].partition("/")[0]
+        with pytest.raises(ConfigError, match="--console-address"):
+            ConsoleServer(taken)

@@ -1,0 +1,179 @@
+"""The console in a real browser: a flight watched, commanded, and found again after a cut."""
+
+from __future__ import annotations
+
+import json
+import urllib.parse
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from browser import Browser, Page
+from flown import Proxy, Watched
+from hovering import console
+from required import needs_peer
+
+from aerodaas.recording.reader import Recording
+
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
+
+PLACE = (4.0, -5.0)
+"""East and north of a waypoint that the survey does not visit."""
+NEAR = 0.8
+
+
+@pytest.fixture
+def browser() -> Iterator[Browser]:
+    """A browser of the test's own."""
+    with Browser() as browser:
+        yield browser
+
+
+def button(name: str) -> str:
+    """Script that presses a button of the commands, which may not be disabled."""
+    return f"document.querySelector('.command.{name}:not(:disabled)').click()"
+
+
+def until_state(page: Page, *states: str) -> None:
+    """Wait until the page says that the drone is in one of these states."""
+    page.until(
+        f"{json.dumps(states)}.includes(document.querySelector('[data-testid=state]')?.innerText)"
+    )
+
+
+def until_done(page: Page, what: str) -> None:
+    """Wait until the newest order is this one, and was seen to be carried out."""
+    page.until(
+        f"(one => one?.dataset.stage === 'done' && one.innerText.startsWith({json.dumps(what)}))"
+        "(document.querySelector('.orders li'))"
+    )
+
+
+def click_map(page: Page, east: float, north: float) -> None:
+    """Click a place of the map."""
+    x, y = page.run(
+        "(map => { const box = map.getBoundingClientRect(); const of = map.dataset; return ["
+        f"box.x + box.width / 2 + ({east} - of.east) * of.scale,"
+        f"box.y + box.height / 2 - ({north} - of.north) * of.scale]; }})"
+        "(document.querySelector('[data-testid=map]'))"
+    )
+    page.click(x, y)
+
+
+def fly_there(page: Page, **values: float) -> None:
+    """Fill in the form of a waypoint, and send it."""
+    for name, value in values.items():
+        page.run(f"document.querySelector('.waypointform [name={name}]').value = '{value}'")
+    page.press(".waypointform .primary")
+
+
+def test_a_flight_is_watched_commanded_and_found_again(browser: Browser, tmp_path: Path) -> None:
+    """From start to landing, on a map that is clicked, over a way that is cut once."""
+    with Watched(
+        "farm_survey", tmp_path, "--set", "quadrotor_base.limits.cruise_speed=2"
+    ) as flight:
+        address = urllib.parse.urlsplit(flight.pilot)
+        proxy = Proxy(address.port or 0)
+        page = browser.open(f"http://127.0.0.1:{proxy.port}/#{address.fragment}")
+        until_state(page, "enroute", "loitering")
+        assert "token" not in page.run("location.href")
+        page.until("document.querySelector('[data-testid=video]')?.dataset.stamp > 0")
+        assert page.run("document.querySelectorAll('[data-waypoint]').length") == 4
+
+        # The waypoint is more urgent than the survey's, so the drone goes there at once.
+        click_map(page, *PLACE)
+        page.until("document.querySelector('.waypointform')")
+        assert float(page.run("document.querySelector('[name=east]').value")) == pytest.approx(
+            PLACE[0], abs=0.2
+        )
+        fly_there(page, priority=1, hover=1, height=2.5)
+        page.until("document.querySelector('.orders li')?.dataset.stage === 'done'")
+        assert "visited" in page.text(".orders li")
+
+        page.run(button("pause"))
+        until_done(page, "pause")
+        until_state(page, "paused")
+        page.until("document.querySelector('.alerts .new')?.innerText.includes('pause: accepted')")
+        page.press(".alerts .new button")
+        page.until("document.querySelectorAll('.alerts .old').length >= 1")
+
+        # Nobody who may only watch can have it go on.
+        watcher = browser.open(flight.viewer, 400)
+        until_state(watcher, "paused")
+        watcher.until("document.querySelectorAll('.command:disabled').length === 5")
+        click_map(watcher, *PLACE)
+        assert watcher.run("document.querySelector('.waypointform')") is None
+        refused = watcher.run(
+            "fetch('v1/missions/own/commands', {method: 'POST', headers: {"
+            "'Content-Type': 'application/json', Authorization: "
+            "`Bearer ${sessionStorage.getItem('aerodaas.token')}`},"
+            "body: JSON.stringify({robot: 'quadrotor_base', command: 'resume'})})"
+            ".then(answer => answer.status)"
+        )
+        assert refused == 403
+        until_state(watcher, "paused")
+
+        # What is old is shown as old; the way comes back without anybody's doing.
+        assert page.complaints() == []
+        proxy.cut()
+        page.until("document.querySelector('[data-testid=banner]')?.innerText.includes('old')")
+        page.until("document.querySelector('[data-testid=age]')?.innerText.includes('stale')")
+        proxy.mend()
+        page.until("document.querySelector('[data-testid=connection]').innerText === 'live'")
+        page.until("document.querySelector('[data-testid=banner]') === null")
+        page.until("!document.querySelector('[data-testid=age]').innerText.includes('stale')")
+
+        page.run(button("resume"))
+        until_done(page, "resume")
+        page.run(button("return-home"))
+        until_done(page, "return-home")
+        for one in (page, watcher):
+            one.until(
+                "document.querySelector('[data-testid=banner]')?.innerText.includes('landed')"
+            )
+        assert flight.ended() == 0
+        proxy.close()
+    assert passed(flight.recording, PLACE)
+
+
+def passed(path: Path, place: tuple[float, float]) -> bool:
+    """Whether the drone was at a place, by the simulator's own truth."""
+    with Recording.open(path) as recording:
+        truths = [
+            (truth["position"]["x"], truth["position"]["y"])
+            for record in recording.records()
+            if isinstance(record.value, dict) and (truth := record.value.get("truth"))
+        ]
+    return bool(np.linalg.norm(np.array(truths) - place, axis=1).min() < NEAR)
+
+
+def test_boxes_are_drawn_on_their_own_frame(browser: Browser, tmp_path: Path) -> None:
+    """Cars that were found, on a picture whose stamp is that of the detections."""
+    with Watched("vehicle_tracking", tmp_path) as flight:
+        page = browser.open(flight.viewer)
+        page.until("document.querySelector('[data-testid=video]')?.dataset.boxes > 0", 120)
+        assert "found" in page.text(".stamp")
+        assert page.complaints() == []
+
+
+@pytest.mark.parametrize(("width", "height"), [(400, 800), (1280, 800), (2560, 1440)])
+def test_it_fits(browser: Browser, width: int, height: int) -> None:
+    """Without a token it asks for one, in windows of a phone and of a wall; nothing is cut off."""
+    with console() as (server, _):
+        page = browser.open(server.address(), width, height)
+        page.until("document.querySelector('.commands')")
+        for scheme in ("light", "dark"):
+            page.resize(width, height, scheme)
+            assert page.run("document.documentElement.scrollWidth - innerWidth") <= 0
+            assert page.run(
+                "[...document.querySelectorAll('.card, button')].every("
+                "one => one.getBoundingClientRect().right <= innerWidth)"
+            )
+        # By keyboard alone: the map takes the focus, and Enter begins a waypoint.
+        page.run("document.querySelector('[data-testid=map]').focus()")
+        page.key("Enter")
+        page.until("document.querySelector('.waypointform')")
+        assert page.complaints() == []
+        asked = browser.open(server.address().partition("#")[0])
+        asked.until("document.querySelector('input[name=token]')")

@@ -1,0 +1,41 @@
+"""What a flight's meter remembers for those who look on later."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
+
+from aerodaas.console.meter import FlightMeter
+from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.waypoints import Waypoint
+
+if TYPE_CHECKING:
+    from aerodaas.actors.run.flight import FlightState
+
+
+def flying_to(target: int, *pending: int) -> FlightState:
+    """A state of one drone on its way to the waypoint `target`, as numbers name them."""
+    ahead = [Waypoint(f"wp{one}", one, 2, 3, waypoint_type="local") for one in (target, *pending)]
+    status = MissionStatus(10**9, MissionState.ENROUTE, "", ahead[0], tuple(ahead[1:]))
+    robots = {"drone": SimpleNamespace(status=status, state=None)}
+    return cast("FlightState", SimpleNamespace(robots=robots, alerts=[]))
+
+
+def test_places_behind_are_remembered() -> None:
+    """Who comes late sees where the drone has been."""
+    meter = FlightMeter()
+    meter.note(flying_to(1, 2))
+    meter.note(flying_to(2))
+    assert meter.status["drone"].places == {"wp1": (1, 2, 3), "wp2": (2, 2, 3)}
+
+
+def test_a_long_flight_forgets_its_first_places_and_none_ahead() -> None:
+    """A status is sent often; all that lies ahead is in it."""
+    meter = FlightMeter()
+    for number in range(300):
+        meter.note(flying_to(number))
+    places = meter.status["drone"].places
+    assert (len(places), "wp99" in places, "wp100" in places) == (200, False, True)
+    meter.note(flying_to(*range(1000, 1400)))
+    places = meter.status["drone"].places
+    assert set(places) == {f"wp{number}" for number in range(1000, 1400)}

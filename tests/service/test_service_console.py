@@ -1,0 +1,83 @@
+"""The console at a provider's address: its page for anybody, missions by token and role."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+from browser import Browser
+from required import needs_peer
+from served import Served, document, fleet, robot
+from websockets.exceptions import InvalidStatus
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
+
+FAR = ((20.0, 0.0), (20.0, 20.0))
+
+
+@pytest.fixture(scope="module")
+def provider() -> Iterator[Served]:
+    """One drone in real time, without rehearsals."""
+    with Served(fleet(robot("one")), "--no-rehearse") as served:
+        yield served
+
+
+@pytest.fixture(scope="module")
+def mission(provider: Served) -> str:
+    """A mission in flight, of the administrator's tenant."""
+    answer = provider.ask("POST", "/v1/missions", {"document": document("one", *FAR)})
+    id_ = str(answer["id"])
+    provider.until(lambda: "one" in provider.mission(id_)["status"])
+    return id_
+
+
+def test_the_page_is_there_for_anybody_and_nothing_else_is(provider: Served) -> None:
+    """The page's files alone need no token."""
+    for path in ("/", "/console.js", "/console.css"):
+        status, content = provider.send("GET", path, token="")
+        assert status == 200
+        assert content
+    for path in ("/v1/missions", "/v1/fleet", "/index.html", "//", "/console.js/", "/v1/../"):
+        assert provider.send("GET", path, token="")[0] == 401
+    assert provider.send("POST", "/", b"{}", token="")[0] == 405
+
+
+def test_a_browsers_socket_comes_in_by_its_subprotocol(provider: Served, mission: str) -> None:
+    """With the account's token; places of waypoints are told."""
+    url = f"{provider.url.replace('http', 'ws')}/v1/missions/{mission}/live"
+    words = [Subprotocol("aerodaas"), Subprotocol(f"bearer.{provider.token}")]
+    with connect(url, subprotocols=words) as socket:
+        assert socket.subprotocol == "aerodaas"
+        status = json.loads(socket.recv(20))["mission"]["status"]["one"]
+    assert status["places"]["wp1"] == [20, 20, 2]
+    wrong = [Subprotocol("aerodaas"), Subprotocol("bearer.aerodaas_wrong")]
+    with pytest.raises(InvalidStatus) as refused, connect(url, subprotocols=wrong):
+        pass
+    assert refused.value.response.status_code == 401
+
+
+@needs_peer("AERODAAS_BROWSER")
+def test_missions_are_watched_and_commanded_by_role(provider: Served, mission: str) -> None:
+    """An operator pauses a mission from the page; a viewer of its tenant sees that, and no more."""
+    del mission
+    tenant = provider.ask("GET", "/v1/me")["tenant"]
+    viewer = provider.user("vera", tenant, "viewer")
+    with Browser() as browser:
+        pages = [
+            browser.open(f"{provider.url}/#token={token}") for token in (provider.token, viewer)
+        ]
+        pilot, watcher = pages
+        pilot.until("document.querySelector('.command.pause:not(:disabled)')")
+        pilot.run("document.querySelector('.command.pause').click()")
+        pilot.until("document.querySelector('.orders li')?.dataset.stage === 'done'")
+        for page in pages:
+            page.until("document.querySelector('[data-testid=state]')?.innerText === 'paused'")
+            assert page.complaints() == []
+        assert watcher.run("document.querySelectorAll('.command:disabled').length") == 5
+        pilot.run("document.querySelector('.command.return-home').click()")
+        watcher.until(
+            "document.querySelector('[data-testid=banner]')?.innerText.includes('over')", 90
+        )
