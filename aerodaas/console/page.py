@@ -34,7 +34,7 @@ _HEADERS = {
 
 def is_page(connection: HTTPConnection) -> bool:
     """Whether a request is for one of the page's own files, which hold no secret."""
-    return connection.scope["type"] == "http" and connection.url.path in _FILES
+    return connection.scope["type"] == "http" and connection.scope["path"] in _FILES
 
 
 def page_routes() -> APIRouter:

@@ -49,7 +49,7 @@ class Gate:
 
 def _bound_of(connection: HTTPConnection) -> int:
     """Most bytes of a request's body; raises RefusedError for one that says it has more."""
-    model = connection.url.path.startswith("/v1/models/")
+    model = connection.scope["path"].startswith("/v1/models/")
     most = LARGEST_MODEL if model else _LARGEST_BODY
     length = connection.headers.get("content-length", "0")
     if not length.isdecimal() or int(length) > most:

@@ -56,6 +56,15 @@ def ask(
     return status, {key.lower(): value for key, value in known.items()}, found
 
 
+def test_a_host_that_looks_like_the_page_opens_nothing() -> None:
+    """An address put together from the `Host` header would end in the page's own path."""
+    with console() as (server, _):
+        address = server.address()
+        host = address.removeprefix("http://").partition("/#")[0]
+        for tail in ("/#", "/?", "/icon.svg?", "\\/#"):
+            assert ask(address, "/v1/missions", token="", Host=host + tail)[0] in {400, 401}
+
+
 @pytest.mark.parametrize("path", ["/", "/console.js", "/console.css", "/icon.svg"])
 def test_the_page_needs_no_token_and_admits_nothing_from_elsewhere(
     flying: tuple[ConsoleServer, Run], path: str

@@ -62,7 +62,7 @@ class Admission:
     def _refuse(
         self, principal: Principal, connection: HTTPConnection, error: RefusedError
     ) -> None:
-        action = f"{connection.scope.get('method', 'WS')} {connection.url.path}"
+        action = f"{connection.scope.get('method', 'WS')} {connection.scope['path']}"
         self._audit.write(
             principal,
             action,
