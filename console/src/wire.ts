@@ -180,7 +180,7 @@ export interface WaypointEntry {
   id: string;
   priority?: number;
   speed?: number | null;
-  waypoint_type?: "relative" | "local" | "global";
+  waypoint_type?: "relative" | "local" | "global" | "global_relative";
   x: number;
   y: number;
   yaw?: number | null;
