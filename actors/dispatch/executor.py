@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import ray
 
 from aerodaas.actors.cluster.dead_man import leave
-from aerodaas.actors.dispatch.frame_codec import CodedFrame, decoded
+from aerodaas.actors.dispatch.frame_codec import CodedFrame, decoded, load
 from aerodaas.actors.priority import be_nice
 from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.application import Application
@@ -72,6 +72,7 @@ class CloudExecutor:
         del variables
         if ray.is_initialized() and ray.get_runtime_context().get_actor_id():
             be_nice(_NICENESS)
+        load()
         for analysis in analyses.values():
             analysis.open()
         self._turns = {name: threading.Lock() for name, a in analyses.items() if not a.concurrent}

@@ -13,7 +13,7 @@ from aerodaas.types.errors import SourceError
 from aerodaas.types.geometry import CameraModel
 from aerodaas.types.records import fast_pickle
 
-__all__ = ["Codec", "CodedFrame", "decoded"]
+__all__ = ["Codec", "CodedFrame", "decoded", "load"]
 
 
 @fast_pickle
@@ -54,11 +54,19 @@ class Codec:
         return "raw" if self.compression == "none" else self.compression
 
 
+def load() -> None:
+    """Load OpenCV now: coding is timed, and the first frame's must not take a second.
+
+    Not with this module, which the application imports to plan a flight.
+    """
+    import cv2  # noqa: F401, PLC0415
+
+
 def decoded(item: Frame | CodedFrame) -> Frame:
     """Decoded frame; raises SourceError for damaged data."""
     if isinstance(item, Frame):
         return item
-    import cv2  # noqa: PLC0415 - 10 MB, for those who decode only
+    import cv2  # noqa: PLC0415 - see `load`
 
     image = cv2.imdecode(item.data, cv2.IMREAD_COLOR)
     depth = None if item.depth is None else cv2.imdecode(item.depth, cv2.IMREAD_UNCHANGED)
@@ -69,14 +77,14 @@ def decoded(item: Frame | CodedFrame) -> Frame:
 
 
 def _jpeg(pixels: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
-    import cv2  # noqa: PLC0415 - as in `decoded`
+    import cv2  # noqa: PLC0415 - see `load`
 
     _, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, quality])
     return np.asarray(data, np.uint8).ravel()
 
 
 def _png(pixels: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.uint8]:
-    import cv2  # noqa: PLC0415 - as in `decoded`
+    import cv2  # noqa: PLC0415 - see `load`
 
     # PNG's fastest settings: they halve 640 x 360 pixels in 12 ms on one core.
     fastest = [cv2.IMWRITE_PNG_COMPRESSION, 1]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from aerodaas.actors.dispatch.costs import LinkEstimate, Uplink
-from aerodaas.actors.dispatch.frame_codec import Codec
+from aerodaas.actors.dispatch.frame_codec import Codec, load
 from aerodaas.actors.streams import encode_message
 from aerodaas.types.data import Frame
 from aerodaas.types.status import Message
@@ -47,6 +47,7 @@ class FrameUplink:
 
     def __init__(self, codec: Codec) -> None:
         """Create the uplink of frames in `codec`."""
+        load()
         self.codec = codec
         self.link = LinkEstimate()
         self.uplink = Uplink(self.link)

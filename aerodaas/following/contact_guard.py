@@ -31,6 +31,9 @@ _CLOSING = 0.3
 _STILL_TURNING = 0.4
 """Fraction of their closing speed by which people are assumed to come faster than estimated, as
 the estimate lags behind a turn."""
+_FAR = 4.0
+"""Metres beyond which somebody must seem to come in two frames in a row before the drone gives way:
+a box that is too high for one frame looks like a sprint, and there the drone can wait for one."""
 _HOLD = 0.8
 """Seconds for which the drone goes on giving way after the last danger, while somebody comes."""
 _CLEARLY = 0.15
@@ -64,6 +67,8 @@ class ContactGuard:
         """Velocity at which the drone gives way (ENU, m/s); None if it does not."""
         self._danger_at = 0
         """Mission time of the last sign of danger, nanoseconds."""
+        self._doubted = False
+        """Whether the last frame showed a danger beyond `_FAR`."""
 
     @property
     def evading(self) -> bool:
@@ -74,6 +79,7 @@ class ContactGuard:
         """Forget all people."""
         self._people.reset()
         self._velocity = None
+        self._doubted = False
 
     def see(
         self,
@@ -93,7 +99,10 @@ class ContactGuard:
         """
         pose = now or _STILL
         people = self._people.relative_to(pose, stamp)
-        walks, danger = self._walks(people, pose)
+        walks, danger, distance = self._walks(people, pose)
+        doubted, self._doubted = self._doubted, danger is not None and distance > _FAR
+        if self._doubted and not (doubted or self.evading):
+            danger = None
         comes = any(away < -_CLOSING for _, away, _ in people)
         if danger is not None:
             self._velocity = self._choose(danger, walks, pose)
@@ -126,12 +135,12 @@ class ContactGuard:
 
     def _walks(
         self, people: Iterable[Prediction], pose: Odometry
-    ) -> tuple[list[_Walk], Vector | None]:
-        """How everybody walks, and the direction of the nearest whom backing off will not avoid.
+    ) -> tuple[list[_Walk], Vector | None, float]:
+        """How everybody walks, and where the nearest is whom backing off will not avoid.
 
-        The direction is a unit vector from the drone; None without danger.
+        The direction is a unit vector from the drone, None without danger; the distance in metres.
         """
-        walks, danger = [], None
+        walks, danger, distance = [], None, math.inf
         flying = _velocity(pose)
         for seen, away, left in people:
             heading = pose.yaw + seen.bearing
@@ -144,8 +153,8 @@ class ContactGuard:
             if danger is None and closing > _CLOSING:
                 left_over = self._room(-self.limits.backward * ahead, [walks[-1]], pose, late=True)
                 if left_over < self.limits.contact + _EARLY:
-                    danger = ahead
-        return walks, danger
+                    danger, distance = ahead, seen.distance
+        return walks, danger, distance
 
     def _choose(self, ahead: Vector, walks: Sequence[_Walk], pose: Odometry) -> Vector:
         """Velocity (ENU) by which to give way to somebody in the direction `ahead`."""

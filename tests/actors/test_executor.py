@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 import threading
 import time
 from typing import Any, ClassVar
@@ -109,3 +111,16 @@ def test_an_executor_that_was_restarted_holds_nothing() -> None:
     """Whatever it is asked."""
     with pytest.raises(UnpreparedError, match="restarted"):
         CloudExecutor().execute("one", ("camera", 7), encoded())
+
+
+def test_the_first_frame_waits_for_no_library() -> None:
+    """Whoever times the coding of frames has loaded what codes them."""
+    code = (
+        "import sys\n"
+        "from aerodaas.actors.dispatch.frame_codec import Codec\n"
+        "from aerodaas.actors.dispatch.frame_uplink import FrameUplink\n"
+        "assert 'cv2' not in sys.modules\n"
+        "FrameUplink(Codec())\n"
+        "assert 'cv2' in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=60)

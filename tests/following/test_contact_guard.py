@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.following import contact_guard
 from aerodaas.following.contact_guard import ContactGuard
 from aerodaas.following.follow_settings import FollowLimits
 from aerodaas.following.target_motion import seen_from
@@ -244,6 +245,25 @@ def test_how_fast_people_go_away_counts_in_sight_and_in_that_direction() -> None
     assert drone.guard.away(1.0, pose, drone.stamp) == math.inf
     drone.guard.see([], pose, drone.stamp + 1, INTERVAL)
     assert drone.guard.away(0.0, pose, drone.stamp + 1) == math.inf
+
+
+@pytest.mark.parametrize(("speed", "waits"), [(1.2, 0), (3.5, 1)])
+def test_who_is_far_must_seem_to_come_twice(
+    monkeypatch: pytest.MonkeyPatch, speed: float, waits: int
+) -> None:
+    """A runner is given way to a frame later than without that rule; who is near, at once."""
+    first = {}
+    for far in (4.0, math.inf):
+        monkeypatch.setattr(contact_guard, "_FAR", far)
+        guard, pose = ContactGuard(LIMITS), Odometry(np.array([0.0, 0.0, 1.5]), np.zeros(3), 0.0)
+        for number in range(200):
+            place = (20.0 - speed * number * INTERVAL, 0.0)
+            stamp = round(number * INTERVAL * NANOSECONDS)
+            guard.see([seen_from(pose, place)], pose, stamp, INTERVAL)
+            if guard.evade(pose, stamp) is not None:
+                first[far] = number
+                break
+    assert first[4.0] - first[math.inf] == waits
 
 
 def test_the_people_are_forgotten() -> None:
