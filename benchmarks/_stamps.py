@@ -69,8 +69,7 @@ def _wait(original: Any, self: Any, timeout: float) -> None:  # noqa: ANN401
 def _decode(original: Any, source: Any) -> Any:  # noqa: ANN401
     began = time.monotonic_ns()
     message = original(source)
-    if "awake" in _latest:
-        _stamps.append(("awake", message.stream, message.seq, _latest["awake"]))
+    _stamps.append(("awake", message.stream, message.seq, _latest["awake"]))
     _stamps.append(("decode", message.stream, message.seq, began))
     _note("decoded", message)
     return message
@@ -79,7 +78,6 @@ def _decode(original: Any, source: Any) -> Any:  # noqa: ANN401
 def _work(original: Any, self: Any, message: Any) -> None:  # noqa: ANN401
     _note("work", message)
     original(self, message)
-    _note("done", message)
 
 
 def _take(original: Any, self: Any, message: Any, now: int) -> None:  # noqa: ANN401

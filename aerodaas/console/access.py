@@ -13,6 +13,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 
 from aerodaas.analytics.remote.attempts import WrongTokens
 from aerodaas.analytics.remote.denial import deny
+from aerodaas.analytics.remote.guard import address_of, body_objection
 from aerodaas.console.page import is_page
 from aerodaas.protocol.schemas import RefusalOut, Role
 
@@ -23,7 +24,6 @@ SUBPROTOCOL = "aerodaas"
 _BEARER = "bearer."
 _ROLE = "aerodaas.role"
 """Key of the sender's role in a request's ASGI scope."""
-_MOST_BYTES = 1_000_000
 
 
 def bearer(headers: Mapping[str, str]) -> str:
@@ -78,16 +78,13 @@ class TokenGuard:
             return
         connection = HTTPConnection(scope)
         role = self._keys.role(bearer(connection.headers))
-        length = connection.headers.get("content-length", "0")
-        if connection.headers.get("transfer-encoding"):
-            await _refuse(scope, send, HTTPStatus.LENGTH_REQUIRED, "say how long the body is")
-        elif not length.isdecimal() or int(length) > _MOST_BYTES:
-            text = f"a body has at most {_MOST_BYTES} bytes"
-            await _refuse(scope, send, HTTPStatus.REQUEST_ENTITY_TOO_LARGE, text)
+        status, text = body_objection(dict(scope["headers"]))
+        if status:
+            await _refuse(scope, send, status, text)
         elif role is not None or is_page(connection):
             scope[_ROLE] = role
             await self._app(scope, receive, send)
-        elif pause := self._wrong.count(_address(connection)):
+        elif pause := self._wrong.count(address_of(scope)):
             text = "too many wrong tokens"
             await _refuse(scope, send, HTTPStatus.TOO_MANY_REQUESTS, text, pause)
         else:
@@ -95,12 +92,5 @@ class TokenGuard:
             await _refuse(scope, send, HTTPStatus.UNAUTHORIZED, text)
 
 
-def _address(connection: HTTPConnection) -> str:
-    return connection.client.host if connection.client is not None else "an unknown address"
-
-
-async def _refuse(scope: Scope, send: Send, status: HTTPStatus, text: str, pause: int = 0) -> None:
-    headers = [(b"retry-after", b"%d" % pause)] if pause else []
-    if status is HTTPStatus.UNAUTHORIZED:
-        headers.append((b"www-authenticate", b"Bearer"))
-    await deny(scope, send, status, RefusalOut(text=text).model_dump(), *headers)
+async def _refuse(scope: Scope, send: Send, status: int, text: str, pause: int = 0) -> None:
+    await deny(scope, send, status, RefusalOut(text=text).model_dump(), pause=pause or None)

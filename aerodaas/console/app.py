@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
-from fastapi import APIRouter, FastAPI, HTTPException, Query, Request, WebSocket
+from fastapi import APIRouter, FastAPI, HTTPException, Request, WebSocket
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException as AnyHTTPException
 
+from aerodaas.analytics.remote.denial import malformed
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.redaction import catalogue
 from aerodaas.console.access import role_of
 from aerodaas.console.hub import StreamHub
-from aerodaas.console.live import LiveSession, wanted_streams
+from aerodaas.console.live import LiveSession, Rate, StreamNames, wanted_streams
 from aerodaas.console.own_flight import OWN, OwnFlight
 from aerodaas.console.page import page_routes
 from aerodaas.protocol.commands import COMMANDS
@@ -108,8 +107,8 @@ class _Routes:
         self,
         socket: WebSocket,
         mission: str,
-        rate: Annotated[float, Query(gt=0, le=20, allow_inf_nan=False)] = 5.0,
-        streams: Annotated[str, Query(max_length=2000)] = "",
+        rate: Rate = 5.0,
+        streams: StreamNames = "",
     ) -> None:
         """Send the flight's state, at most `rate` times a second, and items of `streams`."""
         _require_known(mission)
@@ -132,10 +131,7 @@ def _refused(_: Request, error: Exception) -> JSONResponse:
     """Word a refusal as the service does."""
     status, text = 409, str(error)
     if isinstance(error, RequestValidationError):
-        # Each wrong field and its place, without the input, which may hold NaN.
-        said: list[Any] = list(error.errors())
-        status = 422
-        text = "; ".join(f"{'.'.join(map(str, one['loc'][1:]))}: {one['msg']}" for one in said)
+        status, text = malformed(error.errors())
     elif isinstance(error, AnyHTTPException):
         status, text = error.status_code, str(error.detail)
     return JSONResponse(RefusalOut(text=text).model_dump(), status)

@@ -5,15 +5,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Annotated, Protocol, TypeAlias
 
-from fastapi import WebSocket, WebSocketDisconnect
+from fastapi import Query, WebSocket, WebSocketDisconnect
 
 from aerodaas.console.access import SUBPROTOCOL
 from aerodaas.console.hub import StreamHub, Watcher
 from aerodaas.types.clock import host_time_ns
 
-__all__ = ["LiveSession", "Shown", "wanted_streams"]
+__all__ = ["LiveSession", "Rate", "Shown", "StreamNames", "wanted_streams"]
+
+Rate: TypeAlias = Annotated[float, Query(gt=0, le=20, allow_inf_nan=False)]
+"""Most messages of a mission's state a second, of a view's address."""
+StreamNames: TypeAlias = Annotated[str, Query(max_length=2000)]
+"""Streams whose items are sent, too, by comma; of a view's address."""
 
 _MOST_STREAMS = 16
 _IDLE_SECONDS = 1.0

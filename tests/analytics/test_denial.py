@@ -25,7 +25,7 @@ def sent(kind: str, *extensions: str) -> list[dict[str, Any]]:
         messages.append(dict(message))
 
     scope = {"type": kind, "extensions": {name: {} for name in extensions}}
-    asyncio.run(deny(scope, send, 403, {"text": LONG}, (b"retry-after", b"3")))
+    asyncio.run(deny(scope, send, 403, {"text": LONG}, pause=3))
     return messages
 
 
@@ -40,6 +40,20 @@ def test_the_answer_has_the_whole_reason(kind: str, answer: str) -> None:
     assert (b"content-length", str(len(body["body"])).encode()) in start["headers"]
     assert body["type"] == f"{answer}.body"
     assert json.loads(body["body"]) == {"text": LONG}
+
+
+def test_only_a_missing_identity_is_asked_for() -> None:
+    """A 401 says how to come back; a 403 does not, and names no time unless it has one."""
+    messages: list[dict[str, Any]] = []
+
+    async def send(message: MutableMapping[str, Any]) -> None:
+        messages.append(dict(message))
+
+    for status in (401, 403):
+        asyncio.run(deny({"type": "http"}, send, status, {"text": "no"}))
+    asked = [dict(message["headers"]) for message in messages if "headers" in message]
+    assert [headers.get(b"www-authenticate") for headers in asked] == [b"Bearer", None]
+    assert not any(b"retry-after" in headers for headers in asked)
 
 
 def test_a_server_that_cannot_answer_closes_with_a_reason() -> None:

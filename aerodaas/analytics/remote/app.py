@@ -13,6 +13,7 @@ from fastapi.responses import JSONResponse, Response
 from starlette.exceptions import HTTPException as AnyHTTPException
 
 from aerodaas.analytics.commanding import MissionLink
+from aerodaas.analytics.remote.denial import malformed
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut, WaypointsIn
 from aerodaas.mission.commands import (
     Answer,
@@ -151,16 +152,8 @@ def _jpeg(frame: Frame) -> bytes:
 
 
 def _malformed(_: Request, error: Exception) -> JSONResponse:
-    """Report each invalid field and its location, without the input, which may contain NaN."""
     assert isinstance(error, RequestValidationError)  # noqa: S101 - registered for it alone
-    problems = error.errors()
-    status = 400 if any(problem["type"] == "json_invalid" for problem in problems) else 422
-    said = [f"{_place(problem['loc'])}: {problem['msg']}" for problem in problems]
-    return _refusal(status, "; ".join(said))
-
-
-def _place(location: tuple[int | str, ...]) -> str:
-    return ".".join(str(part) for part in location[1:]) or str(location[0])
+    return _refusal(*malformed(error.errors()))
 
 
 def _failed(_: Request, error: Exception) -> JSONResponse:

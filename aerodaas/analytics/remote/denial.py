@@ -7,11 +7,11 @@ that turns the closing of such a socket into an empty 403 would lose the reason.
 from __future__ import annotations
 
 import json
-from collections.abc import Awaitable, Callable, Iterable, Mapping, MutableMapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping, MutableMapping, Sequence
 from http import HTTPStatus
 from typing import Any, TypeAlias
 
-__all__ = ["answer_of", "closing_reason", "deny"]
+__all__ = ["answer_of", "closing_reason", "deny", "malformed"]
 
 _POLICY_VIOLATION = 1008
 _CLOSING_BYTES = 123
@@ -23,7 +23,12 @@ Send: TypeAlias = Callable[[MutableMapping[str, Any]], Awaitable[None]]
 
 
 async def deny(
-    scope: Mapping[str, Any], send: Send, status: int, content: Mapping[str, Any], *more: Header
+    scope: Mapping[str, Any],
+    send: Send,
+    status: int,
+    content: Mapping[str, Any],
+    *,
+    pause: int | None = None,
 ) -> None:
     """Refuse a request, or a WebSocket that is not accepted yet.
 
@@ -32,8 +37,11 @@ async def deny(
         send: As ASGI has it.
         status: HTTP status.
         content: The answer's JSON, whose `text` is the reason.
-        more: Further headers.
+        pause: Seconds after which the same request may succeed; None if it never will.
     """
+    more = [(b"www-authenticate", b"Bearer")] if status == HTTPStatus.UNAUTHORIZED else []
+    if pause is not None:
+        more.append((b"retry-after", b"%d" % pause))
     if scope["type"] == "websocket" and _ANSWERS not in scope.get("extensions", {}):
         reason = closing_reason(content["text"])
         await send({"type": "websocket.close", "code": _POLICY_VIOLATION, "reason": reason})
@@ -42,6 +50,21 @@ async def deny(
     body, headers = _coded(content, more)
     await send({"type": f"{kind}.start", "status": status, "headers": headers})
     await send({"type": f"{kind}.body", "body": body})
+
+
+def malformed(problems: Sequence[Mapping[str, Any]]) -> tuple[int, str]:
+    """Status and text for a request that is not as its schema has it; `problems` are pydantic's.
+
+    Each wrong field and its place, without the input, which may hold NaN or secrets.
+    """
+    invalid = any(problem["type"] == "json_invalid" for problem in problems)
+    status = HTTPStatus.BAD_REQUEST if invalid else HTTPStatus.UNPROCESSABLE_ENTITY
+    said = (f"{_place(problem['loc'])}: {problem['msg']}" for problem in problems)
+    return int(status), "; ".join(said)
+
+
+def _place(location: tuple[int | str, ...]) -> str:
+    return ".".join(map(str, location[1:])) or str(location[0])
 
 
 def answer_of(status: HTTPStatus, text: str) -> bytes:

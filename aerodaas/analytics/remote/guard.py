@@ -5,14 +5,22 @@ from __future__ import annotations
 import hmac
 import ipaddress
 import socket
-from collections.abc import Awaitable, Callable, MutableMapping
+from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from http import HTTPStatus
 from typing import Any, TypeAlias
 
 from aerodaas.analytics.remote.attempts import WrongTokens
 from aerodaas.analytics.remote.denial import deny
 
-__all__ = ["Guard", "HostGuard", "host_name", "is_loopback", "is_served"]
+__all__ = [
+    "Guard",
+    "HostGuard",
+    "address_of",
+    "body_objection",
+    "host_name",
+    "is_loopback",
+    "is_served",
+]
 
 Scope: TypeAlias = MutableMapping[str, Any]
 Receive: TypeAlias = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -52,7 +60,7 @@ class Guard:
             return
         headers = dict(scope["headers"])
         status, text = self._objection(headers)
-        pause = self._wrong.count(_address(scope)) if status == HTTPStatus.UNAUTHORIZED else 0
+        pause = self._wrong.count(address_of(scope)) if status == HTTPStatus.UNAUTHORIZED else 0
         if pause:
             status, text = HTTPStatus.TOO_MANY_REQUESTS, "too many wrong tokens"
         if not status:
@@ -68,12 +76,17 @@ class Guard:
         elif b"origin" in headers or not is_loopback(host_name(headers.get(b"host", b""))):
             text = "without a token only programs of this machine may command: set remote.token"
             return 403, text
-        if headers.get(b"transfer-encoding"):
-            return 411, "say how long the body is (Content-Length)"
-        length = headers.get(b"content-length", b"0")
-        if not length.isdigit() or int(length) > _MOST_BYTES:
-            return 413, f"a body has at most {_MOST_BYTES} bytes"
-        return 0, ""
+        return body_objection(headers)
+
+
+def body_objection(headers: Mapping[bytes, bytes]) -> tuple[int, str]:
+    """Status and reason against reading a request's body, by its headers; 0 without any."""
+    if headers.get(b"transfer-encoding"):
+        return 411, "say how long the body is (Content-Length)"
+    length = headers.get(b"content-length", b"0")
+    if not length.isdigit() or int(length) > _MOST_BYTES:
+        return 413, f"a body has at most {_MOST_BYTES} bytes"
+    return 0, ""
 
 
 class HostGuard:
@@ -124,7 +137,8 @@ def _is_numeric(name: str) -> bool:
     return True
 
 
-def _address(scope: Scope) -> str:
+def address_of(scope: Scope) -> str:
+    """From which a request comes, without its port."""
     client = scope.get("client")
     return str(client[0]) if client else "an unknown address"
 
@@ -136,8 +150,5 @@ def host_name(host: bytes) -> str:
 
 
 async def _refuse(scope: Scope, send: Send, status: int, text: str, pause: int = 0) -> None:
-    headers = [(b"www-authenticate", b"Bearer")] if status == HTTPStatus.UNAUTHORIZED else []
-    if pause:
-        headers.append((b"retry-after", b"%d" % pause))
     content = {"accepted": False, "text": text, "refused": {}}
-    await deny(scope, send, status, content, *headers)
+    await deny(scope, send, status, content, pause=pause or None)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-from typing import Annotated
 
-from fastapi import APIRouter, Query, WebSocket
+from fastapi import APIRouter, WebSocket
 
 from aerodaas.console.hub import StreamHub
-from aerodaas.console.live import LiveSession, wanted_streams
+from aerodaas.console.live import LiveSession, Rate, StreamNames, wanted_streams
 from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.routes.admission import Admission
@@ -37,8 +36,8 @@ class LiveRoutes:
         self,
         socket: WebSocket,
         mission: str,
-        rate: Annotated[float, Query(gt=0, le=20, allow_inf_nan=False)] = 5.0,
-        streams: Annotated[str, Query(max_length=2000)] = "",
+        rate: Rate = 5.0,
+        streams: StreamNames = "",
     ) -> None:
         """Send the mission's state, at most `rate` times a second, and items of `streams`."""
         wanted = wanted_streams(streams)

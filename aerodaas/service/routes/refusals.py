@@ -11,7 +11,7 @@ from fastapi.responses import Response
 from starlette.exceptions import HTTPException
 from starlette.types import Receive, Scope, Send
 
-from aerodaas.analytics.remote.denial import deny
+from aerodaas.analytics.remote.denial import deny, malformed
 from aerodaas.protocol.schemas import RefusalOut
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.types.errors import AeroDaaSError
@@ -30,21 +30,19 @@ def register_refusals(app: FastAPI) -> None:
 
 async def refuse(scope: Scope, send: Send, error: Exception) -> None:
     """Refuse a request, or a WebSocket that is not accepted yet, with its status and reason."""
-    status, text, headers = int(HTTPStatus.UNPROCESSABLE_ENTITY), str(error), []
+    status, text, pause = int(HTTPStatus.UNPROCESSABLE_ENTITY), str(error), None
     if isinstance(error, RefusedError):
         status = error.status
-        if status == HTTPStatus.UNAUTHORIZED:
-            headers.append((b"www-authenticate", b"Bearer"))
         if error.retry_after is not None:
-            headers.append((b"retry-after", b"%d" % math.ceil(error.retry_after)))
+            pause = math.ceil(error.retry_after)
     elif isinstance(error, StoreError):
         status = int(HTTPStatus.SERVICE_UNAVAILABLE)
         text = f"the service's database cannot be used: {error}"
     elif isinstance(error, RequestValidationError | WebSocketRequestValidationError):
-        status, text = _malformed(error)
+        status, text = malformed(error.errors())
     elif isinstance(error, HTTPException):
         status, text = error.status_code, str(error.detail)
-    await deny(scope, send, status, RefusalOut(text=text[:_LONGEST]).model_dump(), *headers)
+    await deny(scope, send, status, RefusalOut(text=text[:_LONGEST]).model_dump(), pause=pause)
 
 
 class _Refusal(Response):
@@ -64,14 +62,3 @@ def _handled(_: Request, error: Exception) -> Response:
 
 async def _handled_socket(socket: WebSocket, error: Exception) -> None:
     await refuse(socket.scope, socket.send, error)
-
-
-def _malformed(
-    error: RequestValidationError | WebSocketRequestValidationError,
-) -> tuple[int, str]:
-    """Each wrong field and its place, without the input, which may hold NaN or secrets."""
-    problems = error.errors()
-    invalid = any(problem["type"] == "json_invalid" for problem in problems)
-    status = HTTPStatus.BAD_REQUEST if invalid else HTTPStatus.UNPROCESSABLE_ENTITY
-    said = (f"{'.'.join(map(str, one['loc'][1:]))}: {one['msg']}" for one in problems)
-    return int(status), "; ".join(said)
