@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import atexit
 import json
-import os
-import tempfile
 import warnings
 from collections.abc import Iterable
-from pathlib import Path
 
 from aerodaas.dataflow.plans.areas import read_areas
 from aerodaas.types.errors import AeroDaaSError
+from tools.fuzz.scratch import scratch_file
 
 __all__ = ["run", "seeds"]
 
-_FILE, _NAME = tempfile.mkstemp(suffix=".areas")
-os.close(_FILE)
-atexit.register(Path(_NAME).unlink, missing_ok=True)
+_FILE = scratch_file(".areas")
 
 
 def seeds() -> Iterable[bytes]:
@@ -48,11 +43,11 @@ def seeds() -> Iterable[bytes]:
 
 def run(data: bytes) -> None:
     """Read one file; each area has corners on the globe."""
-    Path(_NAME).write_bytes(data)
+    _FILE.write_bytes(data)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            areas = read_areas(_NAME)
+            areas = read_areas(_FILE)
     except AeroDaaSError:
         return
     for area in areas:

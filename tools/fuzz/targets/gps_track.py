@@ -2,24 +2,19 @@
 
 from __future__ import annotations
 
-import atexit
 import json
 import math
-import os
-import tempfile
 from collections.abc import Iterable
-from pathlib import Path
 
 from aerodaas.analytics.base import ComputeKind
 from aerodaas.analytics.monitoring.gps_logger import GpsLoggerAnalytics
 from aerodaas.types.data import Alert
 from aerodaas.types.errors import AeroDaaSError
+from tools.fuzz.scratch import scratch_file
 
 __all__ = ["run", "seeds"]
 
-_FILE, _NAME = tempfile.mkstemp(suffix=".gps")
-os.close(_FILE)
-atexit.register(Path(_NAME).unlink, missing_ok=True)
+_FILE = scratch_file(".gps")
 
 
 class _Context:
@@ -60,9 +55,9 @@ def seeds() -> Iterable[bytes]:
 
 def run(data: bytes) -> None:
     """Read one track and play a minute of it; each fix lies on the globe."""
-    Path(_NAME).write_bytes(data)
+    _FILE.write_bytes(data)
     try:
-        logger = GpsLoggerAnalytics(_NAME)
+        logger = GpsLoggerAnalytics(_FILE)
     except AeroDaaSError:
         return
     fix = logger.process(None, _Context())

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import atexit
-import os
-import tempfile
 from collections.abc import Iterable
-from pathlib import Path
 
 import numpy as np
 import onnx
@@ -15,12 +11,11 @@ from onnx import TensorProto, helper, numpy_helper
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.types.data import Frame, Header
 from aerodaas.types.errors import AeroDaaSError
+from tools.fuzz.scratch import scratch_file
 
 __all__ = ["run", "seeds"]
 
-_FILE, _NAME = tempfile.mkstemp(suffix=".onnx")
-os.close(_FILE)
-atexit.register(Path(_NAME).unlink, missing_ok=True)
+_FILE = scratch_file(".onnx")
 _SIDE = 64
 _CELLS = 84
 """Cells of the strides 8, 16 and 32 in a picture of 64 x 64."""
@@ -39,9 +34,9 @@ def seeds() -> Iterable[bytes]:
 
 def run(data: bytes) -> None:
     """Load one model and detect in one picture."""
-    Path(_NAME).write_bytes(data)
+    _FILE.write_bytes(data)
     try:
-        detector = OnnxDetector(_NAME, threads=1)
+        detector = OnnxDetector(_FILE, threads=1)
         detector.open()
         detector.detect([_FRAME])
         detector.close()

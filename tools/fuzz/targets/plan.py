@@ -2,25 +2,20 @@
 
 from __future__ import annotations
 
-import atexit
 import json
 import math
-import os
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from pathlib import Path
 
 from aerodaas.dataflow.plans.fences import geofence_of
 from aerodaas.dataflow.plans.reading import flown_plan, read_plan
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.geometry import GeodeticOrigin
+from tools.fuzz.scratch import scratch_file
 
 __all__ = ["run", "seeds"]
 
 _HOME = GeodeticOrigin(47.0, 8.0, 488.0)
-_FILE, _NAME = tempfile.mkstemp(suffix=".plan")
-os.close(_FILE)
-atexit.register(Path(_NAME).unlink, missing_ok=True)
+_FILE = scratch_file(".plan")
 
 
 def seeds() -> Iterable[bytes]:
@@ -77,10 +72,10 @@ def seeds() -> Iterable[bytes]:
 
 def run(data: bytes) -> None:
     """Read one plan and its fence; each waypoint lies on the globe, at a height that is finite."""
-    Path(_NAME).write_bytes(data)
+    _FILE.write_bytes(data)
     try:
-        waypoints, _ = flown_plan(_NAME)
-        geofence_of(read_plan(_NAME).fence, _HOME)
+        waypoints, _ = flown_plan(_FILE)
+        geofence_of(read_plan(_FILE).fence, _HOME)
     except AeroDaaSError:
         return
     for one in waypoints:
