@@ -31,7 +31,8 @@ class MissionView:
     """View of a mission's snapshots; it may be updated often and redraws at a limited rate.
 
     On a terminal it draws a panel in place; into a pipe or a file it prints one line for each
-    robot every few seconds and whenever a mission's state changes.
+    robot whenever a mission's state changes, and every few seconds while its clock runs: what was
+    not heard anew is not told anew.
     """
 
     def __init__(self, console: Console | None = None) -> None:
@@ -40,6 +41,8 @@ class MissionView:
         self._live: Live | None = None
         self._last: Snapshot | None = None
         self._drawn = -_LINE_EVERY
+        self._told_time = -1.0
+        """Mission time of the last lines, seconds."""
         self._states: dict[str, MissionState] = {}
         self._alerts = 0
         self._paths: dict[str, list[tuple[float, float]]] = {}
@@ -81,8 +84,10 @@ class MissionView:
                 self._live.update(self.render(snapshot), refresh=True)
         else:
             states = {robot.name: robot.mission.state for robot in snapshot.robots if robot.mission}
-            if states != self._states or now - self._drawn >= _LINE_EVERY:
+            fresh = snapshot.mission_time > self._told_time
+            if states != self._states or (fresh and now - self._drawn >= _LINE_EVERY):
                 self._drawn = now
+                self._told_time = snapshot.mission_time
                 self._states = states
                 self._print(snapshot)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -105,6 +106,18 @@ def test_panel_on_a_terminal_without_unicode() -> None:
     text = drawn(80, "ascii")
     assert "ENROUTE" in text
     assert "50 %" in text
+
+
+def test_a_pipe_is_not_told_twice_what_was_heard_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever looks again and again at a provider that is gone gets one line; then new ones."""
+    clock = itertools.count(step=10.0)
+    monkeypatch.setattr("aerodaas.terminal.live.time.monotonic", lambda: next(clock))
+    out = io.StringIO()
+    with MissionView(Console(file=out, width=200)) as view:
+        for heard in (4.0, 4.0, 4.0, 5.0):
+            view.update(snapshot(heard))
+        lines = out.getvalue().splitlines()
+    assert [line.split(" s]")[0] for line in lines] == ["[    4.0", "[    5.0"]
 
 
 def test_pipe_gets_a_line_at_each_change_of_state() -> None:
