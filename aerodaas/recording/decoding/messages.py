@@ -37,6 +37,8 @@ Pixels = Annotated[int, Field(strict=True, ge=1, le=1 << 20)]
 Number = Annotated[float, Field(strict=True, ge=-_FARTHEST, le=_FARTHEST)]
 Gap = Number | None
 """A number, or null in the place of one that is not finite."""
+Reading = Annotated[float, Field(strict=True, ge=-1e15, le=1e15)] | None
+"""A driver's own figure, which nothing plots: it may count seconds since 1970."""
 Word = Annotated[str, Field(strict=True, max_length=4096)]
 Text = Annotated[str, Field(strict=True, max_length=1 << 16)]
 
@@ -92,7 +94,7 @@ class _VehicleState(TypedDict):
     battery: _Charge
     odometry: _Odometry
     faults: list[Text]
-    extra: dict[Word, Gap]
+    extra: dict[Word, Reading]
     gps: NotRequired[_Fix | None]
     truth: NotRequired[_Odometry | None]
     ended: NotRequired[Literal[tuple(end.value for end in FlightEnd)] | None]  # type: ignore[valid-type]
