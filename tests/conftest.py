@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import databases
+import hypothesis
 import pytest
 import required
 from flying import Flyer
@@ -21,6 +22,10 @@ if TYPE_CHECKING:
     from aerodaas.environment.provider.client import ProviderClient
 
 _ROOT = Path(__file__).resolve().parents[1]
+
+# A busy machine is no failure: how long an example takes is asserted nowhere.
+hypothesis.settings.register_profile("patient", deadline=None)
+hypothesis.settings.load_profile("patient")
 
 _CI = bool(os.environ.get("CI"))
 

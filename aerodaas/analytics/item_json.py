@@ -223,7 +223,18 @@ def _hints(kind: type) -> dict[str, Any]:
     return {name: found[name] for name in _names(kind)}
 
 
+def _resolved(hint: Any) -> Any:  # noqa: ANN401 - an annotation
+    """What a named alias stands for, such as NumPy's `NDArray` from 2.5 on; `hint` otherwise."""
+    # The class of such aliases is there from Python 3.12 on only.
+    meant = getattr(typing.get_origin(hint), "__value__", None)
+    return hint if meant is None else meant[typing.get_args(hint)]
+
+
+_VECTOR: typing.Final = _resolved(geometry.Vector)
+
+
 def _conforms(value: object, hint: Any) -> bool:  # noqa: ANN401 - an annotation
+    hint = _resolved(hint)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
     if origin is typing.Union or isinstance(hint, types.UnionType):
         return any(_conforms(value, one) for one in arguments)
@@ -253,7 +264,7 @@ def _conform_inside(value: Any, origin: Any, hint: Any) -> bool:  # noqa: ANN401
 
 def _fits(array: np.ndarray[Any, Any], hint: Any) -> bool:  # noqa: ANN401 - an annotation
     """Whether an array is of the annotation's number type; for floats, any real numbers do."""
-    if hint == geometry.Vector and array.shape != (3,):
+    if hint == _VECTOR and array.shape != (3,):
         return False
     wanted = np.dtype(typing.get_args(typing.get_args(hint)[1])[0])
     return array.dtype.kind in "iuf" if wanted.kind == "f" else array.dtype == wanted

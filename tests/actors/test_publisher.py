@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from aerodaas.actors.drone.background_publisher import _MOST_WAITING, BackgroundPublisher
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(st.integers(0, 2 * _MOST_WAITING))
 def test_what_is_dropped_is_counted_and_told_once_it_has_caught_up(extra: int) -> None:
     """All that fits is published in order; the loop never waits for it."""

@@ -150,7 +150,7 @@ def test_who_wears_the_vest_counts() -> None:
 
 
 @given(seed=st.integers(0, 10_000), count=st.integers(0, 6))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_nonsense_is_never_a_crash_and_never_a_landing(seed: int, count: int) -> None:
     """NaN, infinite, empty, misshapen keypoints: nobody counts, and it is counted."""
     random = np.random.default_rng(seed)
@@ -251,7 +251,7 @@ def test_boxes_without_keypoints_are_explained_once() -> None:
     down=st.floats(-500, 500),
     seed=st.integers(0, 99),
 )
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_features_do_not_depend_on_place_and_size(
     scale: float, right: float, down: float, seed: int
 ) -> None:
@@ -289,7 +289,7 @@ def test_the_shipped_model_is_as_good_as_its_card_says() -> None:
     more=st.integers(0, 3),
     hold=st.sampled_from([0.0, 0.5]),
 )
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.too_slow])
 def test_an_event_has_its_frames_and_its_time(
     shown: list[bool], needed: int, more: int, hold: float
 ) -> None:

@@ -57,7 +57,7 @@ def seen(
     roll=st.floats(-0.2, 0.2),
     nose=st.floats(-0.15, 0.15),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_ground_points_undo_projection(
     x: float, y: float, height: float, pitch: float, roll: float, nose: float
 ) -> None:

@@ -91,7 +91,7 @@ def falling(time: float, *, forward: bool) -> Posture:
 
 @LENSES
 @given(turn=st.floats(-math.pi, math.pi), away=st.floats(1.6, 2.2), forward=st.booleans())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_a_fall_is_told_wherever_it_goes(
     camera: CameraModel, turn: float, away: float, *, forward: bool
 ) -> None:
@@ -138,7 +138,7 @@ def test_bending_and_crouching_is_no_fall(camera: CameraModel, seconds: float) -
     turning=st.floats(-1.2, 1.2),
     speed=st.floats(-1.0, 1.0),
 )
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_a_drone_that_moves_makes_nobody_fall(
     camera: CameraModel, swing: float, climb: float, turning: float, speed: float
 ) -> None:
@@ -160,7 +160,7 @@ def test_a_drone_that_moves_makes_nobody_fall(
 @given(course=st.floats(-math.pi, math.pi), speed=st.floats(0.3, 2.5), height=st.floats(0.8, 3.0))
 @example(course=3.0, speed=1.0, height=1.75)
 @example(course=3.08, speed=1.69, height=1.65)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_walking_out_of_the_picture_is_no_fall(
     camera: CameraModel, course: float, speed: float, height: float
 ) -> None:

@@ -46,7 +46,7 @@ def circle(speed: float, radius: float = 6.0) -> Path:
     rate=st.sampled_from([5.0, 15.0]),
     seed=st.integers(0, 1000),
 )
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_it_comes_to_2_m_of_a_standing_person(
     distance: float,
     bearing: float,
@@ -283,7 +283,7 @@ def test_a_car_from_its_side_is_no_nearer_than_from_behind() -> None:
     speed=st.floats(0.0, 1.0),
     seed=st.integers(0, 1000),
 )
-@settings(max_examples=10, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@settings(max_examples=10, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 def test_it_never_runs_away(gaps: list[tuple[float, float]], speed: float, seed: int) -> None:
     """Whenever the target is lost and found: never near, never fast, and at rest at the end."""
 
@@ -444,7 +444,7 @@ def vest_world(target: Path, rate: float) -> World:
     seed=st.integers(0, 1000),
 )
 @example(speed=1.1, walk=10.0, rate=5.0, seed=0)
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 def test_who_stops_short_is_not_come_near(
     speed: float, walk: float, rate: float, seed: int
 ) -> None:

@@ -140,7 +140,7 @@ def test_a_file_cut_short_is_used_up_to_there() -> None:
 
 
 @given(st.text(max_size=200))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_any_text_is_read_or_refused(text: str) -> None:
     """Never another exception than SourceError."""
     for content in (text, f"lat,lon,time\n{text}", f"<gpx>{text}</gpx>", f'[{{"lat": {text}}}]'):

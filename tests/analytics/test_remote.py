@@ -226,7 +226,7 @@ def test_malformed_bodies_are_named(service: Service, body: bytes, status: int, 
     assert service.link.status() == before
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(body=st.binary(max_size=200))
 def test_any_bytes_are_answered(anybody: Service, body: bytes) -> None:
     """Whatever comes is answered with 4xx."""

@@ -170,7 +170,7 @@ def in_flight() -> Flight:
 
 @pytest.mark.slow
 @given(asked=requests, pause=st.integers(1, 60))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @example(
     asked=[
         (

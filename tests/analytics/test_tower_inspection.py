@@ -123,7 +123,7 @@ class Site:
     noise=st.sampled_from([0.0, 0.02]),
     seed=st.integers(0, 100),
 )
-@settings(max_examples=5, deadline=None, phases=[Phase.explicit, Phase.reuse, Phase.generate])
+@settings(max_examples=5, phases=[Phase.explicit, Phase.reuse, Phase.generate])
 def test_it_never_comes_nearer_than_the_stand_off(
     distance: float,
     bearing: float,

@@ -139,7 +139,6 @@ def sent(item: object, *, lossless: bool = False) -> tuple[Any, bytes]:
 
 
 @given(items)
-@settings(deadline=None)
 def test_an_item_is_read_as_it_was_written(item: object) -> None:
     """To the last digit, with numbers that JSON does not have."""
     content, blob = sent(item)
@@ -150,14 +149,12 @@ def test_an_item_is_read_as_it_was_written(item: object) -> None:
 
 
 @given(frames())
-@settings(deadline=None)
 def test_a_lossless_frame_is_read_as_it_was_written(frame: Frame) -> None:
     """Its pixels, depth, header and camera."""
     assert unpack(*sent(frame, lossless=True)) == frame
 
 
 @given(frames())
-@settings(deadline=None)
 def test_a_frame_as_jpeg_keeps_all_but_its_pixels(frame: Frame) -> None:
     """Depth is never lossy."""
     content, blob = sent(frame)
@@ -181,7 +178,6 @@ def test_a_grey_frame_is_grey_as_jpeg() -> None:
 @given(
     st.lists(waypoints | commands, max_size=3, unique_by=lambda one: getattr(one, "id", id(one)))
 )
-@settings(deadline=None)
 def test_navigation_is_read_as_it_was_written(given_items: list[Any]) -> None:
     """With its type, order and priority."""
     kind = NavigationType.ANALYTICS_DRIVEN
@@ -208,7 +204,7 @@ def test_no_other_class_goes_over_the_wire(item: object) -> None:
 
 
 @given(items | frames(), st.randoms(use_true_random=False))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_a_damaged_item_is_refused_or_another_item(item: object, rng: random.Random) -> None:
     """Whatever arrives: an item, or ItemError."""
     content, blob = sent(item, lossless=rng.random() < 0.5)

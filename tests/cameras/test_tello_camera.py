@@ -108,7 +108,7 @@ def test_a_lost_packet_costs_its_frame_and_is_counted() -> None:
     assert decoder.waiting == 2 * PERIOD - 12
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.randoms(use_true_random=False), st.floats(0.0, 0.4))
 def test_any_loss_order_and_garbage_is_survived(draw: random.Random, share: float) -> None:
     """Lost, doubled, swapped, cut and foreign packets: no exception, and the end is shown."""

@@ -92,7 +92,7 @@ def whole(path: Path) -> str:
     return "\n".join([*parts, path.read_bytes().decode("latin-1")])
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(secret=SECRETS)
 def test_a_secret_stays_in_the_configuration(
     secret: str, tmp_path_factory: pytest.TempPathFactory
@@ -115,7 +115,7 @@ def test_a_secret_stays_in_the_configuration(
     assert again.robots[0].sensors[4].settings["colour"] == "blue"
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(secret=SECRETS, place=st.sampled_from(["token", "env", "lamp", "url", "package", "path"]))
 def test_an_error_does_not_quote_a_secret(secret: str, place: str) -> None:
     """Whatever is wrong beside it, or with it."""

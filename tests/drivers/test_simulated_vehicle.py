@@ -91,7 +91,7 @@ def test_a_flight_from_the_ground_and_back() -> None:
     assert state.odometry.position[:2] == pytest.approx(np.zeros(2), abs=0.3)
 
 
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 @given(
     st.tuples(st.floats(-15, 15), st.floats(-15, 15), st.floats(0.5, 8)),
     st.floats(0.3, 5),
@@ -108,7 +108,7 @@ def test_a_position_is_reached_in_wind_within_its_speed(
     assert max(np.hypot(*state.odometry.velocity[:2]) for state in states) < speed + 0.3
 
 
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(st.lists(st.integers(1, 400_000_000), min_size=1, max_size=40), st.integers(0, 99))
 def test_slicing_time_changes_nothing(slices: list[int], seed: int) -> None:
     """One advance or many, with reads in between: the same state to the last digit."""

@@ -144,7 +144,7 @@ NUMBERS = st.one_of(
         max_size=40,
     )
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 def test_whatever_it_sees_the_commands_stay_finite_and_within_limits(
     steps: list[tuple[float, float, float, float, bool, int]],
 ) -> None:

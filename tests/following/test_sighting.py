@@ -56,7 +56,7 @@ def found(box: Box, model: CameraModel | None, tilt: float = 0.0) -> Detections:
     pitch=st.floats(-0.1, 0.2),
     tilt=st.floats(-0.1, 0.1),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @example(distance=4.0, bearing=0.1875, pitch=0.1875, tilt=0.09375)
 def test_a_whole_object_is_located(
     distance: float, bearing: float, pitch: float, tilt: float
@@ -85,7 +85,7 @@ def test_a_whole_object_is_located(
 
 
 @given(distance=st.floats(0.6, 6), bearing=st.floats(-0.7, 0.7), eye=st.floats(0.5, 3))
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_a_cut_object_never_seems_farther_than_it_is(
     distance: float, bearing: float, eye: float
 ) -> None:
@@ -173,7 +173,7 @@ def test_a_box_that_says_nothing_gives_no_sighting(box: Box) -> None:
     eye=st.floats(0.8, 3.0),
     pitch=st.floats(0.0, 0.4),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_who_lies_on_the_ground_is_not_thought_far_away(
     distance: float, thickness: float, eye: float, pitch: float
 ) -> None:
@@ -214,7 +214,7 @@ CAR = TargetSize(1.5, 1.8, widest=4.2)
     tilt=st.floats(-0.1, 0.1),
     error=st.floats(-0.01, 0.01),
 )
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_what_stands_is_told_from_what_hangs_in_the_air(
     distance: float, base: float, tilt: float, error: float
 ) -> None:
@@ -249,7 +249,7 @@ def test_the_length_of_a_car_may_be_its_width() -> None:
     tilt=st.floats(-0.1, 0.1),
     tall=st.floats(0.8, 1.4),
 )
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 def test_measured_depth_tells_the_distance_of_anybody(
     distance: float, bearing: float, pitch: float, tilt: float, tall: float
 ) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from flights import KinematicVehicle, add, flight, live, navigation, square
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.config.model import GeofenceConfig, LimitsConfig, MissionConfig
@@ -438,7 +438,6 @@ def test_a_plan_that_never_comes_is_not_waited_for() -> None:
 
 
 @given(st.lists(st.sampled_from(list(S)), max_size=12))
-@settings(deadline=None)
 def test_illegal_transitions_are_refused(states: list[S]) -> None:
     """The machine only ever makes transitions of the table."""
     machine = MissionStateMachine()

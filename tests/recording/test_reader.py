@@ -223,7 +223,7 @@ def test_which_messages_are_wanted(
     assert numbers(path, schemas=["own.Other"], topics=["/b"]) == []
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     times=st.lists(st.integers(10, 30), max_size=12),
     kind=st.sampled_from(["chunks", "small chunks", "no chunks", "no index"]),

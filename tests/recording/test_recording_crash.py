@@ -134,7 +134,7 @@ def test_full_disk_stops_recording_once_and_clearly(tmp_path: Path) -> None:
 
 
 @given(share=st.floats(0, 1))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_cut_off_anywhere_reads_a_part(flight: Path, share: float) -> None:
     """A file cut off at any byte is refused clearly or gives what lies before the cut."""
     data = flight.read_bytes()
@@ -151,7 +151,7 @@ def test_cut_off_anywhere_reads_a_part(flight: Path, share: float) -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0, 1, exclude_max=True), st.integers(0, 255)), max_size=8))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_damaged_anywhere_reads_the_rest(flight: Path, changes: list[tuple[float, int]]) -> None:
     """Bytes changed at random never crash the reader."""
     data = bytearray(flight.read_bytes())

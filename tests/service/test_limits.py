@@ -113,7 +113,7 @@ def within(fence: Geofence, place: tuple[float, float, float]) -> bool:
     return fence.contains(np.array(place)) or bool(near)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     places=st.lists(st.tuples(*[st.floats(-70, 70)] * 2, st.floats(0, 70)), min_size=30), **cases
 )
@@ -143,7 +143,7 @@ def test_a_place_that_is_allowed_is_allowed_by_each(
             assert place[2] <= (case["tenant"].max_height or math.inf)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 @given(
     target=st.tuples(*[st.floats(-90, 90)] * 2, st.floats(0, 70)),
     speed=st.floats(0.1, 15),
@@ -187,7 +187,7 @@ def test_a_setpoint_sent_is_within_each(
         assert abs(setpoint.velocity[2]) <= min(provider.max_climb, fastest) + 1e-9
 
 
-@settings(max_examples=20, deadline=None)
+@settings(max_examples=20)
 @given(
     wishes=st.lists(st.tuples(*[st.floats(-20, 20)] * 3), min_size=5, max_size=12),
     **cases,

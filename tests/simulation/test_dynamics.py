@@ -32,7 +32,7 @@ def rotor(*, gust: float = 0.0, mean: tuple[float, float, float] = (0, 0, 0)) ->
     )
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(demands, st.floats(0, 2))
 def test_tilt_and_yaw_rate_limits_hold_in_any_wind(
     commands: list[tuple[float, float, float, float]], gust: float
@@ -48,7 +48,7 @@ def test_tilt_and_yaw_rate_limits_hold_in_any_wind(
             assert abs(motion.yaw_rate) <= YAW_RATE + 1e-9
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(demands)
 def test_speed_and_acceleration_limits_hold_in_still_air(
     commands: list[tuple[float, float, float, float]],
@@ -70,7 +70,7 @@ def test_speed_and_acceleration_limits_hold_in_still_air(
 
 
 @given(st.floats(-3, 3), st.floats(-3, 3))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_a_velocity_is_reached_in_a_steady_wind(x: float, y: float) -> None:
     """The disturbance observer takes out the wind's steady push."""
     drone = rotor(mean=(4.0, -3.0, 0.0))

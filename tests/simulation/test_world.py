@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
@@ -71,7 +71,6 @@ def test_scattered_trees_keep_clear() -> None:
         assert abs(tree.y + 12) > 2
 
 
-@settings(deadline=None)
 @example([(0.0, 1.0), (0.0, 1e-131), (0.0, 0.0)], 1.0, 0.0, "stop", [0.0, 1.0])
 @given(
     st.lists(place, min_size=2, max_size=6, unique=True),

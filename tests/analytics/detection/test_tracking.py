@@ -62,7 +62,7 @@ def test_a_target_unseen_for_its_age_is_lost() -> None:
     gap=st.integers(0, 5),
     noise=st.integers(0, 2**16),
 )
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_two_who_cross_keep_their_identities(
     speed: float, height: float, gap: int, noise: int
 ) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from mavlink_flights import flight
 from numpy.typing import NDArray
@@ -109,7 +109,6 @@ def flown_by_lag(goal: float, speed: float, lag: float) -> NDArray[np.float64]:
     return np.array(track)
 
 
-@settings(deadline=None)
 @given(st.floats(2.0, 15.0), st.floats(0.5, 3.0), st.floats(0.1, 0.8))
 def test_a_vehicle_that_follows_late_is_slow_where_it_arrives(
     goal: float, speed: float, lag: float

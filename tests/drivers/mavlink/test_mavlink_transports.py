@@ -239,7 +239,7 @@ def test_why_an_address_cannot_be_opened_is_said(tmp_path: Path) -> None:
         (f"serial:{plain}:12345", "12345 is no speed of a serial line"),
         ("udpin:203.0.113.7:14550", "no address of this host"),
         ("udpout:no..name:14550", "no..name"),
-        ("serial:/dev/\0:57600", "null byte"),
+        ("serial:/dev/\0:57600", "null"),
     ):
         with pytest.raises(VehicleError, match=why):
             open_transport(url, "a")

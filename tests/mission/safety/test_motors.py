@@ -213,7 +213,7 @@ def seen(height: float, speed: float, mode: VehicleMode, *, armed: bool) -> Vehi
     late=st.integers(0, 40),
     noise=st.floats(0.0, 0.3),
 )
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_gentle_landing_is_one_on_any_ground(
     ground: float, speed: float, late: int, noise: float
 ) -> None:

@@ -48,7 +48,7 @@ def at(*position: float, velocity: tuple[float, float, float] = (0.0, 0.0, 0.0))
 
 
 @given(setpoint=velocities | positions | wild, before=velocities)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_no_limit_is_ever_exceeded(setpoint: Setpoint, before: VelocitySetpoint) -> None:
     """What is sent is finite and within speed, climb, turn and acceleration, and says so."""
     guard = SetpointFilter(LIMITS, np.zeros(3))
@@ -76,7 +76,7 @@ def test_no_limit_is_ever_exceeded(setpoint: Setpoint, before: VelocitySetpoint)
 
 
 @given(setpoints=st.lists(velocities | positions | wild, min_size=1, max_size=5))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @example(setpoints=[VelocitySetpoint(np.array([10.0, 10.0, -10.0]))])
 @example(setpoints=[PositionSetpoint(np.array([10.0, -10.0, 5.0]), None, 20.0)])
 @example(
@@ -252,7 +252,6 @@ def test_a_fence_that_is_none_is_refused() -> None:
 
 
 @given(numbers, numbers, st.floats(-5, 30))
-@settings(deadline=None)
 def test_the_nearest_allowed_place_is_allowed(x: float, y: float, z: float) -> None:
     """Whatever is asked, the place that is flown to lies inside."""
     fence = Geofence(LIMITS.geofence)

@@ -93,7 +93,7 @@ def _best_by_enumeration(lanes: list[Lane], price: float, until: float) -> float
     return best
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     st.lists(
         st.tuples(st.integers(10, 60), st.integers(0, 80), st.integers(1, 90)),

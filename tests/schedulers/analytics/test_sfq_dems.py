@@ -77,7 +77,7 @@ def test_with_one_tenant_it_is_dems(name: str, slots: int) -> None:
     assert ends(ours) == ends(dems)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     edge=st.integers(20, 150),
     use=st.floats(0.3, 0.95),
@@ -117,7 +117,7 @@ def test_plain_dems_lets_the_greedy_one_take_everything() -> None:
     assert done(run(SfqDems(), arrivals), "modest") == 1.0
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     weights=st.tuples(st.integers(1, 5), st.integers(1, 5)),
     edges=st.tuples(st.integers(20, 120), st.integers(20, 120)),
@@ -145,7 +145,7 @@ def test_two_greedy_tenants_get_the_edge_by_their_weights(
     assert abs(work["a"] - work["b"]) <= 2 * bound
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     tenants=st.lists(
         st.tuples(st.integers(20, 200), st.integers(20, 1500), st.integers(30, 600)),

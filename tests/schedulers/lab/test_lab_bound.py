@@ -42,7 +42,7 @@ def _best(path: SamplePath) -> float:
     return best
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.lists(_job, min_size=1, max_size=5), st.integers(0, MILLISECOND - 1))
 def test_no_clairvoyant_exceeds_it(jobs: list[tuple[int, int, int, int]], offset: int) -> None:
     """Neither on the grid nor off it; and it promises no more than all benefits together."""

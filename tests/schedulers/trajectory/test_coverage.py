@@ -39,7 +39,7 @@ def test_the_sweeps_follow_the_long_side() -> None:
 
 
 @given(angle=st.floats(0, math.pi), width=st.floats(3, 15), overlap=st.floats(0, 0.6))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_everything_is_seen(angle: float, width: float, overlap: float) -> None:
     """Whatever the direction, no strip is missed; slanting ends may lack a corner."""
     plan = cover(L_SHAPE, height=5.0, width=width, overlap=overlap, angle=angle)

@@ -34,7 +34,7 @@ def test_without_the_solver_it_says_what_to_do(monkeypatch: pytest.MonkeyPatch) 
 
 @needs_solver
 @given(points=places)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_its_plan_is_a_permutation(points: list[tuple[float, float, float]]) -> None:
     """Nothing is lost and nothing is visited twice where nothing forbids it."""
     pending = waypoints(points)
@@ -52,7 +52,7 @@ def test_it_keeps_deadlines_where_it_can() -> None:
 
 @needs_solver
 @given(points=places)
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 def test_optimal_is_never_longer_than_nearest_neighbor(
     points: list[tuple[float, float, float]],
 ) -> None:

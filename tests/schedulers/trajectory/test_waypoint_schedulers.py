@@ -25,7 +25,7 @@ NAMES = ["ordered", "nearest_neighbor", "priority", "deadline"]
 
 @pytest.mark.parametrize("name", NAMES)
 @given(points=places)
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_a_plan_is_a_permutation(name: str, points: list[tuple[float, float, float]]) -> None:
     """Nothing is lost and nothing is visited twice where nothing forbids it."""
     pending = waypoints(points)
@@ -34,7 +34,7 @@ def test_a_plan_is_a_permutation(name: str, points: list[tuple[float, float, flo
 
 
 @given(points=places.filter(lambda points: len(points) <= 6))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 def test_exact_equals_brute_force(points: list[tuple[float, float, float]]) -> None:
     """Dynamic programming finds the least of all permutations, with a group in its order."""
     pending = waypoints(points)

@@ -286,6 +286,6 @@ class KeptLeases(Leases):
 
 
 TestLeases = Leases.TestCase
-TestLeases.settings = settings(max_examples=100, stateful_step_count=40, deadline=None)
+TestLeases.settings = settings(max_examples=100, stateful_step_count=40)
 TestKeptLeases = KeptLeases.TestCase
-TestKeptLeases.settings = settings(max_examples=10, stateful_step_count=25, deadline=None)
+TestKeptLeases.settings = settings(max_examples=10, stateful_step_count=25)

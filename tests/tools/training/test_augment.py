@@ -65,7 +65,7 @@ def test_what_is_cut_away_has_no_label() -> None:
     assert len(sample.kinds) == len(sample.boxes) == len(sample.keypoints) == 0
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(0, 2**32))
 def test_whatever_is_drawn_the_labels_lie_in_the_picture(seed: int) -> None:
     """Mosaics as well as single pictures."""
