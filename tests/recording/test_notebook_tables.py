@@ -101,7 +101,8 @@ def test_a_table_that_cannot_be_says_why(monkeypatch: pytest.MonkeyPatch, tmp_pa
     with pytest.raises(GraphError, match=r"call start_mission\(wait=False\) first"):
         notebook.live_table(AeroStreamData(Graph(), "drone/some", int))
     provided = stream()
-    provided.graph.reader = lambda _: SimpleNamespace()
+    wire: Any = SimpleNamespace()
+    provided.graph.reader = lambda _: wire
     with pytest.raises(MissionError, match="make a table of the recording"):
         notebook.live_table(provided)
     monkeypatch.setattr(extras, "has_extra", lambda _: False)
