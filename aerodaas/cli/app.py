@@ -15,6 +15,7 @@ from aerodaas.cli.check import check
 from aerodaas.cli.examples import examples
 from aerodaas.cli.export import export
 from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.init import init
 from aerodaas.cli.new import new
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
@@ -52,6 +53,7 @@ flies a simulated drone or a Tello.
     aerodaas new my_app
 """,
 )
+app.command()(init)
 app.command()(new)
 app.command()(examples)
 app.add_typer(remote.app, name="remote")

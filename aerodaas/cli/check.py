@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, suppress
 from functools import partial
 from pathlib import Path
@@ -13,7 +13,7 @@ import typer
 
 from aerodaas.cli.application import build_application
 from aerodaas.cli.shipped import find_application
-from aerodaas.config.options import RunOptions
+from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.errors import (
     AeroDaaSError,
     GraphError,
@@ -40,7 +40,12 @@ _FIRST_PICTURE = 5.0
 
 def check(
     context: typer.Context,
-    application: Annotated[Path, typer.Argument(help="The application, as for `aerodaas run`.")],
+    application: Annotated[
+        Path,
+        typer.Argument(
+            help="The application, as for `aerodaas run`; or an environment file alone."
+        ),
+    ],
     env: Annotated[
         Path | None, typer.Option(help="Environment file instead of the application's own.")
     ] = None,
@@ -59,12 +64,15 @@ def check(
 
     The graph is built and planned, models are loaded, vehicles and cameras are connected and asked.
     The exit code is 1 if something is to be mended. Words after `--` are the application's own.
+    Of an environment file alone, all vehicles and cameras are asked.
 
+        aerodaas check environment.json
         aerodaas check my_app.py
         aerodaas check my_app.py --set drone.driver=mavlink --set drone.url=udpin:127.0.0.1:14540
     """
     from aerodaas.cli.doctor import show_findings  # noqa: PLC0415 - slow to load
     from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - as above
+    from aerodaas.environment.environment import Environment  # noqa: PLC0415 - as above
 
     application = find_application(application)
     options = RunOptions(
@@ -73,8 +81,13 @@ def check(
         overrides=dict(parse_setting(text) for text in setting or ()),
         view=False,
     )
-    environment = build_application(application, context.args, options)
-    findings = examine_application(environment, application.stem, connect=connect)
+    if _is_environment(application):
+        current_options.set(options)
+        environment = Environment(application.resolve())
+        findings = _environment_alone(environment, connect=connect)
+    else:
+        environment = build_application(application, context.args, options)
+        findings = examine_application(environment, application.stem, connect=connect)
     raise typer.Exit(0 if show_findings(f"aerodaas check {application.name}", findings) else 1)
 
 
@@ -107,20 +120,50 @@ def examine_application(
     for node in analyses:
         yield _tried(node.id, partial(_analysis, node))
     if connect and not provided:
-        yield from _hardware(environment)
+        robots = {edge.robot for edge in graph.navigation}
+        cameras = [one for one in environment.config.all_sensors() if one.full_id in graph.nodes]
+        yield from _hardware(environment, robots, cameras)
 
 
-def _hardware(environment: Environment) -> Iterator[Finding]:
-    graph, config = environment.graph, environment.config
-    flying = {edge.robot for edge in graph.navigation}
+def _is_environment(file: Path) -> bool:
+    """Whether a file is an environment's, and no application's."""
+    from aerodaas.config.json_text import read_json  # noqa: PLC0415 - only for JSON
+
+    if file.suffix != ".json":
+        return False
+    content = read_json(file, "the file")
+    return isinstance(content, dict) and "robots" in content
+
+
+def _environment_alone(environment: Environment, *, connect: bool) -> Iterator[Finding]:
+    """Findings of an environment that no application uses yet."""
+    from aerodaas.actors.run.checks import check_plugins  # noqa: PLC0415 - slow to load
+
+    config = environment.config
+    cameras = [one for one in config.all_sensors() if config.has_pictures(one)]
+    compute = "auto" if config.compute == "auto" else ", ".join(one.id for one in config.compute)
+    counts = f"robots: {len(config.robots)}; sensors: {len(config.all_sensors())}"
+    yield Finding("environment", f"{counts}; compute: {compute}")
+    check_plugins(
+        config, config.robots, [one for one in cameras if one.type == "camera"], here=True
+    )
+    if connect:
+        yield from _hardware(environment, {one.id for one in config.robots}, cameras)
+
+
+def _hardware(
+    environment: Environment, flying: set[str], sensors: Sequence[SensorConfig]
+) -> Iterator[Finding]:
+    """Ask the vehicles of the robots `flying`, then those of the `sensors` that are cameras."""
+    config = environment.config
     # A vehicle's camera may need the vehicle, so all stay connected until the last was asked.
     vehicles: dict[str, Vehicle] = {}
     with ExitStack() as connected:
         for robot in config.robots:
             if robot.id in flying:
                 yield _tried(robot.id, partial(_vehicle, environment, robot, vehicles, connected))
-        for sensor in config.all_sensors():
-            if sensor.type == "camera" and sensor.full_id in graph.nodes:
+        for sensor in sensors:
+            if sensor.type == "camera":
                 yield _tried(sensor.full_id, partial(_camera, environment, sensor, vehicles))
 
 

@@ -25,6 +25,7 @@ app = typer.Typer(
 
 _WORKLOAD = "3D-A"
 _SCHEDULERS = "ec_edf,dems,gems,margin"
+_FIGURES = ("qos per s", "completion")
 
 Names = Annotated[
     list[str] | None,
@@ -129,6 +130,93 @@ def run(
             plots=plots,
             json_path=json_path,
             csv_path=csv_path,
+        )
+    except AeroDaaSError as error:
+        Console(stderr=True).print(f"[red]error:[/red] {error}", highlight=False)
+        raise typer.Exit(error.exit_code) from None
+
+
+@app.command()
+def sweep(
+    *,
+    sweeps: Annotated[
+        list[str],
+        typer.Option(
+            "--sweep",
+            help="`drones=10,20,40`; given several times, all combinations. Of `drones`, `edges`, "
+            "`models` (A: six, P: four), `network`, `times`, `cloud_slots`, `duration`, and "
+            "`scheduler.KEYWORD`, which goes to the constructors that have it.",
+        ),
+    ],
+    scheduler: Names = None,
+    baseline: Annotated[
+        str | None,
+        typer.Option(help="What the others are compared with. Default: the first scheduler."),
+    ] = None,
+    seeds: Annotated[int, typer.Option(help="Number of seeds, 0 to N-1.", min=1)] = 20,
+    figure: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--figure",
+            "-f",
+            help="What is printed and plotted, may be given several times: `qos per s`, "
+            "`completion`, `qoe per s`, … Default: the first two. The files have all.",
+        ),
+    ] = None,
+    workload: Annotated[
+        str, typer.Option("--workload", "-w", help="What is not swept, as for `run`.")
+    ] = _WORKLOAD,
+    network: Annotated[str, typer.Option(help="As for `run`, where it is not swept.")] = "steady",
+    times: Annotated[str, typer.Option(help="As for `run`, where they are not swept.")] = "nominal",
+    duration: Annotated[
+        float | None, typer.Option(help="Simulated seconds; default 300, or the file's.")
+    ] = None,
+    cloud_slots: Annotated[
+        int | None, typer.Option(help="Executions in the cloud at once; default 32.", min=0)
+    ] = None,
+    bound: Annotated[
+        bool, typer.Option("--bound", help="Compute the clairvoyant bound, too; it takes longer.")
+    ] = False,
+    jobs: Annotated[
+        int | None, typer.Option(help="Processes; default one per core.", min=1)
+    ] = None,
+    address: Annotated[
+        str | None,
+        typer.Option(help="Ray cluster (`host:port`, `auto`) whose cores share the seeds."),
+    ] = None,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for tables and plots.")] = Path(
+        "sweep"
+    ),
+) -> None:
+    """Compare schedulers in every combination of some parameters.
+
+    All see the same sample paths, so they are compared seed by seed: differences from the baseline
+    have 95 % intervals (Student's t) and the p of a paired permutation test, corrected by Holm;
+    `*` is significant. The folder gets every run as a row of `runs.csv` (`runs.parquet` where
+    pyarrow is), the comparisons, and plots for a paper.
+
+        aerodaas lab sweep --sweep drones=2,4,8 -s dems,margin,mine.py:Mine
+        aerodaas lab sweep --sweep network=steady,trapezium --sweep cloud_slots=4,16 -s dems,gems
+        aerodaas lab sweep --sweep scheduler.slack=10,50,100 -s mine.py:Mine,dems --baseline dems
+    """
+    from aerodaas.cli.lab_sweep import sweep as run_all  # noqa: PLC0415 - loads numpy and the lab
+
+    try:
+        run_all(
+            ",".join(scheduler or [_SCHEDULERS]),
+            sweeps,
+            workload=workload,
+            seeds=seeds,
+            baseline=baseline,
+            network=network,
+            times=times,
+            duration=duration,
+            cloud_slots=cloud_slots,
+            figures=figure or _FIGURES,
+            bound=bound,
+            jobs=jobs,
+            address=address,
+            out=out,
         )
     except AeroDaaSError as error:
         Console(stderr=True).print(f"[red]error:[/red] {error}", highlight=False)

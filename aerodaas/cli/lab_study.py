@@ -31,7 +31,7 @@ from aerodaas.schedulers.lab.workload import SIX
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.types.clock import NANOSECONDS
 
-__all__ = ["registered", "study"]
+__all__ = ["registered", "show_progress", "spread_of", "study", "workload_of"]
 
 _BOUND_EDGES = 10
 """Most edges for which the clairvoyant bound is computed unasked."""
@@ -60,9 +60,9 @@ def study(
     loads, resources, as_flown = _loads(workload, flown, duration)
     if cloud_slots is not None:
         resources = Resources(cloud_slots=cloud_slots)
-    spread, wanted = _spread(address, names)
+    spread, wanted = spread_of(address, names)
     for load in loads:
-        with _progress() as progress:
+        with show_progress() as progress:
             bar = progress.add_task(load.name, total=seeds * load.edges)
             result = run_lab(
                 load,
@@ -144,14 +144,16 @@ def _show(result: LabResult) -> None:
     show_figures(title, "scheduler", headings, rows)
 
 
-def _workload(name: str, duration: float | None) -> Workload:
+def workload_of(name: str, duration: float | None) -> Workload:
+    """The workload of a name or a JSON file; raises UnknownIdError, SchedulerError."""
     found = load_workload(name) if name.endswith(".json") else Workload.named(name)
     return found if duration is None else found.lasting(round(duration * NANOSECONDS))
 
 
-def _spread(
+def spread_of(
     address: str | None, names: list[str]
 ) -> tuple[Spread | None, Sequence[str | type[AnalyticsScheduler]]]:
+    """What shares the seeds over a cluster, if there is one, and the schedulers to send there."""
     if address is None:
         return None, names
     from aerodaas.actors.cluster.ray_map import shipped, spread_over  # noqa: PLC0415 - loads ray
@@ -165,7 +167,7 @@ def _loads(
     """The workloads, their resources, and the score of a recorded flight itself."""
     if flown is None:
         wanted = SIX if names == "six" else names.split(",")
-        return [_workload(name.strip(), duration) for name in wanted], Resources(), None
+        return [workload_of(name.strip(), duration) for name in wanted], Resources(), None
     # Reading a recording takes libraries that simulating does not.
     from aerodaas.cli.flown_tasks import Flown  # noqa: PLC0415
     from aerodaas.cli.flown_workload import flown_trace, flown_workload  # noqa: PLC0415
@@ -176,7 +178,8 @@ def _loads(
     return [workload], flight.resources, score(tasks, flown_trace(flight, tasks))
 
 
-def _progress() -> Progress:
+def show_progress() -> Progress:
+    """A bar that is gone once all is done."""
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
     return Progress(*columns, TimeRemainingColumn(), console=Console(), transient=True)
 

@@ -9,6 +9,7 @@ from aerodaas.types.errors import ConfigError
 __all__ = ["has_extra", "require_extra"]
 
 _PACKAGES = {
+    "notebook": ("pandas",),
     "plots": ("matplotlib",),
     "remote": ("fastapi", "uvicorn", "websockets"),
     "service": ("fastapi", "jwt", "sqlalchemy", "uvicorn", "websockets"),
@@ -27,7 +28,7 @@ def require_extra(extra: str, purpose: str) -> None:
     """Require the packages of an extra.
 
     Args:
-        extra: `plots`, `remote`, `ros`, `routing` or `service`.
+        extra: `notebook`, `plots`, `remote`, `ros`, `routing` or `service`.
         purpose: The feature, as the subject of the error's sentence, in the singular.
 
     Raises:

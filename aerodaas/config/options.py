@@ -5,15 +5,20 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+
+from aerodaas.types.errors import ConfigError
 
 if TYPE_CHECKING:
     from aerodaas.config.grants import Catalogue
     from aerodaas.config.model import EnvironmentConfig
 
-__all__ = ["ProviderOptions", "RunOptions", "current_options"]
+__all__ = ["ProviderOptions", "RunOptions", "Speed", "current_options"]
+
+Speed: TypeAlias = "float | Literal['max']"
+"""Mission seconds per wall second; `max`: as fast as the machine goes, in lockstep."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +83,23 @@ class RunOptions:
     """For flights on a provider's drones."""
     application: Path | None = None
     """The application's file, for relative paths and the recording's provenance."""
+
+    def at_speed(self, speed: Speed | None) -> RunOptions:
+        """These options with an application's `speed`, where the command line names none.
+
+        Raises ConfigError for a speed that is none.
+        """
+        if speed is None or self.speed is not None or self.lockstep is not None:
+            return self
+        if speed == "max":
+            return replace(self, lockstep=True)
+        try:
+            factor = float(speed)
+        except (TypeError, ValueError):
+            factor = 0.0
+        if not 0.0 < factor < float("inf"):
+            raise ConfigError(f'speed is a positive number or "max", not {speed!r}')
+        return replace(self, speed=factor, lockstep=False)
 
     def beside_application(self, path: Path) -> Path:
         """A relative path beside the application's file, else in the working directory."""

@@ -33,12 +33,15 @@ from aerodaas.types.errors import AeroDaaSError
 __all__ = ["build_console"]
 
 
-def build_console(flight: OwnFlight, config: EnvironmentConfig) -> FastAPI:
-    """The application that shows `flight`, flown in `config`; a guard stands before it."""
+def build_console(flight: OwnFlight, config: EnvironmentConfig, *, framed: bool = False) -> FastAPI:
+    """The application that shows `flight`, flown in `config`; a guard stands before it.
+
+    `framed`: a page of this machine, such as a notebook, may hold it in a frame.
+    """
     app = FastAPI(title="AeroDaaS console", docs_url=None, redoc_url=None, openapi_url=None)
     for kind in (AeroDaaSError, RequestValidationError, AnyHTTPException):
         app.add_exception_handler(kind, _refused)
-    app.include_router(page_routes())
+    app.include_router(page_routes(framed=framed))
     app.include_router(_Routes(flight, config).router())
     return app
 

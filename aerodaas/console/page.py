@@ -19,10 +19,10 @@ _FILES = {
     "/console.css": ("console.css", "text/css; charset=utf-8"),
 }
 _HEADERS = {
-    # Nothing from elsewhere, no inline script or style, and in nobody's frame.
+    # Nothing from elsewhere, no inline script or style, and in nobody's frame unless asked for.
     "content-security-policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob:; "
-        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+        "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors {ancestors}"
     ),
     "x-content-type-options": "nosniff",
     "referrer-policy": "no-referrer",
@@ -30,6 +30,9 @@ _HEADERS = {
     "cross-origin-resource-policy": "same-origin",
     "cache-control": "no-cache",
 }
+_NOBODY = "'none'"
+_NOTEBOOKS = "http://127.0.0.1:* http://localhost:*"
+"""Pages that may hold the console in a frame of theirs, where a notebook asked for it."""
 
 
 def is_page(connection: HTTPConnection) -> bool:
@@ -37,18 +40,20 @@ def is_page(connection: HTTPConnection) -> bool:
     return connection.scope["type"] == "http" and connection.scope["path"] in _FILES
 
 
-def page_routes() -> APIRouter:
-    """Routes of the page's files."""
+def page_routes(*, framed: bool = False) -> APIRouter:
+    """Routes of the page's files; `framed`: pages of this machine may hold them in a frame."""
     router = APIRouter()
+    ancestors = _NOTEBOOKS if framed else _NOBODY
+    headers = {key: value.format(ancestors=ancestors) for key, value in _HEADERS.items()}
     for path, (name, kind) in _FILES.items():
         router.add_api_route(
-            path, _sender(name, kind), response_class=FileResponse, include_in_schema=False
+            path, _sender(name, kind, headers), response_class=FileResponse, include_in_schema=False
         )
     return router
 
 
-def _sender(name: str, kind: str) -> Callable[[], FileResponse]:
+def _sender(name: str, kind: str, headers: dict[str, str]) -> Callable[[], FileResponse]:
     def send() -> FileResponse:
-        return FileResponse(_FOLDER / name, media_type=kind, headers=_HEADERS)
+        return FileResponse(_FOLDER / name, media_type=kind, headers=headers)
 
     return send

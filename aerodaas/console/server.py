@@ -28,11 +28,12 @@ _PING_SECONDS = 5.0
 class ConsoleServer:
     """Serves the page for one flight until it is closed."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, *, framed: bool = False) -> None:
         """Listen.
 
         Args:
             address: `host:port`; port 0 selects a free one.
+            framed: Whether a page of this machine, such as a notebook, may hold it in a frame.
 
         Raises:
             ConfigError: If it cannot be listened on.
@@ -46,6 +47,7 @@ class ConsoleServer:
                 f"cannot serve the console at {address}: {error}; give another --console-address"
             ) from None
         self._keys = FlightKeys()
+        self._framed = framed
         self._flight: OwnFlight | None = None
         self._thread: threading.Thread | None = None
 
@@ -62,7 +64,8 @@ class ConsoleServer:
         """Show a flight that has begun, an application called `name`."""
         flight = self._flight = OwnFlight(run, name)
         wrong = WrongTokens(lambda text: run.note("console_wrong_tokens", text), what="the console")
-        guarded = TokenGuard(build_console(flight, run.config), self._keys, wrong)
+        console = build_console(flight, run.config, framed=self._framed)
+        guarded = TokenGuard(console, self._keys, wrong)
         self._server = web_server(
             HostGuard(guarded, self._host),
             most_connections=_MOST_CONNECTIONS,

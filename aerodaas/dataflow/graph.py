@@ -261,7 +261,14 @@ class AeroStreamData(PaperNames, IAeroData[E], Generic[E]):
         """
         return self._live().newest(timeout)
 
-    def _live(self) -> StreamReader[E]:
+    def open_reader(self) -> StreamReader[E]:
+        """Open a reader of its own in flight, which begins with what comes now.
+
+        Raises GraphError before the mission has started.
+        """
+        return self._opener()(self.name)
+
+    def _opener(self) -> Callable[[str], StreamReader[Any]]:
         opener = self.graph.reader
         if opener is None:
             message = (
@@ -269,6 +276,10 @@ class AeroStreamData(PaperNames, IAeroData[E], Generic[E]):
                 "call start_mission(wait=False) first"
             )
             raise refusal(message)
+        return opener
+
+    def _live(self) -> StreamReader[E]:
+        opener = self._opener()
         if self._reader is None or self._opened_by is not opener:
             self._reader, self._opened_by = opener(self.name), opener
         return self._reader

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from aerodaas.actors.run.checks import check_environment, sensor_properties
 from aerodaas.config.model import ComputeConfig, EnvironmentConfig, SensorConfig
-from aerodaas.config.options import current_options
+from aerodaas.config.options import Speed, current_options
 from aerodaas.config.plugins import load_plugin
 from aerodaas.dataflow.graph import Graph, NavigationEdge, refusal
 from aerodaas.dataflow.handles import Compute, Here, Sensor
@@ -29,6 +29,7 @@ from aerodaas.types.identifiers import find_scoped
 from aerodaas.types.waypoints import Waypoint
 
 if TYPE_CHECKING:
+    from aerodaas.console.view import ConsoleView
     from aerodaas.environment.guests import GuestNote
 
 __all__ = ["Environment"]
@@ -63,6 +64,7 @@ class Environment(PaperNames, IEnvironment):
         """The environment file's content, for analyses that want it."""
         self.graph = Graph(sensor.full_id for sensor in self.config.all_sensors())
         self._mission: MissionRun | None = None
+        self._speed: Speed | None = None
         self._flights = 0
         self._flown = 0
         """Number of the graph's navigation edges that went to flights that have ended."""
@@ -174,12 +176,21 @@ class Environment(PaperNames, IEnvironment):
 
         return shared_waypoints(self.config, waypoints, objective, budget)
 
-    def start_mission(self, hook: Callable[[], None] | None = None, *, wait: bool = True) -> None:
+    def start_mission(
+        self,
+        hook: Callable[[], None] | None = None,
+        *,
+        wait: bool = True,
+        speed: Speed | None = None,
+    ) -> None:
         """Start the mission of every robot that navigates, as `Robot.start_mission` does.
 
         Args:
             hook: Called before the flight, after the hooks of all robots' `on_start`.
             wait: Return when the mission has ended; if False, as soon as it flies.
+            speed: Mission seconds per wall second, or `"max"`: as fast as the machine goes, which
+                is the default where every robot is simulated. `aerodaas run --speed` goes before
+                it; a provider flies by the clock.
 
         Raises:
             AeroDaaSError: What the mission ended with; the drones are landed and the recording is
@@ -192,10 +203,35 @@ class Environment(PaperNames, IEnvironment):
             hook()
         if offer(self):
             return
+        self._speed = speed
         run = self.launch_again()
         run.on_end += [one for robot in robots for one in robot.end_hooks if one not in run.on_end]
         if wait:
             run.wait()
+
+    def console(self, address: str = "127.0.0.1:0", *, viewer: bool = False) -> ConsoleView:
+        """Serve the console of the flight under way, from which it is watched and commanded.
+
+        On the last line of a notebook's cell its page is shown there; elsewhere, print it for the
+        address. It ends with the flight.
+
+        Args:
+            address: `host:port` to listen at; port 0 takes a free one.
+            viewer: Give the address of who only watches.
+
+        Raises:
+            MissionError: If nothing flies, or a provider does, whose own address has the console.
+            ConfigError: If the extra `remote` is missing, or the address cannot be listened on.
+        """
+        from aerodaas.console.view import ConsoleView  # noqa: PLC0415 - only where asked for
+
+        if self.provider is not None:
+            raise MissionError(
+                f"the provider serves the console: open {self.provider.address.base}"
+            )
+        if self.run is None:
+            raise MissionError("nothing flies: call start_mission(wait=False) first")
+        return ConsoleView(self.run.console(address, viewer=viewer))
 
     def end_mission(self) -> None:
         """End the mission: every flying robot lands where it is."""
@@ -399,7 +435,7 @@ class Environment(PaperNames, IEnvironment):
 
     def _prepared(self) -> MissionRun:
         if self.provider is None:
-            return Run(self, self._flights)
+            return Run(self, self._flights, self._speed)
         from aerodaas.environment.provider.run import ProvidedRun  # noqa: PLC0415 - only then
 
         return ProvidedRun(self, self.provider, self._flights)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from aerodaas.config.model import RobotConfig
+from aerodaas.config.options import Speed
 from aerodaas.config.plugins import load_plugin
 from aerodaas.dataflow.graph import NavigationEdge, refusal
 from aerodaas.dataflow.handles import Sensor
@@ -78,15 +79,22 @@ class Robot(PaperNames, IRobot):
             raise GraphError(f"{stream.name} belongs to another Environment than {self.robot_id}")
         self._environment.fly_by(NavigationEdge(self.robot_id, navigation))
 
-    def start_mission(self, hook: Callable[[], None] | None = None, *, wait: bool = True) -> None:
+    def start_mission(
+        self,
+        hook: Callable[[], None] | None = None,
+        *,
+        wait: bool = True,
+        speed: Speed | None = None,
+    ) -> None:
         """Run `hook` and those of `on_start`, fly, and return when the mission has ended.
 
         With `wait=False`, return as soon as it flies; as a guest of another application, which
         flies, at once. While the mission flies, this waits for it; after its end, it flies again:
-        the navigation given to `navigate` since, or else the same. Raises
+        the navigation given to `navigate` since, or else the same. `speed` is that of
+        `Environment.start_mission`. Raises
         the project's errors; whatever happens, the drone is landed and the recording closed first.
         """
-        self._environment.start_mission(hook, wait=wait)
+        self._environment.start_mission(hook, wait=wait, speed=speed)
 
     def end_mission(self) -> None:
         """End the mission: land here; the hooks of `on_end` run once it is over."""

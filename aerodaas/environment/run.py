@@ -13,7 +13,7 @@ from aerodaas.actors.run.checks import check_served
 from aerodaas.actors.stream_names import is_guest_actor
 from aerodaas.config.extras import require_extra
 from aerodaas.config.model import TaskConfig
-from aerodaas.config.options import current_options
+from aerodaas.config.options import Speed, current_options
 from aerodaas.config.plugins import is_built_in, load_plugin
 from aerodaas.environment.mission_run import recording_path
 from aerodaas.environment.signals import (
@@ -61,9 +61,11 @@ _STEPPED = {"simulated", "replayed"}
 class Run:
     """The flight of one environment's robots; made by `Environment.launch`."""
 
-    def __init__(self, environment: Environment, number: int = 1) -> None:
-        """The flight `number` of this environment, counted from 1."""
-        self.options = current_options.get()
+    def __init__(
+        self, environment: Environment, number: int = 1, speed: Speed | None = None
+    ) -> None:
+        """The flight `number` of this environment, counted from 1, at the application's `speed`."""
+        self.options = current_options.get().at_speed(speed)
         self.config = environment.config
         self.graph = environment.graph
         self.on_end: list[Callable[[], None]] = []
@@ -173,10 +175,28 @@ class Run:
     def _open_console(self, console: ConsoleServer) -> None:
         from aerodaas.terminal.console import show_console  # noqa: PLC0415
 
+        self._start_console(console)
+        show_console(console.address(), console.address(viewer=True))
+
+    def _start_console(self, console: ConsoleServer) -> None:
         self._console = console
         application = self.options.application
         console.start(self, application.stem if application else self.config.name)
-        show_console(console.address(), console.address(viewer=True))
+
+    def console(self, address: str, *, viewer: bool) -> str:
+        """Serve the console from now on, unless it is served already; returns its address.
+
+        Raises MissionError once the run is over, ConfigError for what cannot be listened on.
+        """
+        self._flying("there is nothing to be watched")
+        require_extra("remote", "the console")
+        check_served("address", address)
+        if self._console is None:
+            from aerodaas.console.server import ConsoleServer  # noqa: PLC0415 - only where asked
+
+            self._start_console(ConsoleServer(address, framed=True))
+        assert self._console is not None  # noqa: S101 - started
+        return self._console.address(viewer=viewer)
 
     def note(self, kind: str, text: str) -> None:
         """Publish an alert of this process; nothing once the run is over."""

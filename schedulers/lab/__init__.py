@@ -4,8 +4,18 @@ from __future__ import annotations
 
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.schedulers.lab.run import LabResult, run_lab
+from aerodaas.schedulers.lab.sweep import SweepResult, run_sweep
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
 from aerodaas.schedulers.lab.workload_file import load_workload
 
-__all__ = ["ExecutionTimes", "LabResult", "Network", "Workload", "load_workload", "run_lab"]
+__all__ = [
+    "ExecutionTimes",
+    "LabResult",
+    "Network",
+    "SweepResult",
+    "Workload",
+    "load_workload",
+    "run_lab",
+    "run_sweep",
+]

@@ -22,7 +22,7 @@ from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
 from aerodaas.types.errors import SchedulerError
 
-__all__ = ["LabResult", "Spread", "run_lab"]
+__all__ = ["LabResult", "Spread", "Wanted", "run_lab", "scheduler_label"]
 
 Wanted = str | type[AnalyticsScheduler] | AnalyticsScheduler
 Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
@@ -42,7 +42,11 @@ class LabResult:
     bounds: list[float] | None
 
     def figures(self, scheduler: str) -> dict[str, Mean]:
-        """Figures of a scheduler: means over the seeds with confidence intervals.
+        """Figures of a scheduler: means over the seeds with confidence intervals."""
+        return {name: mean_of(values) for name, values in self.values(scheduler).items()}
+
+    def values(self, scheduler: str) -> dict[str, list[float]]:
+        """Figures of a scheduler, one for each seed.
 
         Rates are per second of the workload and summed over its edges; shares are 0 to 1.
         """
@@ -66,7 +70,7 @@ class LabResult:
                 s.qos / bound if bound else 1.0
                 for s, bound in zip(scores, self.bounds, strict=True)
             ]
-        return {name: mean_of(values) for name, values in figures.items()}
+        return figures
 
     def as_json(self) -> dict[str, Any]:
         """Everything, for a file: means with half widths of 95 % intervals, and raw scores."""
@@ -121,7 +125,7 @@ def run_lab(
     """
     if not seeds or not schedulers:
         raise SchedulerError("a run of the lab needs at least one seed and one scheduler")
-    names = [one if isinstance(one, str) else _class_name(one) for one in schedulers]
+    names = [scheduler_label(one) for one in schedulers]
     if len(set(names)) < len(names):
         raise SchedulerError(f"schedulers must differ in name: {', '.join(names)}")
     for wanted in schedulers:
@@ -175,7 +179,10 @@ def _one_part(study: _Study, part: tuple[int, int]) -> tuple[int, list[Score], f
     return seed, scores, clairvoyant_bound(path) if study.bound else 0.0
 
 
-def _class_name(wanted: type[AnalyticsScheduler] | AnalyticsScheduler) -> str:
+def scheduler_label(wanted: Wanted) -> str:
+    """The name by which results are told: the one given, or the class'."""
+    if isinstance(wanted, str):
+        return wanted
     return wanted.__name__ if isinstance(wanted, type) else type(wanted).__name__
 
 

@@ -64,10 +64,10 @@ class Run:
 
 
 @contextmanager
-def console() -> Iterator[tuple[ConsoleServer, Run]]:
+def console(*, framed: bool = False) -> Iterator[tuple[ConsoleServer, Run]]:
     """The console of a flight that never ends."""
     run = Run()
-    server = ConsoleServer("127.0.0.1:0")
+    server = ConsoleServer("127.0.0.1:0", framed=framed)
     server.start(run, "survey")
     try:
         yield server, run

@@ -81,6 +81,14 @@ def test_the_page_needs_no_token_and_admits_nothing_from_elsewhere(
     assert headers["x-content-type-options"] == "nosniff"
 
 
+def test_a_notebook_of_this_machine_may_frame_the_page() -> None:
+    """Where it was asked for, and nobody from elsewhere."""
+    with console(framed=True) as (server, _):
+        policy = ask(server.address(), "/", token="")[1]["content-security-policy"]
+    assert "frame-ancestors http://127.0.0.1:* http://localhost:*" in policy
+    assert "default-src 'none'" in policy
+
+
 @pytest.mark.parametrize("token", ["", "wrong", "é"])
 def test_all_else_needs_one(flying: tuple[ConsoleServer, Run], token: str) -> None:
     """Neither state nor commands without one of the two tokens."""

@@ -1,0 +1,188 @@
+"""The work of `aerodaas lab sweep`: cases, tables, files and plots."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from aerodaas.cli.lab_study import show_progress, spread_of, workload_of
+from aerodaas.config.extras import has_extra
+from aerodaas.schedulers.lab.significance import seeds_needed
+from aerodaas.schedulers.lab.sweep import PARAMETERS, SweepResult, run_sweep
+from aerodaas.terminal.figures import Row, show_figures
+from aerodaas.types.errors import ConfigError, UnknownIdError
+
+__all__ = ["parse_sweeps", "sweep"]
+
+_BETWEEN = re.compile(r",(?=\s*[A-Za-z])")
+"""Commas between words; those within one stand before a number, as in `outage:30-45,80-81`."""
+_WORDS = {"network", "times"}
+_CSV, _SUMMARY, _PARQUET = "runs.csv", "summary.csv", "runs.parquet"
+
+
+def sweep(
+    scheduler: str,
+    sweeps: Sequence[str],
+    *,
+    workload: str,
+    seeds: int,
+    baseline: str | None,
+    network: str,
+    times: str,
+    duration: float | None,
+    cloud_slots: int | None,
+    figures: Sequence[str],
+    bound: bool,
+    jobs: int | None,
+    address: str | None,
+    out: Path,
+) -> None:
+    """Simulate all cases, print the comparisons, and write tables and plots into `out`."""
+    names = [name.strip() for name in scheduler.split(",")]
+    spread, wanted = spread_of(address, names)
+    with show_progress() as progress:
+        bar = progress.add_task("cases", total=None)
+        result = run_sweep(
+            wanted,
+            parse_sweeps(sweeps),
+            workload=workload_of(workload, duration),
+            seeds=range(seeds),
+            baseline=baseline,
+            network=network,
+            times=times,
+            cloud_slots=cloud_slots,
+            bound=bound,
+            jobs=jobs,
+            spread=spread,
+            progress=lambda done, total: progress.update(bar, completed=done, total=total),
+        )
+    for figure in figures:
+        _show(result, figure)
+    _advise(result)
+    files = _write(result, out)
+    if has_extra("plots"):
+        files += _plot(result, figures, out)
+    else:
+        Console().print("plots: pip install 'aerodaas[plots]'", highlight=False, markup=False)
+    Console().print(f"in {out}: {', '.join(files)}", highlight=False, soft_wrap=True)
+
+
+def parse_sweeps(texts: Sequence[str]) -> dict[str, list[Any]]:
+    """Read `drones=10,20,40` and the like; the same parameter several times adds values.
+
+    Raises ConfigError for what cannot be read, UnknownIdError for a parameter that there is not.
+    """
+    found: dict[str, list[Any]] = {}
+    for text in texts:
+        name, equals, values = text.partition("=")
+        name = name.strip()
+        if not equals or not values:
+            raise ConfigError(f"a sweep is written drones=10,20,40, not {text!r}")
+        known = name in PARAMETERS or name.startswith("scheduler.")
+        if not known:
+            raise UnknownIdError("parameter", name, [*PARAMETERS, "scheduler.KEYWORD"])
+        split = _BETWEEN.split(values) if name in _WORDS else values.split(",")
+        found.setdefault(name, []).extend(_value(name, one.strip()) for one in split)
+    return found
+
+
+def _value(name: str, text: str) -> object:
+    kind = PARAMETERS.get(name)
+    if kind is None:
+        return _plain(text)
+    try:
+        return kind(text)
+    except ValueError:
+        what = {int: "whole numbers", float: "numbers"}[kind]
+        raise ConfigError(f"{name} takes {what}, not {text!r}") from None
+
+
+def _plain(text: str) -> object:
+    """A constructor's argument: a number where it reads as one."""
+    if re.fullmatch(r"[+-]?\d+", text):
+        return int(text)
+    try:
+        return float(text)
+    except ValueError:
+        return text
+
+
+def _show(result: SweepResult, figure: str) -> None:
+    """Print a figure's means, and how they differ from the baseline's."""
+    rows = []
+    for row in result.summary(figure):
+        case = " ".join(f"{name}={row[name]}" for name in result.parameters)
+        cells = [_with_margin(row["mean"], row["high"])]
+        if row["difference"] is None:
+            cells += ["", ""]
+        else:
+            cells += [_with_margin(row["difference"], row["difference_high"])]
+            cells.append(_p(row["p_holm"]) + (" *" if row["significant"] else "  "))
+        name = f"{case}  {row['scheduler']}"
+        rows.append(Row(name, cells, bold=bool(row["significant"])))
+    title = f"{figure}: means over {len(result.seeds)} seeds with 95 % intervals"
+    columns = (figure, f"less {result.baseline}", "p (Holm)")
+    show_figures(title, "case", columns, rows)
+
+
+def _with_margin(value: float, high: float) -> str:
+    margin = high - value
+    return f"{value:.4g}" + ("" if math.isnan(margin) else f" ±{margin:.2g}")
+
+
+def _p(p: float) -> str:
+    return "" if math.isnan(p) else f"{p:.4f}" if p >= 0.0001 else "<0.0001"  # noqa: PLR2004 - four digits
+
+
+def _advise(result: SweepResult) -> None:
+    """Say so where there are too few seeds for anything to be significant."""
+    comparisons = len(result.cases) * (len(result.schedulers) - 1)
+    needed = seeds_needed(comparisons)
+    if comparisons and len(result.seeds) < needed:
+        text = (
+            f"with {len(result.seeds)} seeds none of {comparisons} comparisons can be significant: "
+            f"take --seeds {needed} or more"
+        )
+        Console().print(text, highlight=False, soft_wrap=True)
+
+
+def _write(result: SweepResult, out: Path) -> list[str]:
+    """Write the tidy table, and the summary of each figure; returns the files' names."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        _write_csv(out / _CSV, result.rows)
+        _write_csv(out / _SUMMARY, [row for name in result.figures for row in result.summary(name)])
+    except OSError as error:
+        raise ConfigError(f"cannot write into {out}: {error.strerror}") from None
+    try:
+        import pyarrow as pa  # noqa: PLC0415 - an extra
+        from pyarrow import parquet  # noqa: PLC0415
+    except ImportError:
+        return [_CSV, _SUMMARY]
+    parquet.write_table(pa.Table.from_pylist(result.rows), out / _PARQUET)
+    return [_CSV, _PARQUET, _SUMMARY]
+
+
+def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+
+
+def _plot(result: SweepResult, figures: Sequence[str], out: Path) -> list[str]:
+    from aerodaas.schedulers.lab.sweep_plots import plot_sweep  # noqa: PLC0415 - loads matplotlib
+
+    files = []
+    for figure in figures:
+        for suffix in ("pdf", "png"):
+            name = f"{figure.replace(' ', '_')}.{suffix}"
+            plot_sweep(result, figure, out / name)
+            files.append(name)
+    return files

@@ -1,0 +1,130 @@
+"""Pictures with boxes that draw themselves after a cell."""
+
+from __future__ import annotations
+
+import base64
+import html
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import overload
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.recording.pictures import detections_by_frame, picture_topics, shots
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.overlay import draw_detections
+from aerodaas.types.clock import seconds
+from aerodaas.types.data import Detection, Frame
+from aerodaas.types.errors import RecordingError
+
+__all__ = ["Picture", "Pictures", "boxed", "recorded_pictures"]
+
+_STYLE = "display:inline-block;vertical-align:top;margin:0 8px 8px 0;max-width:640px"
+_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 85]
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """One picture, drawn over."""
+
+    image: NDArray[np.uint8]
+    """Height x width x 3, BGR."""
+    caption: str
+
+    def jpeg(self) -> bytes:
+        """The picture, coded."""
+        return bytes(cv2.imencode(".jpg", self.image, _QUALITY)[1])
+
+
+class Pictures(Sequence[Picture]):
+    """Pictures that a notebook shows side by side, in as many rows as they need."""
+
+    def __init__(self, pictures: Iterable[Picture]) -> None:
+        self._pictures = tuple(pictures)
+
+    @overload
+    def __getitem__(self, index: int) -> Picture: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Picture, ...]: ...
+    def __getitem__(self, index: int | slice) -> Picture | tuple[Picture, ...]:
+        """One of them, or several."""
+        return self._pictures[index]
+
+    def __len__(self) -> int:
+        """Count them."""
+        return len(self._pictures)
+
+    def __repr__(self) -> str:
+        """Their captions, where nothing can be drawn."""
+        return f"Pictures({', '.join(one.caption for one in self)})"
+
+    def _repr_html_(self) -> str:
+        """All of them, in one line as far as there is room."""
+        width = "100%" if len(self) == 1 else "300px"
+        figures = (
+            f'<figure style="{_STYLE};width:{width}">'
+            f'<img style="width:100%" src="data:image/jpeg;base64,'
+            f'{base64.b64encode(one.jpeg()).decode()}">'
+            f"<figcaption>{html.escape(one.caption)}</figcaption></figure>"
+            for one in self
+        )
+        return f"<div>{''.join(figures)}</div>"
+
+
+def boxed(frame: Frame, found: Iterable[Detection] = ()) -> Pictures:
+    """A frame with boxes, labels and keypoints drawn in, in the frame's own pixels.
+
+    Args:
+        frame: Of a camera's stream; it is not changed.
+        found: What was found in it, such as a detector's `Detections`.
+    """
+    return Pictures([_drawn(frame.image, found, frame.header.source, frame.header.stamp)])
+
+
+def recorded_pictures(recording: str | Path, camera: str | None = None, count: int = 6) -> Pictures:
+    """Pictures of a recorded flight, evenly over its time, with what was found in them.
+
+    Args:
+        recording: The MCAP file.
+        camera: `robot/sensor`; None: the first camera.
+        count: How many, from 1; fewer if there are fewer.
+
+    Raises:
+        RecordingError: If the file cannot be read, or holds no pictures of this camera.
+    """
+    with Recording.open(recording) as opened:
+        topics = picture_topics(opened)
+        named = [one for one in topics if camera is None or f"/{camera}" in {one, _stream(one)}]
+        if not named:
+            known = ", ".join(_stream(one).removeprefix("/") for one in topics) or "none"
+            wanted = f" of {camera}" if camera is not None else ""
+            raise RecordingError(f"{recording} holds no pictures{wanted}; it has: {known}")
+        found = detections_by_frame(opened)
+        number = opened.topics[named[0]].count
+        # Every so many, the first one half a step from the beginning.
+        step = max(1.0, number / count)
+        wanted_places = {int((place + 0.5) * step) for place in range(min(count, number))}
+        pictures = []
+        for place, shot in enumerate(shots(opened, named[:1])):
+            image = shot.image() if place in wanted_places else None
+            if image is not None:
+                header = shot.header
+                boxes = found.get((header.source, header.stamp), ())
+                pictures.append(_drawn(image, boxes, header.source, header.stamp))
+    return Pictures(pictures)
+
+
+def _stream(topic: str) -> str:
+    return topic.removesuffix("/image")
+
+
+def _drawn(
+    image: NDArray[np.uint8], found: Iterable[Detection], source: str, stamp: int
+) -> Picture:
+    image, boxes = image.copy(), list(found)
+    draw_detections(image, boxes)
+    said = ", ".join(f"{one.label} {one.score:.2f}" for one in boxes)
+    return Picture(image, f"{source}, {seconds(stamp):.1f} s{': ' if said else ''}{said}")
