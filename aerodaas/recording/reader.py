@@ -33,6 +33,8 @@ __all__ = ["Record", "Recording", "Topic"]
 _RECORD_HEAD = 9
 _LATEST = 1 << 63
 """Nanoseconds since 1970 that a date can show: until the year 2262."""
+_NEVER = 1 << 64
+"""Later than any log time."""
 _OVERHEAD = 256
 """Bytes in memory of a message, beside its data."""
 
@@ -62,7 +64,8 @@ class Record:
     """Mission time of the described measurement, nanoseconds."""
     sequence: int
     value: Any
-    """A dictionary for JSON, an object for protobuf and ROS 2's pictures, else bytes."""
+    """A dictionary for JSON, an object for protobuf and ROS 2's pictures, else bytes; None where
+    it was not to be decoded."""
 
 
 class Recording:
@@ -194,14 +197,21 @@ class Recording:
         *,
         schemas: Collection[str] | None = None,
         topics: Collection[str] | None = None,
+        bare: Collection[str] = (),
+        since: int | None = None,
+        until: int | None = None,
     ) -> Iterator[Record]:
         """Iterate over messages in the order of log times.
 
-        Chunks that overlap in time are put in order as far as `limits.MAX_HELD` allows.
+        Chunks that overlap in time are put in order as far as `limits.MAX_HELD` allows. Chunks
+        outside of the given time are not read.
 
         Args:
             schemas: Names of the schemas to read; None for all.
             topics: Topics to read; None for all.
+            bare: Topics whose messages are not decoded: their value is None.
+            since: Earliest mission time of recording, nanoseconds; None for the first message's.
+            until: Latest one; None for the last message's.
 
         Yields:
             Messages, checked by `messages.MessageDecoder`; a damaged chunk or a broken message is
@@ -213,11 +223,15 @@ class Recording:
             if (topics is None or channel.topic in topics)
             and (schemas is None or self._schema_name(channel) in schemas)
         }
-        for message in self._messages(wanted):
+        first = 0 if since is None else since + self.epoch_ns
+        last = _NEVER if until is None else until + self.epoch_ns
+        for message in self._messages(wanted, first, last):
             channel = self._index.channels[message.channel_id]
             schema = self._index.schemas.get(channel.schema_id)
+            value = None
             try:
-                value = self._decoder.decode(channel, schema, message.data)
+                if channel.topic not in bare:
+                    value = self._decoder.decode(channel, schema, message.data)
             except BrokenMessageError:
                 self.skipped[channel.topic] += 1
                 continue
@@ -249,9 +263,13 @@ class Recording:
         schema = self._index.schemas.get(channel.schema_id)
         return schema.name if schema else ""
 
-    def _messages(self, wanted: set[int]) -> Iterator[Message]:
+    def _messages(self, wanted: set[int], first: int, last: int) -> Iterator[Message]:
         blocks = sorted(
-            (block for block in self._index.blocks if block.channels & wanted),
+            (
+                block
+                for block in self._index.blocks
+                if block.channels & wanted and block.start <= last and block.end >= first
+            ),
             key=lambda block: block.start,
         )
         # Chunks may overlap in time: hold messages back until no later chunk can precede them.
@@ -259,7 +277,7 @@ class Recording:
         order = size = 0
         for position, block in enumerate(blocks):
             for message in self._load(block):
-                if message.channel_id in wanted:
+                if message.channel_id in wanted and first <= message.log_time <= last:
                     heapq.heappush(held, (message.log_time, order, message))
                     order += 1
                     size += len(message.data) + _OVERHEAD
