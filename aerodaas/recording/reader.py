@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections import Counter
+from collections import Counter, OrderedDict
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
@@ -35,6 +35,9 @@ _LATEST = 1 << 63
 """Nanoseconds since 1970 that a date can show: until the year 2262."""
 _NEVER = 1 << 64
 """Later than any log time."""
+_KEPT_BLOCKS = 4
+_KEPT_SIZE = 4 << 20
+"""Bytes of a block that is kept; ours have one million."""
 _OVERHEAD = 256
 """Bytes in memory of a message, beside its data."""
 
@@ -77,6 +80,8 @@ class Recording:
         self._file = file
         self._index = index
         self._decoder = MessageDecoder()
+        self._loaded: OrderedDict[int, list[Message]] = OrderedDict()
+        """Messages of the blocks read last, by offset: who seeks reads the same ones again."""
         self.skipped: Counter[str] = Counter()
         """Broken messages that were skipped so far, by topic; counted at each reading."""
         starts = [block.start for block in index.blocks]
@@ -290,10 +295,23 @@ class Recording:
                 yield heapq.heappop(held)[2]
 
     def _load(self, block: Block) -> Iterator[Message]:
+        known = self._loaded.get(block.offset)
+        if known is not None:
+            yield from known
+            return
+        kept = max(block.size, block.length) <= _KEPT_SIZE
+        messages: list[Message] = []
         try:
             for record in load(self._file, block):
                 if isinstance(record, Message):
+                    if kept:
+                        messages.append(record)
                     yield record
         except BROKEN:
             self._index.damaged += not block.damaged
             block.damaged = True
+            return
+        if kept:
+            self._loaded[block.offset] = messages
+            while len(self._loaded) > _KEPT_BLOCKS:
+                self._loaded.popitem(last=False)

@@ -1,6 +1,6 @@
 // The timeline of a recording: states, waypoints visited, alerts, decisions; play, seek and link.
 
-import { useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useLayoutEffect, useMemo, useState } from "preact/hooks";
 import "./timeline.css";
 import { writeFragment } from "./connection";
 import { lastBefore, type Playback } from "./playback";
@@ -47,7 +47,8 @@ export function Timeline({ playback, robot }: { playback: Playback; robot: strin
   };
   const toggle = () => (playback.playing ? playback.pause() : playback.play());
 
-  useEffect(() => {
+  // Before it is painted: who sees the timeline can use its keys.
+  useLayoutEffect(() => {
     const keys: Record<string, (event: KeyboardEvent) => void> = {
       " ": toggle,
       ArrowLeft: (event) => playback.seek(playback.time - (event.shiftKey ? LEAP : STEP)),
@@ -256,7 +257,12 @@ function bandsOf(statuses: StatusOut[], flight: RecordedOut): Band[] {
   const least = NARROW * (flight.end - flight.begin);
   for (const one of statuses) {
     const last = bands.at(-1);
-    if (last && (last.state === one.state || one.time - last.begin < least)) continue;
+    if (last?.state === one.state) continue;
+    if (last && one.time - last.begin < least) {
+      // What is too short to be seen gives way to what follows.
+      last.state = one.state;
+      continue;
+    }
     if (last) last.end = one.time;
     bands.push({ state: one.state, begin: one.time, end: flight.end });
   }
