@@ -155,6 +155,7 @@ export function Video({ flight }: { flight: Flight }) {
           aria-label={`${flight.recorded ? "Recorded" : "Live"} picture of ${camera}`}
           data-testid="video"
           data-stamp={seen?.stamp}
+          data-captured={seen?.captured}
           data-boxes={seen?.boxes}
         />
         {!seen && (

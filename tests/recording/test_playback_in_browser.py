@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from browser import Browser, Page
 from required import needs_peer
 from synthetic_flight import SyntheticFlight, record
 
@@ -18,6 +17,7 @@ from aerodaas.console.viewer import RecordingServer
 from aerodaas.recording.pictures import shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
+from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
 
