@@ -54,7 +54,7 @@ def test_figures_are_those_of_the_recording(path: Path) -> None:
         assert told.velocity[row] == tuple(state.odometry.velocity)
         assert (told.yaw[row], told.battery[row]) == (state.odometry.yaw, state.battery.fraction)
     gaps = [later - time for time, later in zip(told.time, told.time[1:], strict=False)]
-    assert max(gaps) < 2 * track.ROW_SECONDS
+    assert 0.99 * track.ROW_SECONDS < min(gaps) <= max(gaps) < 2 * track.ROW_SECONDS
     assert told.distance[-1] == pytest.approx(FLIGHT_END.distance, abs=0.5)
 
 
@@ -113,6 +113,11 @@ def test_one_that_breaks_off_plays_as_far_as_it_goes(path: Path, tmp_path: Path)
     damaged = tmp_path / "damaged.mcap"
     damaged.write_bytes(data)
     assert read(damaged).remark == "1 damaged parts were left out"
+    with Recording.open(damaged) as recording:
+        # What is not asked for is not read.
+        before = block.start - recording.epoch_ns - 1
+        assert list(recording.records(until=before))
+        assert recording.damaged == 0
 
 
 def test_what_it_is_told_says_how_far_it_has_come(path: Path) -> None:
@@ -171,6 +176,11 @@ def test_a_strangers_recording_is_no_flight_of_ours(tmp_path: Path) -> None:
         writer.start()
         schema = writer.register_schema("aerodaas.MissionStatus", "jsonschema", b"{}")
         channels = [writer.register_channel(name, "json", schema) for name in ("/a", "/b")]
+        plans = writer.register_schema("aerodaas.Plan", "jsonschema", b"{}")
+        planned = writer.register_channel("/plan", "json", plans)
+        place = {"x": 1.0, "y": 2.0, "z": 3.0}
+        plan = {"stamp": 0, "robot": "x", "waypoints": [{**place, "id": one} for one in "ab"]}
+        writer.add_message(planned, 0, json.dumps(plan).encode(), 0)
         for number, value in enumerate(said):
             writer.add_message(channels[number % 2], number, json.dumps(value).encode(), number)
         for number in range(300):
@@ -180,9 +190,10 @@ def test_a_strangers_recording_is_no_flight_of_ours(tmp_path: Path) -> None:
     flight = read(path)
     assert len(flight.tracks) == 256
     told = flight.tracks["x"].statuses
-    assert [one.target for one in told] == [None, None, "late"]
+    assert [one.target for one in told] == [None, None, None, "late"]
+    assert [one.pending for one in told] == [[], [], ["a", "b"], []]
     assert [one.time for one in told] == sorted(one.time for one in told)
-    assert [one.waypoints_visited for one in told] == [0, 3, 0]
+    assert [one.waypoints_visited for one in told] == [0, 0, 3, 0]
     assert flight.environment == {}
 
 
@@ -224,4 +235,6 @@ def test_many_decisions_are_thinned_out(monkeypatch: pytest.MonkeyPatch) -> None
     rows = sums.rows
     assert len(rows) <= 22
     assert [one.in_time for one in rows] == sorted(one.in_time for one in rows)
+    gaps = [later.time - one.time for one, later in zip(rows, rows[1:-1], strict=False)]
+    assert max(gaps) <= 4 * min(gaps)
     assert (rows[-1].time, rows[-1].in_time) == (999, 1000)

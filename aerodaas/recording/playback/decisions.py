@@ -44,7 +44,7 @@ class DecisionSums:
         elif action in _OUTCOMES:
             self._outcomes[action] += 1
             # An outcome's reason begins with where the task ran.
-            self._places[value["reason"].partition(":")[0]] += action != "dropped"
+            self._places[value["reason"].partition(":")[0]] += 1
         else:
             return
         figures = value["values"]

@@ -147,14 +147,17 @@ class Film:
             for record in records:
                 if is_key_frame(picture_bytes(record.value)):
                     key = record.stamp
+                if record.captured == captures.captured[place]:
+                    # What comes next may have been recorded at the same time.
+                    break
             if key is not None or look >= min(place, _FARTHEST_LOOK):
                 return first if key is None else key
             look *= 4
 
     def _detections(self, header: Header) -> Iterator[Packed]:
         for stream, (topic, captures) in self._found.items():
-            for place in captures.at(header.stamp):
-                time = captures.recorded[place]
+            times = {captures.recorded[place] for place in captures.at(header.stamp)}
+            for time in sorted(times):
                 for _, found in detections(self._recording, [topic], time, time):
                     if (found.header.stamp, found.header.source) == (header.stamp, header.source):
                         message = _message(stream, header.stamp, header.stamp)
