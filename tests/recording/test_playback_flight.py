@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +54,7 @@ def test_figures_are_those_of_the_recording(path: Path) -> None:
         assert told.position[row] == tuple(state.odometry.position)
         assert told.velocity[row] == tuple(state.odometry.velocity)
         assert (told.yaw[row], told.battery[row]) == (state.odometry.yaw, state.battery.fraction)
-    gaps = [later - time for time, later in zip(told.time, told.time[1:], strict=False)]
+    gaps = [later - time for time, later in pairwise(told.time)]
     assert 0.99 * track.ROW_SECONDS < min(gaps) <= max(gaps) < 2 * track.ROW_SECONDS
     assert told.distance[-1] == pytest.approx(FLIGHT_END.distance, abs=0.5)
 
@@ -235,6 +236,6 @@ def test_many_decisions_are_thinned_out(monkeypatch: pytest.MonkeyPatch) -> None
     rows = sums.rows
     assert len(rows) <= 22
     assert [one.in_time for one in rows] == sorted(one.in_time for one in rows)
-    gaps = [later.time - one.time for one, later in zip(rows, rows[1:-1], strict=False)]
+    gaps = [later.time - one.time for one, later in pairwise(rows[:-1])]
     assert max(gaps) <= 4 * min(gaps)
     assert (rows[-1].time, rows[-1].in_time) == (999, 1000)
