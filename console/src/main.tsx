@@ -272,7 +272,6 @@ function Console(props: ConsoleProps) {
           onMark={setMarked}
         />
         <Charts flight={flight} robot={robot} theme={theme} />
-        <AnalyticsCharts flight={flight} theme={theme} />
         </div>
         <div class="side">
         {marked && (
@@ -290,6 +289,7 @@ function Console(props: ConsoleProps) {
         <StatePanel flight={flight} robot={robot} />
         {!recorded && <Commands flight={flight} robot={robot} mayFly={may} />}
         <Alerts flight={flight} />
+        <AnalyticsCharts flight={flight} theme={theme} />
         </div>
       </main>
       {flight.source instanceof Playback && <Timeline playback={flight.source} robot={robot} />}

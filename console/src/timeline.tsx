@@ -15,6 +15,8 @@ const NARROW = 0.001;
 const TICKS = 6;
 /** Seconds before an event at which it is sought, so that it is seen to come. */
 const LEAD = 0.05;
+/** Milliseconds after which the address follows the moment shown. */
+const REST = 250;
 
 interface Band {
   state: string;
@@ -71,7 +73,10 @@ export function Timeline({ playback, robot }: { playback: Playback; robot: strin
   // The address is a link to the moment at which it rests.
   const resting = playback.playing ? null : playback.time.toFixed(2);
   useEffect(() => {
-    if (resting !== null) writeFragment({ t: resting });
+    if (resting === null) return;
+    // Browsers refuse to change it as often as a slider moves.
+    const timer = setTimeout(() => writeFragment({ t: resting }), REST);
+    return () => clearTimeout(timer);
   }, [resting]);
   useEffect(() => setCopied(false), [resting]);
   useEffect(() => {

@@ -145,7 +145,7 @@ def test_it_is_played_by_keyboard_and_linked_to_a_moment(browser: Browser, path:
         page.key("ArrowRight")
         page.key("ArrowLeft")
         page.until(f"{TIME} === 31.5")
-        assert page.run("location.hash") == "#t=31.50"
+        page.until("location.hash === '#t=31.50'")
         page.run("document.querySelector('[aria-label=Speed]').value = '8'")
         page.run("document.querySelector('[aria-label=Speed]').dispatchEvent(new Event('change'))")
         page.key(" ")
