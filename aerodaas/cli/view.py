@@ -41,7 +41,7 @@ def view(
     check_served("--address", address)
     opened = Recording.open(recording)
     try:
-        server = RecordingServer(address, opened)
+        server = RecordingServer(address, opened, typer.echo)
     except BaseException:
         opened.close()
         raise

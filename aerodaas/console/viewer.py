@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from fastapi import APIRouter, Response
@@ -20,15 +21,23 @@ __all__ = ["RecordingServer"]
 class RecordingServer(PageServer):
     """Serves the page for one recording until it is closed."""
 
-    def __init__(self, address: str, recording: Recording) -> None:
-        """Listen at `host:port`, and show an open recording, which is closed at the end.
+    def __init__(
+        self, address: str, recording: Recording, tell: Callable[[str], None] = lambda _: None
+    ) -> None:
+        """Listen, and show a recording.
 
-        Raises ConfigError if that cannot be listened on.
+        Args:
+            address: `host:port`; port 0 selects a free one.
+            recording: An open recording, which is closed at the end.
+            tell: Tells people of many wrong tokens.
+
+        Raises:
+            ConfigError: If it cannot be listened on.
         """
         super().__init__(address, "--address")
         self._player = Player(recording.path, recording)
         routes = _Routes(recording, self._player).router()
-        self.serve(build_page(routes), lambda _: None)
+        self.serve(build_page(routes), tell)
 
     def close(self) -> None:
         """Stop serving, and close the recording."""

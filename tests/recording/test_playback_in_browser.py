@@ -17,12 +17,14 @@ from aerodaas.console.viewer import RecordingServer
 from aerodaas.recording.pictures import shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.types.data import Detections
+from aerodaas.types.status import Message
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
 
-TIMES = (20.0, 71.37, 33.03, 0.9, 60.0)
-"""Forwards and back, in different states; none at the moment of a picture."""
+TIMES = (20.0, 20.3, 71.37, 33.03, 0.9, 60.1)
+"""Forwards and back, in different states, with boxes and without."""
 DRONE = (
     "(() => { const map = document.querySelector('[data-testid=map]').dataset;"
     "const box = document.querySelector('[data-testid=map]').getBoundingClientRect();"
@@ -38,11 +40,22 @@ SEEK = (
 TIME = "Number(document.querySelector('[data-testid=time]').dataset.time)"
 
 
+class HalfAnalysed(SyntheticFlight):
+    """A flight in which nothing is found in every other picture."""
+
+    def messages(self) -> Iterator[Message[Any]]:
+        """What the streams carry."""
+        for message in super().messages():
+            item = message.item
+            if not (isinstance(item, Detections) and item.header.id % 2):
+                yield message
+
+
 @pytest.fixture(scope="module")
 def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A survey of 88 s with four pictures a second."""
     path = tmp_path_factory.mktemp("played") / "flight.mcap"
-    record(path, SyntheticFlight(frames=4.0, hover=0.5))
+    record(path, HalfAnalysed(frames=4.0, hover=0.5))
     return path
 
 
@@ -70,10 +83,10 @@ def facts(path: Path) -> tuple[RecordedFlight, dict[int, Any]]:
         return flight, {shot.header.stamp: shot.odometry for shot in shots(recording)}
 
 
-def until_stamp(page: Page, stamp: int) -> None:
-    """Wait until a picture is shown, with the box that was found in it."""
+def until_stamp(page: Page, stamp: int, boxes: int) -> None:
+    """Wait until a picture is shown, with what was found in it."""
     page.until(f"document.querySelector('[data-testid=video]').dataset.stamp === '{stamp}'")
-    page.until("document.querySelector('[data-testid=video]').dataset.boxes === '1'")
+    page.until(f"document.querySelector('[data-testid=video]').dataset.boxes === '{boxes}'")
 
 
 def pixel(page: Page, x: int, y: int) -> list[int]:
@@ -92,13 +105,16 @@ def test_scrubbing_moves_map_picture_state_and_charts_together(
     flight, pictures = facts(path)
     robot = flight.robots["tello"]
     stamps = sorted(pictures)
+    analysed = {one.stamp for one in flight.sightings}
+    seen = set()
     with served(path) as address:
         page = browser.open(address)
         page.until("document.querySelector('.timeline')")
         for time in TIMES:
             page.run(SEEK.format(time))
             stamp = stamps[bisect_right(stamps, round(time * 1e9)) - 1]
-            until_stamp(page, stamp)
+            until_stamp(page, stamp, int(stamp in analysed))
+            seen.add(stamp in analysed)
             row = bisect_right(robot.time.tolist(), time) - 1
             east, north, up = robot.position[row]
             shown = page.run(DRONE)
@@ -113,9 +129,10 @@ def test_scrubbing_moves_map_picture_state_and_charts_together(
             x, y, _ = pictures[stamp].position
             red, _, blue, _ = pixel(page, 160 + round(10 * x), 60 + round(6 * y))
             assert red > blue + 60
-            edge, inside = pixel(page, 139, 110), pixel(page, 120, 110)
-            assert sum(abs(one - other) for one, other in zip(edge, inside, strict=True)) > 60
-        page.run(SEEK.format(0))
+            edge, inside = pixel(page, 100, 110), pixel(page, 112, 110)
+            contrast = sum(abs(one - other) for one, other in zip(edge, inside, strict=True))
+            assert (contrast > 60) == (stamp in analysed)
+        assert seen == {True, False}
         assert page.complaints() == []
 
 

@@ -13,7 +13,9 @@ from typing import Any
 
 import pytest
 from synthetic_flight import SyntheticFlight, record
+from typer.testing import CliRunner
 
+from aerodaas.cli.app import app
 from aerodaas.console.playback import Player, Players
 from aerodaas.console.viewer import RecordingServer
 from aerodaas.protocol.playback import PlaybackOut
@@ -147,6 +149,23 @@ def test_a_taken_address_is_told(path: Path) -> None:
         port = address.partition("/#")[0].rpartition(":")[2]
         with pytest.raises(ConfigError, match="give another --address"):
             RecordingServer(f"127.0.0.1:{port}", recording)
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--address", "nowhere"], "--address takes host:port"),
+        (["--address", "127.0.0.1:99999"], "--address takes host:port"),
+        (["--address", "192.0.2.1:0"], "give another --address"),
+    ],
+)
+def test_the_command_says_what_is_wrong(path: Path, words: list[str], text: str) -> None:
+    """Before anything is served; as for a file that is none."""
+    found = CliRunner().invoke(app, ["view", str(path), *words])
+    assert isinstance(found.exception, ConfigError)
+    assert text in str(found.exception)
+    missing = CliRunner().invoke(app, ["view", str(path.parent / "no.mcap")])
+    assert isinstance(missing.exception, RecordingError)
 
 
 def test_one_that_cannot_be_read_says_so(tmp_path: Path) -> None:
