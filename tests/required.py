@@ -19,6 +19,8 @@ from typing import TypeVar
 
 import pytest
 
+from tools.browser import BROWSERS
+
 __all__ = ["PEERS", "needs", "needs_peer", "needs_python", "needs_root", "peer"]
 
 _Report = TypeVar("_Report", pytest.TestReport, pytest.CollectReport)
@@ -47,9 +49,7 @@ PEERS = {
     ),
     "AERODAAS_MAVSDK": Peer("a Python with MAVSDK: tests/testing/test_mavsdk.py"),
     "AERODAAS_DJITELLOPY": Peer("a Python with djitellopy: tests/testing/test_djitellopy.py"),
-    "AERODAAS_BROWSER": Peer(
-        "a Chromium or Chrome", ("chromium", "chromium-browser", "google-chrome")
-    ),
+    "AERODAAS_BROWSER": Peer("a Chromium or Chrome", BROWSERS),
     "AERODAAS_NPM": Peer("Node.js' npm, with its registry in reach", ("npm",), ("node",)),
     "AERODAAS_SSHD": Peer(
         "OpenSSH's server, with ssh, ssh-keygen and rsync installed, too",

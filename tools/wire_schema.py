@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
 from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.protocol.playback import PlaybackOut
 from aerodaas.protocol.schemas import (
     AccountOut,
     CommandIn,
@@ -26,7 +27,14 @@ from aerodaas.protocol.schemas import (
 __all__ = ["SCHEMA", "schema_text"]
 
 SCHEMA = Path(__file__).resolve().parents[1] / "console" / "wire.schema.json"
-_OUT: tuple[type[BaseModel], ...] = (AccountOut, AnswerOut, FleetOut, MissionOut, RefusalOut)
+_OUT: tuple[type[BaseModel], ...] = (
+    AccountOut,
+    AnswerOut,
+    FleetOut,
+    MissionOut,
+    PlaybackOut,
+    RefusalOut,
+)
 _IN: tuple[type[BaseModel], ...] = (CommandIn, NavigationIn)
 
 

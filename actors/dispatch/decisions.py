@@ -63,6 +63,7 @@ class Counts:
         self.retried = 0
         self._tasks = 0
         self._outcomes: Counter[str] = Counter()
+        self._places: Counter[str] = Counter()
         self._utility = 0.0
         self._windows = QoeWindows()
 
@@ -74,6 +75,7 @@ class Counts:
     def ended(self, result: Result) -> None:
         """Count a task's outcome and utility."""
         self._outcomes[result.outcome.value] += 1
+        self._places[result.place.value] += 1
         self._utility += result.utility
         if result.outcome is TaskOutcome.DONE:
             self._windows.done(result.task)
@@ -88,6 +90,7 @@ class Counts:
         return {
             "tasks": self._tasks,
             "outcomes": dict(self._outcomes),
+            "places": dict(self._places),
             "retried": self.retried,
             **self.totals,
             "qoe_windows": self._windows.won,

@@ -21,6 +21,7 @@ from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
 from aerodaas.cli.serve import serve
 from aerodaas.cli.shipped import find_application
+from aerodaas.cli.view import view
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.errors import (
     AeroDaaSError,
@@ -268,6 +269,7 @@ def doctor(
 
 
 app.command()(serve)
+app.command()(view)
 app.command()(report)
 app.command()(compare)
 app.command()(export)

@@ -30,7 +30,7 @@ from aerodaas.protocol.schemas import (
 )
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["build_console"]
+__all__ = ["account_of", "build_console", "build_page", "require_known"]
 
 
 def build_console(flight: OwnFlight, config: EnvironmentConfig, *, framed: bool = False) -> FastAPI:
@@ -38,12 +38,30 @@ def build_console(flight: OwnFlight, config: EnvironmentConfig, *, framed: bool 
 
     `framed`: a page of this machine, such as a notebook, may hold it in a frame.
     """
+    return build_page(_Routes(flight, config).router(), framed=framed)
+
+
+def build_page(routes: APIRouter, *, framed: bool = False) -> FastAPI:
+    """The application with the page, and the routes that it asks; a guard stands before it."""
     app = FastAPI(title="AeroDaaS console", docs_url=None, redoc_url=None, openapi_url=None)
     for kind in (AeroDaaSError, RequestValidationError, AnyHTTPException):
         app.add_exception_handler(kind, _refused)
     app.include_router(page_routes(framed=framed))
-    app.include_router(_Routes(flight, config).router())
+    app.include_router(routes)
     return app
+
+
+def account_of(request: Request) -> AccountOut:
+    """Who asks."""
+    role = role_of(request)
+    scopes = [Scope.SENSE] if role is Role.VIEWER else list(Scope)
+    return AccountOut(name=role.value, tenant=OWN, role=role, scopes=scopes, created=0.0)
+
+
+def require_known(mission: str) -> None:
+    """Raise HTTPException unless this is the one mission that there is."""
+    if mission != OWN:
+        raise HTTPException(404, f"there is no mission {mission}: this one is called {OWN}")
 
 
 class _Routes:
@@ -64,7 +82,7 @@ class _Routes:
     def router(self) -> APIRouter:
         """The routes."""
         router = APIRouter(prefix="/v1")
-        router.add_api_route("/me", self.me)
+        router.add_api_route("/me", account_of)
         router.add_api_route("/fleet", self.fleet)
         router.add_api_route("/missions", self.missions)
         router.add_api_route("/missions/{mission}", self.mission)
@@ -72,12 +90,6 @@ class _Routes:
         router.add_api_route("/missions/{mission}/navigation", self.navigation, methods=["POST"])
         router.add_api_websocket_route("/missions/{mission}/live", self.live)
         return router
-
-    def me(self, request: Request) -> AccountOut:
-        """Who asks."""
-        role = role_of(request)
-        scopes = [Scope.SENSE] if role is Role.VIEWER else list(Scope)
-        return AccountOut(name=role.value, tenant=OWN, role=role, scopes=scopes, created=0.0)
 
     def fleet(self) -> FleetOut:
         """The drones, and what may be known of where they fly."""
@@ -89,19 +101,19 @@ class _Routes:
 
     def mission(self, mission: str) -> MissionOut:
         """The one flight."""
-        _require_known(mission)
+        require_known(mission)
         return self._flight.mission()
 
     def command(self, mission: str, body: CommandIn, request: Request) -> AnswerOut:
         """Give a robot a command; answers what the drone said."""
-        _require_known(mission)
+        require_known(mission)
         _require_pilot(request)
         command = COMMANDS[body.command]
         return AnswerOut.of(self._flight.command(body.robot, command, body.command))
 
     def navigation(self, mission: str, body: NavigationIn, request: Request) -> AnswerOut:
         """Add waypoints to a robot's queue; answers what the drone said."""
-        _require_known(mission)
+        require_known(mission)
         _require_pilot(request)
         ids = ", ".join(waypoint.id for waypoint in body.waypoints)
         return AnswerOut.of(self._flight.command(body.robot, body.command(), f"visit {ids}"))
@@ -114,14 +126,9 @@ class _Routes:
         streams: StreamNames = "",
     ) -> None:
         """Send the flight's state, at most `rate` times a second, and items of `streams`."""
-        _require_known(mission)
+        require_known(mission)
         session = LiveSession(socket, self._flight, self._hub, mission)
         await session.run(rate, wanted_streams(streams), own=False)
-
-
-def _require_known(mission: str) -> None:
-    if mission != OWN:
-        raise HTTPException(404, f"there is no mission {mission}: this one is called {OWN}")
 
 
 def _require_pilot(request: Request) -> None:

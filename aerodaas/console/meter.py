@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.protocol.schemas import AnalyticsOut
 from aerodaas.types.clock import seconds
 from aerodaas.types.status import MissionState
 
@@ -31,6 +32,8 @@ class FlightMeter:
         self.status: dict[str, StatusOut] = {}
         """By robot; replaced and never changed, because other threads read it."""
         self.alerts: list[str] = []
+        self.analytics: AnalyticsOut | None = None
+        """What the analytics scheduler has done; None before its first outcome."""
         self._places: dict[str, OrderedDict[str, _Place]] = defaultdict(OrderedDict)
         self._flown: dict[str, float] = defaultdict(float)
         self._charges: dict[str, tuple[float, float]] = {}
@@ -56,6 +59,9 @@ class FlightMeter:
                 first, _ = self._charges.get(name, (status.battery, status.battery))
                 self._charges[name] = first, status.battery
         self.alerts = [f"{one.kind}: {one.text}" for one in state.alerts[-_ALERTS:]]
+        dispatcher = state.reports.get("dispatcher")
+        if dispatcher is not None:
+            self.analytics = AnalyticsOut.of(self.time, dispatcher.values)
 
     def _remembering(self, name: str, status: StatusOut) -> StatusOut:
         """A status with the places of waypoints that lie behind, too: those known last."""

@@ -99,6 +99,7 @@ class OwnFlight:
             started=self._began,
             status=self._meter.status,
             alerts=self._meter.alerts,
+            analytics=self._meter.analytics,
             streams={} if self.over else drawn_streams(self._run.graph),
         )
 

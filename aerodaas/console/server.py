@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import threading
 import time
+from collections.abc import Callable
+
+from starlette.types import ASGIApp
 
 from aerodaas.analytics.remote.attempts import WrongTokens
 from aerodaas.analytics.remote.guard import HostGuard
@@ -14,7 +17,7 @@ from aerodaas.console.app import build_console
 from aerodaas.console.own_flight import Flown, OwnFlight
 from aerodaas.types.errors import ConfigError
 
-__all__ = ["ConsoleServer"]
+__all__ = ["ConsoleServer", "PageServer"]
 
 _STOPPING = 5.0
 _FAREWELL = 1.0
@@ -25,15 +28,15 @@ _MOST_BYTES_SENT = 4096
 _PING_SECONDS = 5.0
 
 
-class ConsoleServer:
-    """Serves the page for one flight until it is closed."""
+class PageServer:
+    """Serves the page to who has a token, until it is closed."""
 
-    def __init__(self, address: str, *, framed: bool = False) -> None:
+    def __init__(self, address: str, option: str) -> None:
         """Listen.
 
         Args:
             address: `host:port`; port 0 selects a free one.
-            framed: Whether a page of this machine, such as a notebook, may hold it in a frame.
+            option: The option that has it, for the error's text.
 
         Raises:
             ConfigError: If it cannot be listened on.
@@ -42,13 +45,11 @@ class ConsoleServer:
         self._host = host
         try:
             self._socket = listen(host.strip("[]"), int(port))
-        except (OSError, OverflowError) as error:
+        except (OSError, OverflowError, ValueError) as error:
             raise ConfigError(
-                f"cannot serve the console at {address}: {error}; give another --console-address"
+                f"cannot serve the console at {address}: {error}; give another {option}"
             ) from None
         self._keys = FlightKeys()
-        self._framed = framed
-        self._flight: OwnFlight | None = None
         self._thread: threading.Thread | None = None
 
     def address(self, *, viewer: bool = False) -> str:
@@ -60,12 +61,9 @@ class ConsoleServer:
         token = self._keys.viewer if viewer else self._keys.pilot
         return f"http://{host}:{self._socket.getsockname()[1]}/#token={token}"
 
-    def start(self, run: Flown, name: str) -> None:
-        """Show a flight that has begun, an application called `name`."""
-        flight = self._flight = OwnFlight(run, name)
-        wrong = WrongTokens(lambda text: run.note("console_wrong_tokens", text), what="the console")
-        console = build_console(flight, run.config, framed=self._framed)
-        guarded = TokenGuard(console, self._keys, wrong)
+    def serve(self, app: ASGIApp, tell: Callable[[str], None]) -> None:
+        """Serve an application, in a thread; `tell` tells people of many wrong tokens."""
+        guarded = TokenGuard(app, self._keys, WrongTokens(tell, what="the console"))
         self._server = web_server(
             HostGuard(guarded, self._host),
             most_connections=_MOST_CONNECTIONS,
@@ -82,10 +80,34 @@ class ConsoleServer:
         self._thread.start()
 
     def close(self) -> None:
-        """Tell the watchers that the flight is over, and stop serving."""
-        if self._flight is not None and self._thread is not None:
-            self._flight.close()
-            time.sleep(_FAREWELL)
+        """Stop serving."""
+        if self._thread is not None:
             self._server.should_exit = True
             self._thread.join(_STOPPING)
         self._socket.close()
+
+
+class ConsoleServer(PageServer):
+    """Serves the page for one flight until it is closed."""
+
+    def __init__(self, address: str, *, framed: bool = False) -> None:
+        """Listen at `host:port`; raises ConfigError if that cannot be listened on.
+
+        `framed`: a page of this machine, such as a notebook, may hold it in a frame.
+        """
+        super().__init__(address, "--console-address")
+        self._framed = framed
+        self._flight: OwnFlight | None = None
+
+    def start(self, run: Flown, name: str) -> None:
+        """Show a flight that has begun, an application called `name`."""
+        flight = self._flight = OwnFlight(run, name)
+        app = build_console(flight, run.config, framed=self._framed)
+        self.serve(app, lambda text: run.note("console_wrong_tokens", text))
+
+    def close(self) -> None:
+        """Tell the watchers that the flight is over, and stop serving."""
+        if self._flight is not None:
+            self._flight.close()
+            time.sleep(_FAREWELL)
+        super().close()

@@ -6,6 +6,7 @@ Units are metres, seconds, radians and m/s; moments are seconds of Unix time; a 
 from __future__ import annotations
 
 import enum
+from collections.abc import Mapping
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -18,6 +19,7 @@ from aerodaas.protocol.commands import CommandWord
 __all__ = [
     "AccountIn",
     "AccountOut",
+    "AnalyticsOut",
     "Area",
     "AuditOut",
     "CommandIn",
@@ -240,6 +242,42 @@ class VerdictOut(_Out):
     """Path of a PNG of the flight, at this service."""
 
 
+class AnalyticsOut(_Out):
+    """What the analytics scheduler has made of its tasks, from the start up to one time."""
+
+    time: float
+    """Mission time, seconds."""
+    in_time: int = 0
+    """Tasks with a result by their deadline."""
+    late: int = 0
+    """Tasks with a later result, or with none after they had begun."""
+    dropped: int = 0
+    """Tasks that were given up before they began."""
+    edge: int = 0
+    """Tasks that ended on the edge."""
+    cloud: int = 0
+    qos: float = 0.0
+    """Utility of the results; `qoe` is the bonus of windows with enough of them in time."""
+    qoe: float = 0.0
+
+    @classmethod
+    def of(cls, time: float, values: Mapping[str, Any]) -> AnalyticsOut | None:
+        """Convert what a dispatcher reports; None before its first outcome."""
+        outcomes, places = values.get("outcomes"), values.get("places", {})
+        if not outcomes:
+            return None
+        return cls(
+            time=time,
+            in_time=outcomes.get("done", 0),
+            late=sum(outcomes.get(name, 0) for name in ("late", "timeout", "failed")),
+            dropped=outcomes.get("dropped", 0),
+            edge=places.get("edge", 0),
+            cloud=places.get("cloud", 0),
+            qos=values["qos_total"],
+            qoe=values["qoe_total"],
+        )
+
+
 class MissionOut(_Out):
     """A mission and its newest state."""
 
@@ -263,6 +301,8 @@ class MissionOut(_Out):
     """The newest alerts, oldest first."""
     streams: dict[str, StreamKind] = Field(default_factory=dict)
     """Streams of pictures and of what was found in them, by name, while it flies."""
+    analytics: AnalyticsOut | None = None
+    """What the analytics scheduler has done so far; None without one, and after the flight."""
     recording: bool = False
     """Whether the recording can be fetched."""
 

@@ -29,6 +29,7 @@ from aerodaas.types.data import Detection, Detections, Frame, Header, Odometry
 from aerodaas.types.errors import SourceError
 
 __all__ = [
+    "DETECTIONS_SCHEMA",
     "Shot",
     "decoded_ahead",
     "detections",
@@ -40,6 +41,8 @@ __all__ = [
 
 _log = logging.getLogger(__name__)
 _PICTURE_SCHEMAS = IMAGE_SCHEMAS | VIDEO_SCHEMAS
+DETECTIONS_SCHEMA = "aerodaas.Detections"
+"""Schema of the messages that `detections` reads."""
 _DEPTH = "/aligned_depth"
 """End of the topic of a frame's depth image, next to the topic of its header."""
 _AHEAD = 4
@@ -149,7 +152,9 @@ def picture_topics(recording: Recording) -> list[str]:
     return sorted(name for name in found if not _is_depth(name, known))
 
 
-def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterator[Shot]:
+def shots(
+    recording: Recording, topics: Collection[str] | None = None, since: int | None = None
+) -> Iterator[Shot]:
     """Iterate over images in the order of recording, without decoding them.
 
     Recordings of other software have no frame numbers; there a header has the message's
@@ -158,6 +163,8 @@ def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterat
     Args:
         recording: An open recording.
         topics: Topics to read; None for all that hold images.
+        since: Earliest mission time of recording, nanoseconds; None for the beginning. Frames of
+            a video can be decoded from its first key frame after that.
 
     Yields:
         Images with their headers and, if recorded, odometry and depth.
@@ -169,7 +176,7 @@ def shots(recording: Recording, topics: Collection[str] | None = None) -> Iterat
     wanted = None
     if topics is not None:
         wanted = {name for one in topics for name in (one, *_heads(one), _depth_of(one))}
-    for record in recording.records(schemas=schemas, topics=wanted):
+    for record in recording.records(schemas=schemas, topics=wanted, since=since):
         if record.schema == "aerodaas.Frame":
             heads[record.topic] = record
             continue
@@ -243,9 +250,16 @@ def frames(
                 yield Frame(shot.header, image, odometry=shot.odometry, depth=shot.depth())
 
 
-def detections(recording: Recording) -> Iterator[tuple[str, Detections]]:
-    """Iterate over topics and detections in the order of recording."""
-    for record in recording.records(schemas=("aerodaas.Detections",)):
+def detections(
+    recording: Recording,
+    topics: Collection[str] | None = None,
+    since: int | None = None,
+    until: int | None = None,
+) -> Iterator[tuple[str, Detections]]:
+    """Iterate over topics and detections in the order of recording, as `Recording.records` does."""
+    for record in recording.records(
+        schemas=(DETECTIONS_SCHEMA,), topics=topics, since=since, until=until
+    ):
         value = record.value
         header = Header(value["id"], value["stamp"], value["source"])
         items = tuple(_detection(item) for item in value["items"])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import heapq
-from collections import Counter
+from collections import Counter, OrderedDict
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
@@ -33,6 +33,11 @@ __all__ = ["Record", "Recording", "Topic"]
 _RECORD_HEAD = 9
 _LATEST = 1 << 63
 """Nanoseconds since 1970 that a date can show: until the year 2262."""
+_NEVER = 1 << 64
+"""Later than any log time."""
+_KEPT_BLOCKS = 4
+_KEPT_SIZE = 4 << 20
+"""Bytes of a block that is kept; ours have one million."""
 _OVERHEAD = 256
 """Bytes in memory of a message, beside its data."""
 
@@ -62,7 +67,8 @@ class Record:
     """Mission time of the described measurement, nanoseconds."""
     sequence: int
     value: Any
-    """A dictionary for JSON, an object for protobuf and ROS 2's pictures, else bytes."""
+    """A dictionary for JSON, an object for protobuf and ROS 2's pictures, else bytes; None where
+    it was not to be decoded."""
 
 
 class Recording:
@@ -74,6 +80,8 @@ class Recording:
         self._file = file
         self._index = index
         self._decoder = MessageDecoder()
+        self._loaded: OrderedDict[int, list[Message]] = OrderedDict()
+        """Messages of the blocks read last, by offset: who seeks reads the same ones again."""
         self.skipped: Counter[str] = Counter()
         """Broken messages that were skipped so far, by topic; counted at each reading."""
         starts = [block.start for block in index.blocks]
@@ -194,14 +202,21 @@ class Recording:
         *,
         schemas: Collection[str] | None = None,
         topics: Collection[str] | None = None,
+        bare: Collection[str] = (),
+        since: int | None = None,
+        until: int | None = None,
     ) -> Iterator[Record]:
         """Iterate over messages in the order of log times.
 
-        Chunks that overlap in time are put in order as far as `limits.MAX_HELD` allows.
+        Chunks that overlap in time are put in order as far as `limits.MAX_HELD` allows. Chunks
+        outside of the given time are not read.
 
         Args:
             schemas: Names of the schemas to read; None for all.
             topics: Topics to read; None for all.
+            bare: Topics whose messages are not decoded: their value is None.
+            since: Earliest mission time of recording, nanoseconds; None for the first message's.
+            until: Latest one; None for the last message's.
 
         Yields:
             Messages, checked by `messages.MessageDecoder`; a damaged chunk or a broken message is
@@ -213,11 +228,15 @@ class Recording:
             if (topics is None or channel.topic in topics)
             and (schemas is None or self._schema_name(channel) in schemas)
         }
-        for message in self._messages(wanted):
+        first = 0 if since is None else since + self.epoch_ns
+        last = _NEVER if until is None else until + self.epoch_ns
+        for message in self._messages(wanted, first, last):
             channel = self._index.channels[message.channel_id]
             schema = self._index.schemas.get(channel.schema_id)
+            value = None
             try:
-                value = self._decoder.decode(channel, schema, message.data)
+                if channel.topic not in bare:
+                    value = self._decoder.decode(channel, schema, message.data)
             except BrokenMessageError:
                 self.skipped[channel.topic] += 1
                 continue
@@ -249,9 +268,13 @@ class Recording:
         schema = self._index.schemas.get(channel.schema_id)
         return schema.name if schema else ""
 
-    def _messages(self, wanted: set[int]) -> Iterator[Message]:
+    def _messages(self, wanted: set[int], first: int, last: int) -> Iterator[Message]:
         blocks = sorted(
-            (block for block in self._index.blocks if block.channels & wanted),
+            (
+                block
+                for block in self._index.blocks
+                if block.channels & wanted and block.start <= last and block.end >= first
+            ),
             key=lambda block: block.start,
         )
         # Chunks may overlap in time: hold messages back until no later chunk can precede them.
@@ -259,7 +282,7 @@ class Recording:
         order = size = 0
         for position, block in enumerate(blocks):
             for message in self._load(block):
-                if message.channel_id in wanted:
+                if message.channel_id in wanted and first <= message.log_time <= last:
                     heapq.heappush(held, (message.log_time, order, message))
                     order += 1
                     size += len(message.data) + _OVERHEAD
@@ -272,10 +295,23 @@ class Recording:
                 yield heapq.heappop(held)[2]
 
     def _load(self, block: Block) -> Iterator[Message]:
+        known = self._loaded.get(block.offset)
+        if known is not None:
+            yield from known
+            return
+        kept = max(block.size, block.length) <= _KEPT_SIZE
+        messages: list[Message] = []
         try:
             for record in load(self._file, block):
                 if isinstance(record, Message):
+                    if kept:
+                        messages.append(record)
                     yield record
         except BROKEN:
             self._index.damaged += not block.damaged
             block.damaged = True
+            return
+        if kept:
+            self._loaded[block.offset] = messages
+            while len(self._loaded) > _KEPT_BLOCKS:
+                self._loaded.popitem(last=False)

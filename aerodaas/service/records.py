@@ -36,5 +36,6 @@ def shown(one: ActiveMission) -> MissionOut:
         status=status,
         alerts=alerts,
         streams=news.streams if news is not None and not one.over else {},
+        analytics=news.analytics if news is not None and not one.over else None,
         recording=one.phase is not MissionPhase.FLYING and one.flight.recording.is_file(),
     )

@@ -5,12 +5,28 @@ import type { RefusalOut } from "./wire";
 const TOKEN = "aerodaas.token";
 const PAUSES = [250, 500, 1000, 2000, 4000];
 
+/** Change words of the address' fragment; null takes one out. */
+export function writeFragment(words: Record<string, string | null>): void {
+  const fragment = new URLSearchParams(location.hash.slice(1));
+  for (const [name, word] of Object.entries(words)) {
+    if (word === null) fragment.delete(name);
+    else fragment.set(name, word);
+  }
+  const text = fragment.toString();
+  history.replaceState(null, "", location.pathname + location.search + (text && `#${text}`));
+}
+
+/** A word of the address' fragment; null without it. */
+export function readFragment(name: string): string | null {
+  return new URLSearchParams(location.hash.slice(1)).get(name);
+}
+
 /** The token of the address' fragment, which is taken out of sight; else the one kept in this tab. */
 export function takeToken(): string {
-  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  const given = readFragment("token");
   if (given) {
     keepToken(given);
-    history.replaceState(null, "", location.pathname + location.search);
+    writeFragment({ token: null });
   }
   return sessionStorage.getItem(TOKEN) ?? "";
 }
@@ -30,8 +46,18 @@ export class Refused extends Error {
 
 /** Ask the server; throws Refused with its reason. */
 export async function ask<T>(path: string, token: string, body?: unknown): Promise<T> {
+  return (await (await answered(path, token, body)).json()) as T;
+}
+
+/** As `ask`, for an answer of any kind; `signal` gives the request up. */
+export async function answered(
+  path: string,
+  token: string,
+  body?: unknown,
+  signal?: AbortSignal,
+): Promise<Response> {
   const headers: Record<string, string> = { Authorization: `Bearer ${token}` };
-  const request: RequestInit = { headers, cache: "no-store" };
+  const request: RequestInit = { headers, cache: "no-store", signal: signal ?? null };
   if (body !== undefined) {
     headers["Content-Type"] = "application/json";
     request.method = "POST";
@@ -40,14 +66,14 @@ export async function ask<T>(path: string, token: string, body?: unknown): Promi
   const answer = await fetch(new URL(path, document.baseURI), request).catch(() => {
     throw new Refused(0, "the server does not answer");
   });
-  if (answer.ok) return (await answer.json()) as T;
+  if (answer.ok) return answer;
   const said = (await answer.json().catch(() => null)) as RefusalOut | null;
   throw new Refused(answer.status, said?.text ?? `the server answered ${answer.status}`);
 }
 
 export interface Ears {
   text(message: Record<string, unknown>): void;
-  blob?(message: Record<string, unknown>, data: ArrayBuffer): void;
+  blob?(message: Record<string, unknown>, data: ArrayBuffer): void | Promise<void>;
   up(connected: boolean): void;
 }
 
@@ -110,7 +136,7 @@ export class LiveSocket {
       if (message["kind"] === "end") this.closed = true;
       if (this.head === undefined) this.ears.text(message);
     } else if (this.head !== undefined) {
-      this.ears.blob?.(this.head, data);
+      void this.ears.blob?.(this.head, data);
       this.head = undefined;
     }
   }

@@ -1,12 +1,21 @@
-// The state of one mission as the page knows it, from the live socket: newest status, trails, charts.
+// The state of one mission as the page knows it, live or recorded: newest status, trails, charts.
 
-import { Refused, LiveSocket, ask } from "./connection";
+import { Refused, ask } from "./connection";
 import type { Point } from "./place";
-import type { AnswerOut, CommandIn, MissionOut, NavigationIn, StatusOut } from "./wire";
+import type { Past, Source } from "./source";
+import type {
+  AnalyticsOut,
+  AnswerOut,
+  CommandIn,
+  MissionOut,
+  NavigationIn,
+  StatusOut,
+} from "./wire";
 
 const TRAIL = 3000;
 const STEP = 0.05;
 const HISTORY = 1200;
+const SUMS = 0.5;
 const STALE = 2500;
 const CONFIRMING = 30000;
 
@@ -70,20 +79,34 @@ export class Flight {
   history = new Map<string, Sample[]>();
   orders: Order[] = [];
   alerts: Alert[] = [];
+  /** What the analytics scheduler had done by each time. */
+  analytics: AnalyticsOut[] = [];
   readonly clock = new ClockOffset();
   private told: string[] = [];
   private orderCount = 0;
-  private readonly socket: LiveSocket;
 
   constructor(
     mission: MissionOut,
+    readonly source: Source,
     private readonly token: string,
     private readonly changed: () => void,
   ) {
     this.mission = mission;
     this.take(mission);
-    this.socket = new LiveSocket(`v1/missions/${mission.id}/live?rate=10`, token, {
-      text: (message) => this.message(message),
+    source.follow({
+      mission: (told, now) => {
+        this.clock.take(now);
+        this.take(told);
+        this.changed();
+      },
+      moment: (told, past) => {
+        this.show(told, past);
+        this.changed();
+      },
+      end: () => {
+        this.over = true;
+        this.changed();
+      },
       up: (connected) => {
         this.connected = connected;
         this.changed();
@@ -92,12 +115,17 @@ export class Flight {
   }
 
   close(): void {
-    this.socket.close();
+    this.source.close();
+  }
+
+  /** Whether what is shown was recorded. */
+  get recorded(): boolean {
+    return this.source.recorded;
   }
 
   /** Whether what is shown may not be so any more. */
   get stale(): boolean {
-    return !this.over && (!this.connected || Date.now() - this.heard > STALE);
+    return !this.recorded && !this.over && (!this.connected || Date.now() - this.heard > STALE);
   }
 
   status(robot: string): StatusOut | undefined {
@@ -156,13 +184,11 @@ export class Flight {
       .finally(() => this.changed());
   }
 
-  private message(message: Record<string, unknown>): void {
-    if (message["kind"] === "end") this.over = true;
-    if (message["kind"] === "mission") {
-      this.clock.take(message["now"] as number);
-      this.take(message["mission"] as MissionOut);
-    }
-    this.changed();
+  /** Show a moment of a recording, with what came before it. */
+  private show(mission: MissionOut, past: Past): void {
+    this.mission = mission;
+    this.over = false;
+    Object.assign(this, past);
   }
 
   private take(mission: MissionOut): void {
@@ -170,6 +196,10 @@ export class Flight {
     this.heard = Date.now();
     this.over = ["landed", "failed", "cancelled", "refused"].includes(mission.phase);
     for (const [robot, status] of Object.entries(mission.status)) this.follow(robot, status);
+    const sums = mission.analytics;
+    if (sums && sums.time >= (this.analytics.at(-1)?.time ?? -SUMS) + SUMS) {
+      this.analytics = [...this.analytics, sums].slice(-HISTORY);
+    }
     this.takeAlerts(mission.alerts);
     for (const order of this.orders) this.confirm(order);
   }
@@ -178,8 +208,7 @@ export class Flight {
     const [east, north, up] = status.position ?? [];
     if (east != null && north != null) {
       const trail = this.trails.get(robot) ?? [];
-      const last = trail[trail.length - 1];
-      if (!last || Math.hypot(last[0] - east, last[1] - north) >= STEP) trail.push([east, north]);
+      if (shifted(trail.at(-1), east, north)) trail.push([east, north]);
       this.trails.set(robot, trail.length > TRAIL ? trail.filter((_, n) => n % 2 === 0) : trail);
     }
     const samples = this.history.get(robot) ?? [];
@@ -227,7 +256,12 @@ export class Flight {
   }
 }
 
-export function speedOf(status: StatusOut): number | null {
+/** Whether a place is far enough from the last point of a trail to be one of its own. */
+export function shifted(last: Point | undefined, east: number, north: number): boolean {
+  return !last || Math.hypot(last[0] - east, last[1] - north) >= STEP;
+}
+
+export function speedOf(status: Pick<StatusOut, "velocity">): number | null {
   const [east, north, up] = status.velocity ?? [];
   return east == null || north == null || up == null ? null : Math.hypot(east, north, up);
 }

@@ -1,14 +1,18 @@
 // The console: signs in, chooses a mission, and lays out the panels.
 
 import { render } from "preact";
-import { useCallback, useEffect, useState } from "preact/hooks";
-import { Charts } from "./charts";
-import { Refused, ask, keepToken, takeToken } from "./connection";
+import { useCallback, useEffect, useMemo, useState } from "preact/hooks";
+import { AnalyticsCharts, Charts } from "./charts";
+import { Refused, ask, keepToken, readFragment, takeToken, writeFragment } from "./connection";
 import { Flight } from "./flight";
 import { FlightMap } from "./map";
 import { Alerts, Commands, StatePanel, WaypointForm } from "./panels";
 import { type Place, type Point, placeOf } from "./place";
-import type { AccountOut, FleetOut, MissionOut } from "./wire";
+import { Playback } from "./playback";
+import { Recorded } from "./recorded";
+import { LiveSource } from "./source";
+import { Timeline, momentOfLink } from "./timeline";
+import type { AccountOut, FleetOut, MissionOut, RecordedOut } from "./wire";
 import { Video } from "./video";
 import "./console.css";
 
@@ -27,7 +31,9 @@ function App() {
   const [token, setToken] = useState(takeToken);
   const [known, setKnown] = useState<Known | null>(null);
   const [missions, setMissions] = useState<MissionOut[]>([]);
-  const [chosen, setChosen] = useState<string | null>(null);
+  const [chosen, setChosen] = useState<string | null>(() => readFragment("mission"));
+  /** The mission that was seen flying: its end is shown before its recording. */
+  const [seen, setSeen] = useState<string | null>(null);
   const [problem, setProblem] = useState("");
   const { choice, setChoice, theme } = useTheme();
 
@@ -65,12 +71,21 @@ function App() {
   }, [token]);
 
   const flying = missions.filter((one) => one.phase === "flying");
-  const shown = chosen ?? (flying.length === 1 ? flying[0]?.id : undefined) ?? null;
+  const only = flying.length === 1 ? flying[0] : missions.length === 1 ? missions[0] : undefined;
+  const shown = chosen ?? (only?.phase === "flying" || only?.recording ? only.id : null);
   const mission = missions.find((one) => one.id === shown);
   // A mission that is shown stays shown after it is over.
   useEffect(() => {
     if (chosen === null && shown !== null) setChosen(shown);
   }, [chosen, shown]);
+  useEffect(() => {
+    if (mission?.phase === "flying") setSeen(mission.id);
+  }, [mission?.id, mission?.phase, seen]);
+  const choose = (id: string) => {
+    setSeen(null);
+    setChosen(id);
+    writeFragment({ mission: id, t: null });
+  };
 
   const themes = (
     <button
@@ -85,24 +100,20 @@ function App() {
   );
   if (!token) return <SignIn problem={problem} onToken={setToken} />;
   if (known && mission) {
+    const shared = { first: mission, missions, known, token, theme, themes, onMission: choose };
+    const replayed = mission.recording && known.account.scopes.includes("sense");
+    if (!replayed || seen === mission.id) return <Console key={mission.id} {...shared} />;
     return (
-      <Console
-        key={mission.id}
-        first={mission}
-        missions={missions}
-        known={known}
-        token={token}
-        theme={theme}
-        themes={themes}
-        onMission={setChosen}
-      />
+      <Recorded key={`recorded ${mission.id}`} mission={mission} token={token}>
+        {(flight) => <Console {...shared} recorded={flight} />}
+      </Recorded>
     );
   }
   return (
     <main class="start">
       <h1>AeroDaaS console</h1>
       {problem && <p class="banner bad">{problem}</p>}
-      {known ? <Missions missions={missions} onMission={setChosen} /> : <p>connecting…</p>}
+      {known ? <Missions missions={missions} onMission={choose} /> : <p>connecting…</p>}
       {themes}
     </main>
   );
@@ -162,16 +173,23 @@ interface ConsoleProps {
   theme: string;
   themes: preact.ComponentChildren;
   onMission(id: string): void;
+  recorded?: RecordedOut;
 }
 
-function Console({ first, missions, known, token, theme, themes, onMission }: ConsoleProps) {
+function Console(props: ConsoleProps) {
+  const { first, missions, known, token, theme, themes, onMission, recorded } = props;
   const [, draw] = useState(0);
   const [flight, setFlight] = useState<Flight | null>(null);
-  const [robot, setRobot] = useState(first.robots[0] ?? "");
+  const [robot, setRobot] = useState(
+    () => first.robots[0] ?? Object.keys(recorded?.tracks ?? {})[0] ?? "",
+  );
   const [marked, setMarked] = useState<Point | null>(null);
   const changed = useCallback(() => draw((count) => count + 1), []);
   useEffect(() => {
-    const made = new Flight(first, token, changed);
+    const source = recorded
+      ? new Playback(first, recorded, token, momentOfLink())
+      : new LiveSource(first.id, token);
+    const made = new Flight(first, source, token, changed);
     setFlight(made);
     // Silence has to show, too.
     const timer = setInterval(changed, 500);
@@ -180,15 +198,19 @@ function Console({ first, missions, known, token, theme, themes, onMission }: Co
       made.close();
     };
   }, [first.id, token, changed]);
+  const place = useMemo(
+    () => (recorded ? placeOf({ ...recorded, robots: [] }) : known.place),
+    [recorded, known],
+  );
   if (!flight) return null;
 
-  const may = known.account.role !== "viewer" && known.account.scopes.includes("fly");
+  const may = !recorded && known.account.role !== "viewer" && known.account.scopes.includes("fly");
   const sees = known.account.scopes.includes("sense");
   const status = flight.status(robot);
-  const fence = known.place.fences.find((one) => one.robot === robot);
+  const fence = place.fences.find((one) => one.robot === robot);
   const height = status?.position?.[2] ?? 0;
   return (
-    <div class="page">
+    <div class={`page ${recorded ? "played" : ""}`}>
       <header class="top">
         <h1>AeroDaaS</h1>
         {missions.length > 1 ? (
@@ -231,14 +253,19 @@ function Console({ first, missions, known, token, theme, themes, onMission }: Co
       {flight.over && (
         <p class="banner" role="status" data-testid="banner">
           The flight is over: {flight.mission.phase.replaceAll("_", " ")}
-          {flight.mission.reason && `, ${flight.mission.reason}`}
+          {flight.mission.reason && `, ${flight.mission.reason}`}{" "}
+          {replays(missions, first.id) && (
+            <button type="button" onClick={() => onMission(first.id)}>
+              Play its recording
+            </button>
+          )}
         </p>
       )}
       <main class="panels">
         <div class="wide">
         <FlightMap
           flight={flight}
-          place={known.place}
+          place={place}
           robot={robot}
           mayFly={may && !flight.over}
           marked={marked}
@@ -253,23 +280,31 @@ function Console({ first, missions, known, token, theme, themes, onMission }: Co
             flight={flight}
             robot={robot}
             point={marked}
-            height={height > 0.5 ? height : known.place.takeoffHeight}
+            height={height > 0.5 ? height : place.takeoffHeight}
             ceiling={fence?.ceiling ?? 120}
             onDone={() => setMarked(null)}
           />
         )}
-        {sees && <Video flight={flight} token={token} />}
+        {sees && <Video flight={flight} />}
         <StatePanel flight={flight} robot={robot} />
-        <Commands flight={flight} robot={robot} mayFly={may} />
+        {!recorded && <Commands flight={flight} robot={robot} mayFly={may} />}
         <Alerts flight={flight} />
+        <AnalyticsCharts flight={flight} theme={theme} />
         </div>
       </main>
+      {flight.source instanceof Playback && <Timeline playback={flight.source} robot={robot} />}
     </div>
   );
 }
 
+function replays(missions: MissionOut[], id: string): boolean {
+  return missions.some((one) => one.id === id && one.recording);
+}
+
 function Connection({ flight }: { flight: Flight }) {
-  const [tone, text] = flight.over
+  const [tone, text] = flight.recorded
+    ? ["", "recording"]
+    : flight.over
     ? ["", "over"]
     : flight.stale
       ? ["bad", "not connected"]

@@ -272,7 +272,11 @@ export function Alerts({ flight }: { flight: Flight }) {
       <header>
         <h2>Alerts</h2>
         <span class={`badge ${open.length ? "warn" : "good"}`} data-testid="alerts">
-          {open.length ? `${open.length} new` : "none new"}
+          {flight.recorded
+            ? `${flight.alerts.length} so far`
+            : open.length
+              ? `${open.length} new`
+              : "none new"}
         </span>
         {open.length > 1 && (
           <button type="button" class="plain" onClick={() => flight.acknowledge(null)}>
@@ -282,7 +286,7 @@ export function Alerts({ flight }: { flight: Flight }) {
       </header>
       <ul aria-live="polite">
         {flight.alerts.map((one) => (
-          <li key={one.id} class={one.acknowledged ? "old" : "new"}>
+          <li key={one.id} class={one.acknowledged && !flight.recorded ? "old" : "new"}>
             <span>
               <strong>{one.kind.replaceAll("_", " ")}</strong> {one.text}
               {one.count > 1 && <em> ×{one.count}</em>}

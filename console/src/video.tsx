@@ -1,7 +1,6 @@
-// Live pictures of one camera: boxes and labels are drawn on the very frame they were made from.
+// Pictures of one camera: boxes and labels are drawn on the very frame they were made from.
 
 import { useEffect, useRef, useState } from "preact/hooks";
-import { LiveSocket } from "./connection";
 import type { ClockOffset, Flight } from "./flight";
 
 const KEPT = 16;
@@ -39,6 +38,8 @@ function list(items: unknown): unknown[] {
 }
 
 class Pictures {
+  constructor(private readonly most: number) {}
+
   private kept: Picture[] = [];
   private early = new Map<string, Map<string, Detection[]>>();
 
@@ -57,7 +58,7 @@ class Pictures {
       camera: message["stream"] as string,
       found,
     });
-    while (this.kept.length > KEPT) this.kept.shift()?.bitmap.close();
+    while (this.kept.length > this.most) this.kept.shift()?.bitmap.close();
   }
 
   detections(message: Record<string, unknown>): void {
@@ -89,7 +90,7 @@ class Pictures {
   }
 }
 
-export function Video({ flight, token }: { flight: Flight; token: string }) {
+export function Video({ flight }: { flight: Flight }) {
   const streams = flight.mission.streams;
   const names = Object.keys(streams).sort();
   const cameras = names.filter((name) => streams[name] === "pictures");
@@ -97,11 +98,12 @@ export function Video({ flight, token }: { flight: Flight; token: string }) {
   const camera = cameras.includes(chosen) ? chosen : (cameras[0] ?? "");
   const canvas = useRef<HTMLCanvasElement>(null);
   const [seen, setSeen] = useState<{ stamp: number; captured: number; boxes: number } | null>(null);
-  const wanted = [camera, ...names.filter((name) => streams[name] === "detections")].join(",");
+  const finders = names.filter((name) => streams[name] === "detections").join(",");
 
   useEffect(() => {
     if (!camera) return;
-    const pictures = new Pictures();
+    // Of a recording, the picture of the moment is shown and no other one.
+    const pictures = new Pictures(flight.recorded ? 1 : KEPT);
     let asked = false;
     const draw = () => {
       asked = false;
@@ -114,18 +116,15 @@ export function Video({ flight, token }: { flight: Flight; token: string }) {
       if (!asked) requestAnimationFrame(draw);
       asked = true;
     };
-    const query = new URLSearchParams({ rate: "1", streams: wanted });
-    const socket = new LiveSocket(`v1/missions/${flight.mission.id}/live?${query}`, token, {
-      text: (message) => {
-        if (message["kind"] !== "item") return;
+    return flight.source.watch(camera, finders.split(","), {
+      found: (message) => {
         pictures.detections(message);
         later();
       },
-      blob: (message, data) => void pictures.frame(message, data).then(later),
-      up: () => undefined,
+      picture: (message, data) => pictures.frame(message, data).then(later),
+      nothing: () => setSeen(null),
     });
-    return () => socket.close();
-  }, [camera, wanted, token, flight]);
+  }, [camera, finders, flight]);
 
   return (
     <section class="card video" aria-label="Camera">
@@ -143,18 +142,20 @@ export function Video({ flight, token }: { flight: Flight; token: string }) {
           </select>
         )}
         {cameras.length === 1 && <span class="muted">{camera}</span>}
-        {seen && <Age clock={flight.clock} captured={seen.captured} over={flight.over} />}
+        {seen && !flight.recorded && <Age clock={flight.clock} captured={seen.captured} over={flight.over} />}
       </header>
       <div class="screen">
         {/* Its first picture gives it its shape. */}
         <canvas
           ref={canvas}
+          hidden={!seen && flight.recorded}
           width="16"
           height="9"
           role="img"
-          aria-label={`Live picture of ${camera}`}
+          aria-label={`${flight.recorded ? "Recorded" : "Live"} picture of ${camera}`}
           data-testid="video"
           data-stamp={seen?.stamp}
+          data-captured={seen?.captured}
           data-boxes={seen?.boxes}
         />
         {!seen && (

@@ -33,6 +33,7 @@ export interface Wire {
   FleetOut: FleetOut;
   MissionOut: MissionOut;
   NavigationIn: NavigationIn;
+  PlaybackOut: PlaybackOut;
   RefusalOut: RefusalOut;
 }
 /**
@@ -93,6 +94,7 @@ export interface RobotOut {
 export interface MissionOut {
   account: string;
   alerts: string[];
+  analytics: AnalyticsOut | null;
   ended: number | null;
   id: string;
   lease: string | null;
@@ -112,6 +114,19 @@ export interface MissionOut {
   submitted: number;
   tenant: string;
   verdict: VerdictOut | null;
+}
+/**
+ * What the analytics scheduler has made of its tasks, from the start up to one time.
+ */
+export interface AnalyticsOut {
+  cloud: number;
+  dropped: number;
+  edge: number;
+  in_time: number;
+  late: number;
+  qoe: number;
+  qos: number;
+  time: number;
 }
 /**
  * Status of mission and vehicle at one time; unknown values are null.
@@ -185,6 +200,70 @@ export interface WaypointEntry {
   y: number;
   yaw?: number | null;
   z: number;
+}
+/**
+ * How far a recording has been read, and the flight once it was.
+ */
+export interface PlaybackOut {
+  flight: RecordedOut | null;
+  read: number;
+}
+/**
+ * A recorded flight.
+ */
+export interface RecordedOut {
+  alerts: AlertOut[];
+  analytics: AnalyticsOut[];
+  began: number;
+  begin: number;
+  end: number;
+  environment: {
+    [k: string]: unknown;
+  };
+  name: string;
+  remark: string;
+  streams: {
+    [k: string]: StreamKind;
+  };
+  tracks: {
+    [k: string]: TrackOut;
+  };
+}
+/**
+ * An alert.
+ */
+export interface AlertOut {
+  kind: string;
+  text: string;
+  time: number;
+}
+/**
+ * One robot's flight.
+ *
+ * Its status at a time is the last one of `statuses` until then, with the figures of the last
+ * row until then.
+ */
+export interface TrackOut {
+  battery: (number | null)[];
+  distance: number[];
+  places: PlaceOut[];
+  position: [number | null, number | null, number | null][];
+  statuses: StatusOut[];
+  time: number[];
+  velocity: [number | null, number | null, number | null][];
+  yaw: (number | null)[];
+}
+/**
+ * A waypoint of the plan.
+ */
+export interface PlaceOut {
+  id: string;
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  place: [number, number, number];
+  since: number;
 }
 /**
  * Answer to each request that is not carried out, with the HTTP status.

@@ -48,7 +48,7 @@ class Run:
         vehicle = VehicleState(1, odometry, Battery(0.5), VehicleMode.GUIDED, armed=True)
         status = MissionStatus(10**9, MissionState.ENROUTE, "flying to wp1", target)
         return SimpleNamespace(
-            robots={"drone": SimpleNamespace(status=status, state=vehicle)}, alerts=[]
+            robots={"drone": SimpleNamespace(status=status, state=vehicle)}, alerts=[], reports={}
         )
 
     def command(self, robot: str, command: Command) -> Answer:

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from browser import Browser, Page
 from flown import Proxy, Watched
 from hovering import console
 from required import needs_peer
 
 from aerodaas.recording.reader import Recording
+from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
 

@@ -6,10 +6,12 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, cast
 
 from aerodaas.console.meter import FlightMeter
+from aerodaas.protocol.schemas import AnalyticsOut
 from aerodaas.types.status import MissionState, MissionStatus
 from aerodaas.types.waypoints import Waypoint
 
 if TYPE_CHECKING:
+    from aerodaas.actors.base import ActorReport
     from aerodaas.actors.run.flight import FlightState
 
 
@@ -18,7 +20,7 @@ def flying_to(target: int, *pending: int) -> FlightState:
     ahead = [Waypoint(f"wp{one}", one, 2, 3, waypoint_type="local") for one in (target, *pending)]
     status = MissionStatus(10**9, MissionState.ENROUTE, "", ahead[0], tuple(ahead[1:]))
     robots = {"drone": SimpleNamespace(status=status, state=None)}
-    return cast("FlightState", SimpleNamespace(robots=robots, alerts=[]))
+    return cast("FlightState", SimpleNamespace(robots=robots, alerts=[], reports={}))
 
 
 def test_places_behind_are_remembered() -> None:
@@ -39,3 +41,25 @@ def test_a_long_flight_forgets_its_first_places_and_none_ahead() -> None:
     meter.note(flying_to(*range(1000, 1400)))
     places = meter.status["drone"].places
     assert set(places) == {f"wp{number}" for number in range(1000, 1400)}
+
+
+def test_decisions_of_the_analytics_scheduler_are_told_once_there_are_some() -> None:
+    """As the dispatcher reports them."""
+    meter = FlightMeter()
+    state = flying_to(1)
+    meter.note(state)
+    assert meter.analytics is None
+    values: dict[str, object] = {"outcomes": {}, "qos_total": 0.0, "qoe_total": 0.0}
+    state.reports["dispatcher"] = cast("ActorReport", SimpleNamespace(values=values))
+    meter.note(state)
+    assert meter.analytics is None
+    values |= {
+        "outcomes": {"done": 7, "late": 1, "timeout": 2, "failed": 3, "dropped": 4},
+        "places": {"edge": 5, "cloud": 8, "nowhere": 4},
+        "qos_total": 2.5,
+        "qoe_total": 1.5,
+    }
+    meter.note(state)
+    assert meter.analytics == AnalyticsOut(
+        time=1.0, in_time=7, late=6, dropped=4, edge=5, cloud=8, qos=2.5, qoe=1.5
+    )

@@ -349,3 +349,21 @@ def test_a_recording_is_closed_by_leaving_it(tmp_path: Path) -> None:
     with pytest.raises(KeyError):
         fails()
     assert opened[0]._file.closed
+
+
+@pytest.mark.parametrize("kind", ["chunks", "small chunks", "no chunks", "no index"])
+def test_a_part_is_read_by_time(tmp_path: Path, kind: str) -> None:
+    """Both ends included; what is bare is told without its value."""
+    said = [Said("/a" if number % 2 else "/b", 1000 + number, number) for number in range(40)]
+    path = write_file(tmp_path / "a.mcap", said, kind)
+    with Recording.open(path) as recording:
+        found = list(recording.records(since=10, until=20, bare={"/b"}))
+        assert [one.stamp for one in found] == list(range(10, 21))
+        assert [one.value for one in found if one.topic == "/b"] == [None] * 6
+        assert [one.value for one in found if one.topic == "/a"] == [
+            {"number": number} for number in range(11, 20, 2)
+        ]
+        assert [one.stamp for one in recording.records(topics={"/a"}, until=2)] == [1]
+        assert [one.stamp for one in recording.records(since=38)] == [38, 39]
+        # Read again, from what is kept.
+        assert list(recording.records(since=10, until=20, bare={"/b"})) == found

@@ -6,12 +6,13 @@ import json
 from collections.abc import Iterator
 
 import pytest
-from browser import Browser
 from required import needs_peer
 from served import Served, document, fleet, robot
 from websockets.exceptions import InvalidStatus
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
+
+from tools.browser import Browser
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
@@ -81,3 +82,32 @@ def test_missions_are_watched_and_commanded_by_role(provider: Served, mission: s
         watcher.until(
             "document.querySelector('[data-testid=banner]')?.innerText.includes('over')", 90
         )
+        # The same page plays what has been recorded: for both, and from one moment to the other.
+        for page in pages:
+            page.until("document.querySelector('.banner button')", 60)
+            page.run("document.querySelector('.banner button').click()")
+            page.until("document.querySelector('.timeline')", 60)
+            page.key("Home")
+            page.until("document.querySelector('[data-testid=state]')?.innerText === 'idle'")
+            page.key("End")
+            page.until("document.querySelector('[data-testid=state]').innerText === 'landed'")
+            assert page.complaints() == []
+
+
+def test_a_recording_is_played_to_its_own_tenant_once_it_is_there(
+    provider: Served, mission: str
+) -> None:
+    """To no other one, and to no token that may not sense."""
+    provider.ask("DELETE", f"/v1/missions/{mission}")
+    path = f"/v1/missions/{mission}/playback"
+    provider.until(lambda: provider.mission(mission)["recording"])
+    provider.until(lambda: provider.ask("GET", path)["flight"])
+    assert list(provider.ask("GET", path)["flight"]["tracks"]) == ["one"]
+    picture = f"{path}/picture?stream=one/cam&at=1"
+    assert provider.send("GET", picture)[0] == 422
+    stranger = provider.user("eve", "others")
+    blind = provider.user("ben", provider.ask("GET", "/v1/me")["tenant"], scopes=["fly"])
+    for route in (path, picture):
+        assert provider.send("GET", route, token=stranger)[0] == 404
+        assert provider.send("GET", route, token=blind)[0] == 403
+        assert provider.send("GET", route, token="")[0] == 401

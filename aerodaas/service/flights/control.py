@@ -21,7 +21,7 @@ from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.mission.commands import Answer
 from aerodaas.protocol.commands import COMMANDS, CommandWord
-from aerodaas.protocol.schemas import NavigationIn, StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.watch import LeaseWatch
 from aerodaas.types.errors import AeroDaaSError
@@ -57,6 +57,10 @@ class Flown(Protocol):
 
     def status(self) -> tuple[dict[str, StatusOut], list[str]]:
         """Newest status by robot, and the newest alerts."""
+        ...
+
+    def analytics(self) -> AnalyticsOut | None:
+        """What the analytics scheduler has done so far; None without one."""
         ...
 
     def streams(self) -> dict[str, StreamKind]:
@@ -171,7 +175,14 @@ class ControlServer:
             robots = {name: one.model_dump() for name, one in status.items()}
             over = self._flown.over
             streams = self._flown.streams()
-            message = {"robots": robots, "alerts": alerts, "streams": streams, "over": over}
+            sums = self._flown.analytics()
+            message = {
+                "robots": robots,
+                "alerts": alerts,
+                "analytics": None if sums is None else sums.model_dump(),
+                "streams": streams,
+                "over": over,
+            }
             channel.send(message, timeout=_SEND_SECONDS)
             if over:
                 return

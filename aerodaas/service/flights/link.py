@@ -13,7 +13,7 @@ from pydantic import ValidationError
 
 from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
-from aerodaas.protocol.schemas import StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.types.errors import ConfigError, MissionError
 
@@ -33,6 +33,7 @@ class FlightNews:
     """Counts the news."""
     status: dict[str, StatusOut] = field(default_factory=dict)
     alerts: list[str] = field(default_factory=list)
+    analytics: AnalyticsOut | None = None
     streams: dict[str, StreamKind] = field(default_factory=dict)
 
 
@@ -127,5 +128,12 @@ class FlightLink:
     def _take(self, message: dict[str, Any]) -> None:
         robots = {name: StatusOut(**one) for name, one in message["robots"].items()}
         streams = {name: StreamKind(kind) for name, kind in message.get("streams", {}).items()}
-        self.news = FlightNews(self.news.number + 1, robots, message["alerts"], streams)
+        sums = message.get("analytics")
+        self.news = FlightNews(
+            self.news.number + 1,
+            robots,
+            message["alerts"],
+            None if sums is None else AnalyticsOut(**sums),
+            streams,
+        )
         self._told()

@@ -30,7 +30,7 @@ from aerodaas.environment.environment import Environment
 from aerodaas.environment.run import Run
 from aerodaas.mission.commands import Answer, ReturnHome
 from aerodaas.protocol.commands import COMMANDS, CommandWord
-from aerodaas.protocol.schemas import NavigationIn, StreamKind
+from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, StreamKind
 from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.control import ControlServer
 from aerodaas.service.flights.folder import FlightFolder
@@ -215,6 +215,10 @@ class Flying:
     def status(self) -> tuple[dict[str, StatusOut], list[str]]:
         """Newest status by robot, and the newest alerts."""
         return self._meter.status, self._meter.alerts
+
+    def analytics(self) -> AnalyticsOut | None:
+        """What the analytics scheduler has done so far; None without one."""
+        return self._meter.analytics
 
     def streams(self) -> dict[str, StreamKind]:
         """The streams that can be drawn, by name."""

@@ -5,9 +5,17 @@ from __future__ import annotations
 from typing import Annotated, Any
 
 from fastapi import APIRouter, BackgroundTasks, Header, Request
-from fastapi.responses import FileResponse
+from fastapi.responses import FileResponse, Response
 
 from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.console.playback import (
+    Moment,
+    Player,
+    Players,
+    Stream,
+    flight_answer,
+    picture_answer,
+)
 from aerodaas.protocol.schemas import (
     CommandIn,
     MissionIn,
@@ -32,6 +40,7 @@ class MissionRoutes:
         self._desk = desk
         self._admission = admission
         self._audit = audit
+        self._players = Players()
 
     def router(self) -> APIRouter:
         """The routes."""
@@ -46,6 +55,9 @@ class MissionRoutes:
         files: dict[str, Any] = {"response_class": FileResponse}
         router.add_api_route("/{mission}/recording", self.recording, **files)
         router.add_api_route("/{mission}/rehearsal.png", self.picture, **files)
+        bare: dict[str, Any] = {"response_model": None}
+        router.add_api_route("/{mission}/playback", self.playback, **bare)
+        router.add_api_route("/{mission}/playback/picture", self.moment, **bare)
         return router
 
     def submit(
@@ -121,6 +133,21 @@ class MissionRoutes:
         """Picture of the rehearsed flight."""
         principal = self._admission.require(request, Role.VIEWER)
         return FileResponse(self._desk.file(principal, mission, "picture"), media_type="image/png")
+
+    def playback(self, mission: str, request: Request) -> Response:
+        """The recorded flight as a page plays it, once it is over; how far it has been read."""
+        return flight_answer(self._player(mission, request))
+
+    def moment(self, mission: str, request: Request, stream: Stream, at: Moment) -> Response:
+        """The last picture of a stream captured at or before a mission time, in nanoseconds.
+
+        One line of JSON with what was found in it and the picture's header; after it a JPEG.
+        """
+        return picture_answer(self._player(mission, request), stream, at)
+
+    def _player(self, mission: str, request: Request) -> Player:
+        principal = self._admission.require(request, Role.VIEWER, Scope.SENSE)
+        return self._players.of(mission, self._desk.file(principal, mission, "recording"))
 
     def _note(self, principal: Principal, action: str, target: str, answer: AnswerOut) -> None:
         """Audit a command once it has been answered: nobody in the air waits for a disk."""

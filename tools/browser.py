@@ -5,6 +5,8 @@ from __future__ import annotations
 import base64
 import itertools
 import json
+import os
+import shutil
 import subprocess
 import tempfile
 import time
@@ -12,11 +14,13 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-from required import peer
 from typing_extensions import Self
 from websockets.sync.client import ClientConnection, connect
 
-__all__ = ["Browser", "Page"]
+__all__ = ["BROWSERS", "Browser", "BrowserError", "Page"]
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome")
+"""The first of these that is installed is taken, unless AERODAAS_BROWSER names another one."""
 
 _WORDS = (
     "--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
@@ -26,6 +30,12 @@ _WORDS = (
 _START_SECONDS = 60.0
 _WAIT_SECONDS = 60.0
 _MOST = 64 << 20
+_QUALITY = 82
+"""Of a WebP, 0 to 100: text stays sharp, and a camera's picture takes few bytes."""
+
+
+class BrowserError(AssertionError):
+    """The browser, or the page in it, does not do what it should."""
 
 
 class Browser:
@@ -34,16 +44,18 @@ class Browser:
     def __enter__(self) -> Self:
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         folder = Path(self._profile.name)
-        command = [peer("AERODAAS_BROWSER"), *_WORDS, f"--user-data-dir={folder}", "about:blank"]
-        self._process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+        command = [_program(), *_WORDS, f"--user-data-dir={folder}", "about:blank"]
+        self._process = subprocess.Popen(command, stderr=subprocess.DEVNULL)  # noqa: S603 - see _program
+        self.pid = self._process.pid
         port, until = folder / "DevToolsActivePort", time.monotonic() + _START_SECONDS
-        while not port.is_file() or len(port.read_text().split()) < 2:
-            assert time.monotonic() < until, "the browser does not start"
+        while not port.is_file() or not port.read_text().partition("\n")[2]:
+            if time.monotonic() > until:
+                raise BrowserError("the browser does not start")
             time.sleep(0.05)
         number, path = port.read_text().split()
         self._stack = ExitStack()
         url = f"ws://127.0.0.1:{number}{path}"
-        self._wire = _Wire(self._stack.enter_context(connect(url, max_size=_MOST)))
+        self._wire = _Wire(self._stack.enter_context(connect(url, max_size=_MOST, max_queue=None)))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -61,6 +73,14 @@ class Browser:
         return Page(self._wire, session, url, width, height)
 
 
+def _program() -> str:
+    named = os.environ.get("AERODAAS_BROWSER", "")
+    program = named or next(filter(None, map(shutil.which, BROWSERS)), "")
+    if not program:
+        raise BrowserError(f"install one of {', '.join(BROWSERS)}, or name it in AERODAAS_BROWSER")
+    return program
+
+
 class Page:
     """One tab."""
 
@@ -68,9 +88,17 @@ class Page:
         self._wire = wire
         self._session = session
         self._complaints: list[str] = []
-        for domain in ("Page", "Runtime", "Log", "Network"):
+        for domain in ("Page", "Runtime", "Log"):
             self._ask(f"{domain}.enable")
         self.resize(width, height)
+        self.go(url)
+
+    def before(self, script: str) -> None:
+        """Run a script in each document that is opened from now on, before its own."""
+        self._ask("Page.addScriptToEvaluateOnNewDocument", source=script)
+
+    def go(self, url: str) -> None:
+        """Open another address."""
         self._ask("Page.navigate", url=url)
 
     def resize(self, width: int, height: int, scheme: str = "light") -> None:
@@ -84,15 +112,17 @@ class Page:
         """The value of an expression, awaited."""
         words = {"expression": script, "awaitPromise": True, "returnByValue": True}
         answer = self._ask("Runtime.evaluate", **words)
-        assert "exceptionDetails" not in answer, answer["exceptionDetails"]
+        if "exceptionDetails" in answer:
+            raise BrowserError(json.dumps(answer["exceptionDetails"]))
         return answer["result"].get("value")
 
     def until(self, script: str, seconds: float = _WAIT_SECONDS) -> None:
         """Wait until an expression is true, as JavaScript has it."""
         until = time.monotonic() + seconds
         while not self.run(f"Boolean({script})"):
-            shown = self.run("document.body?.innerText.slice(0, 2000)")
-            assert time.monotonic() < until, f"not so: {script}\n{shown}\n{self.complaints()}"
+            if time.monotonic() > until:
+                shown = self.run("document.body?.innerText.slice(0, 2000)")
+                raise BrowserError(f"not so: {script}\n{shown}\n{self.complaints()}")
             time.sleep(0.05)
 
     def text(self, selector: str) -> str:
@@ -123,8 +153,11 @@ class Page:
             )
 
     def picture(self, path: Path) -> None:
-        """Write what the window shows as a PNG."""
-        path.write_bytes(base64.b64decode(self._ask("Page.captureScreenshot")["data"]))
+        """Write what the window shows, as a PNG or a WebP by the file's name."""
+        words: dict[str, Any] = {"format": "png"}
+        if path.suffix == ".webp":
+            words = {"format": "webp", "quality": _QUALITY}
+        path.write_bytes(base64.b64decode(self._ask("Page.captureScreenshot", **words)["data"]))
 
     def complaints(self) -> list[str]:
         """Errors that the browser has told since the page was opened."""
@@ -158,7 +191,8 @@ class _Wire:
         while True:
             answer: dict[str, Any] = json.loads(self._socket.recv(_WAIT_SECONDS))
             if answer.get("id") == number:
-                assert "error" not in answer, (method, answer["error"])
+                if "error" in answer:
+                    raise BrowserError(f"{method}: {answer['error']}")
                 found: dict[str, Any] = answer["result"]
                 return found
             if answer.get("method") in {"Runtime.exceptionThrown", "Log.entryAdded"}:

@@ -1,0 +1,90 @@
+"""What a page is told of a recorded flight: all that it draws of it but the pictures.
+
+Units are those of `schemas`. Lists are in the order of time, and bounded; what exceeds a bound is
+thinned out or counted in `untold`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
+
+__all__ = ["AlertOut", "PlaceOut", "PlaybackOut", "RecordedOut", "TrackOut"]
+
+
+class _Out(BaseModel):
+    """Base of answers."""
+
+    model_config = ConfigDict(frozen=True)
+
+
+class PlaceOut(_Out):
+    """A waypoint of the plan."""
+
+    since: float
+    """Mission time, seconds, from which it was known."""
+    id: str
+    place: tuple[float, float, float]
+    """Metres east, north and up of home."""
+
+
+class AlertOut(_Out):
+    """An alert."""
+
+    time: float
+    """Mission time, seconds."""
+    kind: str
+    text: str
+
+
+class TrackOut(_Out):
+    """One robot's flight.
+
+    Its status at a time is the last one of `statuses` until then, with the figures of the last
+    row until then.
+    """
+
+    time: list[float]
+    """Mission time of each row, seconds."""
+    position: list[tuple[float | None, float | None, float | None]]
+    """Metres east, north and up of home, by row."""
+    velocity: list[tuple[float | None, float | None, float | None]]
+    yaw: list[float | None]
+    battery: list[float | None]
+    distance: list[float]
+    statuses: list[StatusOut]
+    """One for each change of anything but figures and places, which they do not have."""
+    places: list[PlaceOut]
+    """Waypoints as they became known; a later one of the same id takes the place of an earlier."""
+
+
+class RecordedOut(_Out):
+    """A recorded flight."""
+
+    name: str
+    began: float
+    """Moment of mission time 0."""
+    begin: float
+    end: float
+    """Mission time of its first and last message, seconds."""
+    remark: str
+    """What of the recording could not be read; empty if all could."""
+    environment: dict[str, Any]
+    """Where it was flown, as in `FleetOut`; empty if that was not recorded."""
+    tracks: dict[str, TrackOut]
+    """By robot."""
+    alerts: list[AlertOut]
+    analytics: list[AnalyticsOut]
+    streams: dict[str, StreamKind]
+    """Streams of pictures and of what was found in them, by name."""
+
+
+class PlaybackOut(_Out):
+    """How far a recording has been read, and the flight once it was."""
+
+    read: float = Field(ge=0, le=1)
+    flight: RecordedOut | None = None

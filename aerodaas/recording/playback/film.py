@@ -1,0 +1,199 @@
+"""Pictures of a recording by time of capture, and what was found in them."""
+
+from __future__ import annotations
+
+from array import array
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from aerodaas.analytics.wire_items import ItemError, pack
+from aerodaas.recording.h264 import is_key_frame
+from aerodaas.recording.images import VIDEO_SCHEMAS, picture_bytes
+from aerodaas.recording.pictures import Shot, detections, shots
+from aerodaas.recording.reader import Recording
+from aerodaas.types.data import Frame, Header
+from aerodaas.types.errors import SourceError
+from aerodaas.types.picture_size import picture_fits, picture_size
+
+__all__ = ["Captures", "Film", "Packed"]
+
+Packed = tuple[dict[str, Any], bytes]
+"""An item as a live view sends it: a message, and a picture's bytes."""
+_AHEAD = 64
+"""Pictures that are passed over rather than sought."""
+_BROKEN = 8
+"""Broken pictures in a row before which one is looked for that is not."""
+_FIRST_LOOK = 64
+_FARTHEST_LOOK = 4096
+"""Frames of a video before one, among which its key frame is looked for."""
+
+
+class Captures:
+    """When the messages of one topic were captured and recorded, mission nanoseconds."""
+
+    def __init__(self) -> None:
+        self.captured = array("q")
+        self.recorded = array("q")
+
+    def add(self, captured: int, recorded: int) -> None:
+        """Add a message, in the order of recording."""
+        self.captured.append(captured)
+        self.recorded.append(recorded)
+
+    def sort(self) -> None:
+        """Put them in the order of capture, which the two functions below need."""
+        order = sorted(range(len(self.captured)), key=self.captured.__getitem__)
+        self.captured = array("q", (self.captured[place] for place in order))
+        self.recorded = array("q", (self.recorded[place] for place in order))
+
+    def last(self, time: int) -> int:
+        """Place of the last one captured at or before `time`; -1 for none."""
+        return bisect_right(self.captured, time) - 1
+
+    def at(self, time: int) -> range:
+        """Places of those captured at exactly `time`."""
+        return range(bisect_left(self.captured, time), bisect_right(self.captured, time))
+
+
+@dataclass
+class _Reel:
+    """A topic's pictures, being read from some place on."""
+
+    shots: Iterator[Shot]
+    place: int
+    """Place of the picture that was read last."""
+    shot: Shot | None = None
+
+
+class Film:
+    """Pictures of a recording by time; for one thread at a time."""
+
+    def __init__(
+        self,
+        recording: Recording,
+        pictures: Mapping[str, tuple[str, Captures]],
+        found: Mapping[str, tuple[str, Captures]],
+    ) -> None:
+        """Show an open recording.
+
+        Args:
+            recording: The recording, which stays open.
+            pictures: Topic and captures of each stream of pictures.
+            found: The same of detections.
+        """
+        self._recording = recording
+        self._pictures = pictures
+        self._found = found
+        self._schemas = {name: one.schema for name, one in recording.topics.items()}
+        self._reels: dict[str, _Reel] = {}
+
+    def at(self, stream: str, time: int) -> list[Packed]:
+        """The picture of a stream that was the last one captured at or before a time.
+
+        Args:
+            stream: Its name; KeyError for an unknown one.
+            time: Mission nanoseconds.
+
+        Returns:
+            What was found in the picture, by each analysis, then the picture itself; nothing
+            before the first one. In place of a broken picture comes the last whole one before it.
+        """
+        topic, captures = self._pictures[stream]
+        last = captures.last(time)
+        for place in range(last, max(-1, last - _BROKEN), -1):
+            shot = self._shot(topic, captures, place)
+            packed = None if shot is None else _packed(stream, shot)
+            if shot is not None and packed is not None:
+                return [*self._detections(shot.header), packed]
+        return []
+
+    def _shot(self, topic: str, captures: Captures, place: int) -> Shot | None:
+        reel = self._reels.get(topic)
+        if reel is not None and reel.place == place:
+            return reel.shot
+        if reel is None or not self._comes(captures, reel.place, place):
+            since = self._start(topic, captures, place)
+            reel = self._reels[topic] = _Reel(shots(self._recording, [topic], since), place)
+        captured, recorded = captures.captured[place], captures.recorded[place]
+        for shot in reel.shots:
+            if shot.record.captured == captured and shot.record.stamp == recorded:
+                reel.place, reel.shot = place, shot
+                return shot
+            if shot.record.stamp > recorded:
+                break
+        # It is broken, and what comes after it has been read.
+        del self._reels[topic]
+        return None
+
+    @staticmethod
+    def _comes(captures: Captures, now: int, place: int) -> bool:
+        """Whether the picture at `place` comes soon after the one at `now`."""
+        later = captures.recorded[place] >= captures.recorded[now]
+        return now < place <= now + _AHEAD and later
+
+    def _start(self, topic: str, captures: Captures, place: int) -> int:
+        """Where to begin to read so that the picture at `place` can be decoded."""
+        if self._schemas[topic] not in VIDEO_SCHEMAS:
+            return captures.recorded[place]
+        look = _FIRST_LOOK
+        while True:
+            first = captures.recorded[max(0, place - look)]
+            key = None
+            records = self._recording.records(
+                topics=[topic], since=first, until=captures.recorded[place]
+            )
+            for record in records:
+                if is_key_frame(picture_bytes(record.value)):
+                    key = record.stamp
+                if record.captured == captures.captured[place]:
+                    # What comes next may have been recorded at the same time.
+                    break
+            if key is not None or look >= min(place, _FARTHEST_LOOK):
+                return first if key is None else key
+            look *= 4
+
+    def _detections(self, header: Header) -> Iterator[Packed]:
+        for stream, (topic, captures) in self._found.items():
+            times = {captures.recorded[place] for place in captures.at(header.stamp)}
+            for time in sorted(times):
+                for _, found in detections(self._recording, [topic], time, time):
+                    if (found.header.stamp, found.header.source) == (header.stamp, header.source):
+                        message = _message(stream, header.stamp, header.stamp)
+                        yield {**message, "item": pack(found)[0], "blob": False}, b""
+
+
+def _message(stream: str, stamp: int, captured: int) -> dict[str, Any]:
+    return {"kind": "item", "stream": stream, "stamp": stamp, "captured": captured}
+
+
+def _packed(stream: str, shot: Shot) -> Packed | None:
+    """A picture as a live view sends it; None for one that is broken."""
+    message = _message(stream, shot.record.stamp, shot.record.captured)
+    data = _jpeg(shot)
+    if data is not None:
+        item = {
+            "is": "Frame",
+            "header": pack(shot.header)[0],
+            "bytes": [len(data), 0],
+        }
+        return {**message, "item": item, "blob": True}, data
+    try:
+        image = shot.image()
+        if image is None:
+            return None
+        item, data = pack(Frame(shot.header, image))
+    except (SourceError, ItemError):
+        return None
+    return {**message, "item": item, "blob": True}, data
+
+
+def _jpeg(shot: Shot) -> bytes | None:
+    """The recorded bytes of a picture that a browser can show as they are."""
+    if shot.video is not None or shot.format not in {"jpeg", "jpg"}:
+        return None
+    data = picture_bytes(shot.record.value)
+    size = picture_size(data)
+    fits = size is not None and picture_fits(*size) and shot.size in {None, size}
+    return data if fits and data.startswith(b"\xff\xd8") else None

@@ -1,0 +1,156 @@
+"""A recorded flight as a page plays it, read in one pass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from aerodaas.config.model import validated
+from aerodaas.config.redaction import catalogue
+from aerodaas.protocol.playback import AlertOut, RecordedOut
+from aerodaas.protocol.schemas import StreamKind
+from aerodaas.recording.decoding.limits import MAX_KEYS
+from aerodaas.recording.pictures import DETECTIONS_SCHEMA, picture_topics
+from aerodaas.recording.playback.decisions import DecisionSums
+from aerodaas.recording.playback.film import Captures, Film
+from aerodaas.recording.playback.track import Room, TrackBuilder
+from aerodaas.recording.reader import Record, Recording
+from aerodaas.recording.recorded_environment import allowed_content, recorded_content
+from aerodaas.types.clock import NANOSECONDS, seconds
+from aerodaas.types.errors import AeroDaaSError
+
+__all__ = ["read_flight"]
+
+_SCHEMAS = frozenset(
+    f"aerodaas.{name}" for name in ("VehicleState", "MissionStatus", "Plan", "Alert", "Decision")
+)
+_EACH = 1000
+"""Messages between two words on the progress."""
+
+
+def read_flight(
+    recording: Recording, tell: Callable[[float], None] = lambda _: None
+) -> tuple[RecordedOut, Film]:
+    """Read an open recording, which the film goes on reading.
+
+    Args:
+        recording: The recording.
+        tell: Called with the share that has been read, 0 to 1.
+    """
+    return _Reading(recording).flight(tell)
+
+
+class _Reading:
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+        self._room = Room()
+        self._robots: dict[str, TrackBuilder] = {}
+        self._alerts: list[AlertOut] = []
+        self._sums = DecisionSums()
+        known = recording.topics
+        pictures = picture_topics(recording)[:MAX_KEYS]
+        found = sorted(n for n, one in known.items() if one.schema == DETECTIONS_SCHEMA)[:MAX_KEYS]
+        self._captures = {name: Captures() for name in (*pictures, *found)}
+        self._pictures = _streams(pictures, "/image")
+        self._found = _streams(found, "/detections")
+        self._told = [name for name, one in known.items() if one.schema in _SCHEMAS]
+        self._span = [0, 0]
+
+    def flight(self, tell: Callable[[float], None]) -> tuple[RecordedOut, Film]:
+        recording = self._recording
+        whole = recording.duration * NANOSECONDS or 1.0
+        first: int | None = None
+        last = 0
+        topics = {*self._told, *self._captures}
+        for number, record in enumerate(recording.records(topics=topics, bare=self._captures)):
+            if first is None:
+                first = record.stamp
+            last = record.stamp
+            if number % _EACH == 0:
+                tell(min(1.0, max(0.0, (last - first) / whole)))
+            captures = self._captures.get(record.topic)
+            if captures is not None:
+                captures.add(record.captured, record.stamp)
+            else:
+                self._take(record)
+        for captures in self._captures.values():
+            captures.sort()
+        film = Film(recording, self._named(self._pictures), self._named(self._found))
+        return self._told_of(first or 0, last), film
+
+    def _named(self, streams: dict[str, str]) -> dict[str, tuple[str, Captures]]:
+        return {name: (topic, self._captures[topic]) for name, topic in streams.items()}
+
+    def _take(self, record: Record) -> None:
+        value: dict[str, Any] = record.value
+        match record.schema.removeprefix("aerodaas."):
+            case "Alert":
+                if self._room.take(1):
+                    time = seconds(value["stamp"])
+                    alert = AlertOut(time=time, kind=value["kind"], text=value["text"])
+                    self._alerts.append(alert)
+            case "Decision":
+                self._sums.take(value)
+            case kind:
+                robot = self._robot(value["robot"])
+                if robot is not None:
+                    takers = {"VehicleState": robot.state, "Plan": robot.plan}
+                    takers.get(kind, robot.mission)(value)
+
+    def _robot(self, name: str) -> TrackBuilder | None:
+        known = self._robots.get(name)
+        if known is None:
+            if len(self._robots) >= MAX_KEYS:
+                self._room.untold += 1
+                return None
+            known = self._robots[name] = TrackBuilder(self._room)
+        return known
+
+    def _told_of(self, first: int, last: int) -> RecordedOut:
+        recording = self._recording
+        return RecordedOut(
+            name=recording.provenance.get("name") or recording.path.stem,
+            began=seconds(recording.epoch_ns),
+            begin=max(0.0, seconds(first)),
+            end=seconds(last),
+            remark=_remark(recording, last, self._room.untold),
+            environment=_environment(recording),
+            tracks={name: one.track for name, one in self._robots.items()},
+            alerts=sorted(self._alerts, key=lambda one: one.time),
+            analytics=self._sums.rows,
+            streams={
+                **dict.fromkeys(self._pictures, StreamKind.PICTURES),
+                **dict.fromkeys(self._found, StreamKind.DETECTIONS),
+            },
+        )
+
+
+def _streams(topics: list[str], kind: str) -> dict[str, str]:
+    """Topics by the name of their stream; by their own where two streams have the same."""
+    found: dict[str, str] = {}
+    for topic in topics:
+        name = topic.strip("/").removesuffix(kind)
+        found[topic if name in found or not name else name] = topic
+    return found
+
+
+def _remark(recording: Recording, last: int, untold: int) -> str:
+    parts = []
+    if not recording.complete:
+        parts.append(f"it breaks off at {seconds(last):.1f} s")
+    if recording.damaged:
+        parts.append(f"{recording.damaged} damaged parts were left out")
+    if untold:
+        parts.append(f"{untold} changes, more than a page has room for, were left out")
+    return "; ".join(parts)
+
+
+def _environment(recording: Recording) -> dict[str, Any]:
+    """What anybody may know of the recorded environment; empty where there is none."""
+    try:
+        content = allowed_content(recorded_content(recording))
+        config = validated(content, f"the environment in {recording.path}")
+    except AeroDaaSError:
+        return {}
+    shown: dict[str, Any] = catalogue(config).model_dump(mode="json", by_alias=True)
+    return shown

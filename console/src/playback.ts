@@ -1,0 +1,229 @@
+// A recorded flight as a source: the same words as from the live socket, at any moment asked for.
+
+import { answered } from "./connection";
+import { type Alert, type Sample, shifted, speedOf } from "./flight";
+import type { Point } from "./place";
+import type { FlightEars, ItemEars, Past, Source } from "./source";
+import type { AnalyticsOut, MissionOut, RecordedOut, StatusOut, TrackOut } from "./wire";
+
+/** Milliseconds between two moments shown while it plays, and between two pictures asked for. */
+const STEP = 50;
+const TRAIL = 3000;
+const LONGEST_STEP = 0.25;
+const NEWLINE = 10;
+const MOST_ALERTS = 100;
+
+/** Place of the last of some times at or before `time`; -1 for none. */
+export function lastBefore<T>(items: readonly T[], time: number, of: (item: T) => number): number {
+  let [low, high] = [0, items.length];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (of(items[middle] as T) <= time) low = middle + 1;
+    else high = middle;
+  }
+  return low - 1;
+}
+
+export class Playback implements Source {
+  readonly recorded = true;
+  time: number;
+  playing = false;
+  speed = 1;
+  private ears: FlightEars | undefined;
+  private readonly watchers = new Set<() => void>();
+  private readonly tracks: [string, Track][];
+  private asked = 0;
+  private shown = 0;
+  private before = 0;
+
+  constructor(
+    private readonly mission: MissionOut,
+    readonly flight: RecordedOut,
+    private readonly token: string,
+    begin: number | null,
+  ) {
+    this.tracks = Object.entries(flight.tracks).map(([robot, one]) => [robot, new Track(one)]);
+    this.time = this.within(begin ?? flight.begin);
+  }
+
+  follow(ears: FlightEars): void {
+    this.ears = ears;
+    ears.up(true);
+    this.tell();
+  }
+
+  seek(time: number): void {
+    this.time = this.within(time);
+    this.tell();
+  }
+
+  play(): void {
+    if (this.time >= this.flight.end) this.time = this.flight.begin;
+    this.playing = true;
+    this.before = performance.now();
+    cancelAnimationFrame(this.asked);
+    this.asked = requestAnimationFrame(this.turn);
+    this.tell();
+  }
+
+  pause(): void {
+    this.playing = false;
+    cancelAnimationFrame(this.asked);
+    this.tell();
+  }
+
+  close(): void {
+    this.playing = false;
+    cancelAnimationFrame(this.asked);
+    this.ears = undefined;
+  }
+
+  /** What was decided by a moment: the last sums at or before it. */
+  sums(): AnalyticsOut | undefined {
+    const rows = this.flight.analytics;
+    return rows[lastBefore(rows, this.time, (one) => one.time)];
+  }
+
+  watch(camera: string, _finders: string[], ears: ItemEars): () => void {
+    const gone = new AbortController();
+    let shown = -1;
+    let busy = false;
+    const look = async (): Promise<void> => {
+      if (busy) return;
+      busy = true;
+      while (!gone.signal.aborted && shown !== this.time) {
+        const began = performance.now();
+        shown = this.time;
+        await this.picture(camera, shown, ears, gone.signal).catch(() => undefined);
+        const rest = STEP - (performance.now() - began);
+        if (rest > 0) await new Promise((done) => setTimeout(done, rest));
+      }
+      busy = false;
+    };
+    const changed = () => void look();
+    this.watchers.add(changed);
+    changed();
+    return () => {
+      this.watchers.delete(changed);
+      gone.abort();
+    };
+  }
+
+  private async picture(
+    camera: string,
+    time: number,
+    ears: ItemEars,
+    signal: AbortSignal,
+  ): Promise<void> {
+    const at = String(Math.max(0, Math.round(time * 1e9)));
+    const query = new URLSearchParams({ stream: camera, at });
+    const path = `v1/missions/${this.mission.id}/playback/picture?${query}`;
+    const answer = await answered(path, this.token, undefined, signal);
+    const data = await answer.arrayBuffer();
+    if (signal.aborted) return;
+    const end = new Uint8Array(data).indexOf(NEWLINE);
+    const text = new TextDecoder().decode(new Uint8Array(data, 0, end));
+    const messages = JSON.parse(text) as Record<string, unknown>[];
+    if (messages.length === 0) ears.nothing();
+    for (const message of messages) {
+      if (message["blob"] === true) await ears.picture(message, data.slice(end + 1));
+      else ears.found(message);
+    }
+  }
+
+  private readonly turn = (now: number): void => {
+    if (!this.playing) return;
+    this.asked = requestAnimationFrame(this.turn);
+    // A tab in the background does not run on.
+    const step = Math.min(LONGEST_STEP, Math.max(0, (now - this.before) / 1000));
+    this.before = now;
+    this.time = this.within(this.time + step * this.speed);
+    if (this.time >= this.flight.end) this.pause();
+    else if (now - this.shown >= STEP) this.tell();
+  };
+
+  private within(time: number): number {
+    return Math.min(this.flight.end, Math.max(this.flight.begin, time));
+  }
+
+  private tell(): void {
+    this.shown = performance.now();
+    const status: Record<string, StatusOut> = {};
+    const past: Past = {
+      trails: new Map<string, Point[]>(),
+      history: new Map<string, Sample[]>(),
+      alerts: this.alerts(),
+      analytics: this.flight.analytics,
+    };
+    for (const [robot, track] of this.tracks) {
+      const one = track.at(this.time);
+      if (one) status[robot] = one;
+      past.trails.set(robot, track.trail(this.time));
+      past.history.set(robot, track.history);
+    }
+    const robots = this.tracks.map(([robot]) => robot);
+    const { name, streams } = this.flight;
+    this.ears?.moment({ ...this.mission, name, robots, status, streams }, past);
+    for (const one of this.watchers) one();
+  }
+
+  /** Alerts until now, the newest first; one that repeats itself counts up. */
+  private alerts(): Alert[] {
+    const known = new Map<string, Alert>();
+    const until = lastBefore(this.flight.alerts, this.time, (one) => one.time);
+    for (const { kind, text } of this.flight.alerts.slice(0, until + 1)) {
+      const key = `${kind}: ${text}`;
+      const before = known.get(key);
+      known.delete(key);
+      const count = (before?.count ?? 0) + 1;
+      known.set(key, { id: known.size + 1, kind, text, count, acknowledged: true });
+    }
+    return [...known.values()].reverse().slice(0, MOST_ALERTS);
+  }
+}
+
+/** One robot's flight by time. */
+class Track {
+  readonly history: Sample[];
+  private way: { time: number; point: Point }[] = [];
+
+  constructor(private readonly track: TrackOut) {
+    this.history = track.time.map((time, row) => ({
+      time,
+      height: track.position[row]?.[2] ?? null,
+      speed: speedOf({ velocity: track.velocity[row] ?? null }),
+      battery: track.battery[row] ?? null,
+    }));
+    track.time.forEach((time, row) => {
+      const [east, north] = track.position[row] ?? [];
+      if (east == null || north == null) return;
+      if (shifted(this.way.at(-1)?.point, east, north)) this.way.push({ time, point: [east, north] });
+    });
+    while (this.way.length > TRAIL) this.way = this.way.filter((_, place) => place % 2 === 0);
+  }
+
+  trail(time: number): Point[] {
+    const until = lastBefore(this.way, time, (one) => one.time);
+    return this.way.slice(0, until + 1).map((one) => one.point);
+  }
+
+  at(time: number): StatusOut | undefined {
+    const { statuses, places } = this.track;
+    const status = statuses[lastBefore(statuses, time, (one) => one.time)];
+    const row = lastBefore(this.track.time, time, (one) => one);
+    if (!status) return undefined;
+    const until = lastBefore(places, time, (one) => one.since);
+    const known = places.slice(0, until + 1).map((one) => [one.id, one.place] as const);
+    return {
+      ...status,
+      time,
+      measured: this.track.time[row] ?? null,
+      position: this.track.position[row] ?? null,
+      velocity: this.track.velocity[row] ?? null,
+      yaw: this.track.yaw[row] ?? null,
+      battery: this.track.battery[row] ?? null,
+      distance: this.track.distance[row] ?? 0,
+      places: Object.fromEntries(known),
+    };
+  }
+}

@@ -1,0 +1,79 @@
+// Where a flight's state and pictures come from: the live socket here, a recording in playback.ts.
+
+import { LiveSocket } from "./connection";
+import type { Alert, Sample } from "./flight";
+import type { Point } from "./place";
+import type { AnalyticsOut, MissionOut } from "./wire";
+
+/** What came before a moment of a recording, and of its charts what comes after it, too. */
+export interface Past {
+  trails: Map<string, Point[]>;
+  history: Map<string, Sample[]>;
+  alerts: Alert[];
+  analytics: AnalyticsOut[];
+}
+
+export interface FlightEars {
+  /** The newest state, at the server's time `now`, nanoseconds. */
+  mission(mission: MissionOut, now: number): void;
+  /** The state at a moment of a recording. */
+  moment(mission: MissionOut, past: Past): void;
+  end(): void;
+  up(connected: boolean): void;
+}
+
+export interface ItemEars {
+  /** What was found in a picture; it may come before that. */
+  found(message: Record<string, unknown>): void;
+  picture(message: Record<string, unknown>, data: ArrayBuffer): Promise<void>;
+  /** There is no picture at this moment. */
+  nothing(): void;
+}
+
+export interface Source {
+  readonly recorded: boolean;
+  /** Tell a flight of its state from now on. */
+  follow(ears: FlightEars): void;
+  /** Tell of a camera's pictures and of what `finders` find, until the answer is called. */
+  watch(camera: string, finders: string[], ears: ItemEars): () => void;
+  close(): void;
+}
+
+export class LiveSource implements Source {
+  readonly recorded = false;
+  private socket: LiveSocket | undefined;
+  private readonly path: string;
+
+  constructor(
+    mission: string,
+    private readonly token: string,
+  ) {
+    this.path = `v1/missions/${mission}/live`;
+  }
+
+  follow(ears: FlightEars): void {
+    this.socket = new LiveSocket(`${this.path}?rate=10`, this.token, {
+      text: (message) => {
+        if (message["kind"] === "end") ears.end();
+        if (message["kind"] === "mission") {
+          ears.mission(message["mission"] as MissionOut, message["now"] as number);
+        }
+      },
+      up: (connected) => ears.up(connected),
+    });
+  }
+
+  watch(camera: string, finders: string[], ears: ItemEars): () => void {
+    const query = new URLSearchParams({ rate: "1", streams: [camera, ...finders].join(",") });
+    const socket = new LiveSocket(`${this.path}?${query}`, this.token, {
+      text: (message) => message["kind"] === "item" && ears.found(message),
+      blob: (message, data) => ears.picture(message, data),
+      up: () => undefined,
+    });
+    return () => socket.close();
+  }
+
+  close(): void {
+    this.socket?.close();
+  }
+}

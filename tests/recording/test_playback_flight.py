@@ -1,0 +1,241 @@
+"""What a page is told of a recorded flight is what the recording has, within bounds."""
+
+from __future__ import annotations
+
+import json
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.writer import Writer
+from synthetic_flight import SyntheticFlight, record
+
+from aerodaas.protocol.playback import RecordedOut
+from aerodaas.recording.playback import decisions, track
+from aerodaas.recording.playback.decisions import DecisionSums
+from aerodaas.recording.playback.flight import read_flight
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.states import vehicle_states
+from aerodaas.types.clock import seconds
+from aerodaas.types.vehicle import VehicleState
+
+FLIGHT = SyntheticFlight(frames=2.0)
+FLIGHT_END = [step.status for step in FLIGHT.steps()][-1]
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A survey of four waypoints."""
+    path = tmp_path_factory.mktemp("played") / "flight.mcap"
+    record(path, FLIGHT)
+    return path
+
+
+def read(path: Path) -> RecordedOut:
+    """The flight in a file."""
+    with Recording.open(path) as recording:
+        return read_flight(recording)[0]
+
+
+def states(path: Path) -> dict[float, VehicleState]:
+    """Recorded states by mission time."""
+    with Recording.open(path) as recording:
+        return {seconds(stamp): state for stamp, state in vehicle_states(recording, "tello")}
+
+
+def test_figures_are_those_of_the_recording(path: Path) -> None:
+    """Each row is a recorded state, at most a tenth of a second after the one before it."""
+    told = read(path).tracks["tello"]
+    recorded = states(path)
+    assert len(told.time) > 0.9 * (max(recorded) - min(recorded)) / track.ROW_SECONDS
+    for row, time in enumerate(told.time):
+        state = recorded[time]
+        assert told.position[row] == tuple(state.odometry.position)
+        assert told.velocity[row] == tuple(state.odometry.velocity)
+        assert (told.yaw[row], told.battery[row]) == (state.odometry.yaw, state.battery.fraction)
+    gaps = [later - time for time, later in pairwise(told.time)]
+    assert 0.99 * track.ROW_SECONDS < min(gaps) <= max(gaps) < 2 * track.ROW_SECONDS
+    assert told.distance[-1] == pytest.approx(FLIGHT_END.distance, abs=0.5)
+
+
+def test_statuses_are_those_of_the_mission(path: Path) -> None:
+    """At each step: state, reason, target, what lies ahead, what has been visited."""
+    told = read(path).tracks["tello"]
+    wanted: dict[str, Any] = {}
+    place = 0
+    for step in SyntheticFlight().steps():
+        status, time = step.status, seconds(step.status.stamp)
+        while place + 1 < len(told.statuses) and told.statuses[place + 1].time <= time:
+            place += 1
+        found = told.statuses[place]
+        wanted = {
+            "state": status.state.value,
+            "reason": status.reason,
+            "target": status.target.id if status.target else None,
+            "visited": list(status.visited),
+            "pending": [one.id for one in status.pending],
+            "waypoints_visited": len(status.visited),
+        }
+        assert {name: getattr(found, name) for name in wanted} == wanted, time
+    assert wanted["state"] == "landed"
+    assert {one.id: one.place for one in told.places} == {
+        "north": (0, 10, 1.5), "far": (10, 10, 1.5), "east": (10, 0, 1.5), "start": (0, 0, 1.5)
+    }  # fmt: skip
+    assert len(told.statuses) < 20
+
+
+def test_what_it_was_flown_in_and_what_happened(path: Path) -> None:
+    """Name, times, alerts, streams; the environment without what is nobody's business."""
+    flight = read(path)
+    assert (flight.name, flight.remark) == ("farm_survey", "")
+    assert flight.began == 1_750_000_000
+    assert flight.end == seconds(FLIGHT_END.stamp)
+    assert [(one.kind, one.text) for one in flight.alerts] == [
+        ("battery_low", "the battery is at 20 %")
+    ]
+    assert flight.streams == {"tello/camera": "pictures", "tello/detector": "detections"}
+
+
+def test_one_that_breaks_off_plays_as_far_as_it_goes(path: Path, tmp_path: Path) -> None:
+    """And says so; a damaged part in it is left out, and told of."""
+    whole = read(path)
+    data = bytearray(path.read_bytes())
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(data[: int(len(data) * 0.6)])
+    flight = read(cut)
+    assert 0.2 * whole.end < flight.end < 0.9 * whole.end
+    assert flight.remark == f"it breaks off at {flight.end:.1f} s"
+    rows = len(flight.tracks["tello"].time)
+    assert flight.tracks["tello"].time == whole.tracks["tello"].time[:rows]
+    with Recording.open(path) as recording:
+        block = recording._index.blocks[1]
+    data[block.offset + block.length // 2] ^= 0xFF
+    damaged = tmp_path / "damaged.mcap"
+    damaged.write_bytes(data)
+    assert read(damaged).remark == "1 damaged parts were left out"
+    with Recording.open(damaged) as recording:
+        # What is not asked for is not read.
+        before = block.start - recording.epoch_ns - 1
+        assert list(recording.records(until=before))
+        assert recording.damaged == 0
+
+
+def test_what_it_is_told_says_how_far_it_has_come(path: Path) -> None:
+    """Shares from 0 to 1, and no less than before."""
+    told: list[float] = []
+    with Recording.open(path) as recording:
+        read_flight(recording, told.append)
+    assert told == sorted(told)
+    assert told[0] == 0
+    assert 0.5 < told[-1] <= 1
+
+
+def test_a_long_flight_is_thinned_out(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Evenly, from its start to its end, with figures that stay together."""
+    monkeypatch.setattr(track, "_MOST_ROWS", 100)
+    thin = read(path).tracks["tello"]
+    recorded = states(path)
+    flown = {seconds(one.status.stamp): one.status.distance for one in FLIGHT.steps()}
+    assert 50 <= len(thin.time) <= 101
+    assert thin.time[0] == min(recorded)
+    assert thin.time[-1] > 0.97 * max(recorded)
+    for row, time in enumerate(thin.time):
+        assert thin.position[row] == tuple(recorded[time].odometry.position)
+        assert thin.battery[row] == recorded[time].battery.fraction
+        assert thin.distance[row] == pytest.approx(flown[time], abs=0.1)
+
+
+def test_a_page_has_room_for_so_much(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What does not fit is counted, not kept."""
+    monkeypatch.setattr(track, "_MOST_NAMES", 12)
+    flight = read(path)
+    told = flight.tracks["tello"]
+    named = (
+        len(told.places)
+        + len(flight.alerts)
+        + sum(1 + len(one.visited) + len(one.pending) for one in told.statuses)
+    )
+    assert named <= 12
+    assert "more than a page has room for" in flight.remark
+
+
+def test_a_strangers_recording_is_no_flight_of_ours(tmp_path: Path) -> None:
+    """Names that repeat, targets that are none: whatever it says, it is told or left out."""
+    path = tmp_path / "odd.mcap"
+    status = {
+        "stamp": 10**9, "robot": "x", "state": "enroute", "reason": "", "visited": [],
+        "given_up": [], "distance": 0.0,
+    }  # fmt: skip
+    said = [
+        {**status, "target": "wp1", "pending": -5, "faults": "none"},
+        {**status, "stamp": 2 * 10**9, "target": {"id": 7}, "pending": 10**9, "visits": 3},
+        {**status, "stamp": 10**9, "target": {"id": "late"}, "pending": 1.5, "faults": [{}, None]},
+    ]
+    with path.open("wb") as file:
+        writer = Writer(file)
+        writer.start()
+        schema = writer.register_schema("aerodaas.MissionStatus", "jsonschema", b"{}")
+        channels = [writer.register_channel(name, "json", schema) for name in ("/a", "/b")]
+        plans = writer.register_schema("aerodaas.Plan", "jsonschema", b"{}")
+        planned = writer.register_channel("/plan", "json", plans)
+        place = {"x": 1.0, "y": 2.0, "z": 3.0}
+        plan = {"stamp": 0, "robot": "x", "waypoints": [{**place, "id": one} for one in "ab"]}
+        writer.add_message(planned, 0, json.dumps(plan).encode(), 0)
+        for number, value in enumerate(said):
+            writer.add_message(channels[number % 2], number, json.dumps(value).encode(), number)
+        for number in range(300):
+            value = {**status, "robot": f"r{number}"}
+            writer.add_message(channels[0], 10 + number, json.dumps(value).encode(), 0)
+        writer.finish()
+    flight = read(path)
+    assert len(flight.tracks) == 256
+    told = flight.tracks["x"].statuses
+    assert [one.target for one in told] == [None, None, None, "late"]
+    assert [one.pending for one in told] == [[], [], ["a", "b"], []]
+    assert [one.time for one in told] == sorted(one.time for one in told)
+    assert [one.waypoints_visited for one in told] == [0, 0, 3, 0]
+    assert flight.environment == {}
+
+
+def outcome(time: float, action: str, reason: str, **values: float) -> dict[str, Any]:
+    """A decision as it is recorded."""
+    return {
+        "stamp": round(time * 1e9), "task": "m#1", "action": action, "reason": reason,
+        "values": values,
+    }  # fmt: skip
+
+
+def test_decisions_are_summed_up_as_a_dispatcher_does() -> None:
+    """Outcomes count once, where they ran; what only says what is going to be does not count."""
+    sums = DecisionSums()
+    for value in (
+        outcome(1.0, "edge", "in time"),
+        outcome(1.1, "done", "edge: in time", qos_total=5.0, qoe_total=1.0),
+        outcome(1.2, "cloud", "edge is full"),
+        outcome(1.2, "retry", "it died"),
+        outcome(1.3, "late", "cloud", qos_total=4.0, qoe_total=1.0),
+        outcome(1.4, "timeout", "cloud: edge is full", qos_total=3.0),
+        outcome(1.5, "failed", "edge"),
+        outcome(1.6, "drop", "cannot finish in time"),
+        outcome(1.7, "dropped", "no room in the cloud in time"),
+    ):
+        sums.take(value)
+    last = sums.rows[-1]
+    assert (last.time, last.in_time, last.late, last.dropped) == (1.7, 1, 3, 2)
+    assert (last.edge, last.cloud, last.qos, last.qoe) == (2, 2, 3.0, 1.0)
+    assert [one.time for one in sums.rows] == [1.1, 1.6, 1.7]
+
+
+def test_many_decisions_are_thinned_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """To rows that grow, the last of which has everything."""
+    monkeypatch.setattr(decisions, "_MOST_ROWS", 20)
+    sums = DecisionSums()
+    for number in range(1000):
+        sums.take(outcome(number, "done", "edge"))
+    rows = sums.rows
+    assert len(rows) <= 22
+    assert [one.in_time for one in rows] == sorted(one.in_time for one in rows)
+    gaps = [later.time - one.time for one, later in pairwise(rows[:-1])]
+    assert max(gaps) <= 4 * min(gaps)
+    assert (rows[-1].time, rows[-1].in_time) == (999, 1000)

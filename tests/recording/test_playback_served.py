@@ -1,0 +1,201 @@
+"""A recording's page is served to who has its token, and moments of the recording with it."""
+
+from __future__ import annotations
+
+import json
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from synthetic_flight import SyntheticFlight, record
+from typer.testing import CliRunner
+
+from aerodaas.cli.app import app
+from aerodaas.console.playback import Player, Players
+from aerodaas.console.viewer import RecordingServer
+from aerodaas.protocol.playback import PlaybackOut
+from aerodaas.protocol.schemas import MissionOut
+from aerodaas.recording.reader import Recording
+from aerodaas.types.errors import ConfigError, RecordingError
+
+PLAYBACK = "/v1/missions/own/playback"
+PICTURE = f"{PLAYBACK}/picture?stream=tello/camera&at="
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A survey with two pictures a second."""
+    path = tmp_path_factory.mktemp("served") / "flight.mcap"
+    record(path, SyntheticFlight(frames=2.0, hover=1.0))
+    return path
+
+
+@contextmanager
+def served(path: Path) -> Iterator[str]:
+    """The address of a recording's page."""
+    server = RecordingServer("127.0.0.1:0", Recording.open(path))
+    try:
+        yield server.address(viewer=True)
+    finally:
+        server.close()
+
+
+@pytest.fixture(scope="module")
+def page(path: Path) -> Iterator[str]:
+    """One for all tests here, once it has been read."""
+    with served(path) as address:
+        wait(lambda: played(address).flight)
+        yield address
+
+
+def wait(true: Callable[[], object]) -> None:
+    """Wait until something is so."""
+    until = time.monotonic() + 30
+    while not true():
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def ask(address: str, path: str, token: str | None = None, **headers: str) -> tuple[int, bytes]:
+    """Send a request; returns status and answer."""
+    base, _, own = address.partition("/#token=")
+    given = {"Authorization": f"Bearer {own if token is None else token}", **headers}
+    request = urllib.request.Request(base + path, headers=given)  # noqa: S310 - loopback
+    try:
+        with urllib.request.urlopen(request, timeout=20) as response:  # noqa: S310 - loopback
+            return response.status, response.read()
+    except urllib.error.HTTPError as error:
+        return error.code, error.read()
+
+
+def played(address: str) -> PlaybackOut:
+    """The flight, or how far it has been read."""
+    status, content = ask(address, PLAYBACK)
+    assert status == 200
+    return PlaybackOut.model_validate_json(content)
+
+
+def text(answer: tuple[int, bytes]) -> tuple[int, str]:
+    """Status and text of a refusal."""
+    return answer[0], json.loads(answer[1])["text"]
+
+
+def moment(content: bytes) -> tuple[list[dict[str, Any]], bytes]:
+    """The messages of a moment, and its picture."""
+    head, _, data = content.partition(b"\n")
+    return json.loads(head), data
+
+
+def test_the_flight_is_told_and_its_pictures_are_shown(page: str) -> None:
+    """Beside the routes that the page asks first."""
+    (mission,) = json.loads(ask(page, "/v1/missions")[1])
+    assert MissionOut.model_validate(mission).recording
+    assert json.loads(ask(page, "/v1/me")[1])["role"] == "viewer"
+    assert ask(page, "/v1/fleet")[0] == 200
+    flight = played(page).flight
+    assert flight is not None
+    assert flight.name == "farm_survey"
+    messages, data = moment(ask(page, f"{PICTURE}{10_200_000_000}")[1])
+    assert [one["stream"] for one in messages] == ["tello/detector", "tello/camera"]
+    stamp = messages[1]["captured"]
+    assert 10_200_000_000 - 500_000_000 < stamp <= 10_200_000_000
+    assert data.startswith(b"\xff\xd8")
+    assert len(data) == messages[1]["item"]["bytes"][0]
+    assert moment(ask(page, f"{PICTURE}0")[1]) == ([], b"")
+
+
+@pytest.mark.parametrize(
+    ("query", "status", "word"),
+    [
+        ("?stream=tello/other&at=1", 409, "tello/other"),
+        ("?stream=tello/camera&at=-1", 422, "at"),
+        ("?stream=tello/camera&at=1e3", 422, "at"),
+        (f"?stream=tello/camera&at={2 * 10**18}", 422, "at"),
+        (f"?stream={'x' * 5000}&at=1", 422, "stream"),
+        ("?at=1", 422, "stream"),
+    ],
+)
+def test_what_is_no_moment_is_refused(page: str, query: str, status: int, word: str) -> None:
+    """With the reason."""
+    found = text(ask(page, f"{PLAYBACK}/picture{query}"))
+    assert found[0] == status
+    assert word in found[1]
+
+
+def test_nobody_else_sees_it(page: str) -> None:
+    """Without the token, by a stranger's name or from a stranger's page; nor is there a command."""
+    for token in ("", "wrong"):
+        for path in (PLAYBACK, f"{PICTURE}1", "/v1/missions"):
+            assert ask(page, path, token)[0] == 401
+    assert ask(page, PLAYBACK, Host="evil.example")[0] == 403
+    assert ask(page, PLAYBACK, Origin="https://evil.example")[0] == 403
+    for path in (
+        "/v1/missions/other/playback",
+        "/v1/missions/other/playback/picture?stream=a&at=1",
+    ):
+        assert text(ask(page, path))[0] == 404
+    assert ask(page, "/v1/missions/own/commands")[0] == 404
+    assert ask(page, "/", "")[0] == 200
+
+
+def test_a_taken_address_is_told(path: Path) -> None:
+    """With the option that names another one."""
+    with served(path) as address, Recording.open(path) as recording:
+        port = address.partition("/#")[0].rpartition(":")[2]
+        with pytest.raises(ConfigError, match="give another --address"):
+            RecordingServer(f"127.0.0.1:{port}", recording)
+
+
+@pytest.mark.parametrize(
+    ("words", "text"),
+    [
+        (["--address", "nowhere"], "--address takes host:port"),
+        (["--address", "127.0.0.1:99999"], "--address takes host:port"),
+        (["--address", "192.0.2.1:0"], "give another --address"),
+    ],
+)
+def test_the_command_says_what_is_wrong(path: Path, words: list[str], text: str) -> None:
+    """Before anything is served; as for a file that is none."""
+    found = CliRunner().invoke(app, ["view", str(path), *words])
+    assert isinstance(found.exception, ConfigError)
+    assert text in str(found.exception)
+    missing = CliRunner().invoke(app, ["view", str(path.parent / "no.mcap")])
+    assert isinstance(missing.exception, RecordingError)
+
+
+def test_one_that_cannot_be_read_says_so(tmp_path: Path) -> None:
+    """Without the folder that it lies in."""
+    path = tmp_path / "empty.mcap"
+    path.write_bytes(b"nothing of the kind")
+    player = Player(path)
+    with pytest.raises(RecordingError, match="is not an MCAP recording") as refused:
+        wait(lambda: not player.text)
+    assert str(tmp_path) not in str(refused.value)
+    with pytest.raises(RecordingError, match="is not an MCAP"):
+        player.picture("cam", 0)
+    player.close()
+
+
+def test_as_many_are_open_as_a_provider_can_bear(path: Path) -> None:
+    """The one that nobody looked at for longest is closed, and opened again for who comes back."""
+    players = Players()
+    first = players.of("m0", path)
+    wait(lambda: PlaybackOut.model_validate_json(first.text).flight)
+    assert first.picture("tello/camera", 10**10)
+    for number in range(1, 4):
+        players.of(f"m{number}", path)
+    assert players.of("m0", path) is first
+    players.of("m4", path)
+    assert players.of("m0", path) is first
+    for number in range(5, 9):
+        players.of(f"m{number}", path)
+    with pytest.raises(RecordingError, match="ask again"):
+        first.picture("tello/camera", 10**10)
+    assert players.of("m0", path) is not first
+    for number in range(9, 13):
+        players.of(f"m{number}", path)
