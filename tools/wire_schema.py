@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
 from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn, SurveyIn, SurveyOut
 from aerodaas.protocol.schemas import (
     AccountOut,
     CommandIn,
@@ -26,8 +27,16 @@ from aerodaas.protocol.schemas import (
 __all__ = ["SCHEMA", "schema_text"]
 
 SCHEMA = Path(__file__).resolve().parents[1] / "console" / "wire.schema.json"
-_OUT: tuple[type[BaseModel], ...] = (AccountOut, AnswerOut, FleetOut, MissionOut, RefusalOut)
-_IN: tuple[type[BaseModel], ...] = (CommandIn, NavigationIn)
+_OUT: tuple[type[BaseModel], ...] = (
+    AccountOut,
+    AnswerOut,
+    ControlsOut,
+    FleetOut,
+    MissionOut,
+    RefusalOut,
+    SurveyOut,
+)
+_IN: tuple[type[BaseModel], ...] = (CommandIn, NavigationIn, RearrangeIn, SteerIn, SurveyIn)
 
 
 def schema_text() -> str:
