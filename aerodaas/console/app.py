@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from fastapi import APIRouter, FastAPI, HTTPException, Request, WebSocket
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
@@ -36,6 +38,9 @@ from aerodaas.protocol.schemas import (
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["build_console"]
+
+_NAMED = 8
+"""Most waypoints that an alert names."""
 
 
 def build_console(flight: OwnFlight, config: EnvironmentConfig) -> FastAPI:
@@ -109,15 +114,15 @@ class _Routes:
         """Add waypoints to a robot's queue; answers what the drone said."""
         _require_known(mission)
         _require_pilot(request)
-        ids = ", ".join(waypoint.id for waypoint in body.waypoints)
-        return AnswerOut.of(self._flight.command(body.robot, body.command(), f"visit {ids}"))
+        what = f"visit {_listed([waypoint.id for waypoint in body.waypoints])}"
+        return AnswerOut.of(self._flight.command(body.robot, body.command(), what))
 
     def rearrange(self, mission: str, body: RearrangeIn, request: Request) -> AnswerOut:
         """Change the order of a robot's coming waypoints, or remove some."""
         _require_known(mission)
         _require_pilot(request)
-        what = [f"fly {', '.join(body.order)} in this order"] if body.order else []
-        what += [f"leave out {', '.join(body.remove)}"] if body.remove else []
+        what = [f"fly {_listed(body.order)} in this order"] if body.order else []
+        what += [f"leave out {_listed(body.remove)}"] if body.remove else []
         said = self._flight.command(body.robot, body.command(), " and ".join(what) or "do nothing")
         return AnswerOut.of(said)
 
@@ -150,6 +155,12 @@ class _Routes:
         _require_known(mission)
         session = LiveSession(socket, self._flight, self._hub, mission)
         await session.run(rate, wanted_streams(streams), own=False)
+
+
+def _listed(ids: Sequence[str]) -> str:
+    """Some ids by name, and how many they are where that would be too long to read."""
+    named = ", ".join(ids[:_NAMED])
+    return named if len(ids) <= _NAMED else f"{named}, … ({len(ids)})"
 
 
 def _require_known(mission: str) -> None:

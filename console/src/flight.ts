@@ -1,8 +1,17 @@
 // The state of one mission as the page knows it, from the live socket: newest status, trails, charts.
 
-import { Refused, LiveSocket, ask } from "./connection";
+import { Refused, LiveSocket, ask, openSocket } from "./connection";
 import type { Point } from "./place";
-import type { AnswerOut, CommandIn, MissionOut, NavigationIn, StatusOut } from "./wire";
+import type {
+  AnswerOut,
+  CommandIn,
+  MissionOut,
+  NavigationIn,
+  RearrangeIn,
+  StatusOut,
+  SurveyIn,
+  SurveyOut,
+} from "./wire";
 
 const TRAIL = 3000;
 const STEP = 0.05;
@@ -114,9 +123,29 @@ export class Flight {
   visit(navigation: NavigationIn): void {
     const waypoint = navigation.waypoints[0];
     const what = `${waypoint.id}: ${waypoint.x.toFixed(1)} E, ${waypoint.y.toFixed(1)} N`;
-    this.give(navigation.robot, what, "navigation", navigation, (status) =>
+    this.fly(navigation, what, (status) =>
       status.visited.includes(waypoint.id) ? "visited" : null,
     );
+  }
+
+  /** Add waypoints; `seen` tells from the drone's status when that has taken effect. */
+  fly(navigation: NavigationIn, what: string, seen: Order["seen"]): void {
+    this.give(navigation.robot, what, "navigation", navigation, seen);
+  }
+
+  rearrange(change: RearrangeIn, what: string, seen: Order["seen"]): void {
+    this.give(change.robot, what, "plan", change, seen);
+  }
+
+  /** Plan a survey; nothing is flown. Throws Refused with the reason. */
+  survey(wanted: SurveyIn): Promise<SurveyOut> {
+    return ask<SurveyOut>(`v1/missions/${this.mission.id}/survey`, this.token, wanted);
+  }
+
+  /** The connection by which a robot is flown by hand. */
+  controls(robot: string): WebSocket {
+    const query = new URLSearchParams({ robot });
+    return openSocket(`v1/missions/${this.mission.id}/controls?${query}`, this.token);
   }
 
   acknowledge(id: number | null): void {
@@ -128,7 +157,7 @@ export class Flight {
     robot: string,
     what: string,
     route: string,
-    body: CommandIn | NavigationIn,
+    body: CommandIn | NavigationIn | RearrangeIn,
     seen: Order["seen"],
   ): void {
     const order: Order = {
@@ -225,6 +254,11 @@ export class Flight {
       order.stage = "unconfirmed";
     }
   }
+}
+
+/** Waypoints that lie ahead, the one being flown to first. */
+export function aheadOf(status: StatusOut): string[] {
+  return status.target === null ? status.pending : [status.target, ...status.pending];
 }
 
 export function speedOf(status: StatusOut): number | null {

@@ -10,7 +10,11 @@ import { Alerts, Commands, StatePanel, WaypointForm } from "./panels";
 import { type Place, type Point, placeOf } from "./place";
 import type { AccountOut, FleetOut, MissionOut } from "./wire";
 import { Video } from "./video";
+import { HandPanel } from "./hand_panel";
+import { Plan } from "./plan";
+import { SurveyPanel, useSurvey } from "./survey";
 import "./console.css";
+import "./piloting.css";
 
 const THEMES = ["auto", "light", "dark"] as const;
 type Theme = (typeof THEMES)[number];
@@ -180,13 +184,15 @@ function Console({ first, missions, known, token, theme, themes, onMission }: Co
       made.close();
     };
   }, [first.id, token, changed]);
+  const abilities = known.place.robots.get(robot);
+  const up = flight?.status(robot)?.position?.[2] ?? 0;
+  const height = up > 0.5 ? up : known.place.takeoffHeight;
+  const { survey, begin } = useSurvey(flight, robot, height, abilities);
   if (!flight) return null;
 
   const may = known.account.role !== "viewer" && known.account.scopes.includes("fly");
   const sees = known.account.scopes.includes("sense");
-  const status = flight.status(robot);
   const fence = known.place.fences.find((one) => one.robot === robot);
-  const height = status?.position?.[2] ?? 0;
   return (
     <div class="page">
       <header class="top">
@@ -243,17 +249,29 @@ function Console({ first, missions, known, token, theme, themes, onMission }: Co
           mayFly={may && !flight.over}
           marked={marked}
           onMark={setMarked}
+          drawn={survey}
+          onDraw={() => {
+            setMarked(null);
+            begin();
+          }}
         />
         <Charts flight={flight} robot={robot} theme={theme} />
         </div>
         <div class="side">
+        {survey && (
+          <SurveyPanel
+            survey={survey}
+            ceiling={fence?.ceiling ?? 120}
+            zones={(fence?.noFly.length ?? 0) > 0}
+          />
+        )}
         {marked && (
           <WaypointForm
             key={marked.join()}
             flight={flight}
             robot={robot}
             point={marked}
-            height={height > 0.5 ? height : known.place.takeoffHeight}
+            height={height}
             ceiling={fence?.ceiling ?? 120}
             onDone={() => setMarked(null)}
           />
@@ -261,6 +279,14 @@ function Console({ first, missions, known, token, theme, themes, onMission }: Co
         {sees && <Video flight={flight} token={token} />}
         <StatePanel flight={flight} robot={robot} />
         <Commands flight={flight} robot={robot} mayFly={may} />
+        <Plan key={`plan ${robot}`} flight={flight} robot={robot} mayFly={may} />
+        <HandPanel
+          key={`hand ${robot}`}
+          flight={flight}
+          robot={robot}
+          mayFly={may}
+          abilities={abilities}
+        />
         <Alerts flight={flight} />
         </div>
       </main>

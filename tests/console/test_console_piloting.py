@@ -130,6 +130,9 @@ def test_the_order_is_one_command(flying: tuple[ConsoleServer, Run]) -> None:
     assert ask(server.address(), "/v1/missions/own/plan", change)[0] == 200
     assert run.commands == [RearrangeNavigation(("c", "b"), ("a",))]
     assert "fly c, b in this order and leave out a: accepted" in run.notes[0]
+    many = {"robot": "drone", "order": [f"w{number}" for number in range(20)]}
+    assert ask(server.address(), "/v1/missions/own/plan", many)[0] == 200
+    assert "w6, w7, … (20) in this order" in run.notes[1]
     for bad in ({"order": [1]}, {"remove": [""]}, {"order": ["a"] * 1001}, {"first": 1}):
         body = {"robot": "drone", **bad}
         assert ask(server.address(), "/v1/missions/own/plan", body)[0] == 422
