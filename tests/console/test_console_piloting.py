@@ -198,13 +198,37 @@ def test_velocities_that_were_long_under_way_are_not_obeyed(
         told(socket)
         send(socket, 1.0, forward=1)
         assert told(socket)["at"] == 1000
-        time.sleep(0.6)
-        for late in range(5):
+        time.sleep(0.4)
+        for late in range(3):
             send(socket, 1.05 + 0.05 * late, forward=1)
+        time.sleep(0.2)
         send(socket, 1.6, left=1)
         assert told(socket)["at"] == 1600
     steered = [one.velocity.left for one in run.commands if isinstance(one, Steer)]
     assert steered == [0, 1]
+
+
+def test_a_velocity_that_waited_for_the_drone_is_not_obeyed(
+    flying: tuple[ConsoleServer, Run], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A drone that answers slowly is not flown by what was asked for meanwhile."""
+    server, run = flying
+    slow = run.command
+
+    def answer_slowly(robot: str, command: Command) -> Answer:
+        time.sleep(0.5 * isinstance(command, Steer))
+        return slow(robot, command)
+
+    monkeypatch.setattr(run, "command", answer_slowly)
+    with hand(server) as socket:
+        told(socket)
+        send(socket, 1.0, forward=1)
+        time.sleep(0.1)
+        send(socket, 1.1, left=1)
+        assert told(socket)["at"] == 1000
+        time.sleep(0.2)
+        send(socket, 1.8, up=1)
+        assert told(socket)["at"] == 1800
 
 
 def test_freshness_is_measured_against_the_quickest() -> None:
@@ -256,3 +280,5 @@ def test_a_drone_that_does_not_obey_ends_it(
         monkeypatch.setattr(run, "command", lambda *_: Answer(accepted=False, text="it leaves"))
         send(socket, 1.0, forward=1)
         assert told(socket) == {"held": False, "at": 1000, "text": "it leaves"}
+        with pytest.raises(ConnectionClosed):
+            socket.recv(5)

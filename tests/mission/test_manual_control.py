@@ -60,6 +60,7 @@ def test_a_drone_is_flown_by_hand_and_its_mission_goes_on_afterwards() -> None:
     stood = found.vehicle.position.copy()
     found.run(2.0)
     assert np.linalg.norm(found.vehicle.position - stood) < 0.1
+    assert stood[1] > 2.0, "it holds there, and not where it was taken over"
     assert found.tell(Resume()).accepted
     found.run()
     found.expect(S.LANDED)

@@ -35,7 +35,7 @@ def test_a_flight_takes_as_long_and_as_much_as_was_said() -> None:
     flown.run_to(S.ENROUTE)
     began, until = flown.seconds, len(flown.track)
     flown.run(until=lambda: survey.waypoints[-1].id in flown.status.visited)
-    assert flown.seconds - began == pytest.approx(survey.seconds, rel=0.12)
+    assert flown.seconds - began == pytest.approx(survey.seconds, rel=0.05)
     way_there = float(np.linalg.norm(survey.waypoints[0].position - [0, 0, 1.5]))
     way = length(flown.track[until:])
     assert way == pytest.approx(survey.length + way_there, rel=0.06)
