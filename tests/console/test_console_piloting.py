@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, ClassVar, cast
 
 import pytest
+from fastapi import WebSocket
 from hovering import Run, console
 from test_console_access import ask, token_of
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
+from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.console import controls
 from aerodaas.console.controls import Freshness
 from aerodaas.console.server import ConsoleServer
 from aerodaas.mission.commands import (
@@ -24,6 +28,7 @@ from aerodaas.mission.commands import (
     Steer,
     TakeControls,
 )
+from aerodaas.types.errors import ConfigError
 
 FIELD = [[0, 0], [20, 0], [20, 10], [0, 10]]
 SURVEY = {"robot": "drone", "area": FIELD, "height": 4, "width": 5, "name": "s1"}
@@ -229,6 +234,54 @@ def test_a_velocity_that_waited_for_the_drone_is_not_obeyed(
         time.sleep(0.2)
         send(socket, 1.8, up=1)
         assert told(socket)["at"] == 1800
+
+
+class Talking:
+    """The socket of somebody who steers without a pause."""
+
+    scope: ClassVar[dict[str, object]] = {}
+
+    def __init__(self) -> None:
+        self.answers: list[dict[str, Any]] = []
+
+    async def accept(self, subprotocol: str | None) -> None:
+        """Be let in."""
+
+    async def receive_text(self) -> str:
+        """Steer."""
+        await asyncio.sleep(0.01)
+        return json.dumps({"at": 1000 * time.monotonic(), "forward": 1})
+
+    async def send_text(self, text: str) -> None:
+        """Hear an answer."""
+        self.answers.append(json.loads(text))
+
+    async def close(self) -> None:
+        """Be gone."""
+
+
+def test_who_may_not_fly_any_more_loses_the_controls(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A token that is revoked while its owner steers, as is found out at the next look."""
+    monkeypatch.setattr(controls, "_RENEWAL_SECONDS", 0.2)
+    given: list[Command] = []
+    began = time.monotonic()
+
+    def give(command: controls.ControlCommand) -> AnswerOut:
+        given.append(command)
+        return AnswerOut(accepted=True)
+
+    def renew() -> None:
+        if time.monotonic() - began > 0.3:
+            raise ConfigError("this token was revoked")
+
+    socket = Talking()
+    session = controls.ControlSession(cast("WebSocket", socket), "asha", give, renew)
+    asyncio.run(asyncio.wait_for(session.run(), 5))
+    assert 2 <= sum(isinstance(one, Steer) for one in given) < 50
+    assert isinstance(given[-1], ReleaseControls)
+    assert (socket.answers[-1]["held"], socket.answers[-1]["text"]) == (
+        False, "this token was revoked",
+    )  # fmt: skip
 
 
 def test_freshness_is_measured_against_the_quickest() -> None:

@@ -48,6 +48,7 @@ def taken(limits: LimitsConfig = LIMITS) -> Flight:
 def test_a_drone_is_flown_by_hand_and_its_mission_goes_on_afterwards() -> None:
     """It stops for the takeover, obeys in its own frame, holds when let go, and resumes."""
     found = taken()
+    found.keep_saying(steer, 1.0, rate=10)
     found.vehicle.yaw = np.pi / 2
     found.keep_saying(lambda: steer(forward=1.0), 3.0, rate=10)
     found.expect(S.PAUSED)
