@@ -71,5 +71,4 @@ class FreeArea:
         """Which of `places` are seen from `here`."""
         ends = np.asarray(places, dtype=np.float64).reshape(-1, 2)
         lines = np.stack([np.broadcast_to(np.asarray(here), ends.shape), ends], axis=1)
-        seen: NDArray[np.bool_] = shapely.covers(self._roomy, shapely.linestrings(lines))
-        return seen
+        return np.atleast_1d(shapely.covers(self._roomy, shapely.linestrings(lines)))
