@@ -132,8 +132,7 @@ class Page:
     def click(self, x: float, y: float) -> None:
         """Press and release the mouse at a point of the window."""
         for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
-            words = {"type": kind, "x": x, "y": y, "button": "left", "clickCount": 1}
-            self._ask("Input.dispatchMouseEvent", **words)
+            self._mouse(kind, x, y)
 
     def press(self, selector: str) -> None:
         """Click the middle of an element, which comes into view first."""
@@ -151,6 +150,25 @@ class Page:
             self._ask(
                 "Input.dispatchKeyEvent", type=kind, key=key, text=key if len(key) == 1 else ""
             )
+
+    def drag(self, x: float, y: float, to_x: float, to_y: float) -> None:
+        """Press the mouse at a point of the window, move it in steps, and release it."""
+        self._mouse("mousePressed", x, y)
+        for step in (0.3, 0.6, 1.0):
+            self._mouse("mouseMoved", x + step * (to_x - x), y + step * (to_y - y))
+        self._mouse("mouseReleased", to_x, to_y)
+
+    def hold(self, code: str, key: str) -> None:
+        """Press a key by its place on the keyboard, and keep it down."""
+        self._ask("Input.dispatchKeyEvent", type="keyDown", code=code, key=key)
+
+    def front(self) -> None:
+        """Bring the tab to the front."""
+        self._ask("Page.bringToFront")
+
+    def kill(self) -> None:
+        """End the tab's process, as a crash would; it answers nothing any more."""
+        self._wire.send("Page.crash", self._session)
 
     def picture(self, path: Path) -> None:
         """Write what the window shows, as a PNG or a WebP by the file's name."""
@@ -170,6 +188,10 @@ class Page:
                 self._complaints.append(said["entry"]["text"])
         return self._complaints
 
+    def _mouse(self, kind: str, x: float, y: float) -> None:
+        words = {"type": kind, "x": x, "y": y, "button": "left", "clickCount": 1}
+        self._ask("Input.dispatchMouseEvent", **words)
+
     def _ask(self, method: str, **words: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
         return self._wire.ask(method, self._session, **words)
 
@@ -182,12 +204,16 @@ class _Wire:
         self._numbers = itertools.count(1)
         self._events: list[dict[str, Any]] = []
 
-    def ask(self, method: str, session: str = "", **words: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
+    def send(self, method: str, session: str = "", **words: Any) -> int:  # noqa: ANN401 - JSON
         number = next(self._numbers)
         question: dict[str, Any] = {"id": number, "method": method, "params": words}
         if session:
             question["sessionId"] = session
         self._socket.send(json.dumps(question))
+        return number
+
+    def ask(self, method: str, session: str = "", **words: Any) -> dict[str, Any]:  # noqa: ANN401 - JSON
+        number = self.send(method, session, **words)
         while True:
             answer: dict[str, Any] = json.loads(self._socket.recv(_WAIT_SECONDS))
             if answer.get("id") == number:

@@ -14,6 +14,7 @@ from pydantic import BaseModel
 from pydantic.json_schema import JsonSchemaMode, models_json_schema
 
 from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.protocol.piloting import ControlsOut, RearrangeIn, SteerIn, SurveyIn, SurveyOut
 from aerodaas.protocol.playback import PlaybackOut
 from aerodaas.protocol.schemas import (
     AccountOut,
@@ -30,12 +31,14 @@ SCHEMA = Path(__file__).resolve().parents[1] / "console" / "wire.schema.json"
 _OUT: tuple[type[BaseModel], ...] = (
     AccountOut,
     AnswerOut,
+    ControlsOut,
     FleetOut,
     MissionOut,
     PlaybackOut,
     RefusalOut,
+    SurveyOut,
 )
-_IN: tuple[type[BaseModel], ...] = (CommandIn, NavigationIn)
+_IN: tuple[type[BaseModel], ...] = (CommandIn, NavigationIn, RearrangeIn, SteerIn, SurveyIn)
 
 
 def schema_text() -> str:

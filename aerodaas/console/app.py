@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from fastapi import APIRouter, FastAPI, HTTPException, Request, WebSocket
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import JSONResponse
 from starlette.exceptions import HTTPException as AnyHTTPException
+from starlette.requests import HTTPConnection
 
 from aerodaas.analytics.remote.denial import malformed
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.redaction import catalogue
 from aerodaas.console.access import role_of
+from aerodaas.console.controls import ControlCommand, ControlSession, told_of_controls
 from aerodaas.console.hub import StreamHub
 from aerodaas.console.live import LiveSession, Rate, StreamNames, wanted_streams
 from aerodaas.console.own_flight import OWN, OwnFlight
 from aerodaas.console.page import page_routes
+from aerodaas.console.surveys import SurveyPlanner
 from aerodaas.protocol.commands import COMMANDS
+from aerodaas.protocol.piloting import RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.schemas import (
     AccountOut,
     CommandIn,
@@ -27,10 +33,14 @@ from aerodaas.protocol.schemas import (
     RobotOut,
     Role,
     Scope,
+    Word,
 )
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["account_of", "build_console", "build_page", "require_known"]
+
+_NAMED = 8
+"""Most waypoints that an alert names."""
 
 
 def build_console(flight: OwnFlight, config: EnvironmentConfig, *, framed: bool = False) -> FastAPI:
@@ -70,6 +80,7 @@ class _Routes:
     def __init__(self, flight: OwnFlight, config: EnvironmentConfig) -> None:
         self._flight = flight
         self._hub = StreamHub(flight.items)
+        self._surveys = SurveyPlanner()
         self._fleet = FleetOut(
             name=config.name,
             robots=[
@@ -88,7 +99,10 @@ class _Routes:
         router.add_api_route("/missions/{mission}", self.mission)
         router.add_api_route("/missions/{mission}/commands", self.command, methods=["POST"])
         router.add_api_route("/missions/{mission}/navigation", self.navigation, methods=["POST"])
+        router.add_api_route("/missions/{mission}/plan", self.rearrange, methods=["POST"])
+        router.add_api_route("/missions/{mission}/survey", self.survey, methods=["POST"])
         router.add_api_websocket_route("/missions/{mission}/live", self.live)
+        router.add_api_websocket_route("/missions/{mission}/controls", self.controls)
         return router
 
     def fleet(self) -> FleetOut:
@@ -115,8 +129,35 @@ class _Routes:
         """Add waypoints to a robot's queue; answers what the drone said."""
         require_known(mission)
         _require_pilot(request)
-        ids = ", ".join(waypoint.id for waypoint in body.waypoints)
-        return AnswerOut.of(self._flight.command(body.robot, body.command(), f"visit {ids}"))
+        what = f"visit {_listed([waypoint.id for waypoint in body.waypoints])}"
+        return AnswerOut.of(self._flight.command(body.robot, body.command(), what))
+
+    def rearrange(self, mission: str, body: RearrangeIn, request: Request) -> AnswerOut:
+        """Change the order of a robot's coming waypoints, or remove some."""
+        require_known(mission)
+        _require_pilot(request)
+        what = [f"fly {_listed(body.order)} in this order"] if body.order else []
+        what += [f"leave out {_listed(body.remove)}"] if body.remove else []
+        said = self._flight.command(body.robot, body.command(), " and ".join(what) or "do nothing")
+        return AnswerOut.of(said)
+
+    def survey(self, mission: str, body: SurveyIn, request: Request) -> SurveyOut:
+        """Plan the survey of an area; nothing is flown."""
+        require_known(mission)
+        _require_pilot(request)
+        status = self._flight.mission().status.get(body.robot)
+        return self._surveys.plan(body, self._flight.config, status)
+
+    async def controls(self, socket: WebSocket, mission: str, robot: Word) -> None:
+        """Have a robot flown by hand, until the sender lets go or falls silent."""
+        require_known(mission)
+        _require_pilot(socket)
+
+        def give(command: ControlCommand) -> AnswerOut:
+            what = told_of_controls(command)
+            return AnswerOut.of(self._flight.command(robot, command, what))
+
+        await ControlSession(socket, role_of(socket).value, give).run()
 
     async def live(
         self,
@@ -131,8 +172,14 @@ class _Routes:
         await session.run(rate, wanted_streams(streams), own=False)
 
 
-def _require_pilot(request: Request) -> None:
-    role = role_of(request)
+def _listed(ids: Sequence[str]) -> str:
+    """Some ids by name, and how many they are where that would be too long to read."""
+    named = ", ".join(ids[:_NAMED])
+    return named if len(ids) <= _NAMED else f"{named}, … ({len(ids)})"
+
+
+def _require_pilot(connection: HTTPConnection) -> None:
+    role = role_of(connection)
     if not role.reaches(Role.PILOT):
         raise HTTPException(403, f"this needs the role pilot; you are {role.value}")
 

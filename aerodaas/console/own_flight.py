@@ -83,6 +83,11 @@ class OwnFlight:
         """Whether the flight is over."""
         return self._closed.is_set()
 
+    @property
+    def config(self) -> EnvironmentConfig:
+        """What is flown in."""
+        return self._run.config
+
     def mission(self) -> MissionOut:
         """The flight as a service would show it."""
         self._asked = time.monotonic()
@@ -131,8 +136,13 @@ class OwnFlight:
             yield reader.next_packed(_ITEM_SECONDS) or ({}, b"")
 
     def command(self, robot: str, command: Command, what: str) -> Answer:
-        """Execute a command, and tell of it and its answer by an alert; raises AeroDaaSError."""
+        """Execute a command; raises AeroDaaSError.
+
+        An alert tells of it and its answer, by `what` was asked; none where that is empty.
+        """
         answer = self._run.command(robot, command)
+        if not what:
+            return answer
         word = "accepted" if answer.accepted else "refused"
         said = f"{word}{': ' if answer.text else ''}{answer.text}"
         self._run.note("console_command", f"the console asked {robot} to {what}: {said}")

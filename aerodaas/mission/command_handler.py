@@ -11,6 +11,7 @@ from aerodaas.mission.commands import (
     Answer,
     CloseStream,
     OpenStream,
+    RearrangeNavigation,
     StreamItem,
 )
 from aerodaas.mission.log import MissionLog
@@ -57,6 +58,18 @@ class CommandHandler:
         self._navigator.clear()
         self.last_received = now
 
+    def navigate(
+        self, command: AddNavigation | StreamItem | RearrangeNavigation, now: int
+    ) -> Answer:
+        """Execute a command that changes the queue, at `now`, mission clock in nanoseconds."""
+        match command:
+            case AddNavigation():
+                return self.add(command, now)
+            case StreamItem():
+                return self.receive(command, now)
+            case RearrangeNavigation():
+                return self.rearrange(command)
+
     def add(self, command: AddNavigation, now: int) -> Answer:
         """Add navigation of the application or a remote user."""
         if command.clear_first:
@@ -65,6 +78,32 @@ class CommandHandler:
                 return DONE
         by_hand = OpenStream("", index=command.index, deadline=command.deadline)
         return self._take(command.navigation, by_hand, now, command.cause)
+
+    def rearrange(self, command: RearrangeNavigation) -> Answer:
+        """Change the order of queued waypoints and remove others, unless the drone is there."""
+        named = [*command.order, *command.remove]
+        twice = sorted({key for key in named if named.count(key) > 1})
+        if twice:
+            return Answer(accepted=False, text=f"{', '.join(twice)}: named more than once")
+        refused = {key: text for key in named if (text := self._fixed(key))}
+        if len(refused) == len(named):
+            text = "; ".join(refused.values()) or "nothing was named to be moved or removed"
+            return Answer(accepted=False, text=text, refused=refused)
+        order = [key for key in command.order if key not in refused]
+        removed = [key for key in command.remove if key not in refused]
+        try:
+            self._navigator.queue.rearrange(order, removed)
+        except InvalidWaypointError as error:
+            return Answer(accepted=False, text=str(error))
+        return Answer(accepted=True, text="; ".join(refused.values()), refused=refused)
+
+    def _fixed(self, key: str) -> str:
+        """Why a waypoint can be neither moved nor removed; empty if it can."""
+        stop = self._navigator.queue.find(key)
+        if stop is None:
+            reached = self._log.reached(key)
+            return f"{key} was reached meanwhile" if reached else f"{key} is not in the plan"
+        return f"the drone is at {key} by now" if stop.arrived else ""
 
     def receive(self, message: StreamItem, now: int) -> Answer:
         """Add an item of an open stream."""

@@ -9,7 +9,7 @@ from typing import TypeAlias
 from aerodaas.dataflow.graph import NavigationEdge
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types.data import Header
-from aerodaas.types.waypoints import SchedulingType
+from aerodaas.types.waypoints import SchedulingType, VelocityCommand
 
 __all__ = [
     "TRIGGERED",
@@ -21,12 +21,16 @@ __all__ = [
     "End",
     "OpenStream",
     "Pause",
+    "RearrangeNavigation",
+    "ReleaseControls",
     "Reply",
     "Request",
     "Resume",
     "ReturnHome",
     "Start",
+    "Steer",
     "StreamItem",
+    "TakeControls",
     "initial_commands",
 ]
 
@@ -106,6 +110,45 @@ class Resume:
 
 
 @dataclass(frozen=True, slots=True)
+class RearrangeNavigation:
+    """Change the order of coming waypoints and remove others, as a whole.
+
+    Waypoints that were reached, or at which the drone is by then, are left out.
+    """
+
+    order: tuple[str, ...] = ()
+    """Ids that change places among themselves, and stay there; all others keep their places."""
+    remove: tuple[str, ...] = ()
+    """Ids that are not flown to."""
+
+
+@dataclass(frozen=True, slots=True)
+class TakeControls:
+    """Pause the mission, and fly by hand from now on."""
+
+    operator: str
+    """Name for the others to read."""
+    session: int
+    """Number of this takeover, not 0; the operator's commands carry it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Steer:
+    """Fly at a velocity until it expires, and then brake and hold."""
+
+    session: int
+    """That of the `TakeControls` before."""
+    velocity: VelocityCommand
+
+
+@dataclass(frozen=True, slots=True)
+class ReleaseControls:
+    """Let go of the controls: the drone holds, and the mission stays paused."""
+
+    session: int
+
+
+@dataclass(frozen=True, slots=True)
 class ReturnHome:
     """Fly back to the place of take-off and land."""
 
@@ -128,6 +171,10 @@ Command: TypeAlias = (
     | ClearNavigation
     | Pause
     | Resume
+    | RearrangeNavigation
+    | TakeControls
+    | Steer
+    | ReleaseControls
     | ReturnHome
     | End
 )

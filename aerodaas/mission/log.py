@@ -52,6 +52,10 @@ class MissionLog:
         self.visits += 1
         self._reached.add(waypoint_id)
 
+    def reached(self, waypoint_id: str) -> bool:
+        """Whether a waypoint of this id was reached."""
+        return waypoint_id in self._reached
+
     def waypoint_counts(self, ahead: Iterable[str]) -> tuple[int, int]:
         """How many waypoints were reached, and how many are known with those `ahead`."""
         return len(self._reached), len(self._reached) + len(set(ahead) - self._reached)

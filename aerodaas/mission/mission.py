@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -25,13 +24,19 @@ from aerodaas.mission.commands import (
     End,
     OpenStream,
     Pause,
+    RearrangeNavigation,
+    ReleaseControls,
     Resume,
     ReturnHome,
     Start,
+    Steer,
     StreamItem,
+    TakeControls,
 )
+from aerodaas.mission.forecast import BatteryForecast
 from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards
 from aerodaas.mission.log import MissionLog, words
+from aerodaas.mission.manual import ManualControl
 from aerodaas.mission.navigator import LiveCommand, Navigator
 from aerodaas.mission.planner import Planner
 from aerodaas.mission.queue import QueuedWaypoint
@@ -39,30 +44,26 @@ from aerodaas.mission.safety.detour import Detour
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.motors import Motors, MotorWatch
 from aerodaas.mission.safety.supervisor import CALM, FailsafeAction, Fault, Supervisor, has_position
-from aerodaas.mission.state_machine import TERMINAL, MissionStateMachine
+from aerodaas.mission.state_machine import FLYING, TERMINAL, MissionStateMachine
 from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.types.braking import stopping_point
-from aerodaas.types.clock import NANOSECONDS, seconds
+from aerodaas.types.clock import seconds
 from aerodaas.types.data import Alert
 from aerodaas.types.energy import EnergyMeter, EnergyModel
 from aerodaas.types.errors import failure_line
 from aerodaas.types.geometry import GeodeticOrigin, Vector, body_to_enu
 from aerodaas.types.status import RECENT, MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState, VelocitySetpoint
-from aerodaas.types.waypoints import Waypoint
+from aerodaas.types.waypoints import VelocityCommand
 
 __all__ = ["Mission"]
 
 _ON_GROUND = frozenset({MissionState.IDLE, MissionState.PREFLIGHT})
 _LEAVING = frozenset({MissionState.RETURNING, MissionState.LANDING})
+_NAVIGATION = (AddNavigation, StreamItem, RearrangeNavigation, TakeControls, Steer)
+"""Commands that a drone does not execute any more once it leaves."""
 _DRIFT = 0.5
 """Ground speed in m/s below which a landing may begin; above it, the drone overshoots home."""
-_FORECAST_PERIOD = NANOSECONDS
-_FORECAST_PATIENCE = 10 * NANOSECONDS
-"""Nanoseconds for which the forecast must find the battery too small before an alert is raised."""
-_FORECAST_MARGIN = 1.1
-"""Factor by which the plan must exceed the available charge to be reported: gauge and model are no
-more accurate than that."""
 _SETTLED = frozenset({VehicleMode.HOLDING, VehicleMode.GUIDED})
 
 
@@ -116,11 +117,8 @@ class Mission:
         self._detour = Detour(self.fence, limits.arrival_radius)
         self._command_handler = CommandHandler(self._navigator, self._log)
         self._assessment = CALM
-        self._plan_fault = ""
-        self._forecast_due = 0
-        self._forecast_told = False
-        self._short_since: int | None = None
-        """Mission clock since which every forecast has found the battery too small for the plan."""
+        self._forecast = BatteryForecast(limits, self.home, self._meter, self._log)
+        self._manual = ManualControl()
         self._paused = False
         self._last: VehicleState | None = None
         self._now = 0
@@ -163,9 +161,10 @@ class Mission:
             tuple(self._log.visited),
             tuple(self._log.given_up)[-RECENT:],
             self._log.distance,
-            tuple(text for text in (*texts, self._navigator.fault, self._plan_fault) if text),
+            tuple(text for text in (*texts, self._navigator.fault, self._forecast.fault) if text),
             self._log.visits,
             self._log.waypoint_counts(stop.id for stop in stops),
+            self._manual.operator(self._now),
         )
 
     def handle(self, command: Command, now: int) -> Answer:
@@ -176,15 +175,13 @@ class Mission:
         """
         self._now = max(self._now, now)
         try:
-            if self.finished:
-                return Answer(accepted=False, text=f"the mission is over: {self.state.value}")
+            if objection := self._objection(command):
+                return Answer(accepted=False, text=objection)
             match command:
-                case AddNavigation() | StreamItem() if self.state in _LEAVING:
-                    return Answer(accepted=False, text=f"the drone is {self.state.value} by now")
-                case StreamItem():
-                    return self._command_handler.receive(command, self._now)
-                case AddNavigation():
-                    return self._command_handler.add(command, self._now)
+                case AddNavigation() | StreamItem() | RearrangeNavigation():
+                    return self._command_handler.navigate(command, self._now)
+                case TakeControls() | Steer() | ReleaseControls():
+                    return self._control_by_hand(command)
                 case _:
                     return self._control(command)
         except Exception as error:  # noqa: BLE001 - a sender's objects may raise anything
@@ -194,6 +191,17 @@ class Mission:
             text = f"{what} failed: {failure_line(error)}"
             self._log.alert(self._now, "command_failed", text)
             return Answer(accepted=False, text=text)
+
+    def _objection(self, command: object) -> str:
+        """Why no command of this kind is executed in the present state; empty if it is."""
+        if self.finished:
+            return f"the mission is over: {self.state.value}"
+        navigates = isinstance(command, _NAVIGATION)
+        return (
+            f"the drone is {self.state.value} by now"
+            if navigates and self.state in _LEAVING
+            else ""
+        )
 
     def _control(self, command: object) -> Answer:
         match command:
@@ -225,9 +233,21 @@ class Mission:
         self._paused = True
         return DONE
 
+    def _control_by_hand(self, command: TakeControls | Steer | ReleaseControls) -> Answer:
+        takes = isinstance(command, TakeControls)
+        if takes and self.state not in FLYING | {MissionState.PAUSED}:
+            text = f"a drone is flown by hand in the air only, and it is {self.state.value}"
+            return Answer(accepted=False, text=text)
+        objection = self._manual.handle(command, self._now)
+        self._paused = self._paused or (takes and not objection)
+        return Answer(not objection, objection)
+
     def _resume(self) -> Answer:
         if not self._paused:
             return Answer(accepted=False, text="the mission is not paused")
+        if holder := self._manual.operator(self._now):
+            return Answer(accepted=False, text=f"{holder} has the controls: let go of them first")
+        self._manual = ManualControl()
         self._paused = False
         self._command_handler.last_received = self._now
         if self.state is MissionState.PAUSED:
@@ -263,7 +283,7 @@ class Mission:
             return Wait()
         turns = {
             MissionState.TAKING_OFF: self._take_off,
-            MissionState.PAUSED: self._hover,
+            MissionState.PAUSED: self._stay,
             MissionState.RETURNING: self._return,
             MissionState.LANDING: self._land,
             MissionState.ABORTED: self._release,
@@ -332,7 +352,7 @@ class Mission:
 
     def _preflight(self, state: VehicleState, objections: Sequence[str]) -> Action:
         self._plan(state)
-        self._forecast(state)
+        self._forecast_battery(state)
         reasons = self._supervisor.objections(state)
         waits = self._command_handler.is_fed or self._options.on_complete == "hold"
         if not (waits or len(self._navigator.queue)):
@@ -384,12 +404,12 @@ class Mission:
     def _fly(self, state: VehicleState) -> Action:
         if self._paused:
             self._to(MissionState.PAUSED)
-            return self._hover(state)
+            return self._stay(state)
         if self._assessment.demand is FailsafeAction.HOLD:
             self._to(MissionState.HOLDING, self._assessment.gravest.text)
             return self._hover(state)
         self._plan(state)
-        self._forecast(state)
+        self._forecast_battery(state)
         served = self._navigator.served(self._now)
         if isinstance(served, QueuedWaypoint):
             return self._serve(served, state)
@@ -397,6 +417,15 @@ class Mission:
         if served is not None:
             return self._follow(served, state)
         return self._idle(state)
+
+    def _stay(self, state: VehicleState) -> Action:
+        """Hover, unless somebody flies by hand."""
+        self._to(MissionState.PAUSED, self._manual.reason(self._now))
+        velocity = self._manual.velocity(self._now)
+        if velocity is None or self._assessment.demand is FailsafeAction.HOLD:
+            return self._hover(state)
+        self._leg = self._anchor = None
+        return Fly(_flown(velocity, state))
 
     def _serve(self, stop: QueuedWaypoint, state: VehicleState) -> Action:
         if self._awaits_plan(stop):
@@ -456,9 +485,7 @@ class Mission:
             return self._hover(state)
         self._to(MissionState.DIVERTED if waiting else MissionState.FOLLOWING, "following commands")
         self._anchor = None
-        command = live.command
-        velocity = body_to_enu(command.velocity, state.odometry.yaw)
-        return Fly(VelocitySetpoint(velocity, command.yaw_rate), live.cause)
+        return Fly(_flown(live.command, state), live.cause)
 
     def _idle(self, state: VehicleState) -> Action:
         options, limits = self._options, self.limits
@@ -549,51 +576,17 @@ class Mission:
         if self._navigator.fault and self._navigator.fault != fault:
             self._log.alert(self._now, "scheduler", self._navigator.fault)
 
-    def _forecast(self, state: VehicleState) -> None:
-        """Compare the battery with the charge that the rest of the plan needs.
-
-        On the ground a shortfall raises an alert at once. In the air it must last for
-        `_FORECAST_PATIENCE`: the battery gauge is coarse and a climb is expensive, so that a single
-        estimate is unreliable.
-        """
-        if self._now < self._forecast_due or not has_position(state):
-            return
-        self._forecast_due = self._now + _FORECAST_PERIOD
-        route = [self._as_flown(stop) for stop in self._navigator.queue]
-        needed = self._meter.route(
-            state.odometry.position, route, self.home, self.limits.cruise_speed
-        )
-        available = state.battery.fraction - self.limits.battery_land
-        if not (route and needed > max(0.0, available) * _FORECAST_MARGIN):
-            self._plan_fault, self._short_since = "", None
-            return
-        self._plan_fault = (
-            f"at this rate the plan and the way home need {_share(needed)} of a battery, and "
-            f"{_share(max(0.0, available))} is there to spend: the drone returns when only the way "
-            "home is left"
-        )
-        if self._short_since is None:
-            self._short_since = self._now
-        surely = (
-            self.state is MissionState.PREFLIGHT
-            or self._now - self._short_since >= _FORECAST_PATIENCE
-        )
-        if surely and not self._forecast_told:
-            self._forecast_told = True
-            self._log.alert(self._now, "unreachable_plan", self._plan_fault)
-
-    def _as_flown(self, stop: QueuedWaypoint) -> Waypoint:
-        """The rest of a stop: its remaining hover, at no more than the permitted speed."""
-        speed = min(stop.waypoint.speed or self.limits.cruise_speed, self.limits.max_speed)
-        return replace(stop.waypoint, speed=speed, hover_duration=max(0.0, stop.remaining_hover))
+    def _forecast_battery(self, state: VehicleState) -> None:
+        grounded = self.state is MissionState.PREFLIGHT
+        self._forecast.update(self._now, state, self._navigator.queue, grounded=grounded)
 
     def _to(self, state: MissionState, reason: str = "") -> None:
         self._machine.to(state, self._now, reason)
 
 
-def _share(charge: float) -> str:
-    most = 9.99
-    return f"{charge:.0%}" if charge <= most else f"more than {most:.0%}"
+def _flown(command: VelocityCommand, state: VehicleState) -> VelocitySetpoint:
+    """A velocity command in the local frame, by the drone's yaw."""
+    return VelocitySetpoint(body_to_enu(command.velocity, state.odometry.yaw), command.yaw_rate)
 
 
 def _subject(finding: Fault) -> tuple[str, str]:

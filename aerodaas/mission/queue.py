@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from aerodaas.types.data import Header
 from aerodaas.types.errors import InvalidWaypointError
@@ -189,6 +190,28 @@ class WaypointQueue:
         else:
             self._levels.pop(level, None)
         return given_up
+
+    def rearrange(self, order: Sequence[str], remove: Iterable[str]) -> None:
+        """Have stops change places among themselves, and remove others; all or nothing.
+
+        Those of `order` stay in their new places, around which plans move the others. Raises
+        InvalidWaypointError for an order that priorities contradict.
+        """
+        stops = [stop for key in order if (stop := self.find(key)) is not None]
+        for before, after in pairwise(stops):
+            if before.waypoint.priority > after.waypoint.priority:
+                raise InvalidWaypointError(
+                    f"{after.id!r} is more urgent than {before.id!r}, so it comes first: only "
+                    "waypoints of one priority change places"
+                )
+        for key in remove:
+            self.remove(key)
+        named = set(stops)
+        for level in self._levels.values():
+            moved = iter([stop for stop in stops if stop in set(level)])
+            level[:] = [next(moved) if stop in named else stop for stop in level]
+        for stop in stops:
+            stop.pinned = True
 
     @staticmethod
     def _keep_groups(

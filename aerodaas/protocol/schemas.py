@@ -41,6 +41,7 @@ __all__ = [
     "TokenOut",
     "UsageOut",
     "VerdictOut",
+    "Word",
 ]
 
 Number = Annotated[float, Field(allow_inf_nan=False)]

@@ -26,6 +26,7 @@ from aerodaas.service.routes.here import HereRoutes
 from aerodaas.service.routes.leases import LeaseRoutes
 from aerodaas.service.routes.live import LiveRoutes
 from aerodaas.service.routes.missions import MissionRoutes
+from aerodaas.service.routes.piloting import PilotingRoutes
 from aerodaas.service.routes.refusals import register_refusals
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Store
@@ -83,6 +84,7 @@ def build_service(
         AccountRoutes(accounts, store, admission, audit),
     ):
         app.include_router(routes.router(), dependencies=secured)
+    app.include_router(PilotingRoutes(desk, admission, audit).router())
     app.include_router(LiveRoutes(desk, hub, admission).router())
     app.include_router(HereRoutes(desk, admission).router())
     app.include_router(page_routes())

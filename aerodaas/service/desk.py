@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.protocol.piloting import ControlsIn, RearrangeIn
 from aerodaas.protocol.schemas import (
     CommandIn,
     LeaseState,
@@ -28,6 +29,7 @@ from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.order import FlightOrder
 from aerodaas.service.garage import Garage
 from aerodaas.service.idempotency import fingerprint
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
@@ -173,19 +175,35 @@ class MissionDesk:
         """Give a robot of a flying mission a command; raises MissionError if it is lost."""
         return self._ask(principal, mission, do=command.command, robot=command.robot)
 
-    def fly(self, principal: Principal, mission: str, navigation: NavigationIn) -> AnswerOut:
-        """Add waypoints to a flying mission; raises MissionError if it is lost."""
-        content = navigation.model_dump(mode="json")
-        return self._ask(principal, mission, do="fly", navigation=content)
+    def fly(
+        self,
+        principal: Principal,
+        mission: str,
+        what: NavigationIn | RearrangeIn | ControlsIn,
+    ) -> AnswerOut:
+        """Change what a flying mission does; raises MissionError if it is lost."""
+        words = {NavigationIn: "fly", RearrangeIn: "rearrange", ControlsIn: "controls"}
+        content = what.model_dump(mode="json")
+        return self._ask(principal, mission, do=words[type(what)], content=content)
+
+    def order(self, principal: Principal, mission: str) -> FlightOrder:
+        """The order of a mission that flies and that this account may command."""
+        return FlightOrder.read(self._flown(principal, mission).flight.order)
 
     def _ask(self, principal: Principal, mission: str, **request: Any) -> AnswerOut:  # noqa: ANN401
+        one = self._flown(principal, mission)
+        with self._lock:
+            link = one.follow()
+        return link.ask(operator=principal.role.reaches(Role.OPERATOR), **request)
+
+    def _flown(self, principal: Principal, mission: str) -> ActiveMission:
+        """A flying mission; raises RefusedError unless this account may command it."""
         self._require_own(principal, mission)
         with self._lock:
             one = self._one(mission)
             if one.phase is not MissionPhase.FLYING:
                 raise RefusedError(409, f"{mission} is not flying: {one.phase.value}")
-            link = one.follow()
-        return link.ask(operator=principal.role.reaches(Role.OPERATOR), **request)
+            return one
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
         """A mission that this account may see; raises RefusedError for any other."""

@@ -79,6 +79,8 @@ class MissionStatus:
     """How often a waypoint has been reached since take-off; `visited` holds the last of them."""
     waypoint_counts: tuple[int, int] = (0, 0)
     """How many waypoints were visited, and how many are known; one visited twice is one."""
+    pilot: str = ""
+    """Who flies the drone by hand now; empty for nobody."""
 
     @property
     def progress(self) -> float:

@@ -77,6 +77,13 @@ export interface Ears {
   up(connected: boolean): void;
 }
 
+/** A WebSocket with the token, which a browser sends as a subprotocol. */
+export function openSocket(path: string, token: string): WebSocket {
+  const url = new URL(path, document.baseURI);
+  url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  return new WebSocket(url, ["aerodaas", `bearer.${token}`]);
+}
+
 /** A WebSocket that is made again, with growing pauses, until it is closed. */
 export class LiveSocket {
   private socket: WebSocket | undefined;
@@ -107,9 +114,7 @@ export class LiveSocket {
 
   private open(): void {
     clearTimeout(this.timer);
-    const url = new URL(this.path, document.baseURI);
-    url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
-    const socket = new WebSocket(url, ["aerodaas", `bearer.${this.token}`]);
+    const socket = openSocket(this.path, this.token);
     socket.binaryType = "arraybuffer";
     socket.onopen = () => {
       this.tries = 0;

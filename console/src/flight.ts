@@ -1,6 +1,6 @@
 // The state of one mission as the page knows it, live or recorded: newest status, trails, charts.
 
-import { Refused, ask } from "./connection";
+import { Refused, ask, openSocket } from "./connection";
 import type { Point } from "./place";
 import type { Past, Source } from "./source";
 import type {
@@ -9,7 +9,10 @@ import type {
   CommandIn,
   MissionOut,
   NavigationIn,
+  RearrangeIn,
   StatusOut,
+  SurveyIn,
+  SurveyOut,
 } from "./wire";
 
 const TRAIL = 3000;
@@ -142,9 +145,29 @@ export class Flight {
   visit(navigation: NavigationIn): void {
     const waypoint = navigation.waypoints[0];
     const what = `${waypoint.id}: ${waypoint.x.toFixed(1)} E, ${waypoint.y.toFixed(1)} N`;
-    this.give(navigation.robot, what, "navigation", navigation, (status) =>
+    this.fly(navigation, what, (status) =>
       status.visited.includes(waypoint.id) ? "visited" : null,
     );
+  }
+
+  /** Add waypoints; `seen` tells from the drone's status when that has taken effect. */
+  fly(navigation: NavigationIn, what: string, seen: Order["seen"]): void {
+    this.give(navigation.robot, what, "navigation", navigation, seen);
+  }
+
+  rearrange(change: RearrangeIn, what: string, seen: Order["seen"]): void {
+    this.give(change.robot, what, "plan", change, seen);
+  }
+
+  /** Plan a survey; nothing is flown. Throws Refused with the reason. */
+  survey(wanted: SurveyIn): Promise<SurveyOut> {
+    return ask<SurveyOut>(`v1/missions/${this.mission.id}/survey`, this.token, wanted);
+  }
+
+  /** The connection by which a robot is flown by hand. */
+  controls(robot: string): WebSocket {
+    const query = new URLSearchParams({ robot });
+    return openSocket(`v1/missions/${this.mission.id}/controls?${query}`, this.token);
   }
 
   acknowledge(id: number | null): void {
@@ -156,7 +179,7 @@ export class Flight {
     robot: string,
     what: string,
     route: string,
-    body: CommandIn | NavigationIn,
+    body: CommandIn | NavigationIn | RearrangeIn,
     seen: Order["seen"],
   ): void {
     const order: Order = {
@@ -259,6 +282,11 @@ export class Flight {
 /** Whether a place is far enough from the last point of a trail to be one of its own. */
 export function shifted(last: Point | undefined, east: number, north: number): boolean {
   return !last || Math.hypot(last[0] - east, last[1] - north) >= STEP;
+}
+
+/** Waypoints that lie ahead, the one being flown to first. */
+export function aheadOf(status: StatusOut): string[] {
+  return status.target === null ? status.pending : [status.target, ...status.pending];
 }
 
 export function speedOf(status: Pick<StatusOut, "velocity">): number | null {

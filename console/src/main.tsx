@@ -14,7 +14,11 @@ import { LiveSource } from "./source";
 import { Timeline, momentOfLink } from "./timeline";
 import type { AccountOut, FleetOut, MissionOut, RecordedOut } from "./wire";
 import { Video } from "./video";
+import { HandPanel } from "./hand_panel";
+import { Plan } from "./plan";
+import { SurveyPanel, useSurvey } from "./survey";
 import "./console.css";
+import "./piloting.css";
 
 const THEMES = ["auto", "light", "dark"] as const;
 type Theme = (typeof THEMES)[number];
@@ -202,13 +206,15 @@ function Console(props: ConsoleProps) {
     () => (recorded ? placeOf({ ...recorded, robots: [] }) : known.place),
     [recorded, known],
   );
+  const abilities = place.robots.get(robot);
+  const up = flight?.status(robot)?.position?.[2] ?? 0;
+  const height = up > 0.5 ? up : place.takeoffHeight;
+  const { survey, begin } = useSurvey(flight, robot, height, abilities);
   if (!flight) return null;
 
   const may = !recorded && known.account.role !== "viewer" && known.account.scopes.includes("fly");
   const sees = known.account.scopes.includes("sense");
-  const status = flight.status(robot);
   const fence = place.fences.find((one) => one.robot === robot);
-  const height = status?.position?.[2] ?? 0;
   return (
     <div class={`page ${recorded ? "played" : ""}`}>
       <header class="top">
@@ -270,17 +276,29 @@ function Console(props: ConsoleProps) {
           mayFly={may && !flight.over}
           marked={marked}
           onMark={setMarked}
+          drawn={survey}
+          onDraw={() => {
+            setMarked(null);
+            begin();
+          }}
         />
         <Charts flight={flight} robot={robot} theme={theme} />
         </div>
         <div class="side">
+        {survey && (
+          <SurveyPanel
+            survey={survey}
+            ceiling={fence?.ceiling ?? 120}
+            zones={(fence?.noFly.length ?? 0) > 0}
+          />
+        )}
         {marked && (
           <WaypointForm
             key={marked.join()}
             flight={flight}
             robot={robot}
             point={marked}
-            height={height > 0.5 ? height : place.takeoffHeight}
+            height={height}
             ceiling={fence?.ceiling ?? 120}
             onDone={() => setMarked(null)}
           />
@@ -288,6 +306,16 @@ function Console(props: ConsoleProps) {
         {sees && <Video flight={flight} />}
         <StatePanel flight={flight} robot={robot} />
         {!recorded && <Commands flight={flight} robot={robot} mayFly={may} />}
+        <Plan key={`plan ${robot}`} flight={flight} robot={robot} mayFly={may} />
+        {!recorded && (
+          <HandPanel
+            key={`hand ${robot}`}
+            flight={flight}
+            robot={robot}
+            mayFly={may}
+            abilities={abilities}
+          />
+        )}
         <Alerts flight={flight} />
         <AnalyticsCharts flight={flight} theme={theme} />
         </div>

@@ -1,8 +1,9 @@
 // The map: a metric grid in the environment's local frame, north up, drawn as SVG.
 
 import { useEffect, useMemo, useRef, useState } from "preact/hooks";
-import type { Flight } from "./flight";
+import { type Flight, aheadOf } from "./flight";
 import type { Place, Point } from "./place";
+import { type Drawn, SurveyLayer } from "./survey_map";
 import type { StatusOut } from "./wire";
 
 interface View {
@@ -19,9 +20,14 @@ export interface MapProps {
   mayFly: boolean;
   marked: Point | null;
   onMark(point: Point): void;
+  /** The survey that is being drawn; a click is a corner then. */
+  drawn: Drawn | null;
+  onDraw(): void;
 }
 
 const ZOOM = 1.25;
+/** Most waypoints with their names beside them; a survey has more than can be read. */
+const LABELS = 24;
 
 export function FlightMap(props: MapProps) {
   const box = useRef<HTMLDivElement>(null);
@@ -73,8 +79,14 @@ export function FlightMap(props: MapProps) {
     ArrowRight: () => pan(-40, 0),
     ArrowUp: () => pan(0, 40),
     ArrowDown: () => pan(0, -40),
-    Enter: () => props.mayFly && props.onMark([shown.east, shown.north]),
+    Enter: () => props.mayFly && place([shown.east, shown.north]),
   };
+  const drawing = props.drawn;
+  if (drawing) {
+    keys["Backspace"] = () => drawing.undo();
+    keys["Escape"] = () => drawing.cancel();
+  }
+  const place = (point: Point) => (drawing ? drawing.add(point) : props.onMark(point));
 
   return (
     <section class="card map" aria-label="Map">
@@ -83,7 +95,7 @@ export function FlightMap(props: MapProps) {
         ref={box}
         tabIndex={0}
         role="application"
-        aria-label="Map of the flight. Arrow keys move it, plus and minus zoom, 0 shows all, F follows the drone, Enter sets a waypoint at the cross."
+        aria-label="Map of the flight. Arrow keys move it, plus and minus zoom, 0 shows all, F follows the drone, Enter sets a waypoint, or a corner of the survey that is drawn, at the cross."
         data-testid="map"
         data-scale={shown.scale}
         data-east={shown.east}
@@ -116,7 +128,7 @@ export function FlightMap(props: MapProps) {
           drag.current = null;
           if (!from || from.moved || !props.mayFly) return;
           const at = event.currentTarget.getBoundingClientRect();
-          props.onMark(metres(event.clientX - at.left, event.clientY - at.top));
+          place(metres(event.clientX - at.left, event.clientY - at.top));
         }}
       >
         <svg width={size.width} height={size.height} aria-hidden="true">
@@ -151,6 +163,9 @@ export function FlightMap(props: MapProps) {
               </g>
             );
           })}
+          {drawing && (
+            <SurveyLayer drawn={drawing} x={x} y={y} line={line} metres={metres} box={box} />
+          )}
           {props.marked && (
             <g class="marked" transform={`translate(${x(props.marked[0])} ${y(props.marked[1])})`}>
               <circle r="10" />
@@ -165,6 +180,17 @@ export function FlightMap(props: MapProps) {
         </div>
       </div>
       <div class="mapkeys">
+        {props.mayFly && (
+          <button
+            type="button"
+            class="draw"
+            title="Draw an area to survey"
+            aria-pressed={drawing !== null}
+            onClick={drawing ? drawing.cancel : props.onDraw}
+          >
+            Survey
+          </button>
+        )}
         <button type="button" title="Zoom in (+)" aria-label="Zoom in" onClick={() => zoom(ZOOM)}>
           +
         </button>
@@ -206,13 +232,13 @@ export function FlightMap(props: MapProps) {
   );
 }
 
-interface Frame {
+export interface Frame {
   x(east: number): number;
   y(north: number): number;
 }
 
 function Plan({ status, x, y, line }: Frame & { status: StatusOut; line(p: Point[]): string }) {
-  const ahead = [...(status.target ? [status.target] : []), ...status.pending];
+  const ahead = aheadOf(status);
   const known = Object.entries(status.places);
   const way: Point[] = [];
   if (status.position?.[0] != null && status.position[1] != null) {
@@ -239,9 +265,11 @@ function Plan({ status, x, y, line }: Frame & { status: StatusOut; line(p: Point
           >
             <circle r={current ? 8 : 6} />
             {visited && <path d="M-3 0l2 3 4-6" />}
-            <text x="11" dy="4">
-              {id}
-            </text>
+            {(current || known.length <= LABELS) && (
+              <text x="11" dy="4">
+                {id}
+              </text>
+            )}
           </g>
         );
       })}

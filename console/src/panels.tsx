@@ -223,7 +223,7 @@ export function WaypointForm(props: {
       />
       <Field name="hover" label="Hover, s" value="2" min={0} />
       <Field name="priority" label="Priority (1 first)" value="5" min={0} step="1" />
-      <Field name="deadline" label="Within, s" value="" min={1} optional />
+      <Field name="deadline" label="Within, s" value="" min={1} optional="any time" />
       <div class="buttons">
         <button type="submit" class="primary">
           Fly there
@@ -236,15 +236,17 @@ export function WaypointForm(props: {
   );
 }
 
-function Field(props: {
+export function Field(props: {
   name: string;
   label: string;
   value: string;
   min?: number;
   max?: number;
   step?: string;
-  optional?: boolean;
+  /** What is meant where nothing is given. */
+  optional?: string;
   first?: boolean;
+  onValue?(value: string): void;
 }) {
   return (
     <label>
@@ -255,9 +257,13 @@ function Field(props: {
         inputMode="decimal"
         step={props.step ?? "0.1"}
         defaultValue={props.value}
-        placeholder={props.optional ? "any time" : ""}
-        required={!props.optional}
+        placeholder={props.optional ?? ""}
+        required={props.optional === undefined}
         autoFocus={props.first ?? false}
+        onInput={(event) => {
+          const { validity, value } = event.currentTarget;
+          if (validity.valid) props.onValue?.(value);
+        }}
         {...(props.min === undefined ? {} : { min: props.min })}
         {...(props.max === undefined ? {} : { max: props.max })}
       />

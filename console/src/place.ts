@@ -8,13 +8,28 @@ export interface Place {
   fences: { robot: string; polygon: Point[]; noFly: Point[][]; ceiling: number }[];
   starts: Point[];
   takeoffHeight: number;
+  robots: Map<string, Abilities>;
+}
+
+/** What a robot is able to do, as far as its operator has to know. */
+export interface Abilities {
+  /** m/s. */
+  cruiseSpeed: number;
+  maxSpeed: number;
+  maxClimb: number;
+  /** Of its camera, horizontally, degrees. */
+  fieldOfView: number;
 }
 
 interface Robot {
   id: string;
   start?: number[];
+  sensors?: { type?: string; settings?: { horizontal_fov?: number } }[];
   limits?: {
     takeoff_height?: number;
+    cruise_speed?: number;
+    max_speed?: number;
+    max_climb?: number;
     geofence?: { polygon?: Point[]; no_fly?: Point[][]; ceiling?: number };
   };
 }
@@ -29,6 +44,17 @@ export function placeOf(fleet: FleetOut): Place {
       ceiling: robot.limits?.geofence?.ceiling ?? 120,
     })),
     starts: robots.map((robot) => [robot.start?.[0] ?? 0, robot.start?.[1] ?? 0] as const),
+    robots: new Map(robots.map((robot) => [robot.id, abilitiesOf(robot)])),
     takeoffHeight: robots[0]?.limits?.takeoff_height ?? 2,
+  };
+}
+
+function abilitiesOf(robot: Robot): Abilities {
+  const camera = robot.sensors?.find((one) => one.type === "camera");
+  return {
+    cruiseSpeed: robot.limits?.cruise_speed ?? 1,
+    maxSpeed: robot.limits?.max_speed ?? 5,
+    maxClimb: robot.limits?.max_climb ?? 1.5,
+    fieldOfView: camera?.settings?.horizontal_fov ?? 82.6,
   };
 }

@@ -30,11 +30,16 @@ export interface Wire {
   AccountOut: AccountOut;
   AnswerOut: AnswerOut;
   CommandIn: CommandIn;
+  ControlsOut: ControlsOut;
   FleetOut: FleetOut;
   MissionOut: MissionOut;
   NavigationIn: NavigationIn;
   PlaybackOut: PlaybackOut;
+  RearrangeIn: RearrangeIn;
   RefusalOut: RefusalOut;
+  SteerIn: SteerIn;
+  SurveyIn: SurveyIn;
+  SurveyOut: SurveyOut;
 }
 /**
  * An account.
@@ -63,6 +68,14 @@ export interface AnswerOut {
 export interface CommandIn {
   command: "pause" | "resume" | "clear" | "return-home" | "land";
   robot: string;
+}
+/**
+ * Answer to a velocity by hand.
+ */
+export interface ControlsOut {
+  at: number;
+  held: boolean;
+  text: string;
 }
 /**
  * The fleet, and the environment that an application's graph is built against.
@@ -142,6 +155,7 @@ export interface StatusOut {
   measured: number | null;
   mode: string | null;
   pending: string[];
+  pilot: string;
   places: {
     /**
      * @minItems 3
@@ -266,8 +280,69 @@ export interface PlaceOut {
   since: number;
 }
 /**
+ * Change of the coming waypoints of one robot: one command, carried out whole.
+ */
+export interface RearrangeIn {
+  /**
+   * @maxItems 1000
+   */
+  order?: string[];
+  /**
+   * @maxItems 1000
+   */
+  remove?: string[];
+  robot: string;
+}
+/**
  * Answer to each request that is not carried out, with the HTTP status.
  */
 export interface RefusalOut {
   text: string;
+}
+/**
+ * A velocity by hand, in the drone's level frame; it is good for a third of a second.
+ */
+export interface SteerIn {
+  at: number;
+  forward?: number;
+  left?: number;
+  up?: number;
+  yaw_rate?: number;
+}
+/**
+ * Request of a plan to survey an area; nothing is flown.
+ */
+export interface SurveyIn {
+  angle?: number | null;
+  /**
+   * @minItems 3
+   * @maxItems 30
+   */
+  area: [[number, number], [number, number], [number, number], ...[number, number][]];
+  around?: boolean;
+  field_of_view?: number | null;
+  height: number;
+  name?: string;
+  overlap?: number;
+  robot: string;
+  speed?: number | null;
+  width?: number | null;
+}
+/**
+ * A survey as it would be flown; its waypoints are added by `navigation`.
+ */
+export interface SurveyOut {
+  angle: number;
+  available: number | null;
+  battery: number;
+  length: number;
+  seconds: number;
+  /**
+   * @minItems 3
+   * @maxItems 3
+   */
+  start: [number, number, number];
+  sweeps: number;
+  waypoints: WaypointEntry[];
+  width: number;
 }

@@ -18,7 +18,7 @@ from shapely import affinity
 from shapely.geometry.base import BaseGeometry
 
 from aerodaas.types.errors import SchedulerError
-from aerodaas.types.free_path import Place, free_path
+from aerodaas.types.free_path import FreeArea, Place
 from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["Coverage", "cover", "footprint"]
@@ -87,12 +87,13 @@ def cover(
     if wanted.is_empty:
         raise SchedulerError("no-fly zones and holes leave nothing of the area to cover")
     flyable = _polygon(outline, "area").difference(forbidden)
+    free = FreeArea(flyable)
     spacing = width * (1.0 - overlap)
     angles = _angles(outline) if angle is None else [angle]
     best: tuple[float, float, list[Place], int] | None = None
     for candidate in angles:
         strips = _strips(wanted, candidate, spacing, width)
-        way = _join(strips, flyable, start)
+        way = _join(strips, flyable, free, start)
         if way is None:
             continue
         cost = _length(way) + _TURN * len(strips)
@@ -164,7 +165,10 @@ def _merged_extents(seen: BaseGeometry) -> list[tuple[float, float]]:
 
 
 def _join(
-    strips: list[tuple[Place, Place]], flyable: BaseGeometry, start: Place | None
+    strips: list[tuple[Place, Place]],
+    flyable: BaseGeometry,
+    free: FreeArea,
+    start: Place | None,
 ) -> list[Place] | None:
     """Fly the strips one after the other, always the one whose end is nearest, around obstacles."""
     left = list(strips)
@@ -179,16 +183,16 @@ def _join(
         )
         strip = left.pop(number)
         entry, leave = (strip[1], strip[0]) if backwards else strip
-        if way and not _append(way, flyable, entry):
+        if way and not _append(way, flyable, free, entry):
             return None
         way = way or [entry]
-        if not _append(way, flyable, leave):
+        if not _append(way, flyable, free, leave):
             return None
         here = way[-1]
     return way
 
 
-def _append(way: list[Place], flyable: BaseGeometry, target: Place) -> bool:
+def _append(way: list[Place], flyable: BaseGeometry, free: FreeArea, target: Place) -> bool:
     """Go on to `target`, or to the flyable place nearest to it; False without a path."""
     if not shapely.covers(flyable, shapely.Point(target)):
         nearest = shapely.shortest_line(flyable, shapely.Point(target))
@@ -198,7 +202,7 @@ def _append(way: list[Place], flyable: BaseGeometry, target: Place) -> bool:
         nearest = shapely.shortest_line(flyable, shapely.Point(way[-1]))
         x, y = shapely.get_coordinates(nearest)[0]
         way[-1] = float(x), float(y)
-    path = free_path(flyable, way[-1], target)
+    path = free.path(way[-1], target)
     if path is None:
         return False
     way.extend(place for place in path[1:] if math.dist(place, way[-1]) > _SAME)

@@ -90,6 +90,8 @@ class StatusOut(BaseModel):
     distance: float
     """Metres flown."""
     faults: list[str]
+    pilot: str = ""
+    """Who flies it by hand now; empty for nobody."""
     places: dict[str, tuple[float, float, float]] = Field(default_factory=dict)
     """Waypoints by id, metres east, north and up of home: those ahead, and those known before."""
     mode: str | None = None
@@ -123,6 +125,7 @@ class StatusOut(BaseModel):
             waypoints_known=status.waypoint_counts[1],
             distance=status.distance,
             faults=list(status.faults),
+            pilot=status.pilot,
             places={one.id: (one.x, one.y, one.z) for one in _ahead(status)},
         )
         if vehicle is None:

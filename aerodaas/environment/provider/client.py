@@ -19,6 +19,7 @@ from aerodaas.environment.provider.exchange import Exchange, Method
 from aerodaas.environment.provider.live import LiveConnection
 from aerodaas.environment.provider.pauses import pauses
 from aerodaas.environment.provider.wire import WireConnection
+from aerodaas.protocol.piloting import RearrangeIn, SurveyIn, SurveyOut
 from aerodaas.protocol.schemas import (
     AccountIn,
     AccountOut,
@@ -177,6 +178,14 @@ class ProviderClient:
         """Add waypoints to the queue of a robot, or take its place; the answer is its own."""
         path = f"/v1/missions/{_part(mission)}/navigation"
         return self._ask(AnswerOut, "POST", path, navigation)
+
+    def rearrange(self, mission: str, change: RearrangeIn) -> AnswerOut:
+        """Change the order of a robot's coming waypoints, or remove some, as a whole."""
+        return self._ask(AnswerOut, "POST", f"/v1/missions/{_part(mission)}/plan", change)
+
+    def plan_survey(self, mission: str, wanted: SurveyIn) -> SurveyOut:
+        """Plan the survey of an area; `add_navigation` with its waypoints flies it."""
+        return self._ask(SurveyOut, "POST", f"/v1/missions/{_part(mission)}/survey", wanted)
 
     def recording(
         self,

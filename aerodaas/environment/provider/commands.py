@@ -7,8 +7,15 @@ from pydantic import ValidationError
 from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.environment.provider.client import ProviderClient
-from aerodaas.mission.commands import AddNavigation, Answer, ClearNavigation, Command
+from aerodaas.mission.commands import (
+    AddNavigation,
+    Answer,
+    ClearNavigation,
+    Command,
+    RearrangeNavigation,
+)
 from aerodaas.protocol.commands import word_for
+from aerodaas.protocol.piloting import RearrangeIn
 from aerodaas.protocol.schemas import CommandIn, NavigationIn
 from aerodaas.types.errors import GraphError, InvalidWaypointError
 from aerodaas.types.waypoints import SchedulingType
@@ -28,6 +35,8 @@ def send_command(client: ProviderClient, mission: str, robot: str, command: Comm
         if not command.clear_first:
             return Answer(accepted=False, text="the navigation is empty: there is nothing to fly")
         command = ClearNavigation()
+    if isinstance(command, RearrangeNavigation):
+        return _answer(client.rearrange(mission, _change(robot, command)))
     word = word_for(command)
     if word is None:
         raise GraphError(
@@ -50,6 +59,14 @@ def _navigation(robot: str, command: AddNavigation) -> NavigationIn:
             deadline=command.deadline,
             clear_first=command.clear_first,
         )
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise InvalidWaypointError(f"{robot}: {first['msg']}") from None
+
+
+def _change(robot: str, command: RearrangeNavigation) -> RearrangeIn:
+    try:
+        return RearrangeIn(robot=robot, order=list(command.order), remove=list(command.remove))
     except ValidationError as error:
         first = error.errors()[0]
         raise InvalidWaypointError(f"{robot}: {first['msg']}") from None

@@ -8,6 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
 
+from aerodaas.analytics.remote.schemas import AnswerOut
 from aerodaas.protocol.schemas import AuditOut
 from aerodaas.service.access.principal import Principal
 from aerodaas.service.errors import StoreError
@@ -89,6 +90,11 @@ class Audit:
             if number % _TRIM_EVERY < written:
                 with suppress(StoreError):
                     self._store.audit.trim(number - self._most + 1)
+
+    def note_answer(self, who: Principal, action: str, target: str, answer: AnswerOut) -> None:
+        """Write what a drone answered to a command: nobody in the air waits for a disk."""
+        said, accepted = answer.text, answer.accepted
+        self.write(who, f"mission.{action}", target, said, accepted=accepted, required=False)
 
     def newest(self, limit: int = 100, tenant: str | None = None) -> list[AuditOut]:
         """The newest entries of a tenant, or of all, newest first; at most 1000.

@@ -11,7 +11,7 @@ import queue
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from pydantic import ValidationError
@@ -19,8 +19,9 @@ from pydantic import ValidationError
 from aerodaas.analytics.guests.channel import Channel, GuestError
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
-from aerodaas.mission.commands import Answer
-from aerodaas.protocol.commands import COMMANDS, CommandWord
+from aerodaas.mission.commands import Answer, Command
+from aerodaas.protocol.commands import COMMANDS
+from aerodaas.protocol.piloting import ControlsIn, RearrangeIn
 from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.watch import LeaseWatch
@@ -36,6 +37,14 @@ _RATE = 10.0
 """Status messages a second."""
 
 
+_BODIES: Mapping[str, type[NavigationIn | RearrangeIn | ControlsIn]] = {
+    "fly": NavigationIn,
+    "rearrange": RearrangeIn,
+    "controls": ControlsIn,
+}
+"""Commands with a content, by what is to be done."""
+
+
 class Reader(Protocol):
     """Reader of one stream."""
 
@@ -47,12 +56,8 @@ class Reader(Protocol):
 class Flown(Protocol):
     """The flight as its control socket sees it; called from several threads."""
 
-    def command(self, robot: str, name: CommandWord) -> Answer:
-        """Execute a command of `COMMANDS`; raises AeroDaaSError."""
-        ...
-
-    def fly(self, navigation: NavigationIn) -> Answer:
-        """Add waypoints; raises AeroDaaSError."""
+    def command(self, robot: str, command: Command) -> Answer:
+        """Execute a command; raises AeroDaaSError."""
         ...
 
     def status(self) -> tuple[dict[str, StatusOut], list[str]]:
@@ -162,11 +167,13 @@ class ControlServer:
         return AnswerOut.of(self._commanded(request))
 
     def _commanded(self, request: dict[str, Any]) -> Answer:
-        if request["do"] == "fly":
-            return self._flown.fly(NavigationIn.model_validate(request["navigation"]))
-        if request["do"] not in COMMANDS:
-            return Answer(accepted=False, text=f"there is no command {request['do']!r}")
-        return self._flown.command(request["robot"], request["do"])
+        content, word = request.get("content"), request["do"]
+        if word in _BODIES:
+            body = _BODIES[word].model_validate(content)
+            return self._flown.command(body.robot, body.command())
+        if word not in COMMANDS:
+            return Answer(accepted=False, text=f"there is no command {word!r}")
+        return self._flown.command(request["robot"], COMMANDS[word])
 
     def _follow(self, channel: Channel, _: dict[str, Any]) -> None:
         while not self._closed.is_set():

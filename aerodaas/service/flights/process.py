@@ -21,23 +21,20 @@ from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.model import EnvironmentConfig, RemoteConfig
 from aerodaas.config.options import RunOptions, current_options
-from aerodaas.config.overrides import located
 from aerodaas.console.meter import FlightMeter
 from aerodaas.console.packed_reader import PackedReader, drawn_streams
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.run import Run
-from aerodaas.mission.commands import Answer, ReturnHome
-from aerodaas.protocol.commands import COMMANDS, CommandWord
-from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, StreamKind
+from aerodaas.mission.commands import Answer, Command, ReturnHome
+from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
 from aerodaas.service.flights.absent_user import attach_absent_user
 from aerodaas.service.flights.control import ControlServer
+from aerodaas.service.flights.environment import environment_of
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.flights.watch import LeaseWatch
-from aerodaas.service.limits import limited
-from aerodaas.service.rehearsal import rehearsal_config
 from aerodaas.types.errors import AeroDaaSError, ConfigError, MissionError
 
 __all__ = ["Flying", "fly"]
@@ -58,19 +55,6 @@ def fly(path: Path) -> None:
     os.chdir(folder.path)
     with folder.claim():
         folder.end(Flying(folder, order).outcome())
-
-
-def _environment_of(order: FlightOrder) -> EnvironmentConfig:
-    """The environment of a flight; raises ConfigError where the limits leave no room for it."""
-    config = limited(
-        located(EnvironmentConfig.load(order.fleet), order.fleet.parent),
-        order.robots,
-        tenant=order.limits,
-        area=order.area,
-    )
-    if order.rehearsal:
-        config = rehearsal_config(config, order.battery, order.seed)
-    return config.model_copy(update={"remote": _closed_remote()})
 
 
 def _closed_remote() -> RemoteConfig:
@@ -124,7 +108,7 @@ class Flying:
 
     def _fly(self) -> None:
         order, document = self._order, read_mission(self._folder.document)
-        self.config = _environment_of(order)
+        self.config = environment_of(order).model_copy(update={"remote": _closed_remote()})
         current_options.set(
             RunOptions(
                 environment=order.fleet,
@@ -198,19 +182,11 @@ class Flying:
         edges = environment.graph.navigation if environment is not None else ()
         return robot in {edge.robot for edge in edges}
 
-    def command(self, robot: str, name: CommandWord) -> Answer:
+    def command(self, robot: str, command: Command) -> Answer:
         """Execute a command; raises MissionError for a robot that does not fly."""
-        return self._flying(robot).command(robot, COMMANDS[name])
-
-    def fly(self, navigation: NavigationIn) -> Answer:
-        """Add waypoints to a robot's queue; raises AeroDaaSError for what cannot be flown."""
-        robot = navigation.robot
-        return self._flying(robot).command(robot, navigation.command())
-
-    def _flying(self, robot: str) -> Run:
         if self._run is None or not self._navigates(robot):
             raise MissionError(f"{robot} does not fly in this mission")
-        return self._run
+        return self._run.command(robot, command)
 
     def status(self) -> tuple[dict[str, StatusOut], list[str]]:
         """Newest status by robot, and the newest alerts."""

@@ -24,7 +24,7 @@ from aerodaas.protocol.schemas import (
     Role,
     Scope,
 )
-from aerodaas.service.access import Audit, Principal
+from aerodaas.service.access import Audit
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.idempotency import read_key
 from aerodaas.service.routes.admission import Admission
@@ -111,7 +111,9 @@ class MissionRoutes:
         """Give one of the mission's robots a command; answers what the drone said."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         answer = self._desk.command(principal, mission, body)
-        later.add_task(self._note, principal, body.command, f"{mission}/{body.robot}", answer)
+        later.add_task(
+            self._audit.note_answer, principal, body.command, f"{mission}/{body.robot}", answer
+        )
         return answer
 
     def navigation(
@@ -120,7 +122,9 @@ class MissionRoutes:
         """Add waypoints to the queue of one of the mission's robots."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
         answer = self._desk.fly(principal, mission, body)
-        later.add_task(self._note, principal, "navigation", f"{mission}/{body.robot}", answer)
+        later.add_task(
+            self._audit.note_answer, principal, "navigation", f"{mission}/{body.robot}", answer
+        )
         return answer
 
     def recording(self, mission: str, request: Request) -> FileResponse:
@@ -148,9 +152,3 @@ class MissionRoutes:
     def _player(self, mission: str, request: Request) -> Player:
         principal = self._admission.require(request, Role.VIEWER, Scope.SENSE)
         return self._players.of(mission, self._desk.file(principal, mission, "recording"))
-
-    def _note(self, principal: Principal, action: str, target: str, answer: AnswerOut) -> None:
-        """Audit a command once it has been answered: nobody in the air waits for a disk."""
-        said, accepted = answer.text, answer.accepted
-        name = f"mission.{action}"
-        self._audit.write(principal, name, target, said, accepted=accepted, required=False)

@@ -1,0 +1,78 @@
+"""Planner of surveys that are drawn on the map: one at a time, for each takes a core a while."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+
+from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.dataflow.mission_document import WaypointEntry
+from aerodaas.mission.survey import SurveySettings, plan_survey
+from aerodaas.protocol.piloting import SurveyIn, SurveyOut
+from aerodaas.schedulers.trajectory.coverage import footprint
+from aerodaas.types.errors import MissionError
+
+__all__ = ["SurveyPlanner"]
+
+_PATIENCE = 10.0
+"""Wall seconds for which a request waits for the one before it."""
+
+
+class SurveyPlanner:
+    """Plans surveys for drones in flight; safe in any thread."""
+
+    def __init__(self) -> None:
+        self._busy = threading.Lock()
+
+    def plan(
+        self, wanted: SurveyIn, config: EnvironmentConfig, status: StatusOut | None
+    ) -> SurveyOut:
+        """Plan a survey by a robot of `config`, whose newest status is `status`.
+
+        Raises MissionError for a robot that does not fly and while other surveys are planned,
+        SchedulerError for a survey that cannot be flown.
+        """
+        robot = next((one for one in config.robots if one.id == wanted.robot), None)
+        if robot is None or status is None:
+            raise MissionError(f"{wanted.robot} does not fly in this mission")
+        width = wanted.width
+        if width is None:
+            assert wanted.field_of_view is not None  # noqa: S101 - checked by the model
+            width, _ = footprint(wanted.height, wanted.field_of_view)
+        settings = SurveySettings(
+            wanted.height, width, wanted.overlap, wanted.angle, wanted.speed, wanted.around
+        )
+        start, wind = _start(status, robot.start), np.array(config.simulation.wind)
+        if not self._busy.acquire(timeout=_PATIENCE):
+            raise MissionError("other surveys are being planned: ask again in a moment")
+        try:
+            survey = plan_survey(
+                robot, wanted.area, settings, start=np.array(start, dtype=np.float64), wind=wind
+            )
+        finally:
+            self._busy.release()
+        named = (replace(one, id=f"{wanted.name}-{n}") for n, one in enumerate(survey.waypoints, 1))
+        reserve = robot.limits.battery_land
+        return SurveyOut(
+            waypoints=[WaypointEntry.of(one) for one in named],
+            width=width,
+            angle=survey.angle,
+            sweeps=survey.sweeps,
+            length=survey.length,
+            seconds=survey.seconds,
+            battery=survey.battery,
+            available=None if status.battery is None else max(0.0, status.battery - reserve),
+            start=start,
+        )
+
+
+def _start(status: StatusOut, takeoff: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Where the drone will come from: its last coming waypoint, or where it is."""
+    ahead = [one for one in (status.target, *status.pending) if one in status.places]
+    if ahead:
+        return status.places[ahead[-1]]
+    east, north, up = status.position or takeoff
+    return takeoff if east is None or north is None or up is None else (east, north, up)

@@ -1,0 +1,86 @@
+"""Forecast of the battery: whether the charge lasts for the rest of the plan and the way home."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+from aerodaas.config.model import LimitsConfig
+from aerodaas.mission.log import MissionLog
+from aerodaas.mission.queue import QueuedWaypoint
+from aerodaas.mission.safety.supervisor import has_position
+from aerodaas.types.clock import NANOSECONDS
+from aerodaas.types.energy import EnergyMeter
+from aerodaas.types.geometry import Vector
+from aerodaas.types.vehicle import VehicleState
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["BatteryForecast"]
+
+_PERIOD = NANOSECONDS
+_PATIENCE = 10 * NANOSECONDS
+"""Nanoseconds for which the forecast must find the battery too small before an alert is raised."""
+_MARGIN = 1.1
+"""Factor by which the plan must exceed the available charge to be reported: gauge and model are no
+more accurate than that."""
+
+
+class BatteryForecast:
+    """Compares the battery, once a second, with the charge that the rest of the plan needs."""
+
+    def __init__(
+        self, limits: LimitsConfig, home: Vector, meter: EnergyMeter, log: MissionLog
+    ) -> None:
+        """Forecast by `meter` for a drone that returns to `home`, ENU metres."""
+        self.fault = ""
+        """Why the battery is too small; empty while it is not."""
+        self._limits = limits
+        self._home = home
+        self._meter = meter
+        self._log = log
+        self._due = 0
+        self._told = False
+        self._short_since: int | None = None
+        """Mission clock since which every forecast has found the battery too small for the plan."""
+
+    def update(
+        self, now: int, state: VehicleState, stops: Iterable[QueuedWaypoint], *, grounded: bool
+    ) -> None:
+        """Look at the plan `stops` at `now`, mission clock in nanoseconds.
+
+        On the ground a shortfall raises an alert at once. In the air it must last for
+        `_PATIENCE`: the battery gauge is coarse and a climb is expensive, so that a single
+        estimate is unreliable.
+        """
+        if now < self._due or not has_position(state):
+            return
+        self._due = now + _PERIOD
+        route = [self._as_flown(stop) for stop in stops]
+        needed = self._meter.route(
+            state.odometry.position, route, self._home, self._limits.cruise_speed
+        )
+        available = state.battery.fraction - self._limits.battery_land
+        if not (route and needed > max(0.0, available) * _MARGIN):
+            self.fault, self._short_since = "", None
+            return
+        self.fault = (
+            f"at this rate the plan and the way home need {_share(needed)} of a battery, and "
+            f"{_share(max(0.0, available))} is there to spend: the drone returns when only the way "
+            "home is left"
+        )
+        if self._short_since is None:
+            self._short_since = now
+        surely = grounded or now - self._short_since >= _PATIENCE
+        if surely and not self._told:
+            self._told = True
+            self._log.alert(now, "unreachable_plan", self.fault)
+
+    def _as_flown(self, stop: QueuedWaypoint) -> Waypoint:
+        """The rest of a stop: its remaining hover, at no more than the permitted speed."""
+        speed = min(stop.waypoint.speed or self._limits.cruise_speed, self._limits.max_speed)
+        return replace(stop.waypoint, speed=speed, hover_duration=max(0.0, stop.remaining_hover))
+
+
+def _share(charge: float) -> str:
+    most = 9.99
+    return f"{charge:.0%}" if charge <= most else f"more than {most:.0%}"

@@ -1,0 +1,187 @@
+"""Survey of an area: its path, length, time and battery, or why it cannot be flown."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from aerodaas.config.model import LimitsConfig, RobotConfig
+from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.schedulers.trajectory.coverage import cover
+from aerodaas.types.energy import EnergyModel
+from aerodaas.types.errors import SchedulerError
+from aerodaas.types.free_path import Place
+from aerodaas.types.geometry import Vector
+from aerodaas.types.waypoints import Waypoint
+
+__all__ = ["MOST_CORNERS", "MOST_WAYPOINTS", "Survey", "SurveySettings", "plan_survey"]
+
+MOST_CORNERS = 30
+"""Most corners of an area: more take seconds to plan."""
+MOST_WAYPOINTS = 500
+_MOST_STRIPS = 200
+_TOLERANCE = 1e-3
+"""Metres by which a path may be nearer to the fence than its margin, for rounding."""
+
+
+@dataclass(frozen=True)
+class SurveySettings:
+    """How an area is surveyed."""
+
+    height: float
+    """Metres above home."""
+    width: float
+    """Metres of ground that the camera sees across the sweep; see `coverage.footprint`."""
+    overlap: float = 0.2
+    """Share of it, 0 to less than 1, that neighbouring strips have in common."""
+    angle: float | None = None
+    """Direction of the sweeps, radians counter-clockwise from east; None for the shortest path."""
+    speed: float | None = None
+    """m/s; None for the robot's cruise speed."""
+    around: bool = False
+    """Fly around no-fly zones within the area, which stay unseen; otherwise they are refused."""
+
+
+@dataclass(frozen=True)
+class Survey:
+    """A survey as it would be flown."""
+
+    waypoints: tuple[Waypoint, ...]
+    """Local ENU, in order."""
+    angle: float
+    """Direction of the sweeps, radians counter-clockwise from east."""
+    sweeps: int
+    length: float
+    """Metres from the first waypoint to the last."""
+    seconds: float
+    """From the start to the last waypoint, the way to the first one included."""
+    battery: float
+    """Charge, 0 to 1, from the start through the survey home, by the energy model."""
+
+
+def plan_survey(
+    robot: RobotConfig,
+    outline: Sequence[Place],
+    settings: SurveySettings,
+    *,
+    start: Vector | None = None,
+    wind: Vector | None = None,
+) -> Survey:
+    """Plan the survey of the area inside `outline`, metres east and north.
+
+    Args:
+        robot: Who flies it; its limits count.
+        outline: 3 to `MOST_CORNERS` corners.
+        settings: How it is flown.
+        start: Where the drone comes from, ENU metres; None for its place of take-off.
+        wind: ENU m/s, for the battery; None for none.
+
+    Raises:
+        SchedulerError: If the area leaves the fence, enters a no-fly zone or is out of range, or
+            the settings make no survey that can be flown.
+    """
+    limits, home = robot.limits, np.array(robot.start, dtype=np.float64)
+    here = home if start is None else start
+    speed = min(settings.speed or limits.cruise_speed, limits.max_speed)
+    _check(outline, settings, limits, home)
+    fence = limits.geofence
+    plan = cover(
+        outline,
+        height=settings.height,
+        width=settings.width,
+        overlap=settings.overlap,
+        no_fly=fence.no_fly,
+        clearance=fence.margin + _TOLERANCE,
+        start=(float(here[0]), float(here[1])),
+        angle=settings.angle,
+        speed=speed,
+    )
+    if len(plan.waypoints) > MOST_WAYPOINTS:
+        raise SchedulerError(
+            f"the survey has {len(plan.waypoints)} waypoints, and at most {MOST_WAYPOINTS} are "
+            "flown: draw a smaller area, or make the strips wider"
+        )
+    _check_path(plan.waypoints, limits)
+    model = EnergyModel(limits.endurance, np.zeros(3) if wind is None else wind)
+    return Survey(
+        plan.waypoints,
+        plan.angle,
+        plan.sweeps,
+        plan.length,
+        _seconds([here, *(one.position for one in plan.waypoints)], speed, limits),
+        model.route(here, plan.waypoints, home, speed),
+    )
+
+
+def _check(
+    outline: Sequence[Place], settings: SurveySettings, limits: LimitsConfig, home: Vector
+) -> None:
+    """Raise SchedulerError for an area that must not be flown over, before it is planned."""
+    least = 3
+    if not least <= len(outline) <= MOST_CORNERS:
+        raise SchedulerError(f"an area has {least} to {MOST_CORNERS} corners, not {len(outline)}")
+    outer = Geofence(limits.geofence.model_copy(update={"no_fly": []}))
+    for east, north in outline:
+        corner = np.array([east, north, settings.height])
+        away = float(np.linalg.norm(corner - home))
+        if away > limits.max_range:
+            raise SchedulerError(
+                f"the area's corner ({east:.1f}, {north:.1f}) is {away:.0f} m away, beyond the "
+                f"range of {limits.max_range:g} m"
+            )
+        if objection := outer.objection(corner):
+            raise SchedulerError(f"the area leaves the fence: {objection}")
+    area = shapely.Polygon(outline)
+    if not area.is_valid or area.area == 0.0:
+        raise SchedulerError(
+            f"the area encloses nothing or crosses itself: {shapely.is_valid_reason(area)}"
+        )
+    if outer.inner is not None and not outer.inner.buffer(_TOLERANCE).covers(area):
+        raise SchedulerError("the area leaves the fence between two of its corners")
+    for zone in limits.geofence.no_fly:
+        shared = area.intersection(shapely.Polygon(zone).buffer(limits.geofence.margin))
+        if not settings.around and shared.area > 0.0:
+            place = shared.representative_point()
+            raise SchedulerError(
+                f"the area enters a no-fly zone at ({place.x:.1f}, {place.y:.1f}): draw it "
+                "beside, or have it flown around"
+            )
+    longest = float(np.linalg.norm(np.ptp(np.asarray(outline), axis=0)))
+    if longest > _MOST_STRIPS * settings.width * (1.0 - settings.overlap):
+        raise SchedulerError(
+            f"{longest:.0f} m are more than {_MOST_STRIPS} strips of {settings.width:.2g} m: draw "
+            "a smaller area, or make the strips wider"
+        )
+
+
+def _check_path(waypoints: Sequence[Waypoint], limits: LimitsConfig) -> None:
+    """Raise SchedulerError where a path comes nearer to fence or no-fly zones than the margin."""
+    inner = Geofence(limits.geofence).inner
+    path = shapely.LineString([(one.x, one.y) for one in waypoints] * (2 - (len(waypoints) > 1)))
+    if inner is not None and not inner.buffer(_TOLERANCE).covers(path):
+        raise SchedulerError(
+            "the survey's path comes too near to the fence or a no-fly zone: draw another area"
+        )
+
+
+def _seconds(places: Sequence[Vector], speed: float, limits: LimitsConfig) -> float:
+    """Time for a path that is flown at `speed`, with a stop at each of its places."""
+    total = 0.0
+    for here, there in pairwise(places):
+        way = there - here
+        upright = abs(float(way[2])) / limits.max_climb
+        length = float(np.linalg.norm(way))
+        total += max(upright, _leg_seconds(length, speed, limits.max_acceleration))
+    return total
+
+
+def _leg_seconds(length: float, speed: float, acceleration: float) -> float:
+    """Time from standstill to standstill, with constant acceleration and braking."""
+    if length * acceleration < speed**2:
+        return 2.0 * math.sqrt(length / acceleration)
+    return length / speed + speed / acceleration

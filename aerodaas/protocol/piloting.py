@@ -1,0 +1,158 @@
+"""What a pilot and a flying mission say to each other beyond simple commands: JSON models.
+
+Units are metres, seconds, radians and m/s in the local ENU frame; a charge is 0 to 1.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from typing_extensions import Self
+
+from aerodaas.dataflow.mission_document import WaypointEntry
+from aerodaas.mission.commands import RearrangeNavigation, ReleaseControls, Steer, TakeControls
+from aerodaas.mission.survey import MOST_CORNERS
+from aerodaas.protocol.schemas import Number, Word
+from aerodaas.types.waypoints import VelocityCommand
+
+__all__ = ["ControlsIn", "ControlsOut", "RearrangeIn", "SteerIn", "SurveyIn", "SurveyOut"]
+
+_MOST_WAYPOINTS = 1000
+_Id = Annotated[str, Field(min_length=1, max_length=64)]
+_Ids = Annotated[list[_Id], Field(max_length=_MOST_WAYPOINTS)]
+_Axis = Annotated[float, Field(ge=-100, le=100)]
+_AXES = ("forward", "left", "up", "yaw_rate")
+_MOST_METRES = 10_000.0
+_Length = Annotated[float, Field(gt=0, le=_MOST_METRES, allow_inf_nan=False)]
+_Corner = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+
+
+class _In(BaseModel):
+    """Base of requests: unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class SurveyIn(_In):
+    """Request of a plan to survey an area; nothing is flown."""
+
+    robot: Word
+    area: Annotated[list[tuple[_Corner, _Corner]], Field(min_length=3, max_length=MOST_CORNERS)]
+    """Corners, metres east and north."""
+    height: Annotated[float, Field(gt=0, le=_MOST_METRES, allow_inf_nan=False)]
+    """Metres above home."""
+    width: _Length | None = None
+    """Metres of ground that the camera sees across the sweep; None takes `field_of_view`."""
+    field_of_view: Annotated[float, Field(gt=0.02, lt=3.1)] | None = None
+    """Of a camera that looks straight down, horizontally, radians."""
+    overlap: Annotated[float, Field(ge=0, le=0.9)] = 0.2
+    """Share of a strip that its neighbour sees, too."""
+    angle: Number | None = None
+    """Direction of the sweeps, counter-clockwise from east; None for the shortest path."""
+    speed: Annotated[float, Field(ge=0.1, le=100)] | None = None
+    """None for the robot's cruise speed."""
+    around: bool = False
+    """Fly around no-fly zones within the area; otherwise an area with one is refused."""
+    name: Word = "survey"
+    """Beginning of the waypoints' ids."""
+
+    @model_validator(mode="after")
+    def _wide(self) -> Self:
+        if (self.width is None) == (self.field_of_view is None):
+            raise ValueError("give either the strip's width or the camera's field_of_view")
+        return self
+
+
+class SurveyOut(BaseModel):
+    """A survey as it would be flown; its waypoints are added by `navigation`."""
+
+    model_config = ConfigDict(frozen=True)
+
+    waypoints: list[WaypointEntry]
+    width: float
+    """Metres of ground seen across the sweep."""
+    angle: float
+    sweeps: int
+    length: float
+    """Metres from the first waypoint to the last."""
+    seconds: float
+    """From where the drone will come from to the last waypoint."""
+    battery: float
+    """Charge for the way there, the survey and the way home, by the energy model."""
+    available: float | None
+    """Charge that is there to spend, less the reserve; None while it is unknown."""
+    start: tuple[float, float, float]
+    """Where the drone will come from: its last coming waypoint, or where it is."""
+
+
+class RearrangeIn(_In):
+    """Change of the coming waypoints of one robot: one command, carried out whole."""
+
+    robot: Word
+    order: _Ids = Field(default_factory=list)
+    """Waypoints that change places among themselves; all others keep theirs."""
+    remove: _Ids = Field(default_factory=list)
+    """Waypoints that are not flown to."""
+
+    def command(self) -> RearrangeNavigation:
+        """The command."""
+        return RearrangeNavigation(tuple(self.order), tuple(self.remove))
+
+
+class SteerIn(_In):
+    """A velocity by hand, in the drone's level frame; it is good for a third of a second."""
+
+    forward: _Axis = 0.0
+    left: _Axis = 0.0
+    up: _Axis = 0.0
+    yaw_rate: _Axis = 0.0
+    """rad/s, counter-clockwise."""
+    at: Annotated[float, Field(ge=0, le=1e15)]
+    """Milliseconds of the sender's own clock: what was under way for too long is not obeyed."""
+
+    def velocity(self) -> VelocityCommand:
+        """The command."""
+        return VelocityCommand(self.forward, self.left, self.up, self.yaw_rate)
+
+
+class ControlsIn(_In):
+    """A command of manual control, as the service hands it to a flight's own process."""
+
+    robot: Word
+    session: Annotated[int, Field(gt=0)]
+    operator: str = ""
+    """Of a takeover; with neither this nor `steer` the controls are let go."""
+    steer: SteerIn | None = None
+
+    @classmethod
+    def of(cls, robot: str, command: TakeControls | Steer | ReleaseControls) -> ControlsIn:
+        """Write a command."""
+        match command:
+            case TakeControls():
+                return cls(robot=robot, session=command.session, operator=command.operator)
+            case Steer(session, velocity):
+                axes = {name: getattr(velocity, name) for name in _AXES}
+                return cls(robot=robot, session=session, steer=SteerIn(at=0, **axes))
+            case ReleaseControls():
+                return cls(robot=robot, session=command.session)
+
+    def command(self) -> TakeControls | Steer | ReleaseControls:
+        """The command."""
+        if self.operator:
+            return TakeControls(self.operator, self.session)
+        if self.steer is not None:
+            return Steer(self.session, self.steer.velocity())
+        return ReleaseControls(self.session)
+
+
+class ControlsOut(BaseModel):
+    """Answer to a velocity by hand."""
+
+    model_config = ConfigDict(frozen=True)
+
+    held: bool
+    """Whether the sender has the controls; if not, the connection ends."""
+    at: float = 0.0
+    """Of the velocity that is answered."""
+    text: str = ""

@@ -1,0 +1,148 @@
+// The panel to fly by hand: who has the controls, the keys, and how fast.
+
+import { useCallback, useEffect, useRef, useState } from "preact/hooks";
+import type { Flight } from "./flight";
+import { Hand, KEYS } from "./hand";
+import type { Abilities } from "./place";
+
+const TURN = Math.PI / 4;
+const PAD: { key: string; face: string; name: string }[] = [
+  { key: "ArrowLeft", face: "⟲", name: "Turn left" },
+  { key: "KeyW", face: "W", name: "Forward" },
+  { key: "ArrowRight", face: "⟳", name: "Turn right" },
+  { key: "ArrowUp", face: "▲", name: "Climb" },
+  { key: "KeyA", face: "A", name: "Left" },
+  { key: "KeyS", face: "S", name: "Back" },
+  { key: "KeyD", face: "D", name: "Right" },
+  { key: "ArrowDown", face: "▼", name: "Descend" },
+];
+
+export function HandPanel(props: {
+  flight: Flight;
+  robot: string;
+  mayFly: boolean;
+  abilities: Abilities | undefined;
+}) {
+  const { flight, robot, mayFly, abilities } = props;
+  const [, draw] = useState(0);
+  const [hand, setHand] = useState<Hand | null>(null);
+  const fastest = abilities?.maxSpeed ?? 5;
+  const [level, setLevel] = useState(Math.min(abilities?.cruiseSpeed ?? 1, fastest));
+  const speed = useRef(level);
+  speed.current = level;
+  const panel = useRef<HTMLElement>(null);
+  const changed = useCallback(() => draw((count) => count + 1), []);
+  useEffect(() => () => hand?.release(), [hand, robot]);
+
+  const status = flight.status(robot);
+  const holds = hand !== null && !hand.over;
+  const others = !holds && status?.pilot ? status.pilot : "";
+  const take = () => {
+    const climb = abilities?.maxClimb ?? 1.5;
+    const speeds = () => ({
+      level: speed.current,
+      climb: Math.min(speed.current, climb),
+      turn: TURN,
+    });
+    setHand(new Hand(flight.controls(robot), speeds, changed));
+    panel.current?.focus();
+  };
+  const press = (key: string) => hand?.held.add(key);
+  const lift = (key: string) => hand?.held.delete(key);
+  const [tone, text] = !holds
+    ? others
+      ? ["warn", `${others} has the controls`]
+      : ["", "nobody has the controls"]
+    : hand.silent
+      ? ["bad", "no answer"]
+      : hand.taken
+        ? ["good", "you have the controls"]
+        : ["warn", "asking…"];
+
+  return (
+    <section
+      class="card hand"
+      ref={panel}
+      tabIndex={holds ? 0 : -1}
+      aria-label="Fly by hand"
+      data-testid="hand"
+      onKeyDown={(event) => {
+        if (!holds || event.ctrlKey || event.metaKey || event.altKey) return;
+        if (event.key === "Escape") hand.release("let go");
+        if (!(event.code in KEYS) || event.target instanceof HTMLInputElement) return;
+        event.preventDefault();
+        press(event.code);
+      }}
+      onKeyUp={(event) => lift(event.code)}
+      onBlur={(event) => {
+        // Keys that are lifted elsewhere are not heard of here.
+        const to = event.relatedTarget;
+        if (!(to instanceof Node && event.currentTarget.contains(to))) hand?.held.clear();
+      }}
+    >
+      <header>
+        <h2>Fly by hand</h2>
+        <span class={`badge ${tone}`} role="status" data-testid="controls">
+          {text}
+        </span>
+        {holds && hand.lag !== null && <small>{hand.lag.toFixed(0)} ms</small>}
+      </header>
+      {hand?.over && hand.text && <p class="why">{hand.text}</p>}
+      {holds ? (
+        <>
+          <p class="hint">
+            Hold the keys or a gamepad's sticks; let go and it hovers. Escape gives the controls
+            back, and Resume goes on with the mission.
+          </p>
+          <div class="pad">
+            {PAD.map(({ key, face, name }) => (
+              <button
+                key={key}
+                type="button"
+                class={hand.held.has(key) ? "held" : ""}
+                title={name}
+                aria-label={name}
+                onPointerDown={(event) => {
+                  event.currentTarget.setPointerCapture(event.pointerId);
+                  press(key);
+                }}
+                onPointerUp={() => lift(key)}
+                onPointerCancel={() => lift(key)}
+                onLostPointerCapture={() => lift(key)}
+                onContextMenu={(event) => event.preventDefault()}
+              >
+                {face}
+                <small>{name}</small>
+              </button>
+            ))}
+          </div>
+          <label class="speed">
+            <span>Speed: {level.toFixed(1)} m/s</span>
+            <input
+              type="range"
+              min={0.1}
+              max={fastest}
+              step={0.1}
+              value={level}
+              onInput={(event) => setLevel(Number(event.currentTarget.value))}
+            />
+          </label>
+          <button type="button" class="release" onClick={() => hand.release("let go")}>
+            Let go
+          </button>
+        </>
+      ) : (
+        <button
+          type="button"
+          class="take"
+          disabled={!mayFly || flight.over || others !== "" || !IN_THE_AIR.has(status?.state ?? "")}
+          onClick={take}
+        >
+          Take over
+        </button>
+      )}
+    </section>
+  );
+}
+
+const IN_THE_AIR = new Set(["holding", "enroute", "loitering", "following", "diverted", "paused"]);

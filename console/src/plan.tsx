@@ -1,0 +1,182 @@
+// The coming waypoints: dragged or moved by keys into another order, or left out.
+
+import { useEffect, useRef, useState } from "preact/hooks";
+import { type Flight, aheadOf } from "./flight";
+import type { StatusOut } from "./wire";
+
+/** Milliseconds after the last key before the order is asked for. */
+const PAUSE = 600;
+/** Milliseconds for which an order that was asked for is shown before the mission tells its own. */
+const PATIENCE = 3000;
+
+export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) {
+  const { flight, robot } = props;
+  const status = flight.status(robot);
+  const target = status?.target ?? null;
+  const coming = status?.pending ?? [];
+  const [draft, setDraft] = useState<string[] | null>(null);
+  const [dragged, setDragged] = useState<string | null>(null);
+  const list = useRef<HTMLOListElement>(null);
+  const timer = useRef(0);
+  const mayFly = props.mayFly && !flight.over;
+  useEffect(() => () => clearTimeout(timer.current), []);
+  if (!status || (target === null && coming.length === 0)) return null;
+
+  // What was reached or added meanwhile is so in the draft, too.
+  const shown = draft === null ? coming : merged(draft, coming);
+  const move = (id: string, to: number): string[] => {
+    const rest = shown.filter((one) => one !== id);
+    const place = Math.max(0, Math.min(rest.length, to));
+    const order = [...rest.slice(0, place), id, ...rest.slice(place)];
+    setDraft(order);
+    return order;
+  };
+  const ask = (order: string[]) => {
+    clearTimeout(timer.current);
+    const changed = between(coming, merged(order, coming));
+    if (changed.length > 0) {
+      flight.rearrange({ robot, order: changed }, `order ${named(changed)}`, (now) =>
+        inOrder(now, changed) ? "so the plan is now" : null,
+      );
+    }
+    timer.current = setTimeout(() => setDraft(null), changed.length > 0 ? PATIENCE : 0);
+  };
+  const remove = (id: string) =>
+    flight.rearrange({ robot, remove: [id] }, `leave out ${id}`, (now) =>
+      aheadOf(now).includes(id) ? null : "not in the plan any more",
+    );
+  const placeAt = (y: number) => {
+    const rows = [...(list.current?.querySelectorAll("li[data-coming]") ?? [])];
+    return rows.filter((row) => {
+      const box = row.getBoundingClientRect();
+      return box.top + box.height / 2 < y;
+    }).length;
+  };
+  const keys = (event: KeyboardEvent, id: string, place: number) => {
+    const steps: Record<string, number> = { ArrowUp: -1, ArrowDown: 1 };
+    const step = steps[event.key];
+    if (step !== undefined) {
+      event.preventDefault();
+      const order = move(id, place + step);
+      clearTimeout(timer.current);
+      timer.current = setTimeout(() => ask(order), PAUSE);
+    } else if (event.key === "Delete") {
+      event.preventDefault();
+      remove(id);
+    }
+  };
+
+  return (
+    <section class="card plan" aria-label="Plan">
+      <header>
+        <h2>Plan</h2>
+        <span class="badge">
+          {aheadOf(status).length} to go{target !== null && `, now ${target}`}
+        </span>
+      </header>
+      {mayFly && shown.length > 0 && (
+        <p class="hint">Drag into another order; or arrow keys on a handle, Delete leaves out.</p>
+      )}
+      <ol ref={list} data-testid="plan">
+        {target !== null && (
+          <li class="current" data-plan={target}>
+            <span class="handle" aria-hidden="true">
+              ▶
+            </span>
+            <Place status={status} id={target} />
+            {mayFly && <Remove id={target} word="Skip" onRemove={remove} />}
+          </li>
+        )}
+        {shown.map((id, place) => (
+          <li key={id} data-plan={id} data-coming class={id === dragged ? "dragged" : ""}>
+            <button
+              type="button"
+              class="handle"
+              disabled={!mayFly}
+              aria-label={`${id}, ${place + 1} of ${shown.length} coming. Arrow keys move it, Delete leaves it out.`}
+              onKeyDown={(event) => keys(event, id, place)}
+              onPointerDown={(event) => {
+                event.currentTarget.setPointerCapture(event.pointerId);
+                setDragged(id);
+              }}
+              onPointerMove={(event) => {
+                if (dragged !== id) return;
+                const to = placeAt(event.clientY);
+                // Its own row counts among those above it.
+                move(id, to > place ? to - 1 : to);
+              }}
+              onPointerUp={() => {
+                setDragged(null);
+                if (draft) ask(draft);
+              }}
+              onPointerCancel={() => {
+                setDragged(null);
+                setDraft(null);
+              }}
+            >
+              ⠿
+            </button>
+            <Place status={status} id={id} />
+            {mayFly && <Remove id={id} word="Leave out" onRemove={remove} />}
+          </li>
+        ))}
+      </ol>
+    </section>
+  );
+}
+
+function Place({ status, id }: { status: StatusOut; id: string }) {
+  const at = status.places[id];
+  return (
+    <span class="what">
+      <strong>{id}</strong>{" "}
+      {at && (
+        <small>
+          {at[0].toFixed(1)} E, {at[1].toFixed(1)} N, {at[2].toFixed(1)} m
+        </small>
+      )}
+    </span>
+  );
+}
+
+function Remove(props: { id: string; word: string; onRemove(id: string): void }) {
+  const { id, word, onRemove } = props;
+  return (
+    <button
+      type="button"
+      class="plain"
+      title={word}
+      aria-label={`${word}: ${id}`}
+      onClick={() => onRemove(id)}
+    >
+      ✕
+    </button>
+  );
+}
+
+/** The draft's order, of what is still coming; what has come since is last. */
+function merged(draft: string[], coming: string[]): string[] {
+  return [
+    ...draft.filter((one) => coming.includes(one)),
+    ...coming.filter((one) => !draft.includes(one)),
+  ];
+}
+
+/** The part of an order in which it differs from another: the mission pins what is named. */
+function between(before: string[], after: string[]): string[] {
+  const places = [...after.keys()].filter((place) => before[place] !== after[place]);
+  const [first, last] = [places[0], places.at(-1)];
+  return first === undefined || last === undefined ? [] : after.slice(first, last + 1);
+}
+
+/** Whether those that are still ahead are so in this order. */
+function inOrder(status: StatusOut, order: string[]): boolean {
+  const left = aheadOf(status);
+  const wanted = order.filter((one) => left.includes(one));
+  return left.filter((one) => order.includes(one)).every((one, place) => one === wanted[place]);
+}
+
+function named(ids: string[]): string {
+  const most = 4;
+  return ids.length <= most ? ids.join(", ") : `${ids.slice(0, most).join(", ")}, …`;
+}

@@ -1,0 +1,66 @@
+// A survey on the map: the area with its corners, which can be dragged, and the path.
+
+import type { RefObject } from "preact";
+import { useRef } from "preact/hooks";
+import type { Frame } from "./map";
+import type { Point } from "./place";
+
+/** What the map needs of a survey that is being drawn. */
+export interface Drawn {
+  area: Point[];
+  path: Point[];
+  refused: boolean;
+  add(point: Point): void;
+  move(corner: number, to: Point): void;
+  undo(): void;
+  cancel(): void;
+}
+
+interface LayerProps extends Frame {
+  drawn: Drawn;
+  line(points: readonly Point[]): string;
+  metres(px: number, py: number): Point;
+  box: RefObject<HTMLDivElement | null>;
+}
+
+export function SurveyLayer({ drawn, x, y, line, metres, box }: LayerProps) {
+  const held = useRef<number | null>(null);
+  const drag = (event: PointerEvent) => {
+    const at = box.current?.getBoundingClientRect();
+    if (held.current === null || !at) return;
+    event.stopPropagation();
+    drawn.move(held.current, metres(event.clientX - at.left, event.clientY - at.top));
+  };
+  const [first] = drawn.path;
+  return (
+    <g class={`survey ${drawn.refused ? "refused" : ""}`}>
+      {drawn.area.length > 1 && <polygon class="area" points={line(drawn.area)} />}
+      {drawn.path.length > 1 && <polyline class="sweeps" points={line(drawn.path)} />}
+      {first && <circle class="entry" cx={x(first[0])} cy={y(first[1])} r="5" />}
+      {drawn.area.map(([east, north], corner) => (
+        <g
+          key={corner}
+          class="corner"
+          data-corner={corner}
+          transform={`translate(${x(east)} ${y(north)})`}
+          onPointerDown={(event) => {
+            event.stopPropagation();
+            held.current = corner;
+            event.currentTarget.setPointerCapture(event.pointerId);
+          }}
+          onPointerMove={drag}
+          onPointerUp={(event) => {
+            event.stopPropagation();
+            held.current = null;
+          }}
+        >
+          <circle class="touch" r="18" />
+          <circle r="7" />
+          <text x="10" y="-8">
+            {corner + 1}
+          </text>
+        </g>
+      ))}
+    </g>
+  );
+}
