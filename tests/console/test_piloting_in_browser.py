@@ -8,12 +8,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from browser import Browser, Page
 from flown import Watched
 from required import needs_peer
 from test_console_in_browser import button, click_map, passed, until_done, until_state
 
 from aerodaas.recording.reader import Recording
+from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
 
