@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.actors.base import StreamActor
+from aerodaas.actors.cluster.orphan_reaper import ReaperHost, Watched
 from aerodaas.actors.session import Session
 from aerodaas.actors.stream_names import vitals_stream
 from aerodaas.recording.provenance import Provenance
@@ -22,8 +23,11 @@ from aerodaas.types.vitals import Vitals
 __all__ = ["RecorderActor"]
 
 
-class RecorderActor(StreamActor):
-    """Actor that records `streams`; a full disk ends the recording, not the flight."""
+class RecorderActor(ReaperHost, StreamActor):
+    """Actor that records `streams`; a full disk ends the recording, not the flight.
+
+    As the last one of the run to end, it hosts the orphan reaper.
+    """
 
     def __init__(
         self,
@@ -31,15 +35,17 @@ class RecorderActor(StreamActor):
         path: Path,
         streams: dict[str, int],
         provenance: Provenance,
-        live: str | None = None,
+        live: str | None,
+        watched: Watched,
     ) -> None:
-        """Create the actor, which writes to `path`.
+        """Create the actor, which writes to `path`; its reaper looks after the `watched`.
 
         `live` is the address (`host:port`) of the live view.
         `streams` are queue depths by stream; further messages are dropped and counted, because
         the flight never waits.
         """
-        super().__init__(session, "recorder", streams)
+        StreamActor.__init__(self, session, "recorder", streams)
+        ReaperHost.__init__(self, watched)
         self._path = path
         self._address = live
         self._provenance = provenance

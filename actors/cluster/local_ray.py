@@ -37,7 +37,8 @@ _END_SECONDS = 20.0
 _KEEPER = Path(__file__).with_name("ray_process.py")
 _OPTIONS = (
     *("--head", "--port=0", f"--node-ip-address={_ADDRESS}"),
-    *("--include-dashboard=false", "--include-log-monitor=false", "--disable-usage-stats"),
+    *("--include-dashboard=false", "--include-log-monitor=false", "--no-monitor"),
+    "--disable-usage-stats",
     *(f"--object-store-memory={_STORE_BYTES}", '--resources={"edge": 1, "cloud": 1}'),
 )
 

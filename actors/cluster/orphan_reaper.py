@@ -3,27 +3,31 @@
 The actors of a run are detached from the application, so that the drone's actor survives a
 killed application. The drone's actor brings the drone home by itself; the orphan reaper ends
 all remaining actors afterwards.
+
+It is a thread of the actor that is ended last: the recorder's, which records the end of the
+others, or of one of its own in a run that is not recorded.
 """
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import threading
 import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import ray
-from ray.exceptions import RayError
 
 from aerodaas.actors.cluster.dead_man import exit_soon, leave
 from aerodaas.actors.cluster.run_lock import RunLock
 from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.shutdown import end_actors, may_fly
 
-__all__ = ["OrphanReaper"]
+__all__ = ["REAPER", "OrphanReaperActor", "ReaperHost", "Watched"]
 
+REAPER = "reaper"
+"""Concurrency group of an actor for the calls to its reaper, which its own work must not block."""
 _LAUNCH = 200.0
 """Wall seconds that an application has to start its run, before its first heartbeat."""
 _SILENCE = 5.0
@@ -31,70 +35,92 @@ _SILENCE = 5.0
 _LOOK_INTERVAL = 1.0
 
 
-class OrphanReaper:
-    """Watchdog of one run, active once constructed: a start call could be lost."""
+@dataclass(frozen=True)
+class Watched:
+    """What a reaper watches and what it ends, its own actor excepted."""
 
-    def __init__(
-        self,
-        application: ApplicationProcess,
-        drones: Sequence[Any],
-        groups: Sequence[Sequence[Any]],
-        helpers: Sequence[Any],
-    ) -> None:
-        """Wait until `application` has ended and none of the `drones` flies; then end all actors.
+    application: ApplicationProcess
+    drones: Sequence[Any]
+    """Actors that must not be ended while they fly, unless their time waits for the application."""
+    actors: Sequence[Any]
+    """Actors to be stopped before the reaper's own."""
+    helpers: Sequence[Any]
+    """Actors without streams, to be killed at the end."""
 
-        `groups` are stopped in turn, the `helpers` killed. Drones whose time waits for the
-        application are not waited for.
-        """
-        self._ended: tuple[Sequence[Sequence[Any]], Sequence[Any]] = (), ()
-        self._ending = False
-        self._silent_from = time.monotonic() + _LAUNCH
-        self._application = application
-        self._drones = drones
-        self.look_after(groups, helpers)
-        self._lock: RunLock | None = None
-        self._itself = ray.get_runtime_context().current_actor
-        threading.Thread(target=self._watch, name="orphan_reaper", daemon=True).start()
 
-    def meet(self) -> None:
-        """Do nothing: the call makes Ray resolve the actor's address for the caller."""
+class ReaperHost:
+    """Mixin of an actor in which the orphan reaper of its run lives.
 
-    def leave(self) -> None:
-        """End the process: the application has ended the run itself."""
-        leave()
+    Its reaper watches once it is constructed, also by a restart: a start call could be lost.
+    """
+
+    def __init__(self, watched: Watched) -> None:
+        self._reaper = _OrphanReaper(watched)
 
     def heard(self) -> None:
         """Record a heartbeat of the application; with the first its run begins.
 
         Before, a local Ray ends with the application; from now on it stays until the run has ended.
         """
+        self._reaper.heard()
+
+    def ending(self) -> bool:
+        """Whether the reaper is ending the run, or has ended it."""
+        return self._reaper.ending
+
+    def look_after(self, actors: Sequence[Any], helpers: Sequence[Any]) -> None:
+        """Replace the actors to be ended, after actors were added in flight."""
+        self._reaper.look_after(actors, helpers)
+
+
+class OrphanReaperActor(ReaperHost):
+    """Actor for the reaper alone, of a run that is not recorded."""
+
+    def meet(self) -> None:
+        """Do nothing: the call makes Ray resolve the actor's address for the caller."""
+
+    def stop(self) -> None:
+        """Prepare to end: the process ends soon afterwards, at the latest by its own timer."""
+        exit_soon()
+
+    def leave(self) -> None:
+        """End the process; called after `stop`."""
+        leave()
+
+
+class _OrphanReaper:
+    """Watchdog of one run in a thread of its own."""
+
+    def __init__(self, watched: Watched) -> None:
+        self.ending = False
+        self._application = watched.application
+        self._drones = () if watched.application.time_waits else watched.drones
+        self._itself = ray.get_runtime_context().current_actor
+        self._lock: RunLock | None = None
+        self._silent_from = time.monotonic() + _LAUNCH
+        self.look_after(watched.actors, watched.helpers)
+        threading.Thread(target=self._watch, name="orphan reaper", daemon=True).start()
+
+    def heard(self) -> None:
         if self._lock is None:
             self._lock = RunLock()
         self._silent_from = time.monotonic() + _SILENCE
 
-    def ending(self) -> bool:
-        """Whether it is ending the run, or has ended it."""
-        return self._ending
-
-    def look_after(self, groups: Sequence[Sequence[Any]], helpers: Sequence[Any]) -> None:
-        """Replace the actors to be ended, after actors were added in flight."""
-        self._ended = groups, helpers
-        for actor in (*itertools.chain(*groups), *helpers):
+    def look_after(self, actors: Sequence[Any], helpers: Sequence[Any]) -> None:
+        self._ended: tuple[Sequence[Sequence[Any]], Sequence[Any]] = (
+            (actors, [self._itself]),
+            helpers,
+        )
+        for actor in (*itertools.chain(*self._ended[0]), *helpers):
             # An actor's address is resolved once, by the cluster's head, which may be lost later.
             actor.meet.remote()
 
     def _watch(self) -> None:
-        drones = () if self._application.time_waits else self._drones
-        while not self._gone() or any(map(may_fly, drones)):
+        while not self._gone() or any(map(may_fly, self._drones)):
             time.sleep(_LOOK_INTERVAL)
-        self._ending = True
+        self.ending = True
+        # The last of them is its own: the process ends, which releases the lock.
         end_actors(*self._ended)
-        if self._lock is not None:
-            self._lock.release()
-        exit_soon()
-        with contextlib.suppress(RayError):
-            # Through Ray, or it would print a message about a dead worker to the terminal.
-            ray.kill(self._itself)
 
     def _gone(self) -> bool:
         if not self._application.near:

@@ -48,12 +48,17 @@ _SETTING_UP_SECONDS = 60.0
 _LOOK_SECONDS = 0.2
 _LONGEST = 40
 """Most characters of a temporary folder; a socket's path below it may have 107."""
-_UNWANTED = ("_private/monitor.py", "v2/monitor.py", "dashboard/dashboard.py", "util.client.server")
-"""Processes useless on one machine (200 MB): autoscaler, web pages, proxy for remote drivers."""
+_UNWANTED = ("dashboard/dashboard.py", "_private/monitor.py", "v2/monitor.py", "util.client.server")
+"""Processes useless on one machine (200 MB): web pages, autoscaler, proxy for remote drivers.
+
+`ray start` waits for the first, whose option only makes it smaller, or for its end.
+"""
 _SUBREAPER = 36
+_MISSING = ("ray.serve.scripts", "grpc", "ray.dashboard.optional_deps")
+"""Modules that `ray start` does without, as where they are not installed: a second of imports for
+other subcommands, the proxy for remote drivers, and the web server of the node's agent."""
 _RAY = (
-    # Skips a second of imports that only other subcommands need.
-    "import sys; sys.modules['ray.serve.scripts'] = None; "
+    f"import sys; sys.modules.update(dict.fromkeys({_MISSING})); "
     "from ray.scripts.scripts import main; main()"
 )
 
@@ -100,7 +105,7 @@ def _keep(client: _Client, folder: Path, words: list[str]) -> None:
     if not address:
         client.tell(error=reason)
         return
-    _end_all(lambda line: any(part in line for part in _UNWANTED))
+    _end_all(_unwanted)
     client.tell(address=address, folder=str(folder))
     while not client.gone(1.0):
         _reap()
@@ -149,8 +154,9 @@ def _start(client: _Client, folder: Path, words: list[str]) -> tuple[str, str]:
             )
             until = time.monotonic() + _START_SECONDS
             while starting.poll() is None and time.monotonic() < until:
-                if client.gone(0.02):
+                if client.gone(_LOOK_SECONDS / 4):
                     return "", "the application has gone"
+                _kill(_unwanted)
             code = starting.poll()
             log.seek(0)
             said = log.read().strip()
@@ -184,14 +190,22 @@ def _held(path: Path) -> bool:
 def _end_all(matches: Callable[[str], bool] = lambda _: True) -> None:
     """Kill all descendants whose command line `matches` and wait for their end."""
     until = time.monotonic() + _DYING_SECONDS
-    while left := [pid for pid in _descendants() if matches(_command(pid))]:
-        for pid in left:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGKILL)
-        _reap()
-        if time.monotonic() > until:
-            return
+    while _kill(matches) and time.monotonic() < until:
         time.sleep(0.02)
+        _reap()
+
+
+def _kill(matches: Callable[[str], bool]) -> bool:
+    """Kill all descendants whose command line `matches`; returns whether there were any."""
+    found = [pid for pid in _descendants() if matches(_command(pid))]
+    for pid in found:
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+    return bool(found)
+
+
+def _unwanted(line: str) -> bool:
+    return any(part in line for part in _UNWANTED)
 
 
 def _reap() -> None:

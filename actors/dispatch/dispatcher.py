@@ -34,16 +34,15 @@ from aerodaas.actors.stream_names import ACKS, DECISIONS, done_stream, task_stre
 from aerodaas.actors.triggers import Triggers, TriggerSpec
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
-    Decision,
     Drop,
     Profile,
     Resources,
     Result,
     RunOnEdge,
+    SendToCloud,
     Task,
     TaskOutcome,
     TaskPlace,
-    WakeAt,
 )
 from aerodaas.schedulers.analytics.published.edge_cloud import EdgeCloudEdf
 from aerodaas.types.clock import NANOSECONDS, host_time_ns
@@ -416,10 +415,8 @@ class DispatcherActor(StreamActor):
         """Store a time at which the scheduler is to be woken."""
         heapq.heappush(self._timers, at)
 
-    def decided(self, decision: Decision, now: int) -> None:
+    def decided(self, decision: RunOnEdge | SendToCloud | Drop, now: int) -> None:
         """Publish a decision with its reason."""
-        if isinstance(decision, WakeAt):
-            return
         task = decision.task
         if isinstance(decision, Drop):
             self._why[task.id] = decision.reason

@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Future
 from concurrent.futures import wait as wait_for
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, cast
 
 import ray
 from ray.exceptions import ActorUnavailableError, RayActorError, RayTaskError
@@ -19,18 +19,18 @@ from typing_extensions import Self
 from aerodaas.actors.base import ActorInfo, ActorReport, StreamActor
 from aerodaas.actors.cluster.head_watch import HeadWatch
 from aerodaas.actors.cluster.liveness import ASKED_AGAIN, LIFE, LIFELINES, Life, LivenessMonitor
-from aerodaas.actors.cluster.orphan_reaper import OrphanReaper
-from aerodaas.actors.cluster.ray_cluster import Placement, nodes_at, options_for
+from aerodaas.actors.cluster.orphan_reaper import REAPER, OrphanReaperActor, ReaperHost, Watched
+from aerodaas.actors.cluster.ray_cluster import Placement, options_for
 from aerodaas.actors.dispatch.executor import CloudExecutor
 from aerodaas.actors.dispatch.offload import CloudProcess
 from aerodaas.actors.dispatch.remote_executor import Executor
 from aerodaas.actors.drone.actor import CHANGES, COMMANDS, DroneActor
 from aerodaas.actors.drone.robot_report import RobotReport
-from aerodaas.actors.isolation import isolation_options
 from aerodaas.actors.process_variables import ProcessVariables, private_variables
 from aerodaas.actors.run.actor_classes import actor_classes
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.run.application_process import ApplicationProcess
+from aerodaas.actors.run.environment_options import environment_options
 from aerodaas.actors.run.growth import Growth, growth
 from aerodaas.actors.run.losses import DeadError, SilentError, SuspensionMonitor, drone_lost
 from aerodaas.actors.run.member import Member, ask, require_clock, routes
@@ -104,7 +104,7 @@ class Flight:
         self._liveness_monitor: list[LivenessMonitor] = []
         self._head: HeadWatch | None = None
         session, edge = plan.session, Placement()
-        environments = _environments(plan)
+        environments = environment_options(plan)
         for specs, place in zip(plan.drones, plan.edges, strict=True):
             name = f"drone/{'+'.join(spec.robot.id for spec in specs)}"
             self._drones.update(dict.fromkeys((spec.robot.id for spec in specs), name))
@@ -122,9 +122,11 @@ class Flight:
         if plan.dispatch is not None:
             self._create_dispatcher(plan.dispatch, environments)
         if self.recording is not None and provenance is not None:
-            recorder = (session, self.recording, plan.recorded, provenance, live)
+            recorder = (session, self.recording, plan.recorded, provenance, live, self._watched())
             self._create("recorder", self._classes.recorder, edge, recorder, restarts=_RESTARTS)
-        self._reaper = self._appoint_reaper()
+            self._reaper = self._members["recorder"].handle
+        else:
+            self._reaper = self._create_reaper()
         self._origin = 0
         self._answers: dict[str, tuple[float, dict[str, RobotReport]]] = {}
         """Time (monotonic seconds) and content of each drone actor's last answer."""
@@ -153,7 +155,7 @@ class Flight:
             ask(reference, _PREPARE_TIMEOUT)
         # Nothing starts before the reaper runs and has a heartbeat: later ones would wait in this
         # process for the reaper's, and a suspended application sends none.
-        ask(self._reaper.heard.remote(), _PREPARE_TIMEOUT)
+        ask(self._call_reaper("heard"), _PREPARE_TIMEOUT)
         self._pulse.beat()
         self._origin = host_time_ns()
         self._start(list(self._members.values()))
@@ -177,7 +179,7 @@ class Flight:
             self._next_reports = time.monotonic() + _REPORT_INTERVAL
             self._gather_reports()
             self._record_vitals()
-        self._reaper.heard.remote()
+        self._call_reaper("heard")
         robots: dict[str, RobotReport] = {}
         for name in set(self._drones.values()):
             robots.update(self._robots_of(name, newest))
@@ -220,7 +222,7 @@ class Flight:
         frozen = self._pulse.frozen
         if frozen:
             try:
-                ended = ask(self._reaper.ending.remote())
+                ended = ask(self._call_reaper("ending"))
             except DeadError:
                 ended = True
             except SilentError:
@@ -269,7 +271,7 @@ class Flight:
 
     def _join(self, change: Growth, plan: FlightPlan) -> None:
         known = set(self._members)
-        environments = _environments(replace(self.plan, analyses=change.analyses))
+        environments = environment_options(replace(self.plan, analyses=change.analyses))
         try:
             self._create_cameras(change.cameras)
             self._create_analyses(change.analyses, environments)
@@ -306,7 +308,7 @@ class Flight:
         self._start(fresh)
 
     def _inform_reaper(self) -> None:
-        self._reaper.look_after.remote(self._in_ending_order(), list(self._helpers))
+        self._call_reaper("look_after", self._ended_first(), list(self._helpers))
 
     @property
     def flying(self) -> bool:
@@ -346,7 +348,8 @@ class Flight:
         if self._stopped:
             return self.reports()
         self._watch_no_longer()
-        last = end_actors(self._in_ending_order(), self._helpers)
+        # The reaper's host last, for the application may die meanwhile.
+        last = end_actors([self._ended_first(), [self._reaper]], self._helpers)
         for member in self._members.values():
             member.report = last.get(member.handle, member.report)
         return self.reports()
@@ -362,21 +365,23 @@ class Flight:
         if self._head is not None:
             self._head.end()
 
-    def _in_ending_order(self) -> list[list[Any]]:
-        """All actors with streams; the recorder last, because it records the end of the others."""
-        recorder = [m.handle for m in self._members.values() if m.name == "recorder"]
-        others = [m.handle for m in self._members.values() if m.name != "recorder"]
-        return [others, recorder]
+    def _ended_first(self) -> list[Any]:
+        """All actors with streams but the recorder, which records their end."""
+        return [member.handle for member in self._members.values() if member.name != "recorder"]
 
-    def _appoint_reaper(self) -> Any:  # noqa: ANN401 - Ray's handle
-        options = self._options("orphan_reaper", Placement(), restarts=0)
-        remote: Any = ray.remote(OrphanReaper)
-        drones = [self._members[name].handle for name in self._ids()]
-        watched = (drones, self._in_ending_order(), list(self._helpers))
+    def _watched(self) -> Watched:
         application = ApplicationProcess(time_waits=self.plan.conduct is not None)
-        reaper = remote.options(**options).remote(application, *watched)
-        self._helpers.append(reaper)
-        return reaper
+        drones = [self._members[name].handle for name in self._ids()]
+        return Watched(application, drones, self._ended_first(), list(self._helpers))
+
+    def _create_reaper(self) -> Any:  # noqa: ANN401 - Ray's handle
+        remote: Any = ray.remote
+        made = remote(concurrency_groups={REAPER: 1})(OrphanReaperActor)
+        options = self._options("orphan_reaper", Placement(), restarts=_RESTARTS)
+        return made.options(**options).remote(self._watched())
+
+    def _call_reaper(self, what: Literal["heard", "ending", "look_after"], *args: object) -> Any:  # noqa: ANN401 - Ray's reference
+        return getattr(self._reaper, what).options(concurrency_group=REAPER).remote(*args)
 
     def _ids(self) -> set[str]:
         return set(self._drones.values())
@@ -396,6 +401,7 @@ class Flight:
         # Pending calls, of the liveness monitor or for the loop, must not block others.
         groups = {LIFE: LIFELINES} if restarts else {}
         groups |= {COMMANDS: 1, CHANGES: 1} if issubclass(kind, DroneActor) else {}
+        groups |= {REAPER: 1} if issubclass(kind, ReaperHost) else {}
         if groups:
             remote = remote(concurrency_groups=groups)
         placed = {**self._options(name, place, restarts=restarts), **(options or {})}
@@ -570,6 +576,9 @@ class Flight:
         while member.lost_at == lost_at and not self._stopped:
             try:
                 if cast("ActorReport", ray.get(actor.report.remote())).phase == "new":
+                    if actor == self._reaper:
+                        # It knows what was there at the start.
+                        self._inform_reaper()
                     ray.get(actor.learn.remote(self.plan.session.application))
                     member.info = ray.get(actor.prepare.remote(*member.setup))
                     if member.further:
@@ -582,23 +591,7 @@ class Flight:
                 self.note("actor_failed", f"{member.name} cannot start again: {error.cause}")
                 return
             except RayActorError:
+                if actor == self._reaper:
+                    self._reaper = self._create_reaper()
                 return
             time.sleep(ASKED_AGAIN)
-
-
-def _environments(plan: FlightPlan) -> dict[str, dict[str, Any]]:
-    """Ray options for the environment of each process that runs analyses, by name.
-
-    Called before any actor exists, so that a failure leaves nothing behind. Raises ConfigError
-    for an environment that a node cannot provide, and for a place without a node.
-    """
-    processes: dict[str, AnalyticsActorPlan | CloudProcess] = {
-        one.name: one for one in plan.analyses
-    }
-    for number, process in enumerate(plan.dispatch.cloud if plan.dispatch else ()):
-        processes[f"cloud/{number}/{process.site}"] = process
-    for place in {*plan.edges, *(one.place for one in processes.values())}:
-        nodes_at(place)
-    return {
-        name: isolation_options(one.runtime_env, one.place, name) for name, one in processes.items()
-    }

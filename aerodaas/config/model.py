@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from packaging.requirements import InvalidRequirement, Requirement
 from pydantic import (
     AfterValidator,
     BaseModel,
@@ -86,8 +85,7 @@ class _Strict(BaseModel):
     Neither `repr` nor JSON holds a secret; `model_dump()` keeps them, for a copy.
     """
 
-    # The docstrings of settings become descriptions in the JSON schema.
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", frozen=True)
 
     @model_serializer(mode="wrap")
     def _serialized(
@@ -341,6 +339,8 @@ class RuntimeEnvConfig(_Strict):
 
 
 def _check_requirement(package: str) -> None:
+    from packaging.requirements import InvalidRequirement, Requirement  # noqa: PLC0415 - rarely used
+
     if package.endswith(".whl"):
         return
     try:

@@ -46,7 +46,7 @@ class Host(Protocol):
         """Call `Dispatch.timer` at this time."""
         ...
 
-    def decided(self, decision: Decision, now: int) -> None:
+    def decided(self, decision: RunOnEdge | SendToCloud | Drop, now: int) -> None:
         """Take note of a decision about a task."""
         ...
 
@@ -164,29 +164,33 @@ class Dispatch:
             raise SchedulerError(
                 f"{name} answered an event with None; return a list of decisions, or yield them"
             )
-        undecided = self.undecided
         for decision in decisions:
             if isinstance(decision, WakeAt):
                 # Said so that NaN, which no timer would ever reach, is refused, too.
                 if not now <= decision.at:
                     raise self._refusal(decision, f"it lies in the past, now is {now}")
                 self._host.wake_at(decision.at)
-                continue
-            if not isinstance(decision, (RunOnEdge, SendToCloud, Drop)):
-                raise self._refusal(decision, "that is none of the decisions of the protocol")
-            task = decision.task
-            if undecided.get(task.id) is not task:
-                raise self._refusal(decision, "the task never arrived or was decided before")
-            if not isinstance(decision.reason, str):
-                raise self._refusal(decision, f"its reason {decision.reason!r} is no text")
-            if isinstance(decision, RunOnEdge):
-                self._run_edge(decision, now)
             elif isinstance(decision, SendToCloud):
+                self._require_undecided(decision)
                 self._send(decision, now)
-            else:
-                del undecided[task.id]
+            elif isinstance(decision, RunOnEdge):
+                self._require_undecided(decision)
+                self._run_edge(decision, now)
+            elif isinstance(decision, Drop):
+                self._require_undecided(decision)
+                task = decision.task
+                del self.undecided[task.id]
                 self._host.decided(decision, now)
                 self._host.closed(Result(task, TaskOutcome.DROPPED, TaskPlace.NOWHERE, now, now))
+            else:
+                raise self._refusal(decision, "that is none of the decisions of the protocol")
+
+    def _require_undecided(self, decision: RunOnEdge | SendToCloud | Drop) -> None:
+        task = decision.task
+        if self.undecided.get(task.id) is not task:
+            raise self._refusal(decision, "the task never arrived or was decided before")
+        if not isinstance(decision.reason, str):
+            raise self._refusal(decision, f"its reason {decision.reason!r} is no text")
 
     def _run_edge(self, decision: RunOnEdge, now: int) -> None:
         task = decision.task

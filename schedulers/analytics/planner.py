@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from heapq import nlargest
 from math import inf
 from operator import itemgetter
 from typing import Any
@@ -44,6 +43,7 @@ A lane's position, the number of its jobs taken or passed over, is one digit of 
 keys are much cheaper to make and to compare than tuples, and they are made most of the time.
 """
 
+_merit = itemgetter(0)
 _IDLE_SHARE = 0.5
 """Share of the price that idle time costs where no job is known: some will arrive."""
 
@@ -62,12 +62,13 @@ def plan(
     longest = max((len(lane.jobs) for lane in lanes), default=0)
     digits = longest.bit_length()
     places = [(number * digits, lane) for number, lane in enumerate(lanes)]
+    mask = (1 << digits) - 1
     best_merit = -inf
     best: _Chain = None
     while beam:
         grown: dict[int, _State] = {}
         for state in beam:
-            successors = _successors(state, places, (1 << digits) - 1, price, gap)
+            successors = _successors(state, places, mask, price, gap)
             for successor in successors:
                 merit, free, taken, chain = successor
                 if free >= until:
@@ -76,13 +77,13 @@ def plan(
                     continue
                 # Of two ways to the same merit, the one that is done earlier leaves more room.
                 rival = grown.get(taken)
-                if rival is None or (rival[0], -rival[1]) < (merit, -free):
+                if rival is None or rival[0] < merit or (rival[0] == merit and rival[1] > free):
                     grown[taken] = successor
             if not successors:
                 merit = state[0] - price * _IDLE_SHARE * (until - state[1])
                 if merit > best_merit:
                     best_merit, best = merit, state[3]
-        beam = nlargest(width, grown.values(), key=itemgetter(0))
+        beam = sorted(grown.values(), key=_merit, reverse=True)[:width]
     steps: list[tuple[float, Lane, Job]] = []
     while best is not None:
         best, begin, lane, job = best
@@ -100,22 +101,21 @@ def _successors(
     for shift, lane in places:
         jobs, belief = lane.jobs, lane.time
         mean = belief.mean
-        count = len(jobs)
         position = index = taken >> shift & mask
         hopeless = free + mean - belief.sigma
-        while index < count and jobs[index].deadline < hopeless:
+        for job in jobs[position:] if position else jobs:
             index += 1
-        if index == count:
-            continue
-        job = jobs[index]
-        begin = max(free, job.release)
-        if begin - free > gap:
-            continue
-        gain = job.benefit * chance(belief, job.deadline - begin) - job.loss
-        if gain > 0:
-            end = begin + mean
-            after = taken + (index + 1 - position << shift)
-            found.append(
-                (merit + gain - price * (end - free), end, after, (chain, begin, lane, job))
-            )
+            if job.deadline < hopeless:
+                continue
+            release = job.release
+            begin = max(free, release)
+            if begin - free <= gap:
+                gain = job.benefit * chance(belief, job.deadline - begin) - job.loss
+                if gain > 0:
+                    end = begin + mean
+                    after = taken + (index - position << shift)
+                    found.append(
+                        (merit + gain - price * (end - free), end, after, (chain, begin, lane, job))
+                    )
+            break
     return found

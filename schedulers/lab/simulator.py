@@ -10,12 +10,13 @@ from heapq import heappop, heappush
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     AnalyticsScheduler,
-    Decision,
+    Drop,
     Resources,
     Result,
+    RunOnEdge,
+    SendToCloud,
     Task,
     TaskOutcome,
-    WakeAt,
 )
 from aerodaas.schedulers.analytics.dispatch import Dispatch
 from aerodaas.schedulers.lab.sample import SamplePath
@@ -45,7 +46,7 @@ class Trace:
     """Tasks about which the scheduler never decided."""
     end: int = 0
     """When the last event happened, nanoseconds."""
-    decisions: list[tuple[int, Decision]] = field(default_factory=list)
+    decisions: list[tuple[int, RunOnEdge | SendToCloud | Drop]] = field(default_factory=list)
     """Filled on request, as are the observations."""
     observations: list[SchedulerObservation] = field(default_factory=list)
 
@@ -74,9 +75,8 @@ class _SimulatedHost:
     def wake_at(self, at: int) -> None:
         self._push(at, _TIMER, None)
 
-    def decided(self, decision: Decision, now: int) -> None:
-        if not isinstance(decision, WakeAt):
-            self.trace.reasons[decision.reason] += 1
+    def decided(self, decision: RunOnEdge | SendToCloud | Drop, now: int) -> None:
+        self.trace.reasons[decision.reason] += 1
         if self._record:
             self.trace.decisions.append((now, decision))
 

@@ -108,8 +108,13 @@ def under_way(pid: int) -> bool:
     return any(any((folder / LOCKS).glob("*")) for folder in own)
 
 
-def kill_in_flight(process: subprocess.Popen[str], recording: Path) -> None:
-    """Kill an application once it flies, and wait until all that it has started is gone."""
+def kill_in_flight(
+    process: subprocess.Popen[str], recording: Path | None, also: str | None = None
+) -> None:
+    """Kill an application once it flies, and wait until all that it has started is gone.
+
+    An actor of the class `also` is killed just before.
+    """
     until(lambda: under_way(process.pid), 60.0)
     time.sleep(3.0)
     everyone = set(psutil.Process(process.pid).children(recursive=True))
@@ -118,13 +123,17 @@ def kill_in_flight(process: subprocess.Popen[str], recording: Path) -> None:
     assert len(actors(process.pid)) >= 2
     assert len(own) == 1
     assert memory
+    for one in actors(process.pid):
+        if also is not None and also in one.cmdline()[0]:
+            one.kill()
     process.kill()
     process.wait()
     until(lambda: gone(everyone), 60.0)
     until(lambda: not any(path.exists() for path in own), 20.0)
     assert not any(path.exists() for path in memory)
-    with Recording.open(recording) as written:
-        assert written.complete
+    if recording is not None:
+        with Recording.open(recording) as written:
+            assert written.complete
 
 
 def test_killed_in_lockstep(tmp_path: Path) -> None:
@@ -133,6 +142,22 @@ def test_killed_in_lockstep(tmp_path: Path) -> None:
     words = ("app.py", "--no-view", "--record", "out")
     with started(tmp_path, "run", *words) as process:
         kill_in_flight(process, tmp_path / "out" / "flight.mcap")
+
+
+def test_killed_without_a_recording(tmp_path: Path) -> None:
+    """The orphan reaper, which else lives in the recorder, has an actor of its own."""
+    write(tmp_path, hover=100_000)
+    words = ("app.py", "--no-view", "--set", "recording.enabled=false")
+    with started(tmp_path, "run", *words) as process:
+        kill_in_flight(process, None)
+
+
+def test_killed_together_with_its_recorder(tmp_path: Path) -> None:
+    """Ray restarts the recorder, and the orphan reaper in it, which has heard nobody."""
+    write(tmp_path, hover=100_000)
+    words = ("app.py", "--no-view", "--record", "out")
+    with started(tmp_path, "run", *words) as process:
+        kill_in_flight(process, None, "RecorderActor")
 
 
 def test_several_applications_at_once(tmp_path: Path) -> None:

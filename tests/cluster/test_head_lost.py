@@ -32,7 +32,7 @@ pytestmark = [
 ]
 _ROOT = Path(__file__).resolve().parents[2]
 _PORT = 6379
-_ACTORS = ["ray::AnalyticsActor", "ray::DroneActor", "ray::OrphanReaper", "ray::RecorderActor"]
+_ACTORS = ["ray::AnalyticsActor", "ray::DroneActor", "ray::RecorderActor"]
 """The first has joined in flight."""
 _NODES_OWN = ("ray::IDLE", "ray::DashboardAgent", "ray::RuntimeEnvAgent")
 _APPLICATION = """

@@ -229,8 +229,8 @@ def start_application(
 
 
 def actors_below(pid: int) -> set[psutil.Process]:
-    """Actors of the drone, recorder, analytics and orphan reaper among a process' descendants."""
-    names = ("ray::DroneActor", "ray::RecorderActor", "ray::OrphanReaper", "ray::AnalyticsActor")
+    """Actors of the drone, recorder and analytics among a process' descendants."""
+    names = ("ray::DroneActor", "ray::RecorderActor", "ray::AnalyticsActor")
     found = set()
     for process in psutil.Process(pid).children(recursive=True):
         with contextlib.suppress(psutil.Error):
@@ -270,7 +270,7 @@ def test_application_killed_in_a_cluster(flyer: Flyer, cluster: Cluster) -> None
 
     with RemoteUser(port, kill_and_watch):
         pass
-    assert len(actors) == 4
+    assert len(actors) == 3
     assert wait_for(lambda: gone(actors), 60.0)
     with Recording.open(flyer.folder / "flight" / "flight.mcap") as recording:
         assert recording.complete

@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import psutil
 import pytest
@@ -21,10 +22,14 @@ from flying import FLAT, Flyer, hop, recorded, robot
 from required import needs_root
 
 from aerodaas import AeroNavigation, Environment, NavigationType
+from aerodaas.actors.cluster.ray_process import LOCKS, VARIABLE
+from aerodaas.actors.run import flight
+from aerodaas.actors.run.member import ask
 from aerodaas.analytics import SyntheticAnalytics
 from aerodaas.environment.run import Run
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
+from aerodaas.types.errors import MissionError
 from aerodaas.types.status import MissionState
 from tools.namespaces.machine import run
 
@@ -61,14 +66,11 @@ def process_of(run: Run, actor: str) -> psutil.Process:
     return psutil.Process(run._flight.infos()[actor].pid)
 
 
-def reapers() -> set[psutil.Process]:
-    """Processes of orphan reapers below this one."""
-    found = set()
-    for process in psutil.Process().children(recursive=True):
-        with suppress(psutil.Error):
-            if process.cmdline()[0].startswith("ray::OrphanReaper"):
-                found.add(process)
-    return found
+def holders(folder: Path) -> set[int]:
+    """Processes that hold the lock of a run, by which they keep the local Ray."""
+    inodes = {f":{path.stat().st_ino}" for path in folder.iterdir()}
+    locks = [line.split() for line in Path("/proc/locks").read_text().splitlines()]
+    return {int(words[4]) for words in locks if any(words[5].endswith(one) for one in inodes)}
 
 
 def state_of(run: Run) -> MissionState:
@@ -96,10 +98,10 @@ def frozen(process: psutil.Process) -> Iterator[None]:
 
 def test_a_run_is_watched_before_its_drones_fly(flyer: Flyer) -> None:
     """An application that is suspended at once sends no later heartbeat to a reaper that starts."""
-    before = reapers()
     with flyer.flying(hover, with_camera(), speed=1.0, lockstep=False) as env:
         run = env.launch()
-        assert len(reapers() - before) == 1
+        recorder = process_of(run, "recorder")
+        assert recorder.pid in holders(Path(recorder.environ()[VARIABLE]) / LOCKS)
         until(run, lambda: state_of(run) is MissionState.ENROUTE)
         env.get_robot_by_id("drone").end_mission()
 
@@ -125,6 +127,28 @@ def test_the_recorder_dies(flyer: Flyer) -> None:
         flight = RecordedFlight.read(recording)
     assert flight.robots["drone"].outcome.startswith("landed")
     assert any("recorder is back after" in text for text in alerts(flight)["actor_back"])
+
+
+def test_the_orphan_reaper_outlives_its_host(flyer: Flyer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a recorder that is restarted it knows the actors of now; with one that is not, another."""
+    monkeypatch.setattr(flight, "_RESTARTS", 1)
+    with (
+        suppress(MissionError),  # that the recorder died, if it was seen in time
+        flyer.flying(hover, with_camera(), speed=1.0, lockstep=False) as env,
+    ):
+        run = env.launch()
+        assert run._flight is not None
+        reaper = run._flight._reaper
+        with patch.object(run._flight, "_inform_reaper", wraps=run._flight._inform_reaper) as told:
+            process_of(run, "recorder").kill()
+            until(run, lambda: run.reports()["recorder"].phase == "failed")
+            until(run, lambda: run.reports()["recorder"].phase == "running")
+            told.assert_called_once_with()
+        assert run._flight._reaper == reaper
+        process_of(run, "recorder").kill()
+        until(run, lambda: run._flight is not None and run._flight._reaper != reaper)
+        assert not ask(run._flight._call_reaper("ending"), 20.0)
+        env.get_robot_by_id("drone").end_mission()
 
 
 def test_a_sensor_that_steers_dies(flyer: Flyer) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from heapq import heappop, heappush
 
 from aerodaas.schedulers.analytics.base import MILLISECOND, STOLEN, Decision, Task, WakeAt
 from aerodaas.schedulers.analytics.published.dem import Dem
@@ -28,8 +29,12 @@ class Dems(Dem):
 
     def __init__(self, *, published: bool = False) -> None:
         super().__init__(published=published)
-        self.tentative: dict[Task, tuple[int, str]] = {}
-        """Tasks waiting to leave: their latest start, and why they are bound for the cloud."""
+        self.tentative: dict[Task, str] = {}
+        """Tasks waiting to leave, and why they are bound for the cloud."""
+        self._leaves: list[tuple[int, int, Task]] = []
+        """Latest start of each task that has waited, a heap with numbers in order of waiting; the
+        entries of stolen tasks are stale."""
+        self._waited = 0
 
     def to_cloud(
         self, task: Task, now: int, reason: str = "no room on the edge"
@@ -42,7 +47,9 @@ class Dems(Dem):
         leave = task.deadline - MARGIN - (self.cloud_time(task) if pays else profile.edge_time)
         if leave <= now:
             return self.leave(task, now, reason)
-        self.tentative[task] = (leave, reason)
+        self.tentative[task] = reason
+        heappush(self._leaves, (leave, self._waited, task))
+        self._waited += 1
         return [WakeAt(leave)]
 
     def leave(self, task: Task, now: int, reason: str) -> Iterable[Decision]:
@@ -53,11 +60,14 @@ class Dems(Dem):
 
     def timer(self, now: int) -> Iterable[Decision]:
         """Send or drop the tasks whose latest start has come."""
-        due = [task for task, (leave, _) in self.tentative.items() if leave <= now]
+        due: list[tuple[int, Task]] = []
+        while self._leaves and self._leaves[0][0] <= now:
+            _, number, task = heappop(self._leaves)
+            if task in self.tentative:
+                due.append((number, task))
         decisions: list[Decision] = []
-        for task in due:
-            _, reason = self.tentative.pop(task)
-            decisions.extend(self.leave(task, now, reason))
+        for _, task in sorted(due):
+            decisions.extend(self.leave(task, now, self.tentative.pop(task)))
         return decisions
 
     def executor_idle(self, now: int) -> Iterable[Decision]:

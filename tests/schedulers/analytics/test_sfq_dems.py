@@ -18,7 +18,6 @@ from aerodaas.schedulers.analytics.base import (
     Task,
     TaskOutcome,
     TaskPlace,
-    WakeAt,
 )
 from aerodaas.schedulers.analytics.published.dems import MARGIN, Dems
 from aerodaas.schedulers.analytics.sfq_dems import SfqDems
@@ -205,7 +204,7 @@ def test_a_tenant_that_has_gone_gives_its_share_back() -> None:
     reasons = [
         (at, decision.reason)
         for at, decision in trace.decisions
-        if not isinstance(decision, WakeAt) and decision.task.profile is stays
+        if decision.task.profile is stays
     ]
     early = {reason for at, reason in reasons if at < 9_000 * MILLISECOND}
     late = {reason for at, reason in reasons if at > 11_000 * MILLISECOND}
