@@ -458,7 +458,7 @@ class Mission:
         self._anchor = None
         command = live.command
         velocity = body_to_enu(command.velocity, state.odometry.yaw)
-        return Fly(VelocitySetpoint(velocity, command.yaw_rate), live.cause)
+        return Fly(VelocitySetpoint(velocity, command.yaw_rate, command.evasive), live.cause)
 
     def _idle(self, state: VehicleState) -> Action:
         options, limits = self._options, self.limits
