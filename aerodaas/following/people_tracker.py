@@ -6,14 +6,13 @@ to believe it, so each person has a filter here that expects abrupt turns and st
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
-import numpy as np
-
 from aerodaas.following.relative_target import RelativeTarget
-from aerodaas.following.target_motion import TargetMotion, place_of
+from aerodaas.following.target_motion import TargetMotion
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
 
@@ -31,6 +30,8 @@ _SHORTEST = 0.1
 taken for turns."""
 _STARTING = 1.0
 """Standard deviation of the speed of a person just detected, m/s."""
+_GATE = 13.8
+"""Squared Mahalanobis distance, 2 degrees of freedom, that 1 in 1000 true detections exceeds."""
 _SAME = 1.2
 """Distance in metres between a person's predicted and detected position, at most."""
 _MEMORY = 1.0
@@ -40,11 +41,13 @@ _LOOKS = 3
 people last a frame or two."""
 
 
-@dataclass
+@dataclass(eq=False)
 class _Person:
     motion: TargetMotion
     seen: int
     """Mission time of the last detection, nanoseconds."""
+    located: int
+    """Mission time of the last detection that told a distance, nanoseconds."""
     looks: int = 0
     """Number of frames that showed them."""
 
@@ -72,8 +75,8 @@ class PeopleTracker:
     ) -> None:
         """Add the people in a frame captured from `pose` at `stamp`, `interval` s after the last.
 
-        A person is the one predicted nearest to the sighting, or a new one. An upper bound of the
-        distance is no evidence against somebody predicted nearer.
+        The pairs of a person and a sighting that fit best are the same, the rest are new. An upper
+        bound of the distance is no evidence against somebody predicted nearer.
         """
         last, self._newest = self._newest, stamp
         self._people = [
@@ -81,21 +84,41 @@ class PeopleTracker:
             for one in self._people
             if seconds(stamp - one.seen) <= _MEMORY and (one.sure or one.seen == last)
         ]
-        known = list(self._people)
         turning = _SWERVE / max(interval, _SHORTEST)
-        for sighting in sorted(people, key=lambda one: one.distance):
-            person = _nearest(known, sighting, pose, stamp)
-            if person is None:
-                person = _Person(TargetMotion(turning, _STARTING), stamp)
+        for person in self._people:
+            person.motion.acceleration = turning
+        for sighting, known in self._matched(list(people), pose, stamp):
+            if known is None and sighting.doubtful:
+                continue
+            person = known or _Person(TargetMotion(turning, _STARTING), stamp, stamp)
+            if known is None:
                 self._people.append(person)
-            else:
-                known.remove(person)
-            person.seen, person.motion.acceleration = stamp, turning
+            person.seen = stamp
             person.looks += 1
             predicted = person.motion.relative_to(pose, stamp)
             nearer = predicted is not None and predicted[0].distance <= sighting.distance
-            if not (sighting.bound and nearer):
+            recent = seconds(stamp - person.located) <= _MEMORY
+            if not (sighting.bound and nearer and recent):
                 person.motion.observe(sighting, pose, stamp)
+                person.located = stamp
+
+    def _matched(
+        self, sightings: Sequence[RelativeTarget], pose: Odometry, stamp: int
+    ) -> Iterator[tuple[RelativeTarget, _Person | None]]:
+        """Each sighting with the person whom it shows, None for somebody new."""
+        fits = sorted(
+            (person.motion.surprise(sighting, pose, stamp), number, index)
+            for number, sighting in enumerate(sightings)
+            for index, person in enumerate(self._people)
+            if _off(person, sighting, pose, stamp) <= _SAME
+        )
+        found: dict[int, int] = {}
+        for surprise, number, index in fits:
+            if surprise <= _GATE and number not in found and index not in found.values():
+                found[number] = index
+        matched = {number: self._people[index] for number, index in found.items()}
+        for number, sighting in enumerate(sightings):
+            yield sighting, matched.get(number)
 
     def relative_to(
         self, pose: Odometry, stamp: int, *, in_sight: bool = False
@@ -110,16 +133,7 @@ class PeopleTracker:
         return sorted(filter(None, found), key=lambda one: one[0].distance)
 
 
-def _nearest(
-    known: list[_Person], sighting: RelativeTarget, pose: Odometry, stamp: int
-) -> _Person | None:
-    """Find whom a sighting shows, among those not yet seen in this frame."""
-    place = place_of(sighting, pose)
-    best, least = None, _SAME
-    for person in known:
-        predicted = person.motion.relative_to(pose, stamp)
-        if predicted is not None:
-            off = float(np.linalg.norm(place_of(predicted[0], pose) - place))
-            if off <= least:
-                best, least = person, off
-    return best
+def _off(person: _Person, sighting: RelativeTarget, pose: Odometry, stamp: int) -> float:
+    """Distance in metres of a sighting from a person's predicted position."""
+    predicted = person.motion.relative_to(pose, stamp)
+    return math.inf if predicted is None else math.dist(predicted[0].offset, sighting.offset)

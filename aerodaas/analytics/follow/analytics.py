@@ -45,6 +45,9 @@ _PERSON, _PERSON_SIZE = "person", TargetSize(1.7, 0.55)
 _WORN = 0.8
 """Share of a box, such as a vest's or a body's, within another person's box from which on both show
 the same body. Somebody else in front would hide the vest, so that it would not be detected."""
+_OVERLAPS = 0.4
+"""The same share from which on both may show the same body: a detector that sees half a body puts
+loose boxes around it. Somebody else who comes in front is seen before that."""
 _AS_FAR = 0.6
 """Least height of such a box in parts of the height that it has at the distance of the other; a
 smaller one is behind, not worn."""
@@ -159,7 +162,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         people = bystanders
         if self.falls:
             people += others if sighting is None else (sighting, *others)
-        others += bystanders
+        others += tuple(one for one in bystanders if not one.doubtful)
         command = self.controller.step(
             observation(item, sighting, context, others=others, people=people)
         )
@@ -309,7 +312,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         """Locate everybody detected who is not known by the followed labels already.
 
         A person's box around a box with such a label shows the same body, and so does one where
-        the target is expected while that is not detected.
+        the target is expected while that is not detected. One that overlaps it is doubtful.
         """
         if _PERSON in self.labels:
             return ()
@@ -319,19 +322,20 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         parts += [
             (one, _PERSON_SIZE.height)
             for one in people
-            if any(_is_worn(part, height, one) for part, height in parts)
+            if any(_worn(part, height, one) >= _WORN for part, height in parts)
         ]
         odometry, expected = item.odometry, target
         if expected is None and odometry is not None:
             expected = self.controller.expected(odometry, item.header.stamp)
         found = []
         for box in people:
-            if any(_is_worn(part, height, box) for part, height in parts):
+            share = max((_worn(part, height, box) for part, height in parts), default=0.0)
+            if share >= _WORN:
                 continue
             seen = sight(box, item, _PERSON_SIZE)
             if seen is None or (self.falls and _is_near(seen, expected)):
                 continue
-            found.append(seen)
+            found.append(replace(seen, doubtful=share >= _OVERLAPS))
         return tuple(found)
 
     def _tell_what_blocks(self, item: Detections, context: Context) -> None:
@@ -362,13 +366,17 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             context.alert(Alert(item.header, "target_given_up", text))
 
 
-def _is_worn(part: Detection, height: float, body: Detection) -> bool:
-    """Whether a box of something `height` metres high, such as a vest, shows part of a body."""
+def _worn(part: Detection, height: float, body: Detection) -> float:
+    """Share within a body of the box of a part that is `height` metres high, such as a vest.
+
+    0 for a part too small to be this body's.
+    """
     low = np.maximum(part.box[:2], body.box[:2])
     high = np.minimum(part.box[2:], body.box[2:])
-    inside = float(np.clip(high - low, 0.0, None).prod()) >= _WORN * part.area
+    common = float(np.clip(high - low, 0.0, None).prod())
     tall, taller = (one.box[3] - one.box[1] for one in (part, body))
-    return inside and tall >= _AS_FAR * taller * height / _PERSON_SIZE.height
+    as_far = tall >= _AS_FAR * taller * height / _PERSON_SIZE.height
+    return common / part.area if as_far and common > 0.0 else 0.0
 
 
 def _is_near(seen: RelativeTarget, expected: RelativeTarget | None) -> bool:
