@@ -30,8 +30,6 @@ _SHORTEST = 0.1
 taken for turns."""
 _STARTING = 1.0
 """Standard deviation of the speed of a person just detected, m/s."""
-_GATE = 13.8
-"""Squared Mahalanobis distance, 2 degrees of freedom, that 1 in 1000 true detections exceeds."""
 _SAME = 1.2
 """Distance in metres between a person's predicted and detected position, at most."""
 _MEMORY = 1.0
@@ -113,8 +111,8 @@ class PeopleTracker:
             if _off(person, sighting, pose, stamp) <= _SAME
         )
         found: dict[int, int] = {}
-        for surprise, number, index in fits:
-            if surprise <= _GATE and number not in found and index not in found.values():
+        for _, number, index in fits:
+            if number not in found and index not in found.values():
                 found[number] = index
         matched = {number: self._people[index] for number, index in found.items()}
         for number, sighting in enumerate(sightings):

@@ -127,6 +127,23 @@ def test_a_loose_box_around_the_target_is_no_stranger(width: float) -> None:
     assert len(known) == 1
 
 
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_loose_box_before_half_of_the_target_is_neither_it_nor_a_stranger(side: float) -> None:
+    """Of half a body, a detector shows boxes that by size are near; they cover most of the vest."""
+    watched = Watched(VipFollowAnalytics())
+    target = vest(2.0, 0.0)
+    left, top, right, bottom = target.box
+    width, height = right - left, bottom - top
+    for number in range(20):
+        cut = left + 0.3 * width if side > 0 else right - 0.3 * width
+        across = (cut, cut + 2.6 * width) if side > 0 else (cut - 2.6 * width, cut)
+        loose = Detection((across[0], top - height, across[1], bottom + height), "person", 0.4)
+        command = watched.show(target, *([loose] * (number % 4 != 3)))
+        assert command is None or not command.evasive
+    known = watched.follow.controller.guard._people.relative_to(POSE, round(1.9 * NANOSECONDS))
+    assert [one.distance for one, _, _ in known] == pytest.approx([2.0], abs=0.2)
+
+
 @pytest.mark.parametrize(("frames", "believed"), [(2, False), (3, True)])
 def test_a_stranger_is_believed_after_three_frames(frames: int, *, believed: bool) -> None:
     """False boxes of people last a frame or two."""
