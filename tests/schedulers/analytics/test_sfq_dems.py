@@ -202,9 +202,7 @@ def test_a_tenant_that_has_gone_gives_its_share_back() -> None:
     trace = run(SfqDems(), [(0, gone), *every(500, stays, 20_000)])
     assert done(trace, "stays") == 1.0
     reasons = [
-        (at, decision.reason)
-        for at, decision in trace.decisions
-        if decision.task.profile is stays
+        (at, decision.reason) for at, decision in trace.decisions if decision.task.profile is stays
     ]
     early = {reason for at, reason in reasons if at < 9_000 * MILLISECOND}
     late = {reason for at, reason in reasons if at > 11_000 * MILLISECOND}
