@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import time
@@ -12,6 +13,9 @@ from typing import Any
 import psutil
 import pytest
 from served import Served, document, fleet, robot
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
 
@@ -94,6 +98,74 @@ def test_waypoints_take_the_place_of_a_queue(provider: Served) -> None:
     ended = provider.until_phase(id_)
     assert ended["phase"] == "landed"
     assert ended["status"]["one"]["visited"] == ["new"]
+
+
+def test_a_pilot_surveys_rearranges_and_flies_by_hand(provider: Served) -> None:
+    """Of the mission's own tenant alone, one at a time; a disabled account lets go."""
+    id_ = submitted(provider, "one", *FAR)
+    routes = {name: f"/v1/missions/{id_}/{name}" for name in ("survey", "plan")}
+    flying(provider, id_, "one")
+    area = {"robot": "one", "area": [[5, 5], [15, 5], [15, 12], [5, 12]], "height": 3, "width": 4}
+    survey = provider.ask("POST", routes["survey"], area)
+    assert survey["sweeps"] >= 2
+    assert 0.0 < survey["battery"] < survey["available"]
+    assert all(5 <= one["x"] <= 15 and 5 <= one["y"] <= 12 for one in survey["waypoints"])
+    beyond = {**area, "area": [[50, 50], [80, 50], [80, 80]]}
+    assert "fence" in str(provider.ask("POST", routes["survey"], beyond))
+    order = {"robot": "one", "order": ["wp2", "wp1"]}
+    mine = provider.ask("GET", "/v1/me")["tenant"]
+    viewer, stranger = provider.user("vic", mine, "viewer"), provider.user("eve", "others")
+    for route, body in ((routes["survey"], area), (routes["plan"], order)):
+        assert provider.send("POST", route, body, viewer)[0] == 403
+        assert provider.send("POST", route, body, stranger)[0] == 404
+    assert provider.ask("POST", routes["plan"], order)["accepted"]
+    provider.until(lambda: told(provider, id_)["pending"] == ["wp2", "wp1"])
+    for token, status in ((viewer, 403), (stranger, 404), ("aerodaas_wrong", 401)):
+        with pytest.raises(InvalidStatus) as refused, by_hand(provider, id_, token):
+            pass
+        assert refused.value.response.status_code == status
+    with by_hand(provider, id_, provider.user("hana", mine)) as controls:
+        assert json.loads(controls.recv(20))["held"]
+        with by_hand(provider, id_, provider.token) as second:
+            answer = json.loads(second.recv(20))
+        assert (answer["held"], answer["text"]) == (False, "hana has the controls")
+        until = time.monotonic() + 30.0
+        while told(provider, id_)["position"][2] < 3.0:
+            assert time.monotonic() < until
+            climb(controls)
+        assert told(provider, id_)["pilot"] == "hana"
+        provider.ask("PATCH", "/v1/accounts/hana", {"disabled": True})
+        with pytest.raises(ConnectionClosed):
+            climb(controls, until)
+    provider.until(lambda: told(provider, id_)["pilot"] == "")
+    assert told(provider, id_)["state"] == "paused"
+    home = {"robot": "one", "command": "return-home"}
+    assert provider.ask("POST", f"/v1/missions/{id_}/commands", home)["accepted"]
+    assert provider.until_phase(id_)["phase"] == "landed"
+    noted = {one["action"] for one in provider.ask("GET", "/v1/audit") if id_ in one["target"]}
+    assert {"mission.plan", "mission.controls"} <= noted
+
+
+def told(provider: Served, id_: str) -> dict[str, Any]:
+    """What the mission's drone says of itself."""
+    status: dict[str, Any] = provider.mission(id_)["status"]["one"]
+    return status
+
+
+def by_hand(provider: Served, id_: str, token: str) -> ClientConnection:
+    """The controls of a mission's drone."""
+    words = [Subprotocol("aerodaas"), Subprotocol(f"bearer.{token}")]
+    url = f"{provider.url.replace('http', 'ws')}/v1/missions/{id_}/controls?robot=one"
+    return connect(url, subprotocols=words)
+
+
+def climb(controls: ClientConnection, until: float = 0.0) -> None:
+    """Ask to climb, once or again and again, and take the answers."""
+    asked = False
+    while not asked or time.monotonic() < until:
+        controls.send(json.dumps({"up": 0.5, "at": 1000.0 * time.monotonic()}))
+        controls.recv(20)
+        asked = True
 
 
 def test_a_service_that_is_killed_finds_its_flights_again(provider: Served) -> None:
