@@ -259,7 +259,7 @@ def test_measured_depth_tells_the_distance_of_anybody(
     """Also of who is taller or smaller than assumed, or cut by the picture; then it is no bound.
 
     Seen from high above, towards the picture's side, somebody leans so much that their width says
-    less than half of the distance. Their depth is taken for the background's then: they seem nearer.
+    less than half of the distance. Their depth counts as the background's then: they seem nearer.
     """
     model = camera(pitch)
     whole = project(model, distance, bearing, tilt=tilt)
