@@ -5,6 +5,7 @@ import { type Flight, aheadOf } from "./flight";
 import type { Place, Point } from "./place";
 import { type Drawn, SurveyLayer } from "./survey_map";
 import type { StatusOut } from "./wire";
+import "./map.css";
 
 interface View {
   east: number;
