@@ -89,33 +89,38 @@ export function Plan(props: { flight: Flight; robot: string; mayFly: boolean }) 
         )}
         {shown.map((id, place) => (
           <li key={id} data-plan={id} data-coming class={id === dragged ? "dragged" : ""}>
-            <button
-              type="button"
-              class="handle"
-              disabled={!mayFly}
-              aria-label={`${id}, ${place + 1} of ${shown.length} coming. Arrow keys move it, Delete leaves it out.`}
-              onKeyDown={(event) => keys(event, id, place)}
-              onPointerDown={(event) => {
-                event.currentTarget.setPointerCapture(event.pointerId);
-                setDragged(id);
-              }}
-              onPointerMove={(event) => {
-                if (dragged !== id) return;
-                const to = placeAt(event.clientY);
-                // Its own row counts among those above it.
-                move(id, to > place ? to - 1 : to);
-              }}
-              onPointerUp={() => {
-                setDragged(null);
-                if (draft) ask(draft);
-              }}
-              onPointerCancel={() => {
-                setDragged(null);
-                setDraft(null);
-              }}
-            >
-              ⠿
-            </button>
+            {mayFly ? (
+              <button
+                type="button"
+                class="handle"
+                aria-label={`${id}, ${place + 1} of ${shown.length} coming. Arrow keys move it, Delete leaves it out.`}
+                onKeyDown={(event) => keys(event, id, place)}
+                onPointerDown={(event) => {
+                  event.currentTarget.setPointerCapture(event.pointerId);
+                  setDragged(id);
+                }}
+                onPointerMove={(event) => {
+                  if (dragged !== id) return;
+                  const to = placeAt(event.clientY);
+                  // Its own row counts among those above it.
+                  move(id, to > place ? to - 1 : to);
+                }}
+                onPointerUp={() => {
+                  setDragged(null);
+                  if (draft) ask(draft);
+                }}
+                onPointerCancel={() => {
+                  setDragged(null);
+                  setDraft(null);
+                }}
+              >
+                ⠿
+              </button>
+            ) : (
+              <span class="handle" aria-hidden="true">
+                ○
+              </span>
+            )}
             <Place status={status} id={id} />
             {mayFly && <Remove id={id} word="Leave out" onRemove={remove} />}
           </li>
