@@ -127,6 +127,14 @@ def take_over(page: Page, watcher: Page) -> None:
     assert "flown by hand by pilot" in watcher.text("[data-testid=why]")
 
 
+def leave(page: Page, watcher: Page) -> None:
+    """Whose window is not looked at does not fly: it lets go with the key still down."""
+    watcher.front()
+    watcher.until(f"{CONTROLS} === 'nobody has the controls'", 5)
+    watcher.until(f"{figure('Speed')} < 0.3", 10)
+    assert "window was left" in page.text(".hand .why")
+
+
 def test_an_area_is_surveyed_a_plan_rearranged_and_a_drone_flown_by_hand(
     browser: Browser, tmp_path: Path
 ) -> None:
@@ -141,6 +149,8 @@ def test_an_area_is_surveyed_a_plan_rearranged_and_a_drone_flown_by_hand(
         waypoints = survey(page)
         assert len(waypoints) == 4
         rearrange(page, waypoints[-1])
+        take_over(page, watcher)
+        leave(page, watcher)
         take_over(page, watcher)
         # The browser itself tells of the area that was refused.
         assert [one for one in page.complaints() if "409" not in one] == []
