@@ -128,11 +128,16 @@ def take_over(page: Page, watcher: Page) -> None:
 
 
 def leave(page: Page, watcher: Page) -> None:
-    """Whose window is not looked at does not fly: it lets go with the key still down."""
-    watcher.front()
+    """A page that is not looked at does not fly: hidden, it lets go with the key still down.
+
+    Pages of a browser without a screen are never hidden by another one, so it is told that it is.
+    """
+    hidden = "Object.defineProperty(document, 'hidden', {value: true, configurable: true})"
+    page.run(f"{hidden}; document.dispatchEvent(new Event('visibilitychange'))")
     watcher.until(f"{CONTROLS} === 'nobody has the controls'", 5)
     watcher.until(f"{figure('Speed')} < 0.3", 10)
     assert "window was left" in page.text(".hand .why")
+    page.run("delete document.hidden")
 
 
 def test_an_area_is_surveyed_a_plan_rearranged_and_a_drone_flown_by_hand(
