@@ -31,8 +31,7 @@ class MissionView:
     """View of a mission's snapshots; it may be updated often and redraws at a limited rate.
 
     On a terminal it draws a panel in place; into a pipe or a file it prints one line for each
-    robot whenever a mission's state changes, and every few seconds while its clock runs: what was
-    not heard anew is not told anew.
+    robot every few seconds and whenever a mission's state changes, unless it would be the same.
     """
 
     def __init__(self, console: Console | None = None) -> None:
@@ -41,8 +40,8 @@ class MissionView:
         self._live: Live | None = None
         self._last: Snapshot | None = None
         self._drawn = -_LINE_EVERY
-        self._told_time = -1.0
-        """Mission time of the last lines, seconds."""
+        self._lines: list[str] = []
+        """What was told last of the robots."""
         self._states: dict[str, MissionState] = {}
         self._alerts = 0
         self._paths: dict[str, list[tuple[float, float]]] = {}
@@ -84,10 +83,8 @@ class MissionView:
                 self._live.update(self.render(snapshot), refresh=True)
         else:
             states = {robot.name: robot.mission.state for robot in snapshot.robots if robot.mission}
-            fresh = snapshot.mission_time > self._told_time
-            if states != self._states or (fresh and now - self._drawn >= _LINE_EVERY):
+            if states != self._states or now - self._drawn >= _LINE_EVERY:
                 self._drawn = now
-                self._told_time = snapshot.mission_time
                 self._states = states
                 self._print(snapshot)
 
@@ -127,10 +124,12 @@ class MissionView:
             del path[1::2]
 
     def _print(self, snapshot: Snapshot) -> None:
-        for robot in snapshot.robots:
-            self._console.print(robot_line(snapshot, robot), markup=False, soft_wrap=True)
-        if snapshot.scheduler:
-            self._console.print(snapshot.scheduler, markup=False, soft_wrap=True)
+        lines = [robot_line(snapshot, robot) for robot in snapshot.robots]
+        lines += [snapshot.scheduler] if snapshot.scheduler else []
+        if lines != self._lines:
+            self._lines = lines
+            for line in lines:
+                self._console.print(line, markup=False, soft_wrap=True)
         for alert in snapshot.alerts[self._alerts :]:
             self._console.print(f"alert: {alert}", markup=False, soft_wrap=True)
         self._alerts = max(self._alerts, len(snapshot.alerts))

@@ -129,7 +129,7 @@ def test_pipe_gets_a_line_at_each_change_of_state() -> None:
         view.update(snapshot(5.0, MissionState.LOITERING, ("battery_low: at 20 %",)))
     lines = out.getvalue().splitlines()
     assert "\x1b" not in out.getvalue()
-    assert len(lines) == 4
+    assert len(lines) == 3
     assert lines[0].startswith("[    0.0 s] tello enroute: to [north], E 0.0  N 0.0  up 1.5 m")
     assert "loitering" in lines[1]
     assert lines[2] == "alert: battery_low: at 20 %"
