@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
@@ -37,6 +39,24 @@ Names = Annotated[
         f"code. Default: {_SCHEDULERS}.",
     ),
 ]
+
+Duration = Annotated[
+    float | None, typer.Option(help="Simulated seconds; default 300, or the file's.")
+]
+Jobs = Annotated[int | None, typer.Option(help="Processes; default one per core.", min=1)]
+Address = Annotated[
+    str | None, typer.Option(help="Ray cluster (`host:port`, `auto`) whose cores share the seeds.")
+]
+
+
+@contextmanager
+def _errors_told() -> Iterator[None]:
+    """End the command with an error's message and exit code."""
+    try:
+        yield
+    except AeroDaaSError as error:
+        Console(stderr=True).print(f"[red]error:[/red] {error}", highlight=False)
+        raise typer.Exit(error.exit_code) from None
 
 
 @app.command()
@@ -77,9 +97,7 @@ def run(
             "95th percentiles instead of means."
         ),
     ] = "nominal",
-    duration: Annotated[
-        float | None, typer.Option(help="Simulated seconds; default 300, or the file's.")
-    ] = None,
+    duration: Duration = None,
     cloud_slots: Annotated[
         int | None,
         typer.Option(help="Executions in the cloud at once; default 32, or the flight's.", min=0),
@@ -88,13 +106,8 @@ def run(
         bool | None,
         typer.Option(help="Compute the clairvoyant bound; by default for up to 10 edges."),
     ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(help="Processes; default one per core.", min=1)
-    ] = None,
-    address: Annotated[
-        str | None,
-        typer.Option(help="Ray cluster (`host:port`, `auto`) whose cores share the seeds."),
-    ] = None,
+    jobs: Jobs = None,
+    address: Address = None,
     plots: Annotated[Path | None, typer.Option(help="Folder for plots.")] = None,
     json_path: Annotated[
         Path | None, typer.Option("--json", help="File for every figure and its interval.")
@@ -114,7 +127,7 @@ def run(
     """
     from aerodaas.cli.lab_study import study  # noqa: PLC0415 - loads numpy and the lab
 
-    try:
+    with _errors_told():
         study(
             ",".join(scheduler or [_SCHEDULERS]),
             ",".join(workload or [_WORKLOAD]),
@@ -131,9 +144,6 @@ def run(
             json_path=json_path,
             csv_path=csv_path,
         )
-    except AeroDaaSError as error:
-        Console(stderr=True).print(f"[red]error:[/red] {error}", highlight=False)
-        raise typer.Exit(error.exit_code) from None
 
 
 @app.command()
@@ -168,22 +178,15 @@ def sweep(
     ] = _WORKLOAD,
     network: Annotated[str, typer.Option(help="As for `run`, where it is not swept.")] = "steady",
     times: Annotated[str, typer.Option(help="As for `run`, where they are not swept.")] = "nominal",
-    duration: Annotated[
-        float | None, typer.Option(help="Simulated seconds; default 300, or the file's.")
-    ] = None,
+    duration: Duration = None,
     cloud_slots: Annotated[
         int | None, typer.Option(help="Executions in the cloud at once; default 32.", min=0)
     ] = None,
     bound: Annotated[
         bool, typer.Option("--bound", help="Compute the clairvoyant bound, too; it takes longer.")
     ] = False,
-    jobs: Annotated[
-        int | None, typer.Option(help="Processes; default one per core.", min=1)
-    ] = None,
-    address: Annotated[
-        str | None,
-        typer.Option(help="Ray cluster (`host:port`, `auto`) whose cores share the seeds."),
-    ] = None,
+    jobs: Jobs = None,
+    address: Address = None,
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for tables and plots.")] = Path(
         "sweep"
     ),
@@ -201,7 +204,7 @@ def sweep(
     """
     from aerodaas.cli.lab_sweep import sweep as run_all  # noqa: PLC0415 - loads numpy and the lab
 
-    try:
+    with _errors_told():
         run_all(
             ",".join(scheduler or [_SCHEDULERS]),
             sweeps,
@@ -218,9 +221,6 @@ def sweep(
             address=address,
             out=out,
         )
-    except AeroDaaSError as error:
-        Console(stderr=True).print(f"[red]error:[/red] {error}", highlight=False)
-        raise typer.Exit(error.exit_code) from None
 
 
 @app.command("list")

@@ -91,8 +91,8 @@ class Robot(PaperNames, IRobot):
         With `wait=False`, return as soon as it flies; as a guest of another application, which
         flies, at once. While the mission flies, this waits for it; after its end, it flies again:
         the navigation given to `navigate` since, or else the same. `speed` is that of
-        `Environment.start_mission`. Raises
-        the project's errors; whatever happens, the drone is landed and the recording closed first.
+        `Environment.start_mission`. Raises the project's errors; whatever happens, the drone is
+        landed and the recording closed first.
         """
         self._environment.start_mission(hook, wait=wait, speed=speed)
 

@@ -14,7 +14,7 @@ import numpy as np
 from aerodaas.config.extras import require_extra
 from aerodaas.dataflow.graph import AeroStreamData
 from aerodaas.recording.export.tabular import table_of
-from aerodaas.recording.pictures import detections
+from aerodaas.recording.pictures import DETECTIONS_SCHEMA, detections
 from aerodaas.recording.reader import Recording
 from aerodaas.types.clock import seconds as to_seconds
 from aerodaas.types.data import Detections, Frame, Header
@@ -28,7 +28,6 @@ __all__ = ["live_table", "recorded_table"]
 _TIME = "seconds"
 """Name of the index: mission seconds of capture."""
 _AXES = ("east", "north", "up")
-_DETECTIONS = "aerodaas.Detections"
 _PIXELS = ("image", "depth", "camera", "odometry", "nearest")
 """Fields of a frame and of detections that make no columns."""
 Row = dict[str, Any]
@@ -97,7 +96,7 @@ def recorded_table(recording: str | Path, what: str | AeroStreamData[Any]) -> Da
     name = what if isinstance(what, str) else what.name
     with Recording.open(recording) as opened:
         topic = _channel(opened, name)
-        if topic in opened.topics and opened.topics[topic].schema == _DETECTIONS:
+        if topic in opened.topics and opened.topics[topic].schema == DETECTIONS_SCHEMA:
             found = (one for channel, one in detections(opened) if channel == topic)
             rows = [
                 {_TIME: to_seconds(one.header.stamp), **row} for one in found for row in _rows(one)

@@ -7,12 +7,13 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 from typing_extensions import Self
 
 from aerodaas.dataflow.mission_document import WaypointEntry
 from aerodaas.mission.commands import RearrangeNavigation, ReleaseControls, Steer, TakeControls
 from aerodaas.mission.survey import MOST_CORNERS
+from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.schemas import Number, Word
 from aerodaas.types.waypoints import VelocityCommand
 
@@ -28,13 +29,7 @@ _Length = Annotated[float, Field(gt=0, le=_MOST_METRES, allow_inf_nan=False)]
 _Corner = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 
 
-class _In(BaseModel):
-    """Base of requests: unknown keys are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class SurveyIn(_In):
+class SurveyIn(RequestModel):
     """Request of a plan to survey an area; nothing is flown."""
 
     robot: Word
@@ -64,10 +59,8 @@ class SurveyIn(_In):
         return self
 
 
-class SurveyOut(BaseModel):
+class SurveyOut(AnswerModel):
     """A survey as it would be flown; its waypoints are added by `navigation`."""
-
-    model_config = ConfigDict(frozen=True)
 
     waypoints: list[WaypointEntry]
     width: float
@@ -86,7 +79,7 @@ class SurveyOut(BaseModel):
     """Where the drone will come from: its last coming waypoint, or where it is."""
 
 
-class RearrangeIn(_In):
+class RearrangeIn(RequestModel):
     """Change of the coming waypoints of one robot: one command, carried out whole."""
 
     robot: Word
@@ -100,7 +93,7 @@ class RearrangeIn(_In):
         return RearrangeNavigation(tuple(self.order), tuple(self.remove))
 
 
-class SteerIn(_In):
+class SteerIn(RequestModel):
     """A velocity by hand, in the drone's level frame; it is good for a third of a second."""
 
     forward: _Axis = 0.0
@@ -116,7 +109,7 @@ class SteerIn(_In):
         return VelocityCommand(self.forward, self.left, self.up, self.yaw_rate)
 
 
-class ControlsIn(_In):
+class ControlsIn(RequestModel):
     """A command of manual control, as the service hands it to a flight's own process."""
 
     robot: Word
@@ -146,10 +139,8 @@ class ControlsIn(_In):
         return ReleaseControls(self.session)
 
 
-class ControlsOut(BaseModel):
+class ControlsOut(AnswerModel):
     """Answer to a velocity by hand."""
-
-    model_config = ConfigDict(frozen=True)
 
     held: bool
     """Whether the sender has the controls; if not, the connection ends."""

@@ -8,21 +8,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.protocol.bases import AnswerModel
 from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
 
 __all__ = ["AlertOut", "PlaceOut", "PlaybackOut", "RecordedOut", "TrackOut"]
 
 
-class _Out(BaseModel):
-    """Base of answers."""
-
-    model_config = ConfigDict(frozen=True)
-
-
-class PlaceOut(_Out):
+class PlaceOut(AnswerModel):
     """A waypoint of the plan."""
 
     since: float
@@ -32,7 +27,7 @@ class PlaceOut(_Out):
     """Metres east, north and up of home."""
 
 
-class AlertOut(_Out):
+class AlertOut(AnswerModel):
     """An alert."""
 
     time: float
@@ -41,7 +36,7 @@ class AlertOut(_Out):
     text: str
 
 
-class TrackOut(_Out):
+class TrackOut(AnswerModel):
     """One robot's flight.
 
     Its status at a time is the last one of `statuses` until then, with the figures of the last
@@ -62,7 +57,7 @@ class TrackOut(_Out):
     """Waypoints as they became known; a later one of the same id takes the place of an earlier."""
 
 
-class RecordedOut(_Out):
+class RecordedOut(AnswerModel):
     """A recorded flight."""
 
     name: str
@@ -83,7 +78,7 @@ class RecordedOut(_Out):
     """Streams of pictures and of what was found in them, by name."""
 
 
-class PlaybackOut(_Out):
+class PlaybackOut(AnswerModel):
     """How far a recording has been read, and the flight once it was."""
 
     read: float = Field(ge=0, le=1)

@@ -9,11 +9,12 @@ import enum
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from aerodaas.analytics.remote.schemas import StatusOut, WaypointsIn
 from aerodaas.dataflow.mission_document import MissionDocument
 from aerodaas.mission.commands import AddNavigation
+from aerodaas.protocol.bases import AnswerModel, RequestModel
 from aerodaas.protocol.commands import CommandWord
 
 __all__ = [
@@ -127,26 +128,14 @@ class StreamKind(str, enum.Enum):
     DETECTIONS = "detections"
 
 
-class _In(BaseModel):
-    """Base of requests: unknown keys are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class _Out(BaseModel):
-    """Base of answers."""
-
-    model_config = ConfigDict(frozen=True)
-
-
-class RefusalOut(_Out):
+class RefusalOut(AnswerModel):
     """Answer to each request that is not carried out, with the HTTP status."""
 
     text: str
     """Why, and the remedy."""
 
 
-class RobotOut(_Out):
+class RobotOut(AnswerModel):
     """One drone of the fleet."""
 
     id: str
@@ -167,7 +156,7 @@ class RobotOut(_Out):
     """False after an operator has taken it out of service."""
 
 
-class FleetOut(_Out):
+class FleetOut(AnswerModel):
     """The fleet, and the environment that an application's graph is built against."""
 
     name: str
@@ -176,7 +165,7 @@ class FleetOut(_Out):
     """An environment file's content without addresses, paths, drivers' settings and secrets."""
 
 
-class LeaseIn(_In):
+class LeaseIn(RequestModel):
     """Request of drones for a time."""
 
     robots: Annotated[list[Word], Field(min_length=1, max_length=_MOST_ROBOTS)] | None = None
@@ -194,7 +183,7 @@ class LeaseIn(_In):
     """Where the drones will stay; intersected with the provider's fence."""
 
 
-class LeaseOut(_Out):
+class LeaseOut(AnswerModel):
     """A lease: while it is granted, its tenant alone flies its robots."""
 
     id: str
@@ -212,7 +201,7 @@ class LeaseOut(_Out):
     area: list[tuple[float, float]] | None = None
 
 
-class MissionIn(_In):
+class MissionIn(RequestModel):
     """A mission to be flown."""
 
     document: MissionDocument
@@ -229,7 +218,7 @@ class MissionIn(_In):
     """Of a simulated fleet."""
 
 
-class VerdictOut(_Out):
+class VerdictOut(AnswerModel):
     """Result of the rehearsal in simulation."""
 
     approved: bool
@@ -243,7 +232,7 @@ class VerdictOut(_Out):
     """Path of a PNG of the flight, at this service."""
 
 
-class AnalyticsOut(_Out):
+class AnalyticsOut(AnswerModel):
     """What the analytics scheduler has made of its tasks, from the start up to one time."""
 
     time: float
@@ -279,7 +268,7 @@ class AnalyticsOut(_Out):
         )
 
 
-class MissionOut(_Out):
+class MissionOut(AnswerModel):
     """A mission and its newest state."""
 
     id: str
@@ -308,7 +297,7 @@ class MissionOut(_Out):
     """Whether the recording can be fetched."""
 
 
-class CommandIn(_In):
+class CommandIn(RequestModel):
     """A command to one robot of a mission."""
 
     robot: Word
@@ -331,7 +320,7 @@ class NavigationIn(WaypointsIn):
         )
 
 
-class AccountIn(_In):
+class AccountIn(RequestModel):
     """A new account, or changes of one."""
 
     name: Word
@@ -347,7 +336,7 @@ class AccountOut(AccountIn):
     disabled: bool = False
 
 
-class TokenIn(_In):
+class TokenIn(RequestModel):
     """Request of a token for an account."""
 
     account: Word
@@ -356,7 +345,7 @@ class TokenIn(_In):
     """None: all of the account's."""
 
 
-class TokenOut(_Out):
+class TokenOut(AnswerModel):
     """A token; its secret is shown once."""
 
     id: str
@@ -369,7 +358,7 @@ class TokenOut(_Out):
     """What a request carries as `Authorization: Bearer …`; only in the answer that creates it."""
 
 
-class AuditOut(_Out):
+class AuditOut(AnswerModel):
     """One entry of the audit log."""
 
     at: float
@@ -384,7 +373,7 @@ class AuditOut(_Out):
     text: str = ""
 
 
-class UsageOut(_Out):
+class UsageOut(AnswerModel):
     """What one mission has used."""
 
     mission: str

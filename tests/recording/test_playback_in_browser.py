@@ -5,15 +5,14 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from played import served
 from required import needs_peer
 from synthetic_flight import SyntheticFlight, record
 
-from aerodaas.console.viewer import RecordingServer
 from aerodaas.recording.pictures import shots
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
@@ -64,16 +63,6 @@ def browser() -> Iterator[Browser]:
     """One for all tests here."""
     with Browser() as browser:
         yield browser
-
-
-@contextmanager
-def served(path: Path) -> Iterator[str]:
-    """The address of a recording's page."""
-    server = RecordingServer("127.0.0.1:0", Recording.open(path))
-    try:
-        yield server.address(viewer=True)
-    finally:
-        server.close()
 
 
 def facts(path: Path) -> tuple[RecordedFlight, dict[int, Any]]:

@@ -7,11 +7,11 @@ import time
 import urllib.error
 import urllib.request
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 import pytest
+from played import served
 from synthetic_flight import SyntheticFlight, record
 from typer.testing import CliRunner
 
@@ -33,16 +33,6 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("served") / "flight.mcap"
     record(path, SyntheticFlight(frames=2.0, hover=1.0))
     return path
-
-
-@contextmanager
-def served(path: Path) -> Iterator[str]:
-    """The address of a recording's page."""
-    server = RecordingServer("127.0.0.1:0", Recording.open(path))
-    try:
-        yield server.address(viewer=True)
-    finally:
-        server.close()
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,10 @@ import select
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.dialect import decoded, mavlink
 from aerodaas.drivers.mavlink.wire.finder import Finder, FoundVehicle
 from aerodaas.drivers.mavlink.wire.framing import Framer
 from aerodaas.drivers.mavlink.wire.link import LinkCounts
@@ -22,6 +23,7 @@ __all__ = ["LISTENED", "HeardVehicle", "MavlinkDiscovery", "hear_vehicles"]
 LISTENED = ("udpin:0.0.0.0:14540", "udpin:0.0.0.0:14550", "tcp:127.0.0.1:5760")
 """Where an autopilot is heard by default: PX4's offboard port, the ground station's, and the first
 serial port of ArduPilot's simulator, which is this machine's own."""
+_WANTED = frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT})
 _MOST_PEERS = 64
 _TICK = 0.05
 
@@ -101,10 +103,12 @@ class _Ear:
     def hear(self) -> None:
         """Process what has arrived."""
         for content, peer in self.wire.receive():
-            if peer not in self.framers and len(self.framers) >= _MOST_PEERS:
-                continue
-            wanted = frozenset({mavlink.MAVLINK_MSG_ID_HEARTBEAT})
-            framer = self.framers.setdefault(peer, Framer(wanted, _decoded))
+            if peer not in self.framers:
+                if len(self.framers) >= _MOST_PEERS:
+                    continue
+                reader = mavlink.MAVLink(None)
+                self.framers[peer] = Framer(_WANTED, partial(decoded, reader))
+            framer = self.framers[peer]
             for message in framer.feed(content):
                 system: int = message.get_srcSystem()  # type: ignore[attr-defined]
                 settings = MavlinkSettings(url=self.url)
@@ -132,11 +136,3 @@ class _Ear:
         if found.peer is not None and found.peer[0].startswith("127."):
             return self.url.replace("0.0.0.0", "127.0.0.1")  # noqa: S104 - taken out
         return self.url
-
-
-def _decoded(frame: bytearray) -> object:
-    try:
-        message = mavlink.MAVLink(None).decode(frame)
-    except mavlink.MAVError:
-        return None
-    return None if message.get_type().startswith("UNKNOWN") else message

@@ -6,7 +6,7 @@ import importlib
 import struct
 from typing import Any, ClassVar
 
-__all__ = ["EventMessage", "mavlink"]
+__all__ = ["EventMessage", "decoded", "mavlink"]
 
 mavlink: Any = importlib.import_module("pymavlink.dialects.v20.ardupilotmega")
 """Dialect of both autopilots: the common messages and ArduPilot's own. It has no types."""
@@ -86,3 +86,12 @@ class EventMessage(mavlink.MAVLink_message):  # type: ignore[misc]
 
 
 mavlink.mavlink_map.setdefault(EventMessage.id, EventMessage)
+
+
+def decoded(reader: Any, frame: bytearray) -> Any:  # noqa: ANN401 - pymavlink has no types
+    """The message in a whole packet; None for one that is damaged or that the dialect lacks."""
+    try:
+        message = reader.decode(frame)
+    except mavlink.MAVError:
+        return None
+    return None if message.get_type().startswith("UNKNOWN") else message

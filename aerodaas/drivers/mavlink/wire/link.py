@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, TypeAlias
 
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
-from aerodaas.drivers.mavlink.wire.dialect import EventMessage, mavlink
+from aerodaas.drivers.mavlink.wire.dialect import EventMessage, decoded, mavlink
 from aerodaas.drivers.mavlink.wire.forwarding import Forwarder
 from aerodaas.drivers.mavlink.wire.framing import Framer
 from aerodaas.drivers.mavlink.wire.senders import Sender, SenderPins
@@ -249,12 +249,8 @@ class MavlinkLink:
         return self._framers[peer]
 
     def _decode(self, frame: bytearray) -> Message | None:
-        try:
-            with self._lock:
-                message = self._mav.decode(frame)
-        except mavlink.MAVError:
-            return None
-        return None if message.get_type().startswith("UNKNOWN") else message
+        with self._lock:
+            return decoded(self._mav, frame)
 
     def _take(self, message: Message, peer: Peer, now: float) -> None:
         sender: Sender = (message.get_srcSystem(), message.get_srcComponent())
