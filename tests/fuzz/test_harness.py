@@ -8,6 +8,7 @@ import pytest
 
 from tools.fuzz import limits
 from tools.fuzz.campaign import Result, fuzz, replay
+from tools.fuzz.finding import Finding
 from tools.fuzz.limits import Limits, TooLongError
 
 _TARGET = "tests.fuzz.broken_target"
@@ -81,16 +82,18 @@ def test_time_without_a_processor_is_read() -> None:
     assert limits.kept_waiting(2**22 + 1) == 0.0
 
 
-def test_what_was_found_before_an_interruption_is_kept() -> None:
-    """A campaign of hours may be ended at any time."""
+def test_a_finding_is_told_when_it_is_met() -> None:
+    """A campaign of hours may be interrupted at any time, or killed."""
+    told: list[Finding] = []
 
-    def stop(result: Result) -> None:
-        if result.findings:
+    def stop(_result: Result) -> None:
+        if told:
             raise KeyboardInterrupt
 
-    result = fuzz(f"{_TARGET}_by_luck", seconds=600.0, seed=5, progress=stop)
+    result = fuzz(f"{_TARGET}_by_luck", seconds=600.0, seed=5, progress=stop, found=told.append)
     assert result.interrupted
-    assert len(result.findings) == 1
+    assert result.findings == told
+    assert len(told) == 1
     assert result.inputs > 0
 
 

@@ -12,6 +12,7 @@ import typer
 
 from aerodaas.cli.app import run_typer
 from tools.fuzz.campaign import Result, fuzz, replay
+from tools.fuzz.finding import Finding
 from tools.fuzz.limits import Limits
 from tools.fuzz.target import CORPUS, load_target, target_names
 
@@ -41,8 +42,8 @@ def main(
 ) -> None:
     """Mutate valid inputs, and tell those that raise, hang, crash or exhaust memory.
 
-    Each finding is written below tests/fuzz/corpus, from where tests replay it. Ends, by Ctrl-C as
-    well, with a JSON summary, and with exit code 1 if anything was found.
+    Each finding is written below tests/fuzz/corpus when it is met; tests replay it from there.
+    Ends, by Ctrl-C as well, with a JSON summary, and with exit code 1 if anything was found.
 
         python -m tools.fuzz plan gps_track --inputs 100000
         nice -n 19 python -m tools.fuzz all --seconds 3600 --seed 7 --jobs 2
@@ -59,20 +60,21 @@ def main(
     summary = {}
     for name in names:
         limits = Limits(limit, 5 * limit, memory * 2**20)
+        findings = _Findings(name, output / name)
         if replay_:
-            result = replay(name, [path.read_bytes() for path in replay_], limits)
-            summary[name] = _report(result, output / name)
-            continue
-        result = fuzz(
-            name,
-            inputs=inputs,
-            seconds=seconds,
-            seed=seed,
-            jobs=jobs,
-            limits=limits,
-            progress=_Line(),
-        )
-        summary[name] = _report(result, output / name)
+            result = replay(name, [path.read_bytes() for path in replay_], limits, findings.save)
+        else:
+            result = fuzz(
+                name,
+                inputs=inputs,
+                seconds=seconds,
+                seed=seed,
+                jobs=jobs,
+                limits=limits,
+                progress=_Line(),
+                found=findings.save,
+            )
+        summary[name] = _summary(result, findings.told)
         if result.interrupted:
             break
     typer.echo(json.dumps({"seed": seed, "targets": summary}, indent=2))
@@ -99,15 +101,25 @@ class _Line:
             sys.stderr.flush()
 
 
-def _report(result: Result, folder: Path) -> dict[str, Any]:
-    """Write and print the findings; what the summary says of the target."""
-    if sys.stderr.isatty():
-        sys.stderr.write("\r\x1b[K")
-    told = []
-    for finding in result.findings:
-        path = finding.save(folder)
-        typer.echo(f"{result.target}: {finding.kind}: {path}\n{finding.trace}", err=True)
-        told.append({"kind": finding.kind, "error": finding.title, "file": str(path)})
+class _Findings:
+    """Writes and prints each finding of a target when it is met."""
+
+    def __init__(self, target: str, folder: Path) -> None:
+        self.told: list[dict[str, str]] = []
+        self._target = target
+        self._folder = folder
+
+    def save(self, finding: Finding) -> None:
+        """Write it to the target's folder, and its traceback to the terminal."""
+        path = finding.save(self._folder)
+        if sys.stderr.isatty():
+            sys.stderr.write("\r\x1b[K")
+        typer.echo(f"{self._target}: {finding.kind}: {path}\n{finding.trace}", err=True)
+        self.told.append({"kind": finding.kind, "error": finding.title, "file": str(path)})
+
+
+def _summary(result: Result, told: list[dict[str, str]]) -> dict[str, Any]:
+    """What the summary says of a target."""
     return {
         "inputs": result.inputs,
         "seconds": round(result.seconds, 1),

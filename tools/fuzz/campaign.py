@@ -41,6 +41,8 @@ class Result:
     growth: int = 0
     """Bytes by which the memory of the worker that grew most did so."""
     findings: list[Finding] = field(default_factory=list)
+    found: Callable[[Finding], None] = field(default=lambda _: None, repr=False)
+    """Called with each finding when it is met, for a campaign of hours can end at any time."""
     interrupted: bool = False
     """Whether it was ended from the keyboard: what it has found until then is here."""
 
@@ -48,6 +50,7 @@ class Result:
         """Keep a finding unless an equal one is known."""
         if all(finding.signature != known.signature for known in self.findings):
             self.findings.append(finding)
+            self.found(finding)
 
 
 def fuzz(
@@ -59,6 +62,7 @@ def fuzz(
     jobs: int = 1,
     limits: Limits | None = None,
     progress: Callable[[Result], None] = lambda _: None,
+    found: Callable[[Finding], None] = lambda _: None,
 ) -> Result:
     """Feed a target with its pool and mutations of it.
 
@@ -71,6 +75,7 @@ def fuzz(
         jobs: Workers at once.
         limits: Of one input.
         progress: Called a few times a second.
+        found: Called with each finding when it is met.
 
     Returns what was found, also if it is interrupted (Ctrl-C).
     """
@@ -89,15 +94,20 @@ def fuzz(
             )
             for index in range(jobs)
         ]
-        return _watched(target, plans, progress)
+        return _watched(Result(target, found=found), plans, progress)
 
 
-def replay(target: str, inputs: Sequence[bytes], limits: Limits | None = None) -> Result:
+def replay(
+    target: str,
+    inputs: Sequence[bytes],
+    limits: Limits | None = None,
+    found: Callable[[Finding], None] = lambda _: None,
+) -> Result:
     """Run inputs as they are, all of them, whatever the first ones do."""
     with _folder() as folder:
         box, log = folder / "replay.box", folder / "replay.log"
         job = Job(target, box, log, "", limits=limits or Limits(), fixed=tuple(inputs))
-        return _watched(target, [job], lambda _: None)
+        return _watched(Result(target, found=found), [job], lambda _: None)
 
 
 @contextmanager
@@ -106,9 +116,8 @@ def _folder() -> Iterator[Path]:
         yield Path(name)
 
 
-def _watched(target: str, jobs: list[Job], progress: Callable[[Result], None]) -> Result:
+def _watched(result: Result, jobs: list[Job], progress: Callable[[Result], None]) -> Result:
     begun = time.monotonic()
-    result = Result(target)
     watchers = [_Watcher(job, result) for job in jobs]
     try:
         while any([watcher.step() for watcher in watchers]):  # noqa: C419 - all of them
