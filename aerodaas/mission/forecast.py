@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
@@ -12,12 +13,15 @@ from aerodaas.mission.safety.supervisor import has_position
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.energy import EnergyMeter
 from aerodaas.types.geometry import Vector
+from aerodaas.types.status import BatteryOutlook
 from aerodaas.types.vehicle import VehicleState
 from aerodaas.types.waypoints import Waypoint
 
 __all__ = ["BatteryForecast"]
 
 _PERIOD = NANOSECONDS
+_FRESH = 2 * _PERIOD
+"""Nanoseconds for which an outlook counts."""
 _PATIENCE = 10 * NANOSECONDS
 """Nanoseconds for which the forecast must find the battery too small before an alert is raised."""
 _MARGIN = 1.1
@@ -39,6 +43,8 @@ class BatteryForecast:
         self._meter = meter
         self._log = log
         self._due = 0
+        self._outlook: BatteryOutlook | None = None
+        self._looked = 0
         self._told = False
         self._short_since: int | None = None
         """Mission clock since which every forecast has found the battery too small for the plan."""
@@ -55,10 +61,10 @@ class BatteryForecast:
         if now < self._due or not has_position(state):
             return
         self._due = now + _PERIOD
+        position, speed = state.odometry.position, self._limits.cruise_speed
         route = [self._as_flown(stop) for stop in stops]
-        needed = self._meter.route(
-            state.odometry.position, route, self._home, self._limits.cruise_speed
-        )
+        needed = self._meter.route(position, route, self._home, speed)
+        self._outlook, self._looked = self._look(state, needed), now
         available = state.battery.fraction - self._limits.battery_land
         if not (route and needed > max(0.0, available) * _MARGIN):
             self.fault, self._short_since = "", None
@@ -74,6 +80,20 @@ class BatteryForecast:
         if surely and not self._told:
             self._told = True
             self._log.alert(now, "unreachable_plan", self.fault)
+
+    def outlook(self, now: int) -> BatteryOutlook | None:
+        """How far the battery lasts, if that was looked at just before `now`."""
+        return self._outlook if now - self._looked <= _FRESH else None
+
+    def _look(self, state: VehicleState, needed: float) -> BatteryOutlook | None:
+        """Compare the charge with that at which the supervisor has the drone return."""
+        charge, limits = state.battery.fraction, self._limits
+        if not math.isfinite(charge):
+            return None
+        home = self._meter.way_home(state.odometry.position, self._home, limits.cruise_speed)
+        returns_at = max(limits.battery_return, home + limits.battery_land)
+        hover = max(0.0, charge - returns_at) / self._meter.hover(1.0)
+        return BatteryOutlook(needed + limits.battery_land, returns_at, hover)
 
     def _as_flown(self, stop: QueuedWaypoint) -> Waypoint:
         """The rest of a stop: its remaining hover, at no more than the permitted speed."""

@@ -165,6 +165,7 @@ class Mission:
             self._log.visits,
             self._log.waypoint_counts(stop.id for stop in stops),
             self._manual.operator(self._now),
+            self._forecast.outlook(self._now),
         )
 
     def handle(self, command: Command, now: int) -> Answer:
@@ -421,6 +422,7 @@ class Mission:
     def _stay(self, state: VehicleState) -> Action:
         """Hover, unless somebody flies by hand."""
         self._to(MissionState.PAUSED, self._manual.reason(self._now))
+        self._forecast_battery(state)
         velocity = self._manual.velocity(self._now)
         if velocity is None or self._assessment.demand is FailsafeAction.HOLD:
             return self._hover(state)

@@ -13,7 +13,7 @@ from rich.text import Text
 
 from aerodaas.terminal.plan import braille_plan
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
-from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleState
 
 __all__ = [
@@ -59,6 +59,13 @@ def waypoints_text(mission: MissionStatus) -> tuple[float, str]:
     return mission.progress, f"{visited} of {known} waypoints" if known else "no waypoints"
 
 
+def outlook_text(outlook: BatteryOutlook) -> str:
+    """How far the battery lasts, in words."""
+    minutes, seconds = divmod(round(outlook.hover), 60)
+    plan = f"{outlook.plan:.0%}" if outlook.plan <= 1 else "more"
+    return f"returns at {outlook.returns_at:.0%}, in {minutes}:{seconds:02}; plan needs {plan}"
+
+
 def robot_panel(
     robot: RobotSnapshot, path: Sequence[tuple[float, float]], *, ascii_only: bool
 ) -> RenderableType:
@@ -72,6 +79,8 @@ def robot_panel(
     facts.add_row("waypoint", _waypoint(mission, vehicle))
     facts.add_row("position", _position(vehicle))
     facts.add_row("battery", _battery(vehicle))
+    if mission is not None and mission.outlook is not None:
+        facts.add_row("", outlook_text(mission.outlook))
     facts.add_row("progress", _progress(mission))
     facts.add_row("flown", f"{mission.distance:.1f} m" if mission else "")
     facts.add_row("faults", _faults(mission, vehicle))

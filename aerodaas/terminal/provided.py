@@ -20,7 +20,7 @@ from aerodaas.terminal.live import MissionView
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 from aerodaas.types.waypoints import Waypoint
 
@@ -99,11 +99,12 @@ class ProvidedView:
         return RobotSnapshot(name, self._mission(status), _vehicle(status))
 
     def _mission(self, status: StatusOut) -> MissionStatus:
-        known = {state.value: state for state in MissionState}
+        states = {state.value: state for state in MissionState}
+        known = status.outlook
         ahead = [self._places[one] for one in status.pending if one in self._places]
         return MissionStatus(
             stamp=round(status.time * NANOSECONDS),
-            state=known.get(status.state, MissionState.IDLE),
+            state=states.get(status.state, MissionState.IDLE),
             reason=status.reason,
             target=self._places.get(status.target or ""),
             pending=tuple(ahead),
@@ -113,6 +114,7 @@ class ProvidedView:
             faults=tuple(status.faults),
             visits=status.waypoints_visited,
             waypoint_counts=(status.waypoints_visited, status.waypoints_known),
+            outlook=None if known is None else BatteryOutlook(**known.model_dump()),
         )
 
 

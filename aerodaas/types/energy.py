@@ -130,6 +130,10 @@ class EnergyMeter:
             return 1.0
         return max(1.0, self._spent / self._expected)
 
+    def hover(self, duration: float) -> float:
+        """Charge for `duration` seconds in one place, by the model as scaled."""
+        return self.scale * self.model.hover(duration)
+
     def way_home(self, position: Vector, home: Vector, speed: float) -> float:
         """Charge to come home, by the model as scaled."""
         return self.scale * self.model.way_home(position, home, speed)

@@ -13,6 +13,7 @@ from aerodaas.types.waypoints import Waypoint
 
 __all__ = [
     "RECENT",
+    "BatteryOutlook",
     "Decision",
     "Message",
     "MissionState",
@@ -55,6 +56,20 @@ class MissionState(str, enum.Enum):
 
 @fast_pickle
 @dataclass(frozen=True, slots=True)
+class BatteryOutlook:
+    """How far the battery lasts, by the energy model as this flight scaled it; charges 0 to 1."""
+
+    plan: float
+    """Charge that the rest of the plan, the way home and the reserve of a landing need now; more
+    than 1 where no battery has it."""
+    returns_at: float
+    """Charge at which the drone would return from where it is."""
+    hover: float
+    """Seconds until then, if it stays where it is; 0 where it is due."""
+
+
+@fast_pickle
+@dataclass(frozen=True, slots=True)
 class MissionStatus:
     """The mission at one moment."""
 
@@ -81,6 +96,8 @@ class MissionStatus:
     """How many waypoints were visited, and how many are known; one visited twice is one."""
     pilot: str = ""
     """Who flies the drone by hand now; empty for nobody."""
+    outlook: BatteryOutlook | None = None
+    """None while it leaves, is on the ground, or does not know its charge or place."""
 
     @property
     def progress(self) -> float:

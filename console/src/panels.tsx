@@ -3,6 +3,7 @@
 import { useEffect, useState } from "preact/hooks";
 import { type Flight, type Order, type Word, speedOf } from "./flight";
 import type { Point } from "./place";
+import { Sound } from "./sound";
 import type { NavigationIn, StatusOut } from "./wire";
 
 export function StatePanel({ flight, robot }: { flight: Flight; robot: string }) {
@@ -17,6 +18,8 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
   const height = status.position?.[2];
   const speed = speedOf(status);
   const silent = status.mode === "lost" || status.faults.length > 0;
+  const outlook = status.outlook;
+  const short = outlook != null && status.battery !== null && outlook.plan > status.battery;
   const link = status.mode === "lost" ? "lost" : flight.stale ? "stale" : "up";
   return (
     <section class={`card state ${flight.stale ? "stale" : ""}`} aria-label="State">
@@ -38,6 +41,19 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
           value={status.battery === null ? undefined : (100 * status.battery).toFixed(0)}
           bar={status.battery}
         />
+        <Figure
+          name="Returns at"
+          unit={outlook ? `%, in ${clock(outlook.hover)}` : "%"}
+          title="Charge at which it goes home from where it is, and how long it can hover until then"
+          value={outlook ? (100 * outlook.returns_at).toFixed(0) : undefined}
+        />
+        <Figure
+          name="Plan needs"
+          unit="%"
+          title="Charge that the rest of the plan, the way home and the landing's reserve need now"
+          value={outlook ? (100 * outlook.plan).toFixed(0) : undefined}
+          tone={short ? "bad" : ""}
+        />
         <Figure name="Flown" unit="m" value={status.distance.toFixed(0)} />
         <Figure
           name="Waypoints"
@@ -47,6 +63,11 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
         <Figure name="Mission time" unit="s" value={status.time.toFixed(0)} />
         <Figure name="Link" value={link} tone={link === "up" ? "good" : "bad"} />
         <Figure name="Mode" value={status.mode ?? undefined} />
+        <Figure
+          name="GPS"
+          unit={status.position_sigma == null ? "satellites" : `sat., ±${status.position_sigma.toFixed(1)} m`}
+          value={status.satellites?.toString()}
+        />
       </dl>
       {silent && status.faults.length > 0 && (
         <ul class="faults">
@@ -65,16 +86,23 @@ const UNSAID: Record<string, string> = {
   paused: "hovers until it is told to resume",
 };
 
+/** Minutes and seconds. */
+function clock(seconds: number): string {
+  const whole = Math.round(seconds);
+  return `${Math.floor(whole / 60)}:${String(whole % 60).padStart(2, "0")}`;
+}
+
 function Figure(props: {
   name: string;
   unit?: string;
   value: string | undefined;
   bar?: number | null;
   tone?: string;
+  title?: string;
 }) {
   const low = props.bar != null && props.bar < 0.3;
   return (
-    <div class="figure">
+    <div class="figure" title={props.title ?? ""}>
       <dt>{props.name}</dt>
       <dd class={props.tone ?? ""}>
         {props.value ?? "—"} {props.value !== undefined && <small>{props.unit}</small>}
@@ -284,6 +312,7 @@ export function Alerts({ flight }: { flight: Flight }) {
               ? `${open.length} new`
               : "none new"}
         </span>
+        {!flight.recorded && <Sound flight={flight} />}
         {open.length > 1 && (
           <button type="button" class="plain" onClick={() => flight.acknowledge(null)}>
             Acknowledge all

@@ -154,6 +154,7 @@ export interface StatusOut {
   longitude: number | null;
   measured: number | null;
   mode: string | null;
+  outlook: OutlookOut | null;
   pending: string[];
   pilot: string;
   places: {
@@ -164,7 +165,9 @@ export interface StatusOut {
     [k: string]: [number, number, number];
   };
   position: (number | null)[] | null;
+  position_sigma: number | null;
   reason: string;
+  satellites: number | null;
   state: string;
   target: string | null;
   time: number;
@@ -173,6 +176,14 @@ export interface StatusOut {
   waypoints_known: number;
   waypoints_visited: number;
   yaw: number | null;
+}
+/**
+ * How far the battery lasts from here, by the energy model as the flight has shown it.
+ */
+export interface OutlookOut {
+  hover: number;
+  plan: number;
+  returns_at: number;
 }
 /**
  * Result of the rehearsal in simulation.

@@ -13,9 +13,9 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.console.server import ConsoleServer
 from aerodaas.dataflow.graph import Graph
 from aerodaas.mission.commands import Answer, Command
-from aerodaas.types.data import Battery, Odometry
+from aerodaas.types.data import Alert, Battery, GpsFix, Odometry
 from aerodaas.types.errors import MissionError
-from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 from aerodaas.types.waypoints import Waypoint
 
@@ -38,6 +38,7 @@ class Run:
         self.state: Any = None
         self.commands: list[Command] = []
         self.notes: list[str] = []
+        self.alerts: list[Alert] = []
 
     def look(self, newest: int = 200) -> Any:  # noqa: ANN401 - a FlightState's shape
         """Enroute to a waypoint."""
@@ -45,11 +46,14 @@ class Run:
         target = Waypoint("wp1", 3, 4, 2, waypoint_type="local")
         still = np.zeros(3)
         odometry = Odometry(np.array([1.0, 2.0, 3.0]), still, 0.0)
-        vehicle = VehicleState(1, odometry, Battery(0.5), VehicleMode.GUIDED, armed=True)
-        status = MissionStatus(10**9, MissionState.ENROUTE, "flying to wp1", target)
-        return SimpleNamespace(
-            robots={"drone": SimpleNamespace(status=status, state=vehicle)}, alerts=[], reports={}
+        fix = GpsFix(50.0, 8.0, 120.0, horizontal_sigma=1.24, satellites=14)
+        vehicle = VehicleState(1, odometry, Battery(0.5), VehicleMode.GUIDED, armed=True, gps=fix)
+        outlook = BatteryOutlook(plan=0.61, returns_at=0.27, hover=207.0)
+        status = MissionStatus(
+            10**9, MissionState.ENROUTE, "flying to wp1", target, outlook=outlook
         )
+        robots = {"drone": SimpleNamespace(status=status, state=vehicle)}
+        return SimpleNamespace(robots=robots, alerts=list(self.alerts), reports={})
 
     def command(self, robot: str, command: Command) -> Answer:
         """Remember it."""

@@ -14,6 +14,7 @@ from hovering import console
 from required import needs_peer
 
 from aerodaas.recording.reader import Recording
+from aerodaas.types.data import Alert, Header
 from tools.browser import Browser, Page
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock, needs_peer("AERODAAS_BROWSER")]
@@ -177,3 +178,31 @@ def test_it_fits(browser: Browser, width: int, height: int) -> None:
         assert page.complaints() == []
         asked = browser.open(server.address().partition("#")[0])
         asked.until("document.querySelector('input[name=token]')")
+
+
+def test_battery_and_alerts_are_told_ahead(browser: Browser) -> None:
+    """What the plan needs, red where the battery has less; a tone for each alert, once asked for.
+
+    The tones are counted: what a loudspeaker makes of them cannot be heard here.
+    """
+    with console() as (server, run):
+        page = browser.open(server.address())
+        page.until("document.querySelector('.state')?.innerText.includes('GPS')")
+        said = page.text(".state").replace("\n", " ").lower()
+        for words in ("returns at 27 %, in 3:27", "plan needs 61 %", "gps 14 sat., ±1.2 m"):
+            assert words in said
+        assert "61" in page.text(".state dd.bad")
+
+        page.run(
+            "AudioContext.prototype.createOscillator = (make => function () {"
+            "window.tones = (window.tones ?? 0) + 1; return make.call(this); })"
+            "(AudioContext.prototype.createOscillator)"
+        )
+        run.alerts.append(Alert(Header(0, 0, "drone"), "wind", "it blows"))
+        page.until("document.querySelector('.alerts li.new')?.innerText.includes('it blows')")
+        assert page.run("window.tones ?? 0") == 0
+        page.press(".alerts [aria-pressed]")
+        page.until("window.tones === 2")  # how it will sound
+        run.alerts.append(Alert(Header(1, 0, "drone"), "wind", "it blows harder"))
+        page.until("window.tones === 4")
+        assert page.complaints() == []

@@ -16,7 +16,7 @@ from aerodaas.terminal.live import MissionView
 from aerodaas.terminal.plan import braille_plan
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot, StreamSnapshot
 from aerodaas.types.data import Battery, Odometry
-from aerodaas.types.status import MissionState, MissionStatus
+from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 from aerodaas.types.waypoints import Waypoint
 
@@ -37,6 +37,7 @@ def snapshot(
         ("start",),
         visits=1,
         waypoint_counts=(1, 3),
+        outlook=BatteryOutlook(plan=0.614, returns_at=0.27, hover=65.4),
     )
     odometry = Odometry(np.array([-0.01, time, 1.5]), np.array([0.0, 1.0, 0.0]), 1.57)
     vehicle = VehicleState(0, odometry, Battery(0.5), VehicleMode.GUIDED, armed=True)
@@ -80,6 +81,7 @@ def test_panel_shows_what_matters(width: int) -> None:
         "north (0.0, 10.0, 1.5), 5.0 m away",
         "E 0.0  N 5.0  up 1.5 m, 1.0 m/s",
         "50 %",
+        "returns at 27%, in 1:05; plan needs 61%",
         "1 of 3 waypoints",
         "14.9",
         "Dems: 93 % of 120 in time",

@@ -16,7 +16,7 @@ from aerodaas.types.status import MissionStatus
 from aerodaas.types.vehicle import VehicleState
 from aerodaas.types.waypoints import NavigationType, SchedulingType, Waypoint
 
-__all__ = ["AnswerOut", "StatusOut", "WaypointsIn"]
+__all__ = ["AnswerOut", "OutlookOut", "StatusOut", "WaypointsIn"]
 
 _MOST_WAYPOINTS = 1000
 
@@ -69,6 +69,18 @@ class AnswerOut(BaseModel):
         return cls(accepted=answer.accepted, text=answer.text, refused=dict(answer.refused))
 
 
+class OutlookOut(BaseModel):
+    """How far the battery lasts from here, by the energy model as the flight has shown it."""
+
+    plan: float
+    """Charge that the rest of the plan, the way home and the reserve of a landing need now; more
+    than 1 where no battery has it."""
+    returns_at: float
+    """Charge at which the drone would return from where it is, 0 to 1."""
+    hover: float
+    """Seconds until then, if it stays where it is."""
+
+
 class StatusOut(BaseModel):
     """Status of mission and vehicle at one time; unknown values are null."""
 
@@ -106,9 +118,15 @@ class StatusOut(BaseModel):
     """Radians counter-clockwise from east."""
     battery: float | None = None
     """Charge left, 0 to 1."""
+    outlook: OutlookOut | None = None
+    """How far the battery lasts; null while that is not known, or of no meaning."""
     latitude: float | None = None
     longitude: float | None = None
     altitude: float | None = None
+    position_sigma: float | None = None
+    """Metres, one standard deviation of latitude and longitude; null if unknown."""
+    satellites: int | None = None
+    """Satellites behind the global position; null if unknown."""
 
     @classmethod
     def of(cls, status: MissionStatus, vehicle: VehicleState | None) -> StatusOut:
@@ -126,6 +144,7 @@ class StatusOut(BaseModel):
             distance=status.distance,
             faults=list(status.faults),
             pilot=status.pilot,
+            outlook=_outlook(status),
             places={one.id: (one.x, one.y, one.z) for one in _ahead(status)},
         )
         if vehicle is None:
@@ -142,8 +161,17 @@ class StatusOut(BaseModel):
                 "latitude": _known(fix.latitude) if fix else None,
                 "longitude": _known(fix.longitude) if fix else None,
                 "altitude": _known(fix.altitude) if fix else None,
+                "position_sigma": (_known(fix.horizontal_sigma) or None) if fix else None,
+                "satellites": (fix.satellites or None) if fix else None,
             }
         )
+
+
+def _outlook(status: MissionStatus) -> OutlookOut | None:
+    known = status.outlook
+    if known is None or not math.isfinite(known.plan + known.hover):
+        return None
+    return OutlookOut(plan=known.plan, returns_at=known.returns_at, hover=known.hover)
 
 
 def _ahead(status: MissionStatus) -> tuple[Waypoint, ...]:

@@ -1,0 +1,55 @@
+"""A mission's status as JSON, there and back."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.types.data import Battery, GpsFix, Odometry
+from aerodaas.types.status import BatteryOutlook, MissionState, MissionStatus
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+
+SHARES = st.floats(0, 1)
+
+
+def status(outlook: BatteryOutlook | None) -> MissionStatus:
+    """Of a drone on its way."""
+    return MissionStatus(10**9, MissionState.ENROUTE, "on its way", outlook=outlook)
+
+
+@given(SHARES, SHARES, st.floats(0, 1e6))
+def test_how_far_the_battery_lasts_comes_across(plan: float, at: float, hover: float) -> None:
+    """As it was said, through JSON."""
+    said = StatusOut.of(status(BatteryOutlook(plan, at, hover)), None)
+    heard = StatusOut.model_validate_json(said.model_dump_json()).outlook
+    assert heard is not None
+    assert BatteryOutlook(**heard.model_dump()) == BatteryOutlook(plan, at, hover)
+
+
+@pytest.mark.parametrize("outlook", [None, BatteryOutlook(math.inf, 0.3, 10.0)])
+def test_what_is_no_figure_is_null(outlook: BatteryOutlook | None) -> None:
+    """A hover without end needs more charge than a number tells, and JSON has no infinity."""
+    assert '"outlook":null' in StatusOut.of(status(outlook), None).model_dump_json()
+
+
+@pytest.mark.parametrize(
+    ("fix", "said"),
+    [
+        (GpsFix(50.0, 8.0, 120.0, horizontal_sigma=1.5, satellites=9), (1.5, 9)),
+        (GpsFix(50.0, 8.0, 120.0), (None, None)),
+        (None, (None, None)),
+    ],
+)
+def test_a_driver_that_does_not_know_says_so(
+    fix: GpsFix | None, said: tuple[float | None, int | None]
+) -> None:
+    """Zero satellites and no error at all are what a driver leaves out, not what it measured."""
+    odometry = Odometry(np.array([0.0, 0.0, 1.0]), np.zeros(3), 0.0)
+    state = VehicleState(1, odometry, Battery(0.5), VehicleMode.GUIDED, armed=True, gps=fix)
+    told = StatusOut.of(status(None), state)
+    assert (told.position_sigma, told.satellites) == said
