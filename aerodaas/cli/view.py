@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,6 +16,10 @@ __all__ = ["view"]
 
 def view(
     recording: Recorded,
+    beside: Annotated[
+        Path | None, typer.Argument(help="Another one, played beside it.", show_default=False)
+    ] = None,
+    *,
     at: Annotated[
         float | None, typer.Option(min=0, help="Mission seconds at which it opens.")
     ] = None,
@@ -26,10 +32,11 @@ def view(
 ) -> None:
     """Play a recording in a browser: map, video, state and charts, by one timeline.
 
-    Ctrl-C ends it.
+    Two of them side by side, at the same mission time. Ctrl-C ends it.
 
         aerodaas view runs/farm_survey-20260101-120000/flight.mcap
         aerodaas view flight.mcap --at 63.5
+        aerodaas view dems/flight.mcap edf/flight.mcap
     """
     from aerodaas.config.extras import require_extra  # noqa: PLC0415 - only here
 
@@ -39,14 +46,12 @@ def view(
     from aerodaas.recording.reader import Recording  # noqa: PLC0415 - as above
 
     check_served("--address", address)
-    opened = Recording.open(recording)
-    try:
-        server = RecordingServer(address, opened, typer.echo)
-    except BaseException:
-        opened.close()
-        raise
-    moment = "" if at is None else f"&t={at:g}"
-    typer.echo(f"console: open {server.address(viewer=True)}{moment}")
+    with contextlib.ExitStack() as opened:
+        paths = [recording] if beside is None else [recording, beside]
+        recordings = [opened.enter_context(Recording.open(path)) for path in paths]
+        server = RecordingServer(address, recordings, typer.echo)
+        opened.pop_all()  # the server closes them
+    typer.echo(f"console: open {server.address_of(at)}")
     try:
         threading.Event().wait()
     except KeyboardInterrupt:

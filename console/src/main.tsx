@@ -1,10 +1,11 @@
 // The console: signs in, chooses a mission, and lays out the panels.
 
 import { render } from "preact";
-import { useCallback, useEffect, useMemo, useState } from "preact/hooks";
+import { useEffect, useMemo, useState } from "preact/hooks";
+import { SideBySide } from "./beside";
 import { AnalyticsCharts, Charts } from "./charts";
 import { Refused, ask, keepToken, readFragment, takeToken, writeFragment } from "./connection";
-import { Flight } from "./flight";
+import type { Flight } from "./flight";
 import { FlightMap } from "./map";
 import { Alerts, Commands, StatePanel, WaypointForm } from "./panels";
 import { type Place, type Point, placeOf } from "./place";
@@ -15,6 +16,7 @@ import { Timeline, momentOfLink } from "./timeline";
 import type { AccountOut, FleetOut, MissionOut, RecordedOut } from "./wire";
 import { Video } from "./video";
 import { HandPanel } from "./hand_panel";
+import { useFlight } from "./use_flight";
 import { Plan } from "./plan";
 import { SurveyPanel, useSurvey } from "./survey";
 import "./console.css";
@@ -38,6 +40,8 @@ function App() {
   const [chosen, setChosen] = useState<string | null>(() => readFragment("mission"));
   /** The mission that was seen flying: its end is shown before its recording. */
   const [seen, setSeen] = useState<string | null>(null);
+  /** The mission whose recording is played beside the chosen one's. */
+  const [beside, setBeside] = useState(() => readFragment("beside"));
   const [problem, setProblem] = useState("");
   const { choice, setChoice, theme } = useTheme();
 
@@ -88,7 +92,12 @@ function App() {
   const choose = (id: string) => {
     setSeen(null);
     setChosen(id);
-    writeFragment({ mission: id, t: null });
+    setBeside(null);
+    writeFragment({ mission: id, t: null, beside: null });
+  };
+  const compare = (id: string) => {
+    setBeside(id);
+    writeFragment({ beside: id });
   };
 
   const themes = (
@@ -104,9 +113,32 @@ function App() {
   );
   if (!token) return <SignIn problem={problem} onToken={setToken} />;
   if (known && mission) {
-    const shared = { first: mission, missions, known, token, theme, themes, onMission: choose };
+    const shared = {
+      ...{ first: mission, missions, known, token, theme, themes },
+      onMission: choose,
+      onBeside: compare,
+    };
     const replayed = mission.recording && known.account.scopes.includes("sense");
     if (!replayed || seen === mission.id) return <Console key={mission.id} {...shared} />;
+    const other = missions.find((one) => one.id === beside && one.recording && one !== mission);
+    if (other) {
+      return (
+        <Recorded key={`${mission.id} beside`} mission={mission} token={token}>
+          {(left) => (
+            <Recorded key={other.id} mission={other} token={token}>
+              {(right) => (
+                <SideBySide
+                  missions={[mission, other]}
+                  recorded={[left, right]}
+                  sees={known.account.scopes.includes("sense")}
+                  {...{ token, theme, themes, onAlone: choose }}
+                />
+              )}
+            </Recorded>
+          )}
+        </Recorded>
+      );
+    }
     return (
       <Recorded key={`recorded ${mission.id}`} mission={mission} token={token}>
         {(flight) => <Console {...shared} recorded={flight} />}
@@ -177,31 +209,21 @@ interface ConsoleProps {
   theme: string;
   themes: preact.ComponentChildren;
   onMission(id: string): void;
+  onBeside(id: string): void;
   recorded?: RecordedOut;
 }
 
 function Console(props: ConsoleProps) {
-  const { first, missions, known, token, theme, themes, onMission, recorded } = props;
-  const [, draw] = useState(0);
-  const [flight, setFlight] = useState<Flight | null>(null);
+  const { first, missions, known, token, theme, themes, onMission, onBeside, recorded } = props;
+  const flight = useFlight(first, token, () =>
+    recorded
+      ? new Playback(first, recorded, token, momentOfLink())
+      : new LiveSource(first.id, token),
+  );
   const [robot, setRobot] = useState(
     () => first.robots[0] ?? Object.keys(recorded?.tracks ?? {})[0] ?? "",
   );
   const [marked, setMarked] = useState<Point | null>(null);
-  const changed = useCallback(() => draw((count) => count + 1), []);
-  useEffect(() => {
-    const source = recorded
-      ? new Playback(first, recorded, token, momentOfLink())
-      : new LiveSource(first.id, token);
-    const made = new Flight(first, source, token, changed);
-    setFlight(made);
-    // Silence has to show, too.
-    const timer = setInterval(changed, 500);
-    return () => {
-      clearInterval(timer);
-      made.close();
-    };
-  }, [first.id, token, changed]);
   const place = useMemo(
     () => (recorded ? placeOf({ ...recorded, robots: [] }) : known.place),
     [recorded, known],
@@ -215,6 +237,7 @@ function Console(props: ConsoleProps) {
   const may = !recorded && known.account.role !== "viewer" && known.account.scopes.includes("fly");
   const sees = known.account.scopes.includes("sense");
   const fence = place.fences.find((one) => one.robot === robot);
+  const others = missions.filter((one) => one.recording && one.id !== first.id);
   return (
     <div class={`page ${recorded ? "played" : ""}`}>
       <header class="top">
@@ -242,6 +265,20 @@ function Console(props: ConsoleProps) {
           >
             {flight.mission.robots.map((name) => (
               <option key={name}>{name}</option>
+            ))}
+          </select>
+        )}
+        {recorded && others.length > 0 && (
+          <select
+            aria-label="Beside it"
+            value=""
+            onChange={(event) => onBeside(event.currentTarget.value)}
+          >
+            <option value="">beside…</option>
+            {others.map((one) => (
+              <option key={one.id} value={one.id}>
+                {one.name}
+              </option>
             ))}
           </select>
         )}
@@ -320,7 +357,9 @@ function Console(props: ConsoleProps) {
         <AnalyticsCharts flight={flight} theme={theme} />
         </div>
       </main>
-      {flight.source instanceof Playback && <Timeline playback={flight.source} robot={robot} />}
+      {recorded && flight.source instanceof Playback && (
+        <Timeline playback={flight.source} drones={[{ flight: recorded, robot }]} />
+      )}
     </div>
   );
 }

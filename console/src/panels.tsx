@@ -41,19 +41,23 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
           value={status.battery === null ? undefined : (100 * status.battery).toFixed(0)}
           bar={status.battery}
         />
-        <Figure
-          name="Returns at"
-          unit={outlook ? `%, in ${clock(outlook.hover)}` : "%"}
-          title="Charge at which it goes home from where it is, and how long it can hover until then"
-          value={outlook ? (100 * outlook.returns_at).toFixed(0) : undefined}
-        />
-        <Figure
-          name="Plan needs"
-          unit="%"
-          title="Charge that the rest of the plan, the way home and the landing's reserve need now"
-          value={outlook ? (100 * outlook.plan).toFixed(0) : undefined}
-          tone={short ? "bad" : ""}
-        />
+        {outlook && (
+          <>
+            <Figure
+              name="Returns at"
+              unit={`%, in ${clock(outlook.hover)}`}
+              title="Charge at which it goes home from where it is; how long it can hover until then"
+              value={(100 * outlook.returns_at).toFixed(0)}
+            />
+            <Figure
+              name="Plan needs"
+              unit="%"
+              title="Charge that the rest of the plan, the way home and the landing's reserve need"
+              value={(100 * outlook.plan).toFixed(0)}
+              tone={short ? "bad" : ""}
+            />
+          </>
+        )}
         <Figure name="Flown" unit="m" value={status.distance.toFixed(0)} />
         <Figure
           name="Waypoints"
@@ -63,11 +67,7 @@ export function StatePanel({ flight, robot }: { flight: Flight; robot: string })
         <Figure name="Mission time" unit="s" value={status.time.toFixed(0)} />
         <Figure name="Link" value={link} tone={link === "up" ? "good" : "bad"} />
         <Figure name="Mode" value={status.mode ?? undefined} />
-        <Figure
-          name="GPS"
-          unit={status.position_sigma == null ? "satellites" : `sat., ±${status.position_sigma.toFixed(1)} m`}
-          value={status.satellites?.toString()}
-        />
+        {status.satellites != null && <Gps {...status} />}
       </dl>
       {silent && status.faults.length > 0 && (
         <ul class="faults">
@@ -85,6 +85,11 @@ const UNSAID: Record<string, string> = {
   idle: "nothing has been asked yet",
   paused: "hovers until it is told to resume",
 };
+
+function Gps({ satellites, position_sigma: sigma }: StatusOut) {
+  const unit = sigma == null ? "satellites" : `sat., ±${sigma.toFixed(1)} m`;
+  return <Figure name="GPS" unit={unit} value={satellites?.toString()} />;
+}
 
 /** Minutes and seconds. */
 function clock(seconds: number): string {

@@ -35,6 +35,8 @@ export class Playback implements Source {
   private asked = 0;
   private shown = 0;
   private before = 0;
+  private led: Playback | undefined;
+  private leader: Playback | undefined;
 
   constructor(
     private readonly mission: MissionOut,
@@ -52,13 +54,31 @@ export class Playback implements Source {
     this.tell();
   }
 
-  seek(time: number): void {
-    this.time = this.within(time);
+  /** Have another recording show the same mission time from now on; it takes no time of its own. */
+  lead(other: Playback): void {
+    this.led = other;
+    other.leader = this;
+    this.time = this.within(this.time);
     this.tell();
   }
 
+  /** Mission seconds at which there is something to be seen for the first time. */
+  get begin(): number {
+    return Math.min(this.flight.begin, this.led?.flight.begin ?? Infinity);
+  }
+
+  /** Mission seconds after which nothing more is to be seen. */
+  get end(): number {
+    return Math.max(this.flight.end, this.led?.flight.end ?? -Infinity);
+  }
+
+  seek(time: number): void {
+    if (this.leader) this.leader.seek(time);
+    else this.show(time);
+  }
+
   play(): void {
-    if (this.time >= this.flight.end) this.time = this.flight.begin;
+    if (this.time >= this.end) this.time = this.begin;
     this.playing = true;
     this.before = performance.now();
     cancelAnimationFrame(this.asked);
@@ -138,12 +158,17 @@ export class Playback implements Source {
     const step = Math.min(LONGEST_STEP, Math.max(0, (now - this.before) / 1000));
     this.before = now;
     this.time = this.within(this.time + step * this.speed);
-    if (this.time >= this.flight.end) this.pause();
+    if (this.time >= this.end) this.pause();
     else if (now - this.shown >= STEP) this.tell();
   };
 
+  private show(time: number): void {
+    this.time = this.within(time);
+    this.tell();
+  }
+
   private within(time: number): number {
-    return Math.min(this.flight.end, Math.max(this.flight.begin, time));
+    return Math.min(this.end, Math.max(this.begin, time));
   }
 
   private tell(): void {
@@ -165,6 +190,7 @@ export class Playback implements Source {
     const { name, streams } = this.flight;
     this.ears?.moment({ ...this.mission, name, robots, status, streams }, past);
     for (const one of this.watchers) one();
+    this.led?.show(this.time);
   }
 
   /** Alerts until now, the newest first; one that repeats itself counts up. */

@@ -3,49 +3,30 @@
 import { useEffect, useLayoutEffect, useMemo, useState } from "preact/hooks";
 import "./timeline.css";
 import { writeFragment } from "./connection";
+import { Lanes, type RecordedDrone, clock, eventsOf, stateAt } from "./lanes";
 import { lastBefore, type Playback } from "./playback";
-import type { AnalyticsOut, RecordedOut, StatusOut } from "./wire";
 
 const SPEEDS = [0.25, 0.5, 1, 2, 4, 8, 16];
 const STEP = 1;
 const LEAP = 10;
-const BINS = 120;
-/** Share of the timeline below which a band is not drawn by itself. */
-const NARROW = 0.001;
-const TICKS = 6;
 /** Seconds before an event at which it is sought, so that it is seen to come. */
 const LEAD = 0.05;
 /** Milliseconds after which the address follows the moment shown. */
 const REST = 250;
 
-interface Band {
-  state: string;
-  begin: number;
-  end: number;
-}
-
-export function Timeline({ playback, robot }: { playback: Playback; robot: string }) {
-  const { flight } = playback;
+/** Recorded drones by one timeline, which is that of `playback`. */
+export function Timeline({ playback, drones }: { playback: Playback; drones: RecordedDrone[] }) {
+  const { begin, end } = playback;
   const [copied, setCopied] = useState(false);
-  const statuses = flight.tracks[robot]?.statuses ?? [];
-  const bands = useMemo(() => bandsOf(statuses, flight), [statuses, flight]);
-  const visits = useMemo(() => visitsOf(statuses), [statuses]);
-  const bins = useMemo(() => binsOf(flight.analytics, flight), [flight]);
+  const names = drones.map((one) => one.robot).join();
   const events = useMemo(
-    () =>
-      [
-        ...bands.map((one) => one.begin),
-        ...visits.map((one) => one.time),
-        ...flight.alerts.map((one) => one.time),
-      ].sort((one, other) => one - other),
-    [bands, visits, flight],
+    () => drones.flatMap(eventsOf).sort((one, other) => one - other),
+    [playback, names],
   );
-  const length = Math.max(flight.end - flight.begin, 0.001);
-  const share = (time: number) => `${(100 * (time - flight.begin)) / length}%`;
   const toEvent = (ahead: boolean) => {
     const now = lastBefore(events, playback.time, (one) => one);
     const place = ahead ? now + 1 : lastBefore(events, playback.time - 2 * LEAD, (one) => one);
-    playback.seek(events[place] ?? (ahead ? flight.end : flight.begin));
+    playback.seek(events[place] ?? (ahead ? end : begin));
   };
   const toggle = () => (playback.playing ? playback.pause() : playback.play());
 
@@ -55,8 +36,8 @@ export function Timeline({ playback, robot }: { playback: Playback; robot: strin
       " ": toggle,
       ArrowLeft: (event) => playback.seek(playback.time - (event.shiftKey ? LEAP : STEP)),
       ArrowRight: (event) => playback.seek(playback.time + (event.shiftKey ? LEAP : STEP)),
-      Home: () => playback.seek(flight.begin),
-      End: () => playback.seek(flight.end),
+      Home: () => playback.seek(begin),
+      End: () => playback.seek(end),
       "[": () => toEvent(false),
       "]": () => toEvent(true),
     };
@@ -88,8 +69,8 @@ export function Timeline({ playback, robot }: { playback: Playback; robot: strin
     return () => removeEventListener("hashchange", follow);
   }, [playback]);
 
-  const state = bands[lastBefore(bands, playback.time, (one) => one.begin)]?.state ?? "";
-  const said = `${playback.time.toFixed(1)} of ${flight.end.toFixed(1)} seconds${state && `, ${state}`}`;
+  const states = drones.map((one) => stateAt(one, playback.time)).filter(Boolean);
+  const said = [`${playback.time.toFixed(1)} of ${end.toFixed(1)} seconds`, ...states].join(", ");
   return (
     <section class="card timeline" aria-label="Playback">
       <div class="player">
@@ -132,7 +113,7 @@ export function Timeline({ playback, robot }: { playback: Playback; robot: strin
           ))}
         </select>
         <output class="time" data-testid="time" data-time={playback.time}>
-          {clock(playback.time)} <small>of {clock(flight.end)}</small>
+          {clock(playback.time)} <small>of {clock(end)}</small>
         </output>
         <span class="grow" />
         <button
@@ -150,78 +131,40 @@ export function Timeline({ playback, robot }: { playback: Playback; robot: strin
         class="lanes"
         onPointerDown={(event) => {
           event.currentTarget.setPointerCapture(event.pointerId);
-          playback.seek(timeAt(event, flight));
+          playback.seek(timeAt(event, playback));
         }}
         onPointerMove={(event) => {
-          if (event.buttons) playback.seek(timeAt(event, flight));
+          if (event.buttons) playback.seek(timeAt(event, playback));
         }}
       >
-        <svg aria-hidden="true" width="100%" height="66">
-          {bands.map((band) => (
-            <svg
-              key={band.begin}
-              x={share(band.begin)}
-              width={`${(100 * (band.end - band.begin)) / length}%`}
-              y="0"
-              height="22"
-            >
-              <title>{`${band.state} from ${band.begin.toFixed(1)} s`}</title>
-              <rect class={`band ${band.state}`} width="100%" height="100%" />
-              <text x="5" y="15">
-                {band.state.replaceAll("_", " ")}
-              </text>
-            </svg>
-          ))}
-          {bins.map((bin) => (
-            <g key={bin.time}>
-              <rect class="bad" x={share(bin.time)} y="24" width={bin.width} height="14" />
-              <rect
-                class="good"
-                x={share(bin.time)}
-                y={38 - 14 * bin.inTime}
-                width={bin.width}
-                height={14 * bin.inTime}
-              />
-            </g>
-          ))}
-          {visits.map((visit) => (
-            <svg key={`${visit.id} ${visit.time}`} x={share(visit.time)} y="30" class="visit">
-              <title>{`${visit.id} visited at ${visit.time.toFixed(1)} s`}</title>
-              <circle r="5" />
-            </svg>
-          ))}
-          {flight.alerts.map((alert, place) => (
-            <svg key={place} x={share(alert.time)} y="40" class="alert">
-              <title>{`${alert.time.toFixed(1)} s ${alert.kind}: ${alert.text}`}</title>
-              <path d="M0 0l5 9h-10z" />
-            </svg>
-          ))}
-          {ticksOf(flight).map((tick) => (
-            <text key={tick} class="tick" x={share(tick)} y="64">
-              {clock(tick).replace(/\.0$/, "")}
-            </text>
-          ))}
-          <svg x={share(playback.time)} class="now">
-            <path d="M0 0V52" />
-          </svg>
-        </svg>
+        {drones.map((one, place) => (
+          <Lanes
+            key={`${place} ${one.robot}`}
+            drone={one}
+            {...{ begin, end, now: playback.time }}
+            ticks={place === drones.length - 1}
+          />
+        ))}
       </div>
       <input
         type="range"
         class="seek"
         aria-label="Mission time"
         aria-valuetext={said}
-        min={flight.begin}
-        max={flight.end}
+        min={begin}
+        max={end}
         step="any"
         value={playback.time}
         data-testid="seek"
         onInput={(event) => playback.seek(Number(event.currentTarget.value))}
       />
-      {flight.remark && (
-        <p class="hint" data-testid="remark">
-          Of this recording, {flight.remark}.
-        </p>
+      {drones.map(
+        ({ flight }, place) =>
+          flight.remark && (
+            <p key={place} class="hint" data-testid="remark">
+              Of {drones.length > 1 ? flight.name : "this recording"}, {flight.remark}.
+            </p>
+          ),
       )}
     </section>
   );
@@ -251,73 +194,8 @@ function taken(event: KeyboardEvent): boolean {
   return at.closest("select, textarea, .mapbox") !== null;
 }
 
-function timeAt(event: PointerEvent, flight: RecordedOut): number {
+function timeAt(event: PointerEvent, { begin, end }: Playback): number {
   const box = (event.currentTarget as HTMLElement).getBoundingClientRect();
   const share = (event.clientX - box.left) / Math.max(1, box.width);
-  return flight.begin + share * (flight.end - flight.begin);
-}
-
-function bandsOf(statuses: StatusOut[], flight: RecordedOut): Band[] {
-  const bands: Band[] = [];
-  const least = NARROW * (flight.end - flight.begin);
-  for (const one of statuses) {
-    const last = bands.at(-1);
-    if (last?.state === one.state) continue;
-    if (last && one.time - last.begin < least) {
-      // What is too short to be seen gives way to what follows.
-      last.state = one.state;
-      continue;
-    }
-    if (last) last.end = one.time;
-    bands.push({ state: one.state, begin: one.time, end: flight.end });
-  }
-  return bands;
-}
-
-function visitsOf(statuses: StatusOut[]): { id: string; time: number }[] {
-  const visits: { id: string; time: number }[] = [];
-  let before = 0;
-  for (const one of statuses) {
-    const fresh = Math.min(one.waypoints_visited - before, one.visited.length);
-    if (fresh > 0) for (const id of one.visited.slice(-fresh)) visits.push({ id, time: one.time });
-    before = Math.max(before, one.waypoints_visited);
-  }
-  return visits;
-}
-
-/** How many of the tasks that ended in each part of the flight did so in time, 0 to 1. */
-function binsOf(
-  rows: AnalyticsOut[],
-  flight: RecordedOut,
-): { time: number; width: string; inTime: number }[] {
-  const length = (flight.end - flight.begin) / BINS;
-  if (rows.length === 0 || length <= 0) return [];
-  const sums = (time: number) => rows[lastBefore(rows, time, (one) => one.time)];
-  return Array.from({ length: BINS }, (_, place) => flight.begin + place * length).flatMap((time) => {
-    const [from, to] = [sums(time), sums(time + length)];
-    const inTime = (to?.in_time ?? 0) - (from?.in_time ?? 0);
-    const others =
-      (to?.late ?? 0) + (to?.dropped ?? 0) - (from?.late ?? 0) - (from?.dropped ?? 0);
-    if (inTime + others <= 0) return [];
-    return [{ time, width: `${100 / BINS}%`, inTime: inTime / (inTime + others) }];
-  });
-}
-
-function ticksOf(flight: RecordedOut): number[] {
-  const least = (flight.end - flight.begin) / TICKS;
-  const steps = [1, 2, 5, 10, 15, 30, 60, 120, 300, 600, 900, 1800, 3600, 7200];
-  const step = steps.find((one) => one >= least) ?? least;
-  const count = Math.floor(flight.end / step);
-  return Array.from({ length: count }, (_, place) => (place + 1) * step).filter(
-    (one) => one > flight.begin && one < flight.end - step / 4,
-  );
-}
-
-function clock(seconds: number): string {
-  const whole = Math.floor(seconds);
-  const rest = Math.floor((seconds - whole) * 10);
-  const pad = (number: number) => String(number).padStart(2, "0");
-  const hours = Math.floor(whole / 3600);
-  const minutes = Math.floor((whole % 3600) / 60);
-  return `${hours ? `${hours}:${pad(minutes)}` : minutes}:${pad(whole % 60)}.${rest}`;
+  return begin + share * (end - begin);
 }

@@ -89,7 +89,7 @@ def test_nothing_stands_in_the_way_of_assistive_technology(source: Path, tmp_pat
         page = browser.open(server.address().partition("#")[0])
         page.until("document.querySelector('input[name=token]')")
         assert objections(page, axe) == []
-        playing = RecordingServer("127.0.0.1:0", Recording.open(path))
+        playing = RecordingServer("127.0.0.1:0", [Recording.open(path)])
         page = browser.open(playing.address(viewer=True))
         page.until("document.querySelector('.timeline')")
         assert objections(page, axe) == []

@@ -13,10 +13,10 @@ __all__ = ["served"]
 
 
 @contextmanager
-def served(path: Path) -> Iterator[str]:
-    """The address of a recording's page."""
-    server = RecordingServer("127.0.0.1:0", Recording.open(path))
+def served(*paths: Path) -> Iterator[str]:
+    """The address of the page of one recording, or of several."""
+    server = RecordingServer("127.0.0.1:0", [Recording.open(path) for path in paths])
     try:
-        yield server.address(viewer=True)
+        yield server.address_of()
     finally:
         server.close()

@@ -36,6 +36,7 @@ SEEK = (
     "(bar => {{ bar.value = {}; bar.dispatchEvent(new Event('input', {{bubbles: true}})); }})"
     f"({BAR})"
 )
+HALVES = "[...document.querySelectorAll('.half')]"
 TIME = "Number(document.querySelector('[data-testid=time]').dataset.time)"
 
 
@@ -112,7 +113,7 @@ def test_scrubbing_moves_map_picture_state_and_charts_together(
             assert page.text("[data-testid=state]") == state.replace("_", " ")
             said = page.run(f"{BAR}.getAttribute('aria-valuetext')")
             assert said.startswith(f"{time:.1f} of ")
-            assert state in said
+            assert state.replace("_", " ") in said
             assert abs(float(page.text(".state dd").split()[0]) - up) < 0.16
             # The picture itself: a red disc where the drone was; the box's edge is drawn on it.
             x, y, _ = pictures[stamp].position
@@ -188,3 +189,35 @@ def test_one_that_breaks_off_says_so(browser: Browser, path: Path, tmp_path: Pat
                 page.resize(width, 800, scheme)
                 assert page.run("document.documentElement.scrollWidth - innerWidth") <= 0
         assert page.complaints() == []
+
+
+def test_two_flights_show_one_moment(browser: Browser, path: Path, tmp_path: Path) -> None:
+    """Beside each other, each drone where it was then, until the end of the longer flight."""
+    longer = tmp_path / "longer.mcap"
+    record(longer, SyntheticFlight(frames=2.0, hover=3.0))
+    robots = [facts(one)[0].robots["tello"] for one in (path, longer)]
+    ends = [float(robot.time[-1]) for robot in robots]
+    with served(path, longer) as address:
+        page = browser.open(f"{address}&t=20", 1400, 1000)
+        page.until("document.querySelectorAll('[data-drone]').length === 2")
+        assert page.run(f"{BAR}.max - {ends[1]}") >= 0
+        for time in (20.0, 61.5, 12.25, ends[0] + 4.0):
+            page.run(SEEK.format(time))
+            page.until(f"Math.abs({TIME} - {time}) < 0.01")
+            for half, robot in enumerate(robots):
+                row = bisect_right(robot.time.tolist(), min(time, ends[half])) - 1
+                shown = page.run(DRONE.replace("document", f"{HALVES}[{half}]"))
+                assert math.dist(shown, robot.position[row][:2]) < 0.15, (time, half)
+        # A click into a chart of the second moves both.
+        page.run(
+            "(plot => { const box = plot.getBoundingClientRect(); plot.dispatchEvent("
+            "new MouseEvent('click', {bubbles: true, clientX: box.x + box.width / 2})); })"
+            f"({HALVES}[1].querySelector('.u-over'))"
+        )
+        page.until(f"{TIME} < {ends[0]}")
+        assert page.complaints() == []
+        # The second one alone is played to its own end.
+        page.run(f"{HALVES}[1].querySelector('header button').click()")
+        page.until("document.querySelectorAll('[data-drone]').length === 1")
+        assert page.run(f"{BAR}.max - {ends[1]}") >= 0
+        assert page.run("location.hash").startswith("#mission=own-2")

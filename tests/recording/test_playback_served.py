@@ -133,12 +133,36 @@ def test_nobody_else_sees_it(page: str) -> None:
     assert ask(page, "/", "")[0] == 200
 
 
+def test_two_are_served_side_by_side(path: Path, tmp_path: Path) -> None:
+    """Each by a name of its own, with its own flight and pictures; there is no third."""
+    longer = tmp_path / "longer.mcap"
+    record(longer, SyntheticFlight(frames=2.0, hover=3.0))
+    with served(path, longer) as shown:
+        address, _, fragment = shown.partition("&")
+        assert fragment == "mission=own&beside=own-2"
+        status, said = ask(address, "/v1/missions")
+        missions = [MissionOut.model_validate(one) for one in json.loads(said)]
+        assert [one.id for one in missions] == ["own", "own-2"]
+        flights = []
+        for one in missions:
+            way = f"/v1/missions/{one.id}/playback"
+            wait(lambda way=way: json.loads(ask(address, way)[1])["flight"])  # type: ignore[misc]
+            flights.append(PlaybackOut.model_validate_json(ask(address, way)[1]).flight)
+            assert ask(address, f"{way}/picture?stream=tello/camera&at=40000000000")[0] == 200
+        assert flights[0]
+        assert flights[1]
+        assert flights[1].end > flights[0].end + 5.0
+        status, said = ask(address, "/v1/missions/own-3/playback")
+        assert status == 404
+        assert "there is own, own-2" in said.decode()
+
+
 def test_a_taken_address_is_told(path: Path) -> None:
     """With the option that names another one."""
     with served(path) as address, Recording.open(path) as recording:
         port = address.partition("/#")[0].rpartition(":")[2]
         with pytest.raises(ConfigError, match="give another --address"):
-            RecordingServer(f"127.0.0.1:{port}", recording)
+            RecordingServer(f"127.0.0.1:{port}", [recording])
 
 
 @pytest.mark.parametrize(
