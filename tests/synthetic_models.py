@@ -38,8 +38,8 @@ def patchwork_model(
 ) -> Path:
     """Write an Ultralytics-shaped model of any input size and batch.
 
-    Every row of the output holds 40 times the cell's mean colour, 0 to 1: a white cell gives a
-    box of 40 pixels about (40, 40).
+    Scores are the mean colour, 0 to 1, of cells of stride 32, and boxes 40 times that: a white
+    cell gives a box of 40 pixels about (40, 40). Smaller cells hold nothing.
     """
     nodes, flat = [], []
     for stride in (8, 16, 32):
@@ -49,13 +49,18 @@ def patchwork_model(
                 "AveragePool", ["images"], [f"pool{stride}"], kernel_shape=window, strides=window
             )
         )
-        nodes.append(helper.make_node("Reshape", [f"pool{stride}", "flat"], [f"flat{stride}"]))
+        weight = "one" if stride == 32 else "nothing"
+        nodes.append(helper.make_node("Mul", [f"pool{stride}", weight], [f"mean{stride}"]))
+        nodes.append(helper.make_node("Reshape", [f"mean{stride}", "flat"], [f"flat{stride}"]))
         flat.append(f"flat{stride}")
     nodes.append(helper.make_node("Concat", flat, ["cells"], axis=2))
-    nodes.append(helper.make_node("Mul", ["cells", "forty"], ["values"]))
-    nodes.append(helper.make_node("Tile", ["values", "repeats"], ["output0"]))
+    nodes.append(helper.make_node("Tile", ["cells", "repeats"], ["colours"]))
+    nodes.append(helper.make_node("Mul", ["colours", "scales"], ["output0"]))
+    box = np.arange(3 * ((4 + classes) // 3))[None, :, None] < 4
     initializers = [
-        numpy_helper.from_array(np.array(40, np.float32), "forty"),
+        numpy_helper.from_array(np.where(box, 40, 1).astype(np.float32), "scales"),
+        numpy_helper.from_array(np.array(1, np.float32), "one"),
+        numpy_helper.from_array(np.array(0, np.float32), "nothing"),
         numpy_helper.from_array(np.array([0, 3, -1], np.int64), "flat"),
         numpy_helper.from_array(np.array([1, (4 + classes) // 3, 1], np.int64), "repeats"),
     ]
@@ -75,7 +80,7 @@ def mosaic_model(path: Path, side: int, *, classes: int = 5) -> Path:
     # Classes go by hue; dark cells hold things, about three cells wide.
     weights[5:] = 60 * (weights[5:] - weights[5:].mean(axis=1, keepdims=True))
     bias = np.zeros(5 + classes)
-    bias[2:4], weights[4], bias[4] = 1.0, -4.0, 3.0
+    bias[2:4], weights[4], bias[4] = 1.0, -4.0, 2.4
     constants: dict[str, NDArray[np.generic]] = {
         "full": np.array(255, np.float32),
         "weights": weights.astype(np.float32),

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import onnxruntime as ort
@@ -19,11 +19,15 @@ from numpy.typing import NDArray
 
 from aerodaas.types.errors import ModelError
 
-__all__ = ["ModelFile", "Tensor", "read_model"]
+__all__ = ["ModelFile", "PixelType", "Tensor", "read_model"]
 
-_FLOATS: dict[str, type[np.float32 | np.float16]] = {
+PixelType: TypeAlias = np.float32 | np.float16 | np.uint8
+"""Element types of an input: floating point in the family's range, or bytes from 0 to 255."""
+
+_PIXELS: dict[str, type[PixelType]] = {
     "tensor(float)": np.float32,
     "tensor(float16)": np.float16,
+    "tensor(uint8)": np.uint8,
 }
 _PICTURE_AXES = 4
 _COLOURS = 3
@@ -57,9 +61,9 @@ class ModelFile:
     session: ort.InferenceSession
 
     @property
-    def dtype(self) -> type[np.float32 | np.float16]:
+    def dtype(self) -> type[PixelType]:
         """Element type of the input."""
-        return _FLOATS[self.input.kind]
+        return _PIXELS[self.input.kind]
 
     @property
     def batches(self) -> bool:
@@ -74,12 +78,20 @@ class ModelFile:
     @cached_property
     def trial(self) -> tuple[NDArray[np.float32], ...]:
         """Outputs for one mid-grey image, which show the shapes and scales of the outputs."""
-        picture = np.full((1, _COLOURS, *self.size), 0.5, self.dtype)
+        grey = 127 if self.dtype is np.uint8 else 0.5
+        return self.run(np.full((1, _COLOURS, *self.size), grey, self.dtype))
+
+    def run(self, pixels: NDArray[Any]) -> tuple[NDArray[np.float32], ...]:
+        """Outputs, with their batch axes, for an input of the network.
+
+        Raises:
+            ModelError: If the network fails, or gives something else than numbers.
+        """
         try:
-            outputs = self.session.run(None, {self.input.name: picture})
+            outputs = self.session.run(None, {self.input.name: pixels})
+            return tuple(np.asarray(output, np.float32) for output in outputs)
         except Exception as error:  # noqa: BLE001 - onnxruntime has no common base class
             raise self.refusal(f"fails on a trial picture ({_first_line(error)})") from None
-        return tuple(np.asarray(output, np.float32) for output in outputs)
 
     @property
     def output_shape(self) -> tuple[int, ...]:
@@ -168,9 +180,9 @@ def _tensors(nodes: Sequence[Any]) -> tuple[Tensor, ...]:
 
 
 def _check_picture(path: Path, tensor: Tensor) -> None:
-    if tensor.kind not in _FLOATS:
-        remedy = "export it with a float32 or float16 input"
-        raise _refusal(path, f"takes {tensor.kind} instead of floating-point pixels", remedy)
+    if tensor.kind not in _PIXELS:
+        remedy = "export it with a float32, float16 or uint8 input"
+        raise _refusal(path, f"takes {tensor.kind}, which are no pixels", remedy)
     if len(tensor.shape) != _PICTURE_AXES:
         problem = f"takes an input of {len(tensor.shape)} axes, not batch x 3 x height x width"
         raise _refusal(path, problem, "choose a model that takes pictures")
