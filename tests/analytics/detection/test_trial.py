@@ -49,7 +49,7 @@ def test_a_detector_passes(tmp_path: Path) -> None:
     lowest, highest = trial.scores or (1.0, 1.0)
     assert trial.boxes == CELLS
     assert 0 <= lowest < highest <= 0.02
-    assert trial.corners == (-8, 168)
+    assert trial.corners == pytest.approx((-8, 168))
     assert not trial.doubts
 
 
