@@ -49,9 +49,9 @@ class _Desk(threading.local):
 class OnnxDetector(Analytics[Detections]):
     """Detects objects, with their keypoints if the model is a pose model.
 
-    ``OnnxDetector("yolo11n.onnx", classes=["person"])``. The model's family, class names and
-    input size are read from the file, which is sent to the actor by value: an edge or cloud node
-    needs no copy.
+    ``OnnxDetector("yolox-nano", classes=["person"])``, or a file of one's own. The model's family,
+    class names and input size are read from the file, which is sent to the actor by value: an edge
+    or cloud node needs no copy.
     """
 
     accepts: ClassVar[tuple[type, ...]] = (Frame,)
@@ -77,7 +77,8 @@ class OnnxDetector(Analytics[Detections]):
         """Read the model and check that it is a detector.
 
         Args:
-            path: ONNX file; by default the shipped one.
+            path: ONNX file, or the name of a fetched model (`aerodaas models list`); by default
+                the shipped one.
             classes: Class names to keep; by default all.
             min_score: Least confidence of a detection, above 0 to 1.
             iou: Overlap of two boxes of one class above which only the better one is kept,
@@ -90,7 +91,9 @@ class OnnxDetector(Analytics[Detections]):
             families: Model families to recognise, in order.
 
         Raises:
-            ModelError: If the file or a setting is unsuitable.
+            ModelError: If the file or a setting is unsuitable, the model of this name was not
+                fetched, or a trial run shows that it cannot be a detector.
+            UnknownIdError: If no model has this name.
         """
         for name, value in (("min_score", min_score), ("iou", iou)):
             if not 0.0 < value <= 1.0:
@@ -114,7 +117,7 @@ class OnnxDetector(Analytics[Detections]):
         self.excess = 0
         """Number of boxes dropped so far because a frame had implausibly many."""
         self._wanted = _wanted_classes(self.path, self.names, classes)
-        self._style = preprocessing_for(model, self.decoder)
+        self.style = preprocessing_for(model, self.decoder)
         self._content = model.content
         self._input = model.input.name
         self._dtype = model.dtype
@@ -198,7 +201,7 @@ class OnnxDetector(Analytics[Detections]):
         desk = self._desk
         shape = (frames[0].height, frames[0].width)
         if desk.letterbox is None or desk.letterbox.frame != shape:
-            desk.letterbox = Letterbox(shape, self.size, self._style, flexible=self._flexible)
+            desk.letterbox = Letterbox(shape, self.size, self.style, flexible=self._flexible)
             desk.buffer = None
         if desk.buffer is None or len(desk.buffer) != len(frames):
             desk.buffer = desk.letterbox.buffer(len(frames), self._dtype)

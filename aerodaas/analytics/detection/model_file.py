@@ -17,6 +17,7 @@ import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
 
+from aerodaas.analytics.models.cache import model_named, require_fetched
 from aerodaas.types.errors import ModelError
 
 __all__ = ["ModelFile", "PixelType", "Tensor", "read_model"]
@@ -120,13 +121,18 @@ class ModelFile:
 
 
 def read_model(path: str | Path, size: int | None = None) -> ModelFile:
-    """Read and check an ONNX file.
+    """Read and check an ONNX file, or a fetched model by its name.
 
-    `size` is the side in pixels of the square input of a model of variable input size. Raises
-    ModelError if the file is missing, empty, not an ONNX model, or does not take one colour image.
+    `size` is the side in pixels of the square input of a model of variable input size.
+
+    Raises:
+        ModelError: If the file is missing, empty, not an ONNX model, or does not take one colour
+            image; if a model of this name was not fetched, or its file is another one.
+        UnknownIdError: If no model has this name.
     """
+    named = model_named(path)
     path = Path(path)
-    content = _read(path)
+    content = _read(path) if named is None else require_fetched(named)
     options = ort.SessionOptions()
     options.log_severity_level = _ERRORS_ONLY
     options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_DISABLE_ALL
