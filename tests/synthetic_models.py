@@ -70,6 +70,30 @@ def patchwork_model(
     return _save(path, graph, None)
 
 
+def simcc_model(path: Path, size: tuple[int, int] = (48, 64)) -> Path:
+    """Write an RTMPose-shaped model of crops of `size` (width, height), two bins a pixel.
+
+    All its joints are where the brightest column meets the brightest row.
+    """
+    nodes, initializers, infos = [], [], []
+    for name, axes, side in (("simcc_x", [1, 2], size[0]), ("simcc_y", [1, 3], size[1])):
+        nodes += [
+            helper.make_node("ReduceMean", ["input"], [f"{name}_mean"], axes=axes, keepdims=0),
+            helper.make_node("MatMul", [f"{name}_mean", f"{name}_bins"], [f"{name}_wide"]),
+            helper.make_node("Reshape", [f"{name}_wide", f"{name}_shape"], [f"{name}_flat"]),
+            helper.make_node("Mul", [f"{name}_flat", "joints"], [name]),
+        ]
+        bins = np.repeat(np.eye(side, dtype=np.float32), 2, axis=1)
+        shape = np.array([-1, 1, 2 * side], np.int64)
+        initializers.append(numpy_helper.from_array(bins, f"{name}_bins"))
+        initializers.append(numpy_helper.from_array(shape, f"{name}_shape"))
+        infos.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, ["b", 17, 2 * side]))
+    initializers.append(numpy_helper.from_array(np.ones((1, 17, 1), np.float32), "joints"))
+    crop = helper.make_tensor_value_info("input", TensorProto.FLOAT, ["b", 3, size[1], size[0]])
+    graph = helper.make_graph(nodes, "simcc", [crop], infos, initializers)
+    return _save(path, graph, None)
+
+
 def mosaic_model(path: Path, side: int, *, classes: int = 5) -> Path:
     """Write a YOLOX-shaped model, whose boxes and scores are functions of each cell's mean colour.
 

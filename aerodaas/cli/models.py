@@ -124,8 +124,21 @@ def check(
         aerodaas models check yolox-nano
     """
     from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415 - slow to load
+    from aerodaas.analytics.detection.keypoint_heads import keypoint_head  # noqa: PLC0415
+    from aerodaas.analytics.detection.model_file import read_model  # noqa: PLC0415
 
-    for line in _told(model, OnnxDetector(model, threads=1)):
+    head = keypoint_head(read_model(model))
+    if head is not None:
+        width, height = head.size
+        lines = [
+            f"{model}: a keypoint network on crops around people ({type(head).__name__})",
+            f"input     crops of {width} x {height}",
+            "keypoints 17, COCO's",
+            f"use       PoseAnalytics({model!r})",
+        ]
+    else:
+        lines = _told(model, OnnxDetector(model, threads=1))
+    for line in lines:
         typer.echo(printable(line))
 
 

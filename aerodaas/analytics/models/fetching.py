@@ -17,7 +17,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http import HTTPStatus
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import IO, Any
 from urllib.parse import urlsplit
 
@@ -214,9 +214,12 @@ def _unpack(file: IO[bytes], part: Path, model: RegisteredModel) -> None:
     if model.archive is None:
         return
     try:
-        with zipfile.ZipFile(file) as archive, archive.open(model.archive.member) as member:
-            content = member.read(model.size + 1)
-    except (zipfile.BadZipFile, KeyError) as error:
+        with zipfile.ZipFile(file) as archive:
+            names = [PurePosixPath(name) for name in archive.namelist()]
+            (member,) = (str(name) for name in names if name.name == model.archive.member)
+            with archive.open(member) as packed:
+                content = packed.read(model.size + 1)
+    except (zipfile.BadZipFile, ValueError) as error:
         part.unlink()
         raise ModelError(f"the archive of {model.name} is damaged: {error}") from None
     file.truncate(0)

@@ -19,6 +19,7 @@ from aerodaas.types.errors import UnknownIdError
 __all__ = ["REGISTRY", "Archive", "RegisteredModel", "registered"]
 
 _YOLOX = "https://github.com/Megvii-BaseDetection/YOLOX/releases/download/0.1.1rc0"
+_RTMPOSE = "https://download.openmmlab.com/mmpose/v1/projects/rtmposev1/onnx_sdk"
 _COCO = "COCO's 80 classes"
 
 
@@ -30,7 +31,7 @@ class Archive:
     size: int
     """Bytes."""
     member: str
-    """Path of the model in it."""
+    """Name of the model's file in it, in whatever folder."""
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,38 @@ _ALL = (
         _COCO,
         (640, 640),
         "COCO AP 0.405",
+    ),
+    RegisteredModel(
+        "rtmpose-t",
+        "pose",
+        f"{_RTMPOSE}/rtmpose-t_simcc-body7_pt-body7_420e-256x192-026a1439_20230504.zip",
+        "a6c2f6a3896a4d51131d14d7a80a3d08b50f559af5a58a45d5b098aef510a70f",
+        13_350_364,
+        "Apache-2.0",
+        "COCO's 17 keypoints",
+        (192, 256),
+        "COCO keypoint AP 0.659",
+        Archive(
+            "937003a70832d9cc34ea16927f504792f3133e92dda1b9c626236bbbe9e805cb",
+            12_547_710,
+            "end2end.onnx",
+        ),
+    ),
+    RegisteredModel(
+        "rtmpose-s",
+        "pose",
+        f"{_RTMPOSE}/rtmpose-s_simcc-body7_pt-body7_420e-256x192-acd4a1ef_20230504.zip",
+        "9aeb635b83f86aea45cf45d85798f7eba1a162de8e0d721c44e54fe5eebaf47d",
+        21_890_172,
+        "Apache-2.0",
+        "COCO's 17 keypoints",
+        (192, 256),
+        "COCO keypoint AP 0.697",
+        Archive(
+            "7673922e531014906ca4f0f239b7e233b740146a10b632deaa2a28d45470d802",
+            20_496_303,
+            "end2end.onnx",
+        ),
     ),
 )
 

@@ -218,7 +218,7 @@ def test_a_model_in_an_archive(
         archive.writestr("sdk/end2end.onnx", content)
     release.content = packed.getvalue()
     sha256 = hashlib.sha256(release.content).hexdigest()
-    archived = Archive(sha256, len(release.content), "sdk/end2end.onnx")
+    archived = Archive(sha256, len(release.content), "end2end.onnx")
     monkeypatch.setitem(REGISTRY, "small", replace(small, archive=archived))
     assert fetch_model("small").read_bytes() == content
     assert left(small) == ["small.onnx"]
