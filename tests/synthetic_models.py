@@ -70,6 +70,36 @@ def patchwork_model(
     return _save(path, graph, None)
 
 
+def endless_model(path: Path) -> Path:
+    """Write a model that declares one output of [1, 6, 84] and never comes to it."""
+    kind, shape = TensorProto.FLOAT, [1, 6, 84]
+    value = helper.make_tensor_value_info
+    body = helper.make_graph(
+        [
+            helper.make_node("Identity", ["going"], ["on"]),
+            helper.make_node("Identity", ["boxes"], ["same"]),
+        ],
+        "body",
+        [
+            value("round", TensorProto.INT64, []),
+            value("going", TensorProto.BOOL, []),
+            value("boxes", kind, shape),
+        ],
+        [value("on", TensorProto.BOOL, []), value("same", kind, shape)],
+    )
+    constants = [
+        numpy_helper.from_array(np.array(2**62, np.int64), "rounds"),
+        numpy_helper.from_array(np.array(True), "true"),  # noqa: FBT003 - a constant's value
+        numpy_helper.from_array(np.zeros(shape, np.float32), "start"),
+    ]
+    loop = helper.make_node("Loop", ["rounds", "true", "start"], ["output0"], body=body)
+    picture = value("images", kind, [1, 3, 64, 64])
+    graph = helper.make_graph(
+        [loop], "endless", [picture], [value("output0", kind, shape)], constants
+    )
+    return _save(path, graph, {"names": "['vest', 'person']"})
+
+
 def simcc_model(path: Path, size: tuple[int, int] = (48, 64)) -> Path:
     """Write an RTMPose-shaped model of crops of `size` (width, height), two bins a pixel.
 

@@ -118,6 +118,7 @@ class OnnxDetector(Analytics[Detections]):
         """Number of boxes dropped so far because a frame had implausibly many."""
         self._wanted = _wanted_classes(self.path, self.names, classes)
         self.style = preprocessing_for(model, self.decoder)
+        """How frames become the network's input."""
         self._content = model.content
         self._input = model.input.name
         self._dtype = model.dtype

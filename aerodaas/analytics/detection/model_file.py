@@ -7,6 +7,7 @@ built, as one ModelError that names the path and the remedy.
 from __future__ import annotations
 
 import ast
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -34,7 +35,9 @@ _PICTURE_AXES = 4
 _COLOURS = 3
 _FALLBACK_SIZE = 640
 _STRIDE = 32
-_ERRORS_ONLY = 3
+_ERRORS_ONLY, _NOTHING = 3, 4
+_LONGEST_RUN = 60.0
+"""Seconds for one picture in a trial; a network that flies takes less than one."""
 _REMEDY = "export the model again, for example `yolo export model=yolo11n.pt format=onnx`"
 
 
@@ -86,13 +89,23 @@ class ModelFile:
         """Outputs, with their batch axes, for an input of the network.
 
         Raises:
-            ModelError: If the network fails, or gives something else than numbers.
+            ModelError: If the network fails, gives something else than numbers, or takes longer
+                than any that could fly: a stranger's may loop without end.
         """
+        options = ort.RunOptions()
+        options.log_severity_level = _NOTHING
+        watch = threading.Timer(_LONGEST_RUN, setattr, (options, "terminate", True))
+        watch.start()
         try:
-            outputs = self.session.run(None, {self.input.name: pixels})
+            outputs = self.session.run(None, {self.input.name: pixels}, options)
             return tuple(np.asarray(output, np.float32) for output in outputs)
         except Exception as error:  # noqa: BLE001 - onnxruntime has no common base class
+            if options.terminate:
+                problem = f"takes more than {_LONGEST_RUN:g} s for one picture"
+                raise self.refusal(problem, "choose a smaller model") from None
             raise self.refusal(f"fails on a trial picture ({_first_line(error)})") from None
+        finally:
+            watch.cancel()
 
     @property
     def output_shape(self) -> tuple[int, ...]:

@@ -199,13 +199,15 @@ class _Matching:
             _entry(key, index, number[item.label], item.box) | {"score": item.score}
             for key, (index, item) in enumerate(self.boxes, 1)
         ]
-        truth, given = COCO(), COCO()
+        # Its stubs ask for typed dictionaries; what it reads is JSON.
+        truth: Any = COCO()
+        given: Any = COCO()
         truth.dataset = {**head, "annotations": annotations}
         given.dataset = {**head, "annotations": detections}
         with contextlib.redirect_stdout(io.StringIO()):
             truth.createIndex()
             given.createIndex()
-            self._run = COCOeval(truth, given, "bbox")
+            self._run: Any = COCOeval(truth, given, "bbox")
             self._run.evaluate()
             self._run.accumulate()
         self._precision: NDArray[np.float64] = self._run.eval["precision"]

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from synthetic_models import constant_model
+from synthetic_models import constant_model, endless_model
 
+from aerodaas.analytics.detection import model_file
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.types.errors import ModelError
 
@@ -107,3 +108,10 @@ def test_a_model_with_nms_that_finds_nothing_is_doubted(tmp_path: Path) -> None:
     constant_model(path, [np.zeros((1, 300, 6), np.float32)], shape=SHAPE, metadata=NAMES)
     (doubt,) = OnnxDetector(path).trial.doubts
     assert "may find nothing" in doubt
+
+
+def test_a_model_without_an_end_is_stopped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A stranger's file does not hold up whoever builds with it."""
+    monkeypatch.setattr(model_file, "_LONGEST_RUN", 0.2)
+    with pytest.raises(ModelError, match=r"takes more than 0\.2 s for one picture"):
+        OnnxDetector(endless_model(tmp_path / "a.onnx"))

@@ -62,8 +62,8 @@ def release(tmp_path: Path) -> Iterator[Release]:
             self.end_headers()
             self.wfile.write(served.content[start : served.breaks_after])
 
-        def log_message(self, *_: object) -> None:
-            pass
+        def log_message(self, format: str, *args: object) -> None:  # noqa: A002 - its name
+            del format, args
 
     server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), Handler)
     served.address = f"http://127.0.0.1:{server.server_port}/models/small_1.onnx"
