@@ -102,4 +102,5 @@ class KeypointModel:
             raise ModelError(f"{self.path}: call open() before the first frame")
         pixels = self.head.normalise(cuts[..., ::-1]).transpose(0, 3, 1, 2)
         given = np.ascontiguousarray(pixels, self._dtype)
-        return self.head.decode(self._session.run(None, {self._input: given}))
+        outputs = self._session.run(None, {self._input: given})
+        return self.head.decode([np.asarray(output) for output in outputs])

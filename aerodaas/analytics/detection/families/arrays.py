@@ -49,5 +49,4 @@ def boxes_and_scores(shapes: Sequence[tuple[int, ...]]) -> tuple[int, int] | Non
 
 def sigmoid(logits: NDArray[np.float32]) -> NDArray[np.float32]:
     """Logistic function, without overflow."""
-    half: NDArray[np.float32] = 0.5 * (1 + np.tanh(0.5 * logits))
-    return half
+    return np.asarray(0.5 * (1 + np.tanh(0.5 * logits)), np.float32)
