@@ -11,7 +11,7 @@ def main() -> None:
     """Build the dataflow and fly it."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("source", type=Path, help="folder of pictures, or a video file")
-    parser.add_argument("model", help="detector, as an ONNX file (Ultralytics or YOLOX export)")
+    parser.add_argument("model", help="detector: an ONNX file, or a fetched model's name")
     parser.add_argument("--rate", type=float, default=5.0, help="pictures per second")
     parser.add_argument("--distance", type=float, default=2.0, help="metres to keep to the person")
     words = parser.parse_args()

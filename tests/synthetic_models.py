@@ -38,8 +38,8 @@ def patchwork_model(
 ) -> Path:
     """Write an Ultralytics-shaped model of any input size and batch.
 
-    Every row of the output holds 40 times the cell's mean colour, 0 to 1: a white cell gives a
-    box of 40 pixels about (40, 40).
+    Scores are the mean colour, 0 to 1, of cells of stride 32, and boxes 40 times that: a white
+    cell gives a box of 40 pixels about (40, 40). Smaller cells hold nothing.
     """
     nodes, flat = [], []
     for stride in (8, 16, 32):
@@ -49,19 +49,78 @@ def patchwork_model(
                 "AveragePool", ["images"], [f"pool{stride}"], kernel_shape=window, strides=window
             )
         )
-        nodes.append(helper.make_node("Reshape", [f"pool{stride}", "flat"], [f"flat{stride}"]))
+        weight = "one" if stride == 32 else "nothing"
+        nodes.append(helper.make_node("Mul", [f"pool{stride}", weight], [f"mean{stride}"]))
+        nodes.append(helper.make_node("Reshape", [f"mean{stride}", "flat"], [f"flat{stride}"]))
         flat.append(f"flat{stride}")
     nodes.append(helper.make_node("Concat", flat, ["cells"], axis=2))
-    nodes.append(helper.make_node("Mul", ["cells", "forty"], ["values"]))
-    nodes.append(helper.make_node("Tile", ["values", "repeats"], ["output0"]))
+    nodes.append(helper.make_node("Tile", ["cells", "repeats"], ["colours"]))
+    nodes.append(helper.make_node("Mul", ["colours", "scales"], ["output0"]))
+    box = np.arange(3 * ((4 + classes) // 3))[None, :, None] < 4
     initializers = [
-        numpy_helper.from_array(np.array(40, np.float32), "forty"),
+        numpy_helper.from_array(np.where(box, 40, 1).astype(np.float32), "scales"),
+        numpy_helper.from_array(np.array(1, np.float32), "one"),
+        numpy_helper.from_array(np.array(0, np.float32), "nothing"),
         numpy_helper.from_array(np.array([0, 3, -1], np.int64), "flat"),
         numpy_helper.from_array(np.array([1, (4 + classes) // 3, 1], np.int64), "repeats"),
     ]
     info = helper.make_tensor_value_info("output0", TensorProto.FLOAT, ["b", 4 + classes, "n"])
     picture = helper.make_tensor_value_info("images", TensorProto.FLOAT, shape)
     graph = helper.make_graph(nodes, "patchwork", [picture], [info], initializers)
+    return _save(path, graph, None)
+
+
+def endless_model(path: Path) -> Path:
+    """Write a model that declares one output of [1, 6, 84] and never comes to it."""
+    kind, shape = TensorProto.FLOAT, [1, 6, 84]
+    value = helper.make_tensor_value_info
+    body = helper.make_graph(
+        [
+            helper.make_node("Identity", ["going"], ["on"]),
+            helper.make_node("Identity", ["boxes"], ["same"]),
+        ],
+        "body",
+        [
+            value("round", TensorProto.INT64, []),
+            value("going", TensorProto.BOOL, []),
+            value("boxes", kind, shape),
+        ],
+        [value("on", TensorProto.BOOL, []), value("same", kind, shape)],
+    )
+    constants = [
+        numpy_helper.from_array(np.array(2**62, np.int64), "rounds"),
+        numpy_helper.from_array(np.array(True), "true"),  # noqa: FBT003 - a constant's value
+        numpy_helper.from_array(np.zeros(shape, np.float32), "start"),
+    ]
+    loop = helper.make_node("Loop", ["rounds", "true", "start"], ["output0"], body=body)
+    picture = value("images", kind, [1, 3, 64, 64])
+    graph = helper.make_graph(
+        [loop], "endless", [picture], [value("output0", kind, shape)], constants
+    )
+    return _save(path, graph, {"names": "['vest', 'person']"})
+
+
+def simcc_model(path: Path, size: tuple[int, int] = (48, 64)) -> Path:
+    """Write an RTMPose-shaped model of crops of `size` (width, height), two bins a pixel.
+
+    All its joints are where the brightest column meets the brightest row.
+    """
+    nodes, initializers, infos = [], [], []
+    for name, axes, side in (("simcc_x", [1, 2], size[0]), ("simcc_y", [1, 3], size[1])):
+        nodes += [
+            helper.make_node("ReduceMean", ["input"], [f"{name}_mean"], axes=axes, keepdims=0),
+            helper.make_node("MatMul", [f"{name}_mean", f"{name}_bins"], [f"{name}_wide"]),
+            helper.make_node("Reshape", [f"{name}_wide", f"{name}_shape"], [f"{name}_flat"]),
+            helper.make_node("Mul", [f"{name}_flat", "joints"], [name]),
+        ]
+        bins = np.repeat(np.eye(side, dtype=np.float32), 2, axis=1)
+        shape = np.array([-1, 1, 2 * side], np.int64)
+        initializers.append(numpy_helper.from_array(bins, f"{name}_bins"))
+        initializers.append(numpy_helper.from_array(shape, f"{name}_shape"))
+        infos.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, ["b", 17, 2 * side]))
+    initializers.append(numpy_helper.from_array(np.ones((1, 17, 1), np.float32), "joints"))
+    crop = helper.make_tensor_value_info("input", TensorProto.FLOAT, ["b", 3, size[1], size[0]])
+    graph = helper.make_graph(nodes, "simcc", [crop], infos, initializers)
     return _save(path, graph, None)
 
 
@@ -75,7 +134,7 @@ def mosaic_model(path: Path, side: int, *, classes: int = 5) -> Path:
     # Classes go by hue; dark cells hold things, about three cells wide.
     weights[5:] = 60 * (weights[5:] - weights[5:].mean(axis=1, keepdims=True))
     bias = np.zeros(5 + classes)
-    bias[2:4], weights[4], bias[4] = 1.0, -4.0, 3.0
+    bias[2:4], weights[4], bias[4] = 1.0, -4.0, 2.4
     constants: dict[str, NDArray[np.generic]] = {
         "full": np.array(255, np.float32),
         "weights": weights.astype(np.float32),

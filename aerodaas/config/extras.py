@@ -9,6 +9,7 @@ from aerodaas.types.errors import ConfigError
 __all__ = ["has_extra", "require_extra"]
 
 _PACKAGES = {
+    "evaluation": ("pycocotools", "yaml"),
     "notebook": ("pandas",),
     "plots": ("matplotlib",),
     "remote": ("fastapi", "uvicorn", "websockets"),
@@ -28,7 +29,7 @@ def require_extra(extra: str, purpose: str) -> None:
     """Require the packages of an extra.
 
     Args:
-        extra: `notebook`, `plots`, `remote`, `ros`, `routing` or `service`.
+        extra: `evaluation`, `notebook`, `plots`, `remote`, `ros`, `routing` or `service`.
         purpose: The feature, as the subject of the error's sentence, in the singular.
 
     Raises:

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import yaml  # type: ignore[import-untyped]
+import yaml
 from required import needs_peer, needs_root, peer
 
 from tools.namespaces.machine import run

@@ -18,7 +18,7 @@ _UNKNOWN = "unknown"
 _BY_TEXT = {
     "0BSD": r"0BSD",
     "Apache-2.0": r"Apache([ -]Software)?( License)?,?( Version)?[ -]*(2\.0)?",
-    "BSD-2-Clause": r"BSD[ -]2[ -]Clause( License)?",
+    "BSD-2-Clause": r"(BSD[ -]2[ -]Clause( License)?|FreeBSD)",
     "BSD-3-Clause": r"(BSD[ -]3[ -]Clause( License)?|3-Clause BSD License|Modified BSD License"
     r"|BSD( License)?)",
     "GPL-2.0-only": r"GPLv2",

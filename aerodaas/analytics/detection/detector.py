@@ -7,7 +7,7 @@ import logging
 import threading
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import onnxruntime as ort
@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from typing_extensions import Self
 
 from aerodaas.analytics.base import Analytics, Context, ResourceUse
-from aerodaas.analytics.detection.coco import COCO_NAMES
 from aerodaas.analytics.detection.families import FAMILIES
-from aerodaas.analytics.detection.families.base import Candidates, Decoder, ModelFamily
+from aerodaas.analytics.detection.families.base import Candidates, ModelFamily
 from aerodaas.analytics.detection.letterbox import Letterbox
-from aerodaas.analytics.detection.model_file import ModelFile, read_model
+from aerodaas.analytics.detection.model_file import read_model
 from aerodaas.analytics.detection.providers import open_session
+from aerodaas.analytics.detection.recognition import class_names, recognise
 from aerodaas.analytics.detection.suppression import strongest, suppress
+from aerodaas.analytics.detection.trial import Trial, preprocessing_for, try_out
 from aerodaas.analytics.endpoint.tensors import TensorSpec
 from aerodaas.analytics.models import DETECTOR
 from aerodaas.types.data import Detection, Detections, Frame
@@ -39,7 +40,7 @@ class _Desk(threading.local):
     """Working buffers of one thread, which are not pickled."""
 
     letterbox: Letterbox | None = None
-    buffer: NDArray[np.floating] | None = None
+    buffer: NDArray[Any] | None = None
 
     def __reduce__(self) -> tuple[type[_Desk], tuple[()]]:
         return _Desk, ()
@@ -48,9 +49,9 @@ class _Desk(threading.local):
 class OnnxDetector(Analytics[Detections]):
     """Detects objects, with their keypoints if the model is a pose model.
 
-    ``OnnxDetector("yolo11n.onnx", classes=["person"])``. The model's family, class names and
-    input size are read from the file, which is sent to the actor by value: an edge or cloud node
-    needs no copy.
+    ``OnnxDetector("yolox-nano", classes=["person"])``, or a file of one's own. The model's family,
+    class names and input size are read from the file, which is sent to the actor by value: an edge
+    or cloud node needs no copy.
     """
 
     accepts: ClassVar[tuple[type, ...]] = (Frame,)
@@ -76,7 +77,8 @@ class OnnxDetector(Analytics[Detections]):
         """Read the model and check that it is a detector.
 
         Args:
-            path: ONNX file; by default the shipped one.
+            path: ONNX file, or the name of a fetched model (`aerodaas models list`); by default
+                the shipped one.
             classes: Class names to keep; by default all.
             min_score: Least confidence of a detection, above 0 to 1.
             iou: Overlap of two boxes of one class above which only the better one is kept,
@@ -89,7 +91,9 @@ class OnnxDetector(Analytics[Detections]):
             families: Model families to recognise, in order.
 
         Raises:
-            ModelError: If the file or a setting is unsuitable.
+            ModelError: If the file or a setting is unsuitable, the model of this name was not
+                fetched, or a trial run shows that it cannot be a detector.
+            UnknownIdError: If no model has this name.
         """
         for name, value in (("min_score", min_score), ("iou", iou)):
             if not 0.0 < value <= 1.0:
@@ -105,14 +109,16 @@ class OnnxDetector(Analytics[Detections]):
         self.iou = iou
         self.providers = providers
         self.threads = threads
-        self.decoder = _decoder_for(model, families)
-        self.names = _names_for(model, self.decoder, names)
+        self.decoder = recognise(model, families)
+        self.names = class_names(model, self.decoder, names)
         self.size = model.size
         self.invalid = 0
         """Number of outputs dropped so far because they were not finite."""
         self.excess = 0
         """Number of boxes dropped so far because a frame had implausibly many."""
         self._wanted = _wanted_classes(self.path, self.names, classes)
+        self.style = preprocessing_for(model, self.decoder)
+        """How frames become the network's input."""
         self._content = model.content
         self._input = model.input.name
         self._dtype = model.dtype
@@ -123,6 +129,8 @@ class OnnxDetector(Analytics[Detections]):
             TensorSpec.of(output.name, np.float32, output.shape) for output in model.outputs
         )
         self._desk = _Desk()
+        self.trial: Trial = try_out(model, self.decoder)
+        """What the model gave for the trial pictures."""
 
     def with_model(self, path: str | Path) -> Self:
         """Return a detector with the model at `path` and the same classes, thresholds and threads.
@@ -186,7 +194,7 @@ class OnnxDetector(Analytics[Detections]):
         spec = TensorSpec.of(self._input, self._dtype, (1, 3, *axes))
         return spec, self._outputs
 
-    def preprocess(self, frames: Sequence[Frame]) -> NDArray[np.floating]:
+    def preprocess(self, frames: Sequence[Frame]) -> NDArray[Any]:
         """Letterbox frames of one size into the network's input, count x 3 x height x width.
 
         The returned array is overwritten by this thread's next call.
@@ -194,8 +202,7 @@ class OnnxDetector(Analytics[Detections]):
         desk = self._desk
         shape = (frames[0].height, frames[0].width)
         if desk.letterbox is None or desk.letterbox.frame != shape:
-            style = self.decoder.preprocessing
-            desk.letterbox = Letterbox(shape, self.size, style, flexible=self._flexible)
+            desk.letterbox = Letterbox(shape, self.size, self.style, flexible=self._flexible)
             desk.buffer = None
         if desk.buffer is None or len(desk.buffer) != len(frames):
             desk.buffer = desk.letterbox.buffer(len(frames), self._dtype)
@@ -203,7 +210,7 @@ class OnnxDetector(Analytics[Detections]):
             desk.letterbox.write(frame.image, slot)
         return desk.buffer
 
-    def infer(self, pixels: NDArray[np.floating]) -> list[NDArray[np.floating]]:
+    def infer(self, pixels: NDArray[Any]) -> list[NDArray[Any]]:
         """Run the network.
 
         Raises:
@@ -215,7 +222,7 @@ class OnnxDetector(Analytics[Detections]):
         return [np.asarray(output) for output in self._session.run(None, {self._input: pixels})]
 
     def postprocess(
-        self, frames: Sequence[Frame], outputs: Sequence[NDArray[np.floating]]
+        self, frames: Sequence[Frame], outputs: Sequence[NDArray[Any]]
     ) -> list[Detections]:
         """Convert the network's outputs for the frames last preprocessed to detections.
 
@@ -269,33 +276,6 @@ class OnnxDetector(Analytics[Detections]):
         if count and not self.invalid:
             _log.warning("%s: gives outputs that are not finite; they are dropped", self.path)
         self.invalid += count
-
-
-def _decoder_for(model: ModelFile, families: Sequence[ModelFamily]) -> Decoder:
-    task = model.metadata.get("task", "detect")
-    if task not in ("detect", "pose"):
-        raise model.refusal(f"is made to {task}, not to detect", "choose a detect or pose model")
-    decoder = next((found for family in families if (found := family(model))), None)
-    if decoder is None:
-        shapes = ", ".join(str(list(output.shape)) for output in model.outputs)
-        problem = f"gives {shapes}, the output of no detector that is known here"
-        remedy = "choose a YOLO detector, or pass a ModelFamily of your own in families="
-        raise model.refusal(problem, remedy)
-    return decoder
-
-
-def _names_for(model: ModelFile, decoder: Decoder, names: Sequence[str] | None) -> tuple[str, ...]:
-    given = tuple(names) if names is not None else model.names
-    if given is None and decoder.classes == len(COCO_NAMES):
-        _log.info("%s names no classes; its 80 are taken for COCO's", model.path)
-        given = COCO_NAMES
-    if given is None:
-        _log.warning("%s names no classes; they are called by number", model.path)
-        given = tuple(str(number) for number in range(decoder.classes))
-    if len(given) != decoder.classes:
-        problem = f"tells {decoder.classes} classes apart, but {len(given)} are named"
-        raise model.refusal(problem, "give one name for each in names=")
-    return given
 
 
 def _wanted_classes(

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.detection.families.base import Preprocessing
+from aerodaas.analytics.detection.model_file import PixelType
 
 __all__ = ["Letterbox"]
 
@@ -33,9 +36,11 @@ class Letterbox:
         If the input's size is `flexible`, padding beyond the next multiple of 32 is omitted.
         """
         height, width = frame
-        self.ratio = min(network[0] / height, network[1] / width)
-        self.inner = (max(1, round(height * self.ratio)), max(1, round(width * self.ratio)))
-        if flexible:
+        ratio = min(network[0] / height, network[1] / width)
+        self.inner = (max(1, round(height * ratio)), max(1, round(width * ratio)))
+        if style.stretched:
+            self.inner = network
+        elif flexible:
             network = (_round_up(self.inner[0]), _round_up(self.inner[1]))
         self.frame = frame
         self.network = network
@@ -44,11 +49,11 @@ class Letterbox:
         # Halves are rounded down, as in Ultralytics' LetterBox.
         self.top, self.left = (slack[0] // 2, slack[1] // 2) if style.centred else (0, 0)
 
-    def buffer(self, count: int, dtype: type[np.float32 | np.float16]) -> NDArray[np.floating]:
+    def buffer(self, count: int, dtype: type[PixelType]) -> NDArray[Any]:
         """Make an input for `count` frames, count x 3 x height x width, filled with padding."""
         return np.full((count, 3, *self.network), self.style.fill * self.style.scale, dtype)
 
-    def write(self, image: NDArray[np.uint8], slot: NDArray[np.floating]) -> None:
+    def write(self, image: NDArray[np.uint8], slot: NDArray[Any]) -> None:
         """Resize a BGR `image` into `slot` (3 x height x width) of a buffer."""
         height, width = self.inner
         if self.frame != self.inner:

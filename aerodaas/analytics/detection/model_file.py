@@ -7,29 +7,37 @@ built, as one ModelError that names the path and the remedy.
 from __future__ import annotations
 
 import ast
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
 
+from aerodaas.analytics.models.cache import model_named, require_fetched
 from aerodaas.types.errors import ModelError
 
-__all__ = ["ModelFile", "Tensor", "read_model"]
+__all__ = ["ModelFile", "PixelType", "Tensor", "read_model"]
 
-_FLOATS: dict[str, type[np.float32 | np.float16]] = {
+PixelType: TypeAlias = np.float32 | np.float16 | np.uint8
+"""Element types of an input: floating point in the family's range, or bytes from 0 to 255."""
+
+_PIXELS: dict[str, type[PixelType]] = {
     "tensor(float)": np.float32,
     "tensor(float16)": np.float16,
+    "tensor(uint8)": np.uint8,
 }
 _PICTURE_AXES = 4
 _COLOURS = 3
 _FALLBACK_SIZE = 640
 _STRIDE = 32
-_ERRORS_ONLY = 3
+_ERRORS_ONLY, _NOTHING = 3, 4
+_LONGEST_RUN = 60.0
+"""Seconds for one picture in a trial; a network that flies takes less than one."""
 _REMEDY = "export the model again, for example `yolo export model=yolo11n.pt format=onnx`"
 
 
@@ -57,9 +65,9 @@ class ModelFile:
     session: ort.InferenceSession
 
     @property
-    def dtype(self) -> type[np.float32 | np.float16]:
+    def dtype(self) -> type[PixelType]:
         """Element type of the input."""
-        return _FLOATS[self.input.kind]
+        return _PIXELS[self.input.kind]
 
     @property
     def batches(self) -> bool:
@@ -74,12 +82,30 @@ class ModelFile:
     @cached_property
     def trial(self) -> tuple[NDArray[np.float32], ...]:
         """Outputs for one mid-grey image, which show the shapes and scales of the outputs."""
-        picture = np.full((1, _COLOURS, *self.size), 0.5, self.dtype)
+        grey = 127 if self.dtype is np.uint8 else 0.5
+        return self.run(np.full((1, _COLOURS, *self.size), grey, self.dtype))
+
+    def run(self, pixels: NDArray[Any]) -> tuple[NDArray[np.float32], ...]:
+        """Outputs, with their batch axes, for an input of the network.
+
+        Raises:
+            ModelError: If the network fails, gives something else than numbers, or takes longer
+                than any that could fly: a stranger's may loop without end.
+        """
+        options = ort.RunOptions()
+        options.log_severity_level = _NOTHING
+        watch = threading.Timer(_LONGEST_RUN, setattr, (options, "terminate", True))
+        watch.start()
         try:
-            outputs = self.session.run(None, {self.input.name: picture})
+            outputs = self.session.run(None, {self.input.name: pixels}, options)
+            return tuple(np.asarray(output, np.float32) for output in outputs)
         except Exception as error:  # noqa: BLE001 - onnxruntime has no common base class
+            if options.terminate:
+                problem = f"takes more than {_LONGEST_RUN:g} s for one picture"
+                raise self.refusal(problem, "choose a smaller model") from None
             raise self.refusal(f"fails on a trial picture ({_first_line(error)})") from None
-        return tuple(np.asarray(output, np.float32) for output in outputs)
+        finally:
+            watch.cancel()
 
     @property
     def output_shape(self) -> tuple[int, ...]:
@@ -108,13 +134,18 @@ class ModelFile:
 
 
 def read_model(path: str | Path, size: int | None = None) -> ModelFile:
-    """Read and check an ONNX file.
+    """Read and check an ONNX file, or a fetched model by its name.
 
-    `size` is the side in pixels of the square input of a model of variable input size. Raises
-    ModelError if the file is missing, empty, not an ONNX model, or does not take one colour image.
+    `size` is the side in pixels of the square input of a model of variable input size.
+
+    Raises:
+        ModelError: If the file is missing, empty, not an ONNX model, or does not take one colour
+            image; if a model of this name was not fetched, or its file is another one.
+        UnknownIdError: If no model has this name.
     """
+    named = model_named(path)
     path = Path(path)
-    content = _read(path)
+    content = _read(path) if named is None else require_fetched(named)
     options = ort.SessionOptions()
     options.log_severity_level = _ERRORS_ONLY
     options.graph_optimization_level = ort.GraphOptimizationLevel.ORT_DISABLE_ALL
@@ -168,9 +199,9 @@ def _tensors(nodes: Sequence[Any]) -> tuple[Tensor, ...]:
 
 
 def _check_picture(path: Path, tensor: Tensor) -> None:
-    if tensor.kind not in _FLOATS:
-        remedy = "export it with a float32 or float16 input"
-        raise _refusal(path, f"takes {tensor.kind} instead of floating-point pixels", remedy)
+    if tensor.kind not in _PIXELS:
+        remedy = "export it with a float32, float16 or uint8 input"
+        raise _refusal(path, f"takes {tensor.kind}, which are no pixels", remedy)
     if len(tensor.shape) != _PICTURE_AXES:
         problem = f"takes an input of {len(tensor.shape)} axes, not batch x 3 x height x width"
         raise _refusal(path, problem, "choose a model that takes pictures")

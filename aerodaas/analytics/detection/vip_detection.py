@@ -31,7 +31,7 @@ class VipDetectionAnalytics(OnnxDetector):
         """Read the model.
 
         Args:
-            model: ONNX file; by default the shipped one.
+            model: ONNX file, or the name of a fetched model; by default the shipped one.
             classes: Class names to keep; by default `vest` of the shipped model, and every class
                 of any other model.
             min_score: Least confidence of a detection, above 0 to 1.

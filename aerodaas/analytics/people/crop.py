@@ -6,7 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CUT", "GREY", "MARGIN", "cut_out", "square_around"]
+__all__ = ["CUT", "GREY", "MARGIN", "Region", "cut_out", "cut_region", "square_around"]
+
+Region = tuple[float, float, float, float]
+"""Left, top, width, height of a part of an image, in pixels; it may reach beyond it."""
 
 CUT = 128
 """Side of the crop in pixels."""
@@ -35,19 +38,31 @@ def cut_out(
 ) -> NDArray[np.uint8]:
     """Crop a square (left, top, side) of `image` to size x size pixels; grey outside the image."""
     left, top, side = square
+    return cut_region(image, (left, top, side, side), (size, size))
+
+
+def cut_region(
+    image: NDArray[np.uint8], region: Region, size: tuple[int, int], fill: int = GREY
+) -> NDArray[np.uint8]:
+    """Crop a region of `image` to `size` (width, height), of one shape.
+
+    Outside the image it is of the grey level `fill`, 0 to 255.
+    """
+    left, top, wide, high = region
     height, width = image.shape[:2]
     first = np.floor([left, top]).astype(int).clip(0, (width, height))
-    last = np.ceil([left + side, top + side]).astype(int).clip(0, (width, height))
+    last = np.ceil([left + wide, top + high]).astype(int).clip(0, (width, height))
     part = image[first[1] : last[1], first[0] : last[0]]
     if not part.size:
-        return np.full((size, size, 3), GREY, np.uint8)
-    zoom = size / side
+        return np.full((size[1], size[0], 3), fill, np.uint8)
+    full = size[0] / wide
+    zoom = full
     while zoom <= 0.5 and min(part.shape[:2]) > 1:  # noqa: PLR2004 - warping skips pixels below
         part = np.asarray(cv2.resize(part, None, fx=0.5, fy=0.5, interpolation=cv2.INTER_AREA))
         zoom *= 2
     scale = (last - first) / part.shape[1::-1]
     matrix = np.zeros((2, 3))
-    matrix[[0, 1], [0, 1]] = size / side * scale
-    matrix[:, 2] = (first + 0.5 * scale - 0.5 - (left, top)) * size / side
-    warped = cv2.warpAffine(part, matrix, (size, size), borderValue=(GREY, GREY, GREY))
+    matrix[[0, 1], [0, 1]] = full * scale
+    matrix[:, 2] = (first + 0.5 * scale - 0.5 - (left, top)) * full
+    warped = cv2.warpAffine(part, matrix, size, borderValue=(fill, fill, fill))
     return np.asarray(warped, np.uint8)

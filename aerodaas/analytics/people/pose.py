@@ -69,8 +69,9 @@ class PoseAnalytics(Analytics[Detections]):
         """Read the models.
 
         Args:
-            model: ONNX file of the keypoint network, as made by `python -m tools.training pose`;
-                by default the shipped one.
+            model: ONNX file of the keypoint network, as made by `python -m tools.training pose` or
+                an RTMPose, or the name of a fetched one (`aerodaas models list`); by default the
+                shipped one.
             detector: Detector of `person` or `vest`; by default the shipped one.
             most: Greatest number of people per frame, 1 or more.
             min_score: Least confidence of the default detector's boxes, above 0 to 1.

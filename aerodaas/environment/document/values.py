@@ -18,6 +18,7 @@ import numpy as np
 
 from aerodaas.analytics.base import Analytics, ResourceUse
 from aerodaas.analytics.models import DETECTOR
+from aerodaas.analytics.models.cache import fetched_path, model_folder, model_named
 from aerodaas.config.plugins import load_plugin, plugin_names
 from aerodaas.environment.environment import Environment
 from aerodaas.types.errors import AeroDaaSError, GraphError
@@ -130,6 +131,8 @@ class ValueWriter:
             raise GraphError(f"{place} comes from the environment file alone: leave it out")
         path = Path(str(value))
         if use == "model":
+            named = model_named(str(value))
+            path = path if named is None else fetched_path(named)
             sha256 = _hash_of(path)
             self.models[sha256] = path
             return {"$model": path.name, "sha256": sha256}
@@ -220,7 +223,7 @@ class ValueReader:
 
     def _model(self, name: str, wanted: str, place: str) -> Path:
         if not self._known:
-            for folder in (DETECTOR.parent, self._models):
+            for folder in (DETECTOR.parent, self._models, model_folder()):
                 self._known |= {_hash_of(one): one for one in sorted(folder.glob("*.onnx"))}
         if wanted not in self._known:
             raise GraphError(

@@ -178,7 +178,8 @@ def test_a_model_that_does_not_fit_is_refused_before_the_mission(
     """Another name, another input, another number of classes, an address of something else."""
     with pytest.raises(ModelError, match=r"no model 'yolo'.*endpoint\.models"):
         opened(OnnxDetector(model), resource(url, models={"lamps": "yolo"})).__enter__()
-    few = OnnxDetector(constant_model(tmp_path / "few.onnx", [np.zeros((1, 6, 84), "f4")]))
+    boxes = np.repeat(np.array([[[20], [20], [9], [9], [0.05], [0.05]]], "f4"), 84, axis=2)
+    few = OnnxDetector(constant_model(tmp_path / "few.onnx", [boxes]))
     with pytest.raises(ModelError, match="no output output0"):
         opened(few, resource(url, models={"lamps": "patchwork"})).__enter__()
     with pytest.raises(ModelError, match="no model"):

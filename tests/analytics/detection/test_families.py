@@ -12,8 +12,10 @@ from numpy.typing import NDArray
 from onnx import TensorProto
 from synthetic_models import constant_model, patchwork_model
 
+from aerodaas.analytics.detection.coco import COCO_NAMES
 from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.types.data import Detections, Frame, Header
+from aerodaas.types.errors import ModelError
 
 NAMES = "{0: 'vest', 1: 'person'}"
 CELLS = 8 * 8 + 4 * 4 + 2 * 2  # 64 x 64 pixels at strides of 8, 16 and 32
@@ -136,3 +138,77 @@ def test_dynamic_shapes_take_batches_and_leave_out_padding(tmp_path: Path) -> No
     white = pytest.approx((20, 8, 60, 48))  # the frame starts at row 12 of 96
     assert [any(item.box == white for item in found) for found in results] == [False, True]
     assert detector.detect([bright])[0].items == results[1].items
+
+
+def query_boxes() -> NDArray[np.float32]:
+    """Centre, width and height of 30 queries as fractions of the input; the third is a thing's."""
+    boxes = np.random.default_rng(3).uniform(0.3, 0.6, (30, 4)).astype(np.float32)
+    boxes[2] = [0.5, 0.5, 0.25, 0.75]
+    return boxes
+
+
+def with_coco_scores(form: str) -> list[NDArray[Any]]:
+    """Outputs of an RT-DETR of COCO's classes, in one of its forms; query 2 is a car of 0.9."""
+    scores = np.full((30, 80), 0.01, np.float32)
+    scores[2, 2] = 0.9
+    if form == "joined":
+        return [np.hstack([query_boxes(), scores])[None]]
+    if form == "ranked":
+        best = np.stack([scores.max(axis=1), scores.argmax(axis=1)], axis=1)
+        return [np.hstack([query_boxes(), best])[None].astype(np.float32)]
+    logits = np.log(scores / (1 - scores))
+    return [logits[None], query_boxes()[None]]
+
+
+@pytest.mark.parametrize("form", ["joined", "ranked", "logits and boxes"])
+def test_rt_detr_stretches_the_frame(tmp_path: Path, form: str) -> None:
+    """Fractions of the input are fractions of the frame, whatever its aspect ratio."""
+    # Without names, 84 columns would be the cells of 64 x 64 pixels.
+    names = str(dict(enumerate(COCO_NAMES)))
+    path = constant_model(tmp_path / "a.onnx", with_coco_scores(form), metadata={"names": names})
+    (found,) = detect(path, frame(50, 200))
+    assert found.label == "car"
+    assert found.score == pytest.approx(0.9)
+    assert found.box == pytest.approx((75, 6.25, 125, 43.75), abs=1e-3)
+
+
+def test_yolo_nas_without_nms(tmp_path: Path) -> None:
+    """Corners and scores in outputs of their own; overlapping boxes of one class are suppressed."""
+    boxes = np.zeros((1, CELLS, 4), np.float32)
+    scores = np.zeros((1, CELLS, 2), np.float32)
+    boxes[0, :3] = [[22, 12, 42, 52], [23, 13, 43, 53], [2, 2, 9, 9]]
+    scores[0, :3] = [[0.1, 0.9], [0.1, 0.8], [0.7, 0]]
+    for outputs in ([boxes, scores], [scores, boxes]):
+        path = constant_model(tmp_path / "a.onnx", outputs, metadata={"names": NAMES})
+        assert [(item.label, item.box) for item in detect(path)] == [
+            ("person", (22, 12, 42, 52)),
+            ("vest", (2, 2, 9, 9)),
+        ]
+
+
+def test_nms_with_four_outputs_and_bytes_for_pixels(tmp_path: Path) -> None:
+    """YOLO-NAS' own export: what follows the count is padding, whatever it holds."""
+    outputs: list[NDArray[Any]] = [
+        np.array([[2]], np.int64),
+        np.array([[[22, 12, 42, 52], [2, 2, 9, 9], [1, 1, 60, 60]]], np.float32),
+        np.array([[0.9, 0.7, 0.8]], np.float32),
+        np.array([[1, 0, 1]], np.int64),
+    ]
+    path = constant_model(
+        tmp_path / "a.onnx", outputs, element=TensorProto.UINT8, metadata={"names": NAMES}
+    )
+    assert [(item.label, item.box) for item in detect(path)] == [
+        ("person", (22, 12, 42, 52)),
+        ("vest", (2, 2, 9, 9)),
+    ]
+    detector = OnnxDetector(path)
+    pixels = detector.preprocess([Frame(Header(0, 0, "cam"), np.full((32, 64, 3), 200, np.uint8))])
+    assert pixels.dtype == np.uint8
+    assert set(np.unique(pixels)) == {114, 200}, "bytes are not scaled"
+
+
+def test_results_of_all_pictures_in_one_table_are_refused_with_the_remedy(tmp_path: Path) -> None:
+    """YOLO-NAS' flat format and YOLOv7's end-to-end export differ in the order of their columns."""
+    path = constant_model(tmp_path / "a.onnx", [np.zeros((3, 7), np.float32)])
+    with pytest.raises(ModelError, match="output_predictions_format=BATCH"):
+        OnnxDetector(path)

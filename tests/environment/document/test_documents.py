@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +24,14 @@ from aerodaas.analytics import (
     MonitoringAnalytics,
     Near,
     OnnxDetector,
+    PersonFollowAnalytics,
     RemoteAnalytics,
     TowerInspectionAnalytics,
     VipDetectionAnalytics,
 )
 from aerodaas.analytics.base import Context
 from aerodaas.analytics.models import DETECTOR
+from aerodaas.analytics.models.registry import REGISTRY
 from aerodaas.analytics.people.body_pose import hand_raised
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
@@ -109,6 +113,31 @@ def test_an_application_survives_the_way_into_a_document_and_back(
     env = Environment(APPS / "environments" / document.environment)
     assert again(document, env, tmp_path) == document
     assert document.navigation
+
+
+def test_a_model_by_name_is_written_by_its_checksum(
+    environment: Callable[[], Environment], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever has fetched the same model flies the document; nobody else does."""
+    content = DETECTOR.read_bytes() + b"\x72\x00"  # an empty entry of metadata
+    fetched = tmp_path / "fetched"
+    fetched.mkdir()
+    (fetched / "mine.onnx").write_bytes(content)
+    sha256 = hashlib.sha256(content).hexdigest()
+    model = replace(REGISTRY["yolox-nano"], name="mine", sha256=sha256)
+    monkeypatch.setitem(REGISTRY, "mine", model)
+    monkeypatch.setenv("AERODAAS_MODELS", str(fetched))
+    env = environment()
+    edge = env.get_compute_resource_by_id("edge")
+    people = OnnxDetector("mine", classes=["person"]).deploy(edge).analyse(camera(env))
+    PersonFollowAnalytics().deploy(edge).analyse(people)
+    fly(env)
+    written = write_mission(env, "by name")
+    assert f'"sha256": "{sha256}"' in written.text()
+    assert again(written, environment(), tmp_path) == written
+    monkeypatch.setenv("AERODAAS_MODELS", str(tmp_path))
+    with pytest.raises(GraphError, match=r"no model 'mine.onnx' with the SHA-256"):
+        again(written, environment(), tmp_path)
 
 
 def test_settings_of_every_kind_come_back(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 import onnx
@@ -23,13 +23,19 @@ _FRAME = Frame(Header(0, 0, "camera"), np.full((48, 80, 3), 127, np.uint8))
 
 
 def seeds() -> Iterable[bytes]:
-    """Detectors of two families, of a few cells and classes."""
+    """Detectors of each family, of a few cells and classes, that find one thing."""
     rng = np.random.default_rng(1)
-    boxes = rng.uniform(8, 40, (1, 4, _CELLS))
-    scores = rng.uniform(0, 1, (1, 3, _CELLS))
     names = {"names": "{0: 'person', 1: 'car', 2: 'vest'}", "imgsz": "[64, 64]", "stride": "32"}
-    yield _model(np.concatenate([boxes, scores], axis=1).astype(np.float32), names)
-    yield _model(rng.uniform(0, 1, (1, _CELLS, 8)).astype(np.float32), {})
+    boxes, scores = rng.uniform(8, 40, (1, _CELLS, 4)), rng.uniform(0, 0.05, (1, _CELLS, 3))
+    scores[0, 7] = [0.1, 0.9, 0.1]
+    sure, car = scores.max(axis=2, keepdims=True), np.ones((1, _CELLS, 1))
+    corners = np.concatenate([boxes[..., :2], boxes[..., :2] + 9], axis=2)
+    yield _model([np.concatenate([boxes, scores], axis=2).transpose(0, 2, 1)], names)
+    yield _model([np.concatenate([boxes / 40, sure, scores], axis=2)], {})
+    yield _model([np.concatenate([corners, sure, car], axis=2)], names)
+    yield _model([np.concatenate([boxes / 64, scores], axis=2)[:, :30]], names)
+    yield _model([corners, scores], names)
+    yield _model([np.array([[9.0]]), corners[:, :9], sure[:, :9, 0], car[:, :9, 0]], names)
 
 
 def run(data: bytes) -> None:
@@ -44,24 +50,21 @@ def run(data: bytes) -> None:
         return
 
 
-def _model(output: np.ndarray, metadata: dict[str, str]) -> bytes:
-    """A network that reads its picture and gives `output`."""
+def _model(outputs: Sequence[np.ndarray], metadata: dict[str, str]) -> bytes:
+    """A network that reads its picture and gives `outputs`."""
     nodes = [
         helper.make_node("ReduceMean", ["images"], ["mean"], keepdims=0),
         helper.make_node("Mul", ["mean", "nothing"], ["zero"]),
-        helper.make_node("Add", ["boxes", "zero"], ["output0"]),
     ]
-    constants = [
-        numpy_helper.from_array(output, "boxes"),
-        numpy_helper.from_array(np.zeros((), np.float32), "nothing"),
-    ]
-    graph = helper.make_graph(
-        nodes,
-        "detector",
-        [helper.make_tensor_value_info("images", TensorProto.FLOAT, (1, 3, _SIDE, _SIDE))],
-        [helper.make_tensor_value_info("output0", TensorProto.FLOAT, output.shape)],
-        constants,
-    )
+    constants = [numpy_helper.from_array(np.zeros((), np.float32), "nothing")]
+    infos = []
+    for number, output in enumerate(outputs):
+        given, name = f"constant{number}", f"output{number}"
+        nodes.append(helper.make_node("Add", [given, "zero"], [name]))
+        constants.append(numpy_helper.from_array(output.astype(np.float32), given))
+        infos.append(helper.make_tensor_value_info(name, TensorProto.FLOAT, output.shape))
+    picture = helper.make_tensor_value_info("images", TensorProto.FLOAT, (1, 3, _SIDE, _SIDE))
+    graph = helper.make_graph(nodes, "detector", [picture], infos, constants)
     model = helper.make_model(graph, opset_imports=[helper.make_opsetid("", 13)], ir_version=8)
     helper.set_model_props(model, metadata)
     onnx.checker.check_model(model)

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from aerodaas.analytics.detection.families.base import ModelFamily
 from aerodaas.analytics.detection.families.end2end import end_to_end
+from aerodaas.analytics.detection.families.nms_outputs import nms_outputs
+from aerodaas.analytics.detection.families.rtdetr import rtdetr
 from aerodaas.analytics.detection.families.ultralytics import ultralytics
+from aerodaas.analytics.detection.families.yolo_nas import yolo_nas
 from aerodaas.analytics.detection.families.yolov5 import yolov5
 from aerodaas.analytics.detection.families.yolox import yolox
 
 __all__ = ["FAMILIES"]
 
-FAMILIES: tuple[ModelFamily, ...] = (yolov5, yolox, ultralytics, end_to_end)
+FAMILIES: tuple[ModelFamily, ...] = (
+    yolov5,
+    yolox,
+    ultralytics,
+    rtdetr,
+    end_to_end,
+    yolo_nas,
+    nms_outputs,
+)
 """All families, the strictest first: those that must match the grid of the input size exactly."""

@@ -39,6 +39,8 @@ class Preprocessing:
     """Padding on both sides; otherwise the image lies in the top left corner."""
     fill: int = 114
     """Grey level of the padding, 0 to 255."""
+    stretched: bool = False
+    """The image fills the input, whatever its aspect ratio; otherwise it is padded."""
 
 
 @dataclass(frozen=True)

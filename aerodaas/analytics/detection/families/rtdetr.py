@@ -1,0 +1,118 @@
+"""RT-DETR: a transformer's list of boxes, one for each query, which needs no suppression.
+
+Boxes are centre, width and height as fractions of the input, to which the image is stretched. The
+exports differ in the rest: Ultralytics' has one output, [batch, queries, 6] with score and class
+after the box, or in earlier versions [batch, queries, 4 + classes] with scores after the sigmoid;
+Hugging Face's has two, boxes [batch, queries, 4] and logits [batch, queries, classes]. Sources:
+ultralytics/nn/modules/head.py, `RTDETRDecoder`, ultralytics/models/rtdetr/predict.py, and
+transformers, models/rt_detr/modeling_rt_detr.py, `RTDetrForObjectDetection`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.analytics.detection.coco import COCO_NAMES
+from aerodaas.analytics.detection.families.arrays import (
+    best_class,
+    boxes_and_scores,
+    corners,
+    sigmoid,
+)
+from aerodaas.analytics.detection.families.base import Candidates, Preprocessing, keep_finite
+from aerodaas.analytics.detection.model_file import ModelFile
+
+__all__ = ["RtDetrDecoder", "rtdetr"]
+
+_AXES = 3
+_BOX, _SCORE, _CLASS, _ROW = 4, 4, 5, 6
+_MOST_QUERIES = 1000
+_PIXELS = Preprocessing(stretched=True)
+
+
+@dataclass(frozen=True)
+class RtDetrDecoder:
+    """Decodes [queries, 4 + classes], [queries, 6], or boxes and scores in outputs of their own."""
+
+    classes: int
+    separate: tuple[int, int] | None = None
+    """Numbers of the outputs of boxes and of scores; None if one output holds both."""
+    logits: bool = False
+    """Whether the scores are before the sigmoid."""
+    ranked: bool = False
+    """Whether the one output holds the best score and its class, instead of all scores."""
+    family: str = "RT-DETR"
+    preprocessing: Preprocessing = _PIXELS
+    overlapping: bool = False
+
+    def decode(
+        self, outputs: Sequence[NDArray[np.float32]], size: tuple[int, int], min_score: float
+    ) -> Candidates:
+        """Keep the queries whose score reaches `min_score`, their boxes scaled to pixels."""
+        if self.ranked:
+            return self._of(outputs[0], *self._listed(outputs[0], min_score), size)
+        if self.separate is None:
+            boxes, scores = outputs[0][:, :_BOX], outputs[0][:, _BOX:]
+        else:
+            boxes, scores = (outputs[number] for number in self.separate)
+        if self.logits:
+            scores = sigmoid(scores)
+        return self._of(boxes, *best_class(scores.T, min_score), size)
+
+    def _listed(
+        self, rows: NDArray[np.float32], min_score: float
+    ) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.int32], int]:
+        scores, classes = rows[:, _SCORE], rows[:, _CLASS]
+        known = (classes >= 0) & (classes < self.classes)
+        kept = np.flatnonzero(known & (scores >= min_score))
+        invalid = np.isnan(scores) | (~known & (scores >= min_score))
+        return kept, scores[kept], classes[kept].astype(np.int32), int(np.count_nonzero(invalid))
+
+    def _of(
+        self,
+        boxes: NDArray[np.float32],
+        kept: NDArray[np.intp],
+        scores: NDArray[np.float32],
+        classes: NDArray[np.int32],
+        invalid: int,
+        size: tuple[int, int],
+    ) -> Candidates:
+        height, width = size
+        scale = np.array([width, height, width, height], np.float32)
+        pixels = corners(boxes[kept, :_BOX]) * scale
+        return keep_finite(Candidates(pixels, scores, classes, None, invalid))
+
+
+def rtdetr(model: ModelFile) -> RtDetrDecoder | None:
+    """Recognise at most a thousand boxes, all of which the trial picture shows to be fractions."""
+    shapes = [output.shape for output in model.trial] if _may_be(model) else []
+    separate = boxes_and_scores(shapes)
+    if separate is not None:
+        boxes, scores = (model.trial[number][0] for number in separate)
+    elif len(shapes) == 1 and len(shapes[0]) == _AXES:
+        boxes, scores = np.split(model.trial[0][0], [_BOX], axis=1)
+    else:
+        return None
+    fractions = bool(((boxes >= 0) & (boxes <= 1)).all() and boxes.any())
+    if not 1 <= len(boxes) <= _MOST_QUERIES or not fractions:
+        return None
+    if separate is not None:
+        # One number is enough: hundreds of logits do not all lie between 0 and 1.
+        logits = bool(((scores < 0) | (scores > 1)).any())
+        return RtDetrDecoder(scores.shape[1], separate, logits)
+    names = model.names or COCO_NAMES
+    if scores.shape[1] == _ROW - _BOX and (scores[:, 1] % 1 == 0).all():
+        return RtDetrDecoder(len(names), ranked=True)
+    return RtDetrDecoder(len(names)) if scores.shape[1] == len(names) else None
+
+
+def _may_be(model: ModelFile) -> bool:
+    """Whether the declared outputs can be a list of boxes, so that a trial is worth its time."""
+    shapes = [output.shape for output in model.outputs]
+    queries = {shape[1] for shape in shapes if len(shape) == _AXES}
+    few = all(count is None or 1 <= count <= _MOST_QUERIES for count in queries)
+    return len(shapes) in (1, 2) and len(queries) == 1 and few

@@ -1,0 +1,151 @@
+"""Annotated pictures: boxes and labels, in whichever of three formats they were written.
+
+Annotations are a stranger's data: sizes, counts and numbers have bounds, and pictures lie in the
+folder of the pictures alone, whatever path an annotation names.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from aerodaas.config.printable import printable
+from aerodaas.types.errors import ConfigError
+from aerodaas.types.picture_size import picture_fits, picture_size
+
+__all__ = [
+    "MOST_THINGS",
+    "PICTURE_SUFFIXES",
+    "AnnotatedPicture",
+    "Box",
+    "Dataset",
+    "Thing",
+    "checked_box",
+    "read_bytes",
+    "read_picture",
+    "shown",
+]
+
+Box = tuple[float, float, float, float]
+
+MOST_THINGS = 2_000_000
+"""Most annotations of a dataset: COCO's training set has 860,000."""
+PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
+_MOST_PICTURE_BYTES = 64 << 20
+_MOST_SIDE = 1e6
+"""Pixels; beyond them no box lies."""
+_SHOWN = 60
+"""Characters of a stranger's text in an error."""
+
+
+@dataclass(frozen=True)
+class Thing:
+    """One annotated object."""
+
+    label: str
+    box: Box
+    """Left, top, right, bottom in pixels."""
+    ignored: bool = False
+    """Need not be found, and may be: COCO's crowds, VOC's difficult objects."""
+    area: float | None = None
+    """Square pixels of its outline where that is annotated; otherwise the box's count."""
+
+
+@dataclass(frozen=True)
+class AnnotatedPicture:
+    """One picture with all its annotations."""
+
+    path: Path
+    things: tuple[Thing, ...]
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """Annotated pictures, and the labels that were annotated throughout."""
+
+    pictures: tuple[AnnotatedPicture, ...]
+    labels: tuple[str, ...]
+
+    def renamed(self, names: Mapping[str, str]) -> Dataset:
+        """The dataset with other labels; several may get one name.
+
+        Raises:
+            ConfigError: If there is no such label.
+        """
+        unknown = [name for name in names if name not in self.labels]
+        if unknown:
+            known = ", ".join(shown(label) for label in self.labels)
+            raise ConfigError(f"the dataset has no label {', '.join(unknown)}; it has {known}")
+        pictures = tuple(
+            AnnotatedPicture(
+                picture.path,
+                tuple(
+                    replace(one, label=names.get(one.label, one.label)) for one in picture.things
+                ),
+            )
+            for picture in self.pictures
+        )
+        return Dataset(
+            pictures, tuple(dict.fromkeys(names.get(label, label) for label in self.labels))
+        )
+
+
+def shown(content: object) -> str:
+    """A stranger's value, short and printable."""
+    text = printable(str(content))
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}…"
+
+
+def checked_box(numbers: Sequence[object], place: str) -> Box:
+    """Return left, top, right, bottom as given.
+
+    Raises:
+        ConfigError: That names the `place`, for anything but finite numbers of a box with a size.
+    """
+    plain = [
+        float(one) for one in numbers if isinstance(one, int | float) and not isinstance(one, bool)
+    ]
+    if len(plain) != len(numbers) or not all(
+        math.isfinite(one) and abs(one) <= _MOST_SIDE for one in plain
+    ):
+        raise ConfigError(f"{place}: a box has four finite numbers, not {shown(list(numbers))}")
+    left, top, right, bottom = plain
+    if right <= left or bottom <= top:
+        raise ConfigError(
+            f"{place}: the box is empty: {right - left:g} x {bottom - top:g} pixels; remove it, or "
+            "give it a size"
+        )
+    return left, top, right, bottom
+
+
+def read_bytes(path: Path, most: int) -> bytes:
+    """Read a file of at most `most` bytes; raises ConfigError."""
+    try:
+        with path.open("rb") as file:
+            # Python takes the memory for as much as is asked for, however small the file.
+            size = os.fstat(file.fileno()).st_size
+            if size <= most:
+                return file.read(size)
+    except OSError as error:
+        raise ConfigError(f"cannot read {path}: {error.strerror}") from None
+    raise ConfigError(f"{path} is larger than {most / (1 << 20):.3g} MiB; is it what was meant?")
+
+
+def read_picture(path: Path) -> NDArray[np.uint8]:
+    """Read a picture as height x width x 3 (BGR), not turned by its EXIF; raises ConfigError."""
+    content = read_bytes(path, _MOST_PICTURE_BYTES)
+    size = picture_size(content)
+    if size is not None and not picture_fits(*size):
+        raise ConfigError(f"{path} has {size[0]} x {size[1]} pixels, too many to be read")
+    flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
+    image = cv2.imdecode(np.frombuffer(content, np.uint8), flags) if size is not None else None
+    if image is None:
+        raise ConfigError(f"{path} is no JPEG, PNG or WebP that can be read")
+    return np.asarray(image, np.uint8)

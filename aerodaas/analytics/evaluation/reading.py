@@ -1,0 +1,49 @@
+"""Choice of the reader: what a path holds tells its format."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from aerodaas.analytics.evaluation.coco_json import read_coco
+from aerodaas.analytics.evaluation.dataset import Dataset
+from aerodaas.analytics.evaluation.voc_xml import read_voc
+from aerodaas.analytics.evaluation.yolo_text import read_yolo
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["read_dataset"]
+
+_YAML = (".yaml", ".yml")
+
+
+def read_dataset(path: Path, pictures: Path | None = None) -> Dataset:
+    """Read annotations of COCO (a JSON), YOLO (`data.yaml`, or its folder) or VOC (a folder).
+
+    Args:
+        path: File or folder of the annotations.
+        pictures: Folder of the pictures, where it is not where the format puts it.
+
+    Raises:
+        ConfigError: If it is none of these, is malformed, or has no picture; names the place.
+    """
+    if path.suffix == ".json":
+        dataset = read_coco(path, pictures)
+    elif path.suffix in _YAML or _is_yolo(path):
+        dataset = read_yolo(path, pictures)
+    elif path.is_dir() and any(_xml_in(path)):
+        dataset = read_voc(path, pictures)
+    else:
+        raise ConfigError(
+            f"{path} holds no annotations that are known: give COCO's .json, YOLO's data.yaml or "
+            "folder (images, labels, classes.txt), or VOC's folder (Annotations, JPEGImages)"
+        )
+    if not dataset.pictures:
+        raise ConfigError(f"{path} annotates no picture")
+    return dataset
+
+
+def _is_yolo(path: Path) -> bool:
+    return (path / "data.yaml").is_file() or (path / "labels").is_dir()
+
+
+def _xml_in(path: Path) -> list[Path]:
+    return [*path.glob("*.xml"), *(path / "Annotations").glob("*.xml")]

@@ -1,0 +1,106 @@
+"""Pascal VOC's annotations: an XML for each picture, in `Annotations` beside `JPEGImages`.
+
+Source of the format: host.robots.ox.ac.uk/pascal/VOC/voc2012, development kit. Pixels count from 1
+there, and both corners belong to the box.
+"""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+from aerodaas.analytics.evaluation.dataset import (
+    MOST_THINGS,
+    AnnotatedPicture,
+    Dataset,
+    Thing,
+    checked_box,
+    read_bytes,
+    shown,
+)
+from aerodaas.types.errors import ConfigError
+
+__all__ = ["read_voc"]
+
+_MOST_BYTES = 4 << 20
+_MOST_LEVELS = 40
+_CORNERS = ("xmin", "ymin", "xmax", "ymax")
+
+
+def read_voc(path: Path, pictures: Path | None = None) -> Dataset:
+    """Read the annotations of a folder, or of `Annotations` in it.
+
+    Args:
+        path: The folder.
+        pictures: Folder of the pictures; by default `JPEGImages` beside the annotations, or their
+            own folder.
+
+    Raises:
+        ConfigError: That names the file and the object, if one is not as it should be.
+    """
+    texts = path / "Annotations" if (path / "Annotations").is_dir() else path
+    beside = texts.parent / "JPEGImages"
+    folder = pictures or (beside if beside.is_dir() else texts)
+    found = []
+    count = 0
+    for file in sorted(texts.glob("*.xml")):
+        picture = _picture(file, folder)
+        count += len(picture.things)
+        if count > MOST_THINGS:
+            raise ConfigError(f"{texts} has more than {MOST_THINGS:,} annotations")
+        found.append(picture)
+    labels = sorted({one.label for picture in found for one in picture.things})
+    return Dataset(tuple(found), tuple(labels))
+
+
+def _picture(file: Path, folder: Path) -> AnnotatedPicture:
+    root = _tree(file)
+    if root.tag != "annotation":
+        raise ConfigError(f"{file}: is XML of the kind {shown(root.tag)!r}, not an annotation")
+    name = (root.findtext("filename") or "").strip() or f"{file.stem}.jpg"
+    if "\0" in name or Path(name).name != name:
+        raise ConfigError(f"{file}: filename: {shown(name)!r} leads out of the pictures' folder")
+    things = [
+        _thing(f"{file}: object {number}", one)
+        for number, one in enumerate(root.findall("object"), 1)
+    ]
+    return AnnotatedPicture(folder / name, tuple(things))
+
+
+def _thing(place: str, entry: ET.Element) -> Thing:
+    label = (entry.findtext("name") or "").strip()
+    if not label:
+        raise ConfigError(f"{place}: has no name")
+    texts = [(entry.findtext(f"bndbox/{corner}") or "").strip() for corner in _CORNERS]
+    try:
+        left, top, right, bottom = (float(text) for text in texts)
+    except ValueError:
+        given = shown(", ".join(texts))
+        raise ConfigError(
+            f"{place}: bndbox must have the numbers {', '.join(_CORNERS)}, not {given}"
+        ) from None
+    box = checked_box([left - 1, top - 1, right, bottom], place)
+    return Thing(label, box, (entry.findtext("difficult") or "0").strip() not in ("", "0"))
+
+
+def _tree(file: Path) -> ET.Element:
+    content = read_bytes(file, _MOST_BYTES)
+    if b"<!DOCTYPE" in content or b"<!ENTITY" in content or b"\0" in content:
+        raise ConfigError(f"{file}: declares entities, or is no UTF-8; it is not read")
+    level = 0
+    root: ET.Element | None = None
+    try:
+        # Event by event, so that a bound is met before all of a deep tree is there.
+        for event, element in ET.iterparse(io.BytesIO(content), ["start", "end"]):  # noqa: S314
+            root = element if root is None else root
+            level += 1 if event == "start" else -1
+            if level > _MOST_LEVELS:
+                raise ConfigError(f"{file}: is nested more than {_MOST_LEVELS} levels deep")
+    except ET.ParseError as error:
+        raise ConfigError(f"{file}:{error.position[0]}: is no XML: {error}") from None
+    except (LookupError, ValueError):
+        raise ConfigError(f"{file}: is in an encoding that is not read; use UTF-8") from None
+    if root is None:
+        raise ConfigError(f"{file}: is empty")
+    return root

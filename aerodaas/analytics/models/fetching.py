@@ -1,0 +1,228 @@
+"""Fetching of released models: whole and with the right checksum, or not at all.
+
+Nothing is fetched but by `fetch_model`, which `aerodaas models add` calls. What arrives is kept
+beside its place until its checksum is right, and goes on from there after an interruption; nothing
+reads it before. So neither the network nor a mirror need be trusted.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import http.client
+import os
+import urllib.error
+import urllib.request
+import zipfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from http import HTTPStatus
+from pathlib import Path, PurePosixPath
+from typing import IO, Any
+from urllib.parse import urlsplit
+
+from aerodaas.analytics.models.cache import fetched_path, require_fetched
+from aerodaas.analytics.models.registry import RegisteredModel, registered
+from aerodaas.config.printable import printable
+from aerodaas.types.errors import ConfigError, ModelError, SourceError
+
+__all__ = ["fetch_model"]
+
+_CHUNK = 1 << 16
+_SILENCE = 20.0
+"""Seconds without a byte after which a server is given up."""
+_AGENT = "aerodaas-models"
+
+Progress = Callable[[int, int], None]
+"""Called with the bytes that are there, and all of them."""
+
+
+def fetch_model(
+    name: str, source: str | None = None, *, progress: Progress = lambda _done, _all: None
+) -> Path:
+    """Put a registered model among the fetched ones; one that is there already stays.
+
+    Args:
+        name: Of the model.
+        source: Another place than its release: an address of the file, or of a folder with it
+            (which ends in a slash), or a file on this machine.
+        progress: Called while it arrives.
+
+    Returns:
+        The model's file.
+
+    Raises:
+        UnknownIdError: If there is no such model.
+        SourceError: If it cannot be had from there; what has arrived goes on next time.
+        ModelError: If what arrived is another file; nothing of it is kept.
+        ConfigError: If the source is malformed, the folder cannot be written, or another process
+            fetches the model.
+    """
+    model = registered(name)
+    target = fetched_path(model)
+    if _is_there(model):
+        return target
+    part = target.with_name(f"{Path(urlsplit(model.address).path).name}.part")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with _alone(part, name) as file:
+            _receive(file, model, source, progress)
+            _check(file, part, model.archive.sha256 if model.archive else model.sha256, name)
+            if model.archive is not None:
+                _unpack(file, part, model)
+            part.replace(target)
+    except OSError as error:
+        raise ConfigError(f"cannot write into {target.parent}: {error.strerror}") from None
+    return target
+
+
+def _is_there(model: RegisteredModel) -> bool:
+    try:
+        require_fetched(model)
+    except ModelError:
+        return False
+    return True
+
+
+@contextmanager
+def _alone(part: Path, name: str) -> Iterator[IO[bytes]]:
+    """The file of what has arrived, for one process at a time."""
+    with part.open("a+b") as file:
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise ConfigError(f"another process is fetching {name}: wait for it") from None
+        yield file
+
+
+def _receive(
+    file: IO[bytes], model: RegisteredModel, source: str | None, progress: Progress
+) -> None:
+    """Append what is missing to `file`."""
+    size = model.download
+    have = file.seek(0, os.SEEK_END)
+    if have > size:
+        have = file.truncate(0)
+    if have == size:
+        return
+    where = source or model.address
+    with _opened(model, source, have) as (stream, start):
+        file.truncate(start)
+        done = start
+        progress(done, size)
+        for chunk in _chunks(stream, where):
+            done += len(chunk)
+            if done > size:
+                break
+            file.write(chunk)
+            progress(done, size)
+    file.flush()
+    if done > size or (done < size and _is_local(source)):
+        file.truncate(0)
+        longer = "longer" if done > size else "shorter"
+        raise ModelError(
+            f"{where} is {longer} than {model.name} ({size} bytes): it is another file"
+        )
+    if done < size:
+        raise SourceError(
+            f"{model.name} was cut off after {done} of {size} bytes: the same command goes on there"
+        )
+
+
+def _is_local(source: str | None) -> bool:
+    return source is not None and Path(source).is_file()
+
+
+@contextmanager
+def _opened(
+    model: RegisteredModel, source: str | None, have: int
+) -> Iterator[tuple[IO[bytes], int]]:
+    """A stream of the file, and the byte at which it begins: at `have`, or at 0."""
+    if source is not None and _is_local(source):
+        with Path(source).open("rb") as local:
+            yield local, 0
+        return
+    with _asked(_address(model, source), have) as answer:
+        partial = answer.status == HTTPStatus.PARTIAL_CONTENT
+        yield answer, have if partial and _begins_at(answer, have) else 0
+
+
+def _address(model: RegisteredModel, source: str | None) -> str:
+    address = source or model.address
+    parts = urlsplit(address)
+    if parts.scheme not in ("http", "https") or not parts.hostname:
+        raise ConfigError(
+            f"{printable(address)} is neither a file nor an address of the form https://…"
+        )
+    if not parts.path.endswith("/"):
+        return address
+    return address + Path(urlsplit(model.address).path).name
+
+
+@contextmanager
+def _asked(address: str, have: int) -> Iterator[Any]:
+    headers = {"User-Agent": _AGENT} | ({"Range": f"bytes={have}-"} if have else {})
+    request = urllib.request.Request(address, headers=headers)  # noqa: S310 - checked before
+    try:
+        with urllib.request.urlopen(request, timeout=_SILENCE) as answer:  # noqa: S310 - as above
+            yield answer
+    except urllib.error.HTTPError as error:
+        raise SourceError(f"{address} answers with status {error.code}") from None
+    except (urllib.error.URLError, http.client.HTTPException, TimeoutError) as error:
+        reason = printable(str(getattr(error, "reason", error)))
+        raise SourceError(
+            f"{address} cannot be reached: {reason}; --from takes a mirror, or a file that was "
+            "fetched elsewhere"
+        ) from None
+
+
+def _begins_at(answer: http.client.HTTPResponse, have: int) -> bool:
+    return (answer.headers.get("Content-Range") or "").startswith(f"bytes {have}-")
+
+
+def _chunks(stream: IO[bytes], where: str) -> Iterator[bytes]:
+    """All chunks; what is cut off ends early, which its length tells."""
+    while True:
+        try:
+            chunk = stream.read(_CHUNK)
+        except (http.client.HTTPException, ConnectionError, TimeoutError):
+            return
+        except OSError as error:
+            raise SourceError(f"cannot read {where}: {error}") from None
+        if not chunk:
+            return
+        yield chunk
+
+
+def _check(file: IO[bytes], part: Path, wanted: str, name: str) -> None:
+    """Require a checksum; another file is removed."""
+    file.seek(0)
+    digest = hashlib.sha256()
+    while chunk := file.read(_CHUNK):
+        digest.update(chunk)
+    found = digest.hexdigest()
+    if found != wanted:
+        part.unlink()
+        raise ModelError(
+            f"what arrived is not {name}: its SHA-256 is {found}, not {wanted}; nothing of it was "
+            "kept"
+        )
+
+
+def _unpack(file: IO[bytes], part: Path, model: RegisteredModel) -> None:
+    """Put the model in the archive's place, and require its checksum."""
+    if model.archive is None:
+        return
+    try:
+        with zipfile.ZipFile(file) as archive:
+            names = [PurePosixPath(name) for name in archive.namelist()]
+            (member,) = (str(name) for name in names if name.name == model.archive.member)
+            with archive.open(member) as packed:
+                content = packed.read(model.size + 1)
+    except (zipfile.BadZipFile, ValueError) as error:
+        part.unlink()
+        raise ModelError(f"the archive of {model.name} is damaged: {error}") from None
+    file.truncate(0)
+    file.write(content)
+    file.flush()
+    _check(file, part, model.sha256, model.name)

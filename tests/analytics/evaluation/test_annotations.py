@@ -1,0 +1,216 @@
+"""Annotations of three formats mean the same; malformed ones are named by file and place."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from aerodaas.analytics.evaluation.dataset import Dataset
+from aerodaas.analytics.evaluation.reading import read_dataset
+from aerodaas.types.errors import AeroDaaSError, ConfigError
+
+pytest.importorskip("yaml")
+
+BOX = (20.0, 10.0, 60.0, 90.0)
+XML = """<annotation><filename>a.png</filename>
+<object><name>person</name><difficult>1</difficult>
+<bndbox><xmin>21</xmin><ymin>11</ymin><xmax>60</xmax><ymax>90</ymax></bndbox></object></annotation>
+"""
+
+
+def coco(**changes: object) -> dict[str, Any]:
+    """Annotations of one picture, with something else in them."""
+    return {
+        "images": [{"id": 4, "file_name": "a.png"}],
+        "categories": [{"id": 9, "name": "person"}],
+        "annotations": [{"id": 1, "image_id": 4, "category_id": 9, "bbox": [20, 10, 40, 80]}],
+    } | changes
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A dataset in all three formats, of one picture of 200 x 100."""
+    for name in ("images", "JPEGImages", "labels", "Annotations"):
+        (tmp_path / name).mkdir()
+    picture = cv2.imencode(".png", np.zeros((100, 200, 3), np.uint8))[1].tobytes()
+    for place in ("images/a.png", "JPEGImages/a.png"):
+        (tmp_path / place).write_bytes(picture)
+    (tmp_path / "labels/a.txt").write_text("0 0.2 0.5 0.2 0.8\n")
+    (tmp_path / "data.yaml").write_text("val: images\nnames: {0: person}\n")
+    (tmp_path / "Annotations/a.xml").write_text(XML)
+    (tmp_path / "coco.json").write_text(json.dumps(coco()))
+    return tmp_path
+
+
+def only(dataset: Dataset) -> tuple[bool, Path]:
+    """Whether the one thing of the one picture is ignored, and the picture; the box is right."""
+    (picture,) = dataset.pictures
+    (thing,) = picture.things
+    assert dataset.labels == ("person",) == (thing.label,)
+    assert thing.box == pytest.approx(BOX)
+    return thing.ignored, picture.path
+
+
+def test_three_formats_of_one_box(folder: Path) -> None:
+    """Corner and size, fractions about the middle, and pixels that count from one."""
+    image, jpeg = folder / "images/a.png", folder / "JPEGImages/a.png"
+    assert only(read_dataset(folder / "coco.json", folder / "images")) == (False, image)
+    assert only(read_dataset(folder / "data.yaml")) == (False, image)
+    assert only(read_dataset(folder)) == (False, image)
+    assert only(read_dataset(folder / "Annotations")) == (True, jpeg)
+
+
+def test_a_picture_without_a_text_shows_nothing(folder: Path) -> None:
+    """YOLO's way to say so; the names may stand in classes.txt."""
+    (folder / "labels/a.txt").unlink()
+    (folder / "data.yaml").unlink()
+    (folder / "classes.txt").write_text("person\ncar\n")
+    dataset = read_dataset(folder)
+    assert [one.things for one in dataset.pictures] == [()]
+    assert dataset.labels == ("person", "car")
+
+
+def thing(**changes: object) -> list[dict[str, Any]]:
+    """One annotation, with something else in it."""
+    return [{"image_id": 4, "category_id": 9, "bbox": [1, 1, 2, 2]} | changes]
+
+
+BAD_COCO: dict[str, tuple[object, str]] = {
+    "list": ([], "not an object of images"),
+    "no images": ({"annotations": []}, "coco.json: categories: must be a list"),
+    "category": (
+        coco(annotations=thing(category_id=1)),
+        r"annotations\[0\].category_id: there is no category 1",
+    ),
+    "image": (
+        coco(annotations=thing(image_id=1)),
+        r"annotations\[0\].image_id: there is no image 1",
+    ),
+    "three numbers": (
+        coco(annotations=thing(bbox=[1, 2, 3])),
+        r"annotations\[0\].bbox: must be x, y",
+    ),
+    "text": (coco(annotations=thing(bbox=[1, 2, "a", 3])), "four finite numbers"),
+    "empty box": (coco(annotations=thing(bbox=[1, 2, 0, 3])), "the box is empty: 0 x 3"),
+    "endless": (coco(annotations=thing(bbox=[1, 2, 1e400, 3])), "four finite numbers"),
+    "escape": (coco(images=[{"id": 4, "file_name": "../../etc/passwd"}]), "leads out of"),
+    "root": (coco(images=[{"id": 4, "file_name": "/etc/passwd"}]), "leads out of"),
+    "number": (coco(images=[{"id": 4, "file_name": 5}]), r"images\[0\].file_name: must be a text"),
+}
+
+
+@pytest.mark.parametrize("case", BAD_COCO)
+def test_malformed_coco_names_the_entry(folder: Path, case: str) -> None:
+    """File, entry, and what stands there."""
+    content, problem = BAD_COCO[case]
+    (folder / "coco.json").write_text(json.dumps(content))
+    with pytest.raises(ConfigError, match=problem):
+        read_dataset(folder / "coco.json")
+
+
+def test_json_that_is_none_names_the_line(folder: Path) -> None:
+    """As a file that was cut short."""
+    (folder / "coco.json").write_text('{"images": [\n\n{"id": ')
+    with pytest.raises(ConfigError, match=r"coco.json:3: is not JSON"):
+        read_dataset(folder / "coco.json")
+
+
+@pytest.mark.parametrize(
+    ("line", "problem"),
+    [
+        ("1 0.2 0.5 0.2 0.8", "there is no class 1; there are 1"),
+        ("0 0.2 0.5 0.2", "not 4 words"),
+        ("0 20 50 20 80", "fractions of the picture"),
+        ("0 nan 0.5 0.2 0.8", "fractions of the picture"),
+        ("person 0.2 0.5 0.2 0.8", "five numbers"),
+        ("0 0.2 0.5 0 0.8", "the box is empty"),
+    ],
+)
+def test_malformed_yolo_names_the_line(folder: Path, line: str, problem: str) -> None:
+    """The second line here."""
+    (folder / "labels/a.txt").write_text(f"0 0.2 0.5 0.2 0.8\n{line}\n")
+    with pytest.raises(ConfigError, match=rf"labels/a.txt:2: .*{problem}"):
+        read_dataset(folder)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ("val: [\n", r"data.yaml:2: is not YAML"),
+        ("val: images\n", "names no classes"),
+        ("val: ../elsewhere\nnames: [a]\n", "leads out of"),
+        ("path: /srv\nval: images\nnames: [a]\n", "leads out of"),
+        ("a: &a [x,x]\nb: &b [*a,*a]\nnames: [*b]\n", "names no classes"),
+        ("names: !!python/object/apply:os.getcwd []\n", "is not YAML"),
+    ],
+)
+def test_a_malformed_description_of_a_yolo_dataset(folder: Path, text: str, problem: str) -> None:
+    """It names no folder elsewhere, and runs nothing."""
+    (folder / "data.yaml").write_text(text)
+    with pytest.raises(ConfigError, match=problem):
+        read_dataset(folder / "data.yaml")
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        (XML.replace("<xmax>60", "<xmax>wide"), "object 1: bndbox must have the numbers"),
+        (XML.replace("<xmax>60", "<xmax>20"), "object 1: the box is empty"),
+        (XML.replace("<name>person</name>", ""), "object 1: has no name"),
+        (XML.replace("a.png", "../a.png"), "leads out of"),
+        (XML[:80], r"a.xml:\d+: is no XML"),
+        ('<!DOCTYPE a [<!ENTITY b "c">]>' + XML, "declares entities"),
+        ("<a>" * 50, "more than 40 levels"),
+        ("<svg/>", "of the kind 'svg'"),
+    ],
+)
+def test_malformed_voc_names_the_object(folder: Path, text: str, problem: str) -> None:
+    """Entities, which could grow without end, are not read."""
+    (folder / "Annotations/a.xml").write_text(text)
+    with pytest.raises(ConfigError, match=problem):
+        read_dataset(folder / "Annotations")
+
+
+def test_what_is_no_dataset_is_told_what_would_be(folder: Path) -> None:
+    """An empty folder, a picture, nothing at all."""
+    for path in (folder / "images", folder / "images/a.png", folder / "gone"):
+        with pytest.raises(ConfigError, match="no annotations that are known"):
+            read_dataset(path)
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(data=st.data())
+def test_changed_bytes_are_read_or_refused(folder: Path, data: st.DataObject) -> None:
+    """Nothing but the project's own error comes of a stranger's file."""
+    name, seed = data.draw(
+        st.sampled_from(
+            [
+                ("coco.json", json.dumps(coco()).encode()),
+                ("labels/a.txt", b"0 0.2 0.5 0.2 0.8\n"),
+                ("data.yaml", b"val: images\nnames: {0: person}\n"),
+                ("Annotations/a.xml", XML.encode()),
+            ]
+        )
+    )
+    content = bytearray(seed)
+    for _ in range(data.draw(st.integers(1, 4))):
+        at = data.draw(st.integers(0, len(content) - 1))
+        content[at : at + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=3))
+        content = content or bytearray(b" ")
+    (folder / name).write_bytes(bytes(content))
+    target = {"coco.json": "coco.json", "Annotations/a.xml": "Annotations"}.get(name, "data.yaml")
+    try:
+        read_dataset(folder / target)
+    except AeroDaaSError as error:
+        str(error).encode()
+    finally:
+        (folder / name).write_bytes(seed)
