@@ -13,7 +13,7 @@ _PACKAGES = {
     "plots": ("matplotlib",),
     "remote": ("fastapi", "uvicorn", "websockets"),
     "service": ("fastapi", "jwt", "sqlalchemy", "uvicorn", "websockets"),
-    "ros": ("mcap_ros2",),
+    "ros": ("rosbags",),
     "routing": ("pyvrp",),
 }
 """Packages to import, by extra."""
