@@ -15,6 +15,7 @@ _PACKAGES = {
     "service": ("fastapi", "jwt", "sqlalchemy", "uvicorn", "websockets"),
     "ros": ("rosbags",),
     "routing": ("pyvrp",),
+    "supervision": ("supervision",),
 }
 """Packages to import, by extra."""
 
@@ -28,7 +29,7 @@ def require_extra(extra: str, purpose: str) -> None:
     """Require the packages of an extra.
 
     Args:
-        extra: `notebook`, `plots`, `remote`, `ros`, `routing` or `service`.
+        extra: `notebook`, `plots`, `remote`, `ros`, `routing`, `service` or `supervision`.
         purpose: The feature, as the subject of the error's sentence, in the singular.
 
     Raises:
