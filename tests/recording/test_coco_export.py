@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import cv2
 import pytest
@@ -18,7 +19,9 @@ from aerodaas.types.errors import RecordingError
 
 
 @pytest.mark.parametrize("images", ["jpeg", "h264"])
-def test_pycocotools_reads_pictures_boxes_and_keypoints(tmp_path: Path, images: str) -> None:
+def test_pycocotools_reads_pictures_boxes_and_keypoints(
+    tmp_path: Path, images: Literal["jpeg", "h264"]
+) -> None:
     """Each annotation belongs to its picture; the box is left, top, width, height."""
     path = tmp_path / "flight.mcap"
     flight = SyntheticFlight(frames=0.5, rate=5.0, hover=0.5)

@@ -52,7 +52,9 @@ def test_their_filters_tracker_and_zones_take_it() -> None:
     zone = supervision.PolygonZone(
         left_half, triggering_anchors=[supervision.Position.CENTER]
     ).trigger(theirs)
-    assert [one.label for one in from_supervision(theirs[zone], ours)] == ["person"]
+    inside = theirs[zone]
+    assert isinstance(inside, supervision.Detections)
+    assert [one.label for one in from_supervision(inside, ours)] == ["person"]
 
 
 def test_results_of_other_models_become_ours() -> None:
