@@ -8,6 +8,7 @@
 #   AERODAAS_CERTIFICATE   certificate and key of the service; without, it listens on
 #   AERODAAS_KEY           loopback only
 #   AERODAAS_OWN_ADDRESS   where other nodes find this one            (default: the first address)
+#   AERODAAS_OBJECT_STORE  bytes of Ray's object store, within /dev/shm (default: Ray's)
 #   AERODAAS_VENV          Python environment with aerodaas           (default: ~/aerodaas)
 set -eu
 
@@ -45,4 +46,5 @@ fi
 
 echo "edge-head: $own:6379"
 exec "$venv/bin/ray" start --head --block --port=6379 --node-ip-address="$own" \
+    ${AERODAAS_OBJECT_STORE:+--object-store-memory="$AERODAAS_OBJECT_STORE"} \
     --dashboard-host=127.0.0.1 --resources='{"edge":1}'

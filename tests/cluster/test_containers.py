@@ -181,6 +181,37 @@ def test_scripts_know_the_variables_that_are_set() -> None:
     assert SERVICES["cloud"]["environment"]["AERODAAS_RESOURCES"] == '{"cloud":1}'
 
 
+def test_a_head_is_joined_by_its_name(tmp_path: Path) -> None:
+    """As containers call each other; the own address is that of the way there."""
+    (tmp_path / "bin").mkdir()
+    for name, script in (
+        ("python", "true"),
+        ("ray", 'echo ray "$@"'),
+        ("pgrep", "false"),
+        ("ip", '[ "$4" = 127.0.0.1 ] || [ "$4" = ::1 ] && echo "local $4 dev lo src $4 uid 0"'),
+    ):
+        program = tmp_path / "bin" / name
+        program.write_text(f"#!/bin/sh\n{script}\n")
+        program.chmod(0o755)
+    variables = {
+        "PATH": f"{tmp_path}/bin:/usr/bin:/bin",
+        "AERODAAS_VENV": str(tmp_path),
+        "AERODAAS_OBJECT_STORE": "1000",
+        "HOME": str(tmp_path),
+    }
+    words = ["sh", str(ROOT / "clusters" / "edge-join.sh")]
+    done = subprocess.run(
+        [*words, "localhost:6379"], env=variables, capture_output=True, text=True, check=True
+    )
+    joined = done.stdout.splitlines()[-1]
+    assert re.search(r"--address localhost:6379 --node-ip-address (127.0.0.1|::1) ", joined)
+    assert "--object-store-memory 1000 --resources" in joined
+    done = subprocess.run(
+        [*words, "nowhere.invalid:6379"], env=variables, capture_output=True, text=True, check=False
+    )
+    assert "no way leads to nowhere.invalid:6379" in done.stderr
+
+
 @pytest.mark.parametrize("script", ["edge-head.sh", "edge-join.sh"])
 def test_scripts_are_posix_shell(script: str) -> None:
     """As far as a shell that reads them without running them can tell."""
