@@ -10,6 +10,7 @@
 # From the environment, or /etc/aerodaas/edge.env under aerodaas-edge.service:
 #   AERODAAS_VENV        Python environment with aerodaas   (default: ~/aerodaas)
 #   AERODAAS_RESOURCES   what this node offers              (default: {"edge":1})
+#   AERODAAS_OBJECT_STORE  bytes of Ray's object store      (default: Ray's, a third of the memory)
 #   RAY_AUTH_TOKEN_PATH  the cluster's token, mode 0600     (default: ~/.ray/auth_token)
 #   RAY_USE_TLS and the paths of certificates (docs/cluster.md), if the cluster speaks TLS
 set -eu
@@ -51,7 +52,12 @@ export RAY_USAGE_STATS_ENABLED=0
 "$venv/bin/python" -m aerodaas cluster greet "$head" || exit 1
 
 if [ -z "$own" ]; then
-    own=$(ip -o route get "${head%:*}" | sed -n 's/.* src \([^ ]*\).*/\1/p')
+    # `ip` takes no names, by which containers know each other.
+    there=$(getent ahosts "${head%:*}" | sed -n '1s/ .*//p')
+    own=$(ip -o route get "${there:-${head%:*}}" | sed -n 's/.* src \([^ ]*\).*/\1/p')
 fi
+[ -n "$own" ] || fail "no way leads to $head; say this machine's own address after it"
 echo "edge-join: joining $head as $own with $resources"
-exec "$venv/bin/ray" start --block --address "$head" --node-ip-address "$own" --resources "$resources"
+exec "$venv/bin/ray" start --block --address "$head" --node-ip-address "$own" \
+    ${AERODAAS_OBJECT_STORE:+--object-store-memory "$AERODAAS_OBJECT_STORE"} \
+    --resources "$resources"

@@ -15,6 +15,7 @@ from aerodaas.cli.check import check
 from aerodaas.cli.examples import examples
 from aerodaas.cli.export import export
 from aerodaas.cli.help_examples import ExampleGroup
+from aerodaas.cli.import_bag import import_bag
 from aerodaas.cli.init import init
 from aerodaas.cli.new import new
 from aerodaas.cli.replay import replay
@@ -274,6 +275,7 @@ app.command()(view)
 app.command()(report)
 app.command()(compare)
 app.command()(export)
+app.command("import")(import_bag)
 app.command(context_settings=_WORDS)(replay)
 for _command in (
     provider.login,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -28,19 +28,35 @@ def export(
     overlays: Annotated[bool, typer.Option(help="Draw detections into the videos.")] = True,  # noqa: FBT002
     gpx: Annotated[bool, typer.Option("--gpx", help="The track as GPX.")] = False,  # noqa: FBT002
     kml: Annotated[bool, typer.Option("--kml", help="The track as KML.")] = False,  # noqa: FBT002
+    coco: Annotated[
+        float | None,
+        typer.Option(
+            metavar="SECONDS",
+            min=0,
+            help="Pictures, at least so far apart, and what was detected, as a COCO dataset.",
+        ),
+    ] = None,
+    ros2: Annotated[
+        Literal["mcap", "sqlite3"] | None,
+        typer.Option(help="States, pictures and detections as a ROS 2 bag in this storage."),
+    ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Folder for the files. Default: the recording's own.")
     ] = None,
 ) -> None:
-    """Write parts of a recording as CSV, Parquet, MP4, GPX or KML.
+    """Write parts of a recording as CSV, Parquet, MP4, GPX, KML, a COCO dataset or a ROS 2 bag.
 
     Without any of these, list the recording's channels.
 
         aerodaas export flight.mcap --csv /tello/state --csv /decisions/decision
         aerodaas export flight.mcap --mp4 --kml --out for_the_web
+        aerodaas export flight.mcap --coco 0.5
+        aerodaas export flight.mcap --ros2 mcap
     """
     from aerodaas.recording.export import tabular, track, video  # noqa: PLC0415 - slow to load
+    from aerodaas.recording.export.coco import write_coco  # noqa: PLC0415
     from aerodaas.recording.reader import Recording  # noqa: PLC0415
+    from aerodaas.recording.ros import bag_writer  # noqa: PLC0415
 
     folder = out or recording.parent
     with Recording.open(recording) as opened:
@@ -49,6 +65,8 @@ def export(
         files += video.write_videos(opened, folder, overlays=overlays) if mp4 else []
         files += [track.write_gpx(opened, folder)] if gpx else []
         files += [track.write_kml(opened, folder)] if kml else []
+        files += [] if coco is None else [write_coco(opened, folder, interval=coco)]
+        files += [bag_writer.write_bag(opened, folder, ros2)] if ros2 else []
         lines = [str(path) for path in files] or _channels(opened)
         if opened.damaged:
             lines.append(f"skipped {opened.damaged} broken messages or chunks")

@@ -14,8 +14,9 @@ _PACKAGES = {
     "plots": ("matplotlib",),
     "remote": ("fastapi", "uvicorn", "websockets"),
     "service": ("fastapi", "jwt", "sqlalchemy", "uvicorn", "websockets"),
-    "ros": ("mcap_ros2",),
+    "ros": ("rosbags",),
     "routing": ("pyvrp",),
+    "supervision": ("supervision",),
 }
 """Packages to import, by extra."""
 
@@ -29,7 +30,8 @@ def require_extra(extra: str, purpose: str) -> None:
     """Require the packages of an extra.
 
     Args:
-        extra: `evaluation`, `notebook`, `plots`, `remote`, `ros`, `routing` or `service`.
+        extra: `evaluation`, `notebook`, `plots`, `remote`, `ros`, `routing`, `service` or
+            `supervision`.
         purpose: The feature, as the subject of the error's sentence, in the singular.
 
     Raises:

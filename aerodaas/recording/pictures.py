@@ -34,6 +34,7 @@ __all__ = [
     "decoded_ahead",
     "detections",
     "detections_by_frame",
+    "detections_of",
     "frames",
     "picture_topics",
     "shots",
@@ -260,10 +261,14 @@ def detections(
     for record in recording.records(
         schemas=(DETECTIONS_SCHEMA,), topics=topics, since=since, until=until
     ):
-        value = record.value
-        header = Header(value["id"], value["stamp"], value["source"])
-        items = tuple(_detection(item) for item in value["items"])
-        yield record.topic, Detections(header, items, value["width"], value["height"])
+        yield record.topic, detections_of(record.value)
+
+
+def detections_of(value: dict[str, Any]) -> Detections:
+    """Decode detections from their JSON, an `aerodaas.Detections`."""
+    header = Header(value["id"], value["stamp"], value["source"])
+    items = tuple(_detection(item) for item in value["items"])
+    return Detections(header, items, value["width"], value["height"])
 
 
 def detections_by_frame(recording: Recording) -> dict[tuple[str, int], list[Detection]]:

@@ -67,8 +67,8 @@ class Record:
     """Mission time of the described measurement, nanoseconds."""
     sequence: int
     value: Any
-    """A dictionary for JSON, an object for protobuf and ROS 2's pictures, else bytes; None where
-    it was not to be decoded."""
+    """A dictionary for JSON, an object for protobuf and the ROS 2 types that are known, else bytes;
+    None where it was not to be decoded."""
 
 
 class Recording:

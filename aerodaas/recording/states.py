@@ -12,7 +12,7 @@ from aerodaas.recording.reader import Recording
 from aerodaas.types.data import Battery, GpsFix, Odometry
 from aerodaas.types.vehicle import FlightEnd, VehicleMode, VehicleState
 
-__all__ = ["odometry_of", "vehicle_states"]
+__all__ = ["odometry_of", "state_of", "vehicle_states"]
 
 
 def vehicle_states(recording: Recording, robot: str) -> Iterator[tuple[int, VehicleState]]:
@@ -27,7 +27,7 @@ def vehicle_states(recording: Recording, robot: str) -> Iterator[tuple[int, Vehi
     """
     for record in recording.records(schemas=("aerodaas.VehicleState",)):
         if record.value["robot"] == robot:
-            yield record.stamp, _state(record.value)
+            yield record.stamp, state_of(record.value)
 
 
 def odometry_of(value: dict[str, Any] | None) -> Odometry | None:
@@ -42,7 +42,8 @@ def odometry_of(value: dict[str, Any] | None) -> Odometry | None:
     return Odometry(position, velocity, *map(_number, angles))
 
 
-def _state(value: dict[str, Any]) -> VehicleState:
+def state_of(value: dict[str, Any]) -> VehicleState:
+    """Decode a state from its JSON, an `aerodaas.VehicleState`, without loss of precision."""
     odometry = odometry_of(value["odometry"])
     assert odometry is not None  # noqa: S101 - never null
     battery, gps, ended = value["battery"], value.get("gps"), value.get("ended")

@@ -65,8 +65,8 @@ class Renderer:
         )
         if pipe is None:
             raise SourceError(
-                "panda3d came without its software renderer (p3tinydisplay); "
-                "reinstall it with `pip install --force-reinstall panda3d`"
+                "panda3d's software renderer (p3tinydisplay) does not load; it needs libX11, "
+                "which a bare system lacks: apt-get install libx11-6"
             )
         # A separate engine, so that rendering one camera does not render all others of the process.
         self._pipe = pipe

@@ -14,7 +14,7 @@ from aerodaas.types.errors import ConfigError, SchedulerError
 
 @pytest.mark.parametrize(
     ("extra", "package"),
-    [("notebook", "pandas"), ("plots", "matplotlib"), ("remote", "uvicorn"), ("ros", "mcap_ros2")],
+    [("notebook", "pandas"), ("plots", "matplotlib"), ("remote", "uvicorn"), ("ros", "rosbags")],
 )
 def test_a_missing_extra_is_named_with_its_remedy(
     extra: str, package: str, monkeypatch: pytest.MonkeyPatch

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from aerodaas.config.model import RecordingConfig
 from aerodaas.recording.converters.base import Session, convert, quaternion, vector
 from aerodaas.recording.converters.vehicle import body_frame, odometry_json
+from aerodaas.recording.encoded_frame import EncodedFrame
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.h264 import H264Encoder
 from aerodaas.recording.report.palette import label_colour, rgb
@@ -63,25 +64,23 @@ _BLACK = Color(r=0.0, g=0.0, b=0.0, a=0.7)
 def frame(item: Frame, message: Message[Any], session: Session) -> Iterator[Entry]:
     """Write an image, its depth, and its camera's calibration when that has changed."""
     header, stream = item.header, message.stream
-    if item.camera is not None and session.changed("camera", stream, item.camera):
-        yield from _camera(item.camera, header.source, stream, header.stamp, session)
-    value: dict[str, Any] = {
-        "id": header.id,
-        "stamp": header.stamp,
-        "source": header.source,
-        "width": item.width,
-        "height": item.height,
-    }
-    if item.odometry is not None:
-        value["odometry"] = odometry_json(item.odometry)
-    yield Entry(topic(stream, "frame"), FRAME, json_bytes(value), header.stamp)
+    yield from _head(item, stream, session)
     if item.depth is not None and session.config.images != "none":
         # Before the image, so that a reader has the whole frame once it has the image.
         yield _depth(item.depth, header, stream, session)
     if session.config.images == "h264":
         yield _video(item, stream, session)
     elif session.config.images != "none":
-        yield _image(item, stream, session)
+        kind = session.config.images
+        _, data = cv2.imencode(f".{kind}", item.image, _settings(session.config))
+        yield _image(data.tobytes(), kind, header, stream, session)
+
+
+@convert.register
+def encoded_frame(item: EncodedFrame, message: Message[Any], session: Session) -> Iterator[Entry]:
+    """Write an image as it came, and its camera's calibration when that has changed."""
+    yield from _head(item, message.stream, session)
+    yield _image(item.data, item.format, item.header, message.stream, session)
 
 
 @convert.register
@@ -106,17 +105,27 @@ def detections(item: Detections, message: Message[Any], session: Session) -> Ite
     yield Entry(topic(stream, "detections"), DETECTIONS, json_bytes(value), header.stamp)
 
 
-def _image(item: Frame, stream: str, session: Session) -> Entry:
-    kind = session.config.images
-    _, data = cv2.imencode(f".{kind}", item.image, _settings(session.config))
-    stamp = item.header.stamp
+def _head(item: Frame | EncodedFrame, stream: str, session: Session) -> Iterator[Entry]:
+    header = item.header
+    if item.camera is not None and session.changed("camera", stream, item.camera):
+        yield from _camera(item.camera, header.source, stream, header.stamp, session)
+    value: dict[str, Any] = {
+        "id": header.id,
+        "stamp": header.stamp,
+        "source": header.source,
+        "width": item.width,
+        "height": item.height,
+    }
+    if item.odometry is not None:
+        value["odometry"] = odometry_json(item.odometry)
+    yield Entry(topic(stream, "frame"), FRAME, json_bytes(value), header.stamp)
+
+
+def _image(data: bytes, kind: str, header: Header, stream: str, session: Session) -> Entry:
     image = CompressedImage(
-        timestamp=session.time(stamp),
-        frame_id=item.header.source,
-        data=data.tobytes(),
-        format=kind,
+        timestamp=session.time(header.stamp), frame_id=header.source, data=data, format=kind
     )
-    return Entry(topic(stream, "image"), IMAGE, image.encode(), stamp)
+    return Entry(topic(stream, "image"), IMAGE, image.encode(), header.stamp)
 
 
 def _depth(depth: NDArray[np.uint16], header: Header, stream: str, session: Session) -> Entry:

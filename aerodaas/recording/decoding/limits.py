@@ -16,6 +16,7 @@ __all__ = [
     "MAX_KEYS",
     "MAX_METADATA",
     "MAX_RATIO",
+    "MAX_ROS",
     "MAX_UNPACKED",
     "MAX_VIDEO_GROUP",
 ]
@@ -31,6 +32,9 @@ MAX_HELD = 256 << 20
 """Bytes of messages held back to be put in order, where chunks overlap in time."""
 MAX_JSON = 32 << 20
 """Bytes of a JSON message; objects take up to twenty times as many in memory."""
+MAX_ROS = 1 << 20
+"""Bytes of a ROS 2 message other than a picture: a thousand detections take 400 kB, and thirty
+times as much as objects."""
 MAX_DEPTH = 32
 """Levels of nesting of a JSON message; ours have six, and Python's stack ends near 1000."""
 MAX_METADATA = 1 << 20

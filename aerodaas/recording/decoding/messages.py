@@ -18,9 +18,9 @@ from mcap_protobuf.decoder import DecoderFactory
 from pydantic import ConfigDict, Field, TypeAdapter, with_config
 from typing_extensions import NotRequired, TypedDict
 
-from aerodaas.config.extras import require_extra
 from aerodaas.recording.decoding.limits import MAX_DEPTH, MAX_JSON
 from aerodaas.recording.images import IMAGE_SCHEMAS, VIDEO_SCHEMAS, check_picture
+from aerodaas.recording.ros.typestore import ROS_TYPES, ros_decoder
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.vehicle import FlightEnd, VehicleMode
 
@@ -264,20 +264,6 @@ _SHAPES: Final[dict[str, TypeAdapter[Any]]] = {
 }
 """Checks of this project's own messages by the name of their schema."""
 Decoder: TypeAlias = Callable[[bytes], Any]
-_RULE = "=" * 80
-_STAMPED = "std_msgs/Header header\n"
-_HEADER = f"\n{_RULE}\nMSG: std_msgs/Header\nbuiltin_interfaces/Time stamp\nstring frame_id\n"
-_ROS: Final = {
-    "sensor_msgs/msg/Image": _STAMPED
-    + "uint32 height\nuint32 width\nstring encoding\nuint8 is_bigendian\nuint32 step\nuint8[] data"
-    + _HEADER,
-    "sensor_msgs/msg/CompressedImage": _STAMPED + "string format\nuint8[] data" + _HEADER,
-    "foxglove_msgs/msg/CompressedVideo": (
-        "builtin_interfaces/Time timestamp\nstring frame_id\nuint8[] data\nstring format"
-    ),
-}
-"""ROS 2's own definitions of the pictures. Those in the file are not used: one with an array of
-empty parts would be read forever."""
 _PICTURES = IMAGE_SCHEMAS | VIDEO_SCHEMAS
 _ESCAPED_SURROGATE = re.compile(rb"\\u[dD][89a-fA-F]")
 
@@ -302,8 +288,8 @@ class MessageDecoder:
             data: The message's bytes.
 
         Returns:
-            A dictionary for JSON, an object with fields for protobuf and ROS 2's pictures, else the
-            bytes.
+            A dictionary for JSON, an object with fields for protobuf and `ROS_TYPES`, else
+            the bytes.
 
         Raises:
             BrokenMessageError: If the message is broken; the others of its channel may be whole.
@@ -339,11 +325,8 @@ class MessageDecoder:
         found = self._protobuf.decoder_for(encoding, schema)
         if found is not None:
             return found
-        if encoding == "cdr" and schema is not None and schema.name in _ROS:
-            require_extra("ros", "a ROS 2 message")
-            from mcap_ros2._dynamic import generate_dynamic  # noqa: PLC0415 - rarely met
-
-            return generate_dynamic(schema.name, _ROS[schema.name])[schema.name]
+        if encoding == "cdr" and schema is not None and schema.name in ROS_TYPES:
+            return ros_decoder(schema.name)
         return decode_json if encoding == "json" else bytes
 
 

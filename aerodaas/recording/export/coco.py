@@ -1,0 +1,166 @@
+"""Export of pictures and detections as a COCO dataset, to label further and to train from.
+
+The format is that of `instances_*.json` by https://cocodataset.org/#format-data: boxes are left,
+top, width and height in pixels of the picture.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import cv2
+
+from aerodaas.recording.decoding.limits import MAX_KEYS
+from aerodaas.recording.export.output import file_name, new_file
+from aerodaas.recording.pictures import Shot, detections_by_frame, shots
+from aerodaas.recording.reader import Recording
+from aerodaas.types.clock import NANOSECONDS, seconds
+from aerodaas.types.data import Detection
+from aerodaas.types.errors import RecordingError, SourceError
+
+__all__ = ["write_coco"]
+
+_SUFFIXES = {"jpeg": "jpg", "png": "png", "webp": "webp"}
+"""Suffixes by the formats whose pictures are files as recorded."""
+_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95]
+_VISIBLE = 2
+"""COCO's flag of a keypoint that is seen; 0 is one that is not labelled."""
+_SEEN = 0.3
+"""Least confidence of a keypoint that is called seen, as where they are drawn."""
+
+
+def write_coco(recording: Recording, folder: Path, *, interval: float = 1.0) -> Path:
+    """Write pictures and their detections as a COCO dataset.
+
+    Pictures that are files in the recording stay as they are; others become JPEG. What a detector
+    found is the annotation: a beginning for people who label, no truth. `score` and `track_id` are
+    kept beside COCO's own fields.
+
+    Args:
+        recording: An open recording.
+        folder: Folder of the dataset, which is a folder itself: `images` and `annotations.json`.
+        interval: Least seconds between two pictures of a camera; 0 for all.
+
+    Returns:
+        The dataset.
+
+    Raises:
+        RecordingError: If there are no pictures or more than `MAX_KEYS` labels, or the dataset
+            exists or cannot be written.
+    """
+    path = new_file(folder / f"{recording.path.stem}_coco")
+    found = detections_by_frame(recording)
+    labels = sorted({item.label for items in found.values() for item in items})
+    if len(labels) > MAX_KEYS:
+        raise RecordingError(f"{recording.path} has {len(labels)} labels, more than {MAX_KEYS}")
+    points = _points(found)
+    numbers = {label: number for number, label in enumerate(labels, 1)}
+    images: list[dict[str, Any]] = []
+    annotations: list[dict[str, Any]] = []
+    try:
+        for shot in _spaced(shots(recording), round(interval * NANOSECONDS)):
+            picture = _picture(shot)
+            if picture is None:
+                continue
+            data, suffix, (width, height) = picture
+            source, stamp = shot.header.source, shot.header.stamp
+            name = f"{file_name(source) or 'camera'}-{shot.header.id:06}.{suffix}"
+            target = new_file(path / "images" / name)
+            target.write_bytes(data)
+            images.append(
+                {
+                    "id": len(images) + 1,
+                    "file_name": name,
+                    "width": width,
+                    "height": height,
+                    "camera": source,
+                    "mission_seconds": seconds(stamp),
+                }
+            )
+            for item in found.get((source, stamp), ()):
+                annotation = _annotation(item, width, height, points.get(item.label, 0))
+                annotation["id"] = len(annotations) + 1
+                annotation["image_id"] = len(images)
+                annotation["category_id"] = numbers[item.label]
+                annotations.append(annotation)
+        if not images:
+            raise RecordingError(f"{recording.path} holds no pictures; were they switched off?")
+        content = {
+            "info": {"description": f"{recording.path.name}, detected, not verified"},
+            "images": images,
+            "annotations": annotations,
+            "categories": [_category(label, numbers[label], points) for label in labels],
+        }
+        (path / "annotations.json").write_text(json.dumps(content) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise RecordingError(f"cannot write {path}: {error.strerror}") from None
+    return path
+
+
+def _spaced(found: Iterator[Shot], gap: int) -> Iterator[Shot]:
+    """Pictures of each camera at least `gap` nanoseconds apart."""
+    newest: dict[str, int] = {}
+    for shot in found:
+        source, stamp = shot.record.topic, shot.header.stamp
+        if source not in newest or stamp >= newest[source] + gap:
+            newest[source] = stamp
+            yield shot
+
+
+def _picture(shot: Shot) -> tuple[bytes, str, tuple[int, int]] | None:
+    """File, suffix, width and height of a picture; None for a broken one."""
+    try:
+        image = shot.image()
+    except SourceError:
+        return None
+    if image is None:
+        return None
+    height, width = image.shape[:2]
+    if shot.video is None and shot.format in _SUFFIXES:
+        return bytes(shot.record.value.data), _SUFFIXES[shot.format], (width, height)
+    return cv2.imencode(".jpg", image, _QUALITY)[1].tobytes(), "jpg", (width, height)
+
+
+def _points(found: dict[tuple[str, int], list[Detection]]) -> dict[str, int]:
+    """Keypoints by label; labels whose detections differ in their number have none."""
+    counts: dict[str, set[int]] = {}
+    for items in found.values():
+        for item in items:
+            number = 0 if item.keypoints is None else len(item.keypoints)
+            counts.setdefault(item.label, set()).add(number)
+    return {label: number for label, (number, *more) in counts.items() if number and not more}
+
+
+def _category(label: str, number: int, points: dict[str, int]) -> dict[str, Any]:
+    category: dict[str, Any] = {"id": number, "name": label}
+    if label in points:
+        category["keypoints"] = [str(index) for index in range(points[label])]
+        category["skeleton"] = []
+    return category
+
+
+def _annotation(item: Detection, width: int, height: int, points: int) -> dict[str, Any]:
+    left, right = (min(max(edge, 0.0), width) for edge in item.box[::2])
+    top, bottom = (min(max(edge, 0.0), height) for edge in item.box[1::2])
+    across, down = max(right - left, 0.0), max(bottom - top, 0.0)
+    annotation: dict[str, Any] = {
+        "bbox": [left, top, across, down],
+        "area": across * down,
+        "iscrowd": 0,
+        "segmentation": [],
+        "score": item.score,
+    }
+    if item.track_id is not None:
+        annotation["track_id"] = item.track_id
+    if points and item.keypoints is not None:
+        seen = [
+            (float(u), float(v), _VISIBLE) if c >= _SEEN and math.isfinite(u + v) else (0.0, 0.0, 0)
+            for u, v, c in item.keypoints.tolist()
+        ]
+        annotation["keypoints"] = [figure for point in seen for figure in point]
+        annotation["num_keypoints"] = sum(flag > 0 for _, _, flag in seen)
+    return annotation

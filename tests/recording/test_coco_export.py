@@ -1,0 +1,70 @@
+"""Recordings as COCO datasets, read by pycocotools."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import cv2
+import pytest
+from pycocotools.coco import COCO
+from synthetic_flight import PROVENANCE, SyntheticFlight, record
+
+from aerodaas.config.model import RecordingConfig
+from aerodaas.recording.export.coco import write_coco
+from aerodaas.recording.pictures import detections, shots
+from aerodaas.recording.reader import Recording
+from aerodaas.recording.recorder import FlightRecorder
+from aerodaas.types.errors import RecordingError
+
+
+@pytest.mark.parametrize("images", ["jpeg", "h264"])
+def test_pycocotools_reads_pictures_boxes_and_keypoints(
+    tmp_path: Path, images: Literal["jpeg", "h264"]
+) -> None:
+    """Each annotation belongs to its picture; the box is left, top, width, height."""
+    path = tmp_path / "flight.mcap"
+    flight = SyntheticFlight(frames=0.5, rate=5.0, hover=0.5)
+    record(path, flight, config=RecordingConfig(images=images))
+    with Recording.open(path) as recording:
+        folder = write_coco(recording, tmp_path, interval=0.0)
+        expected = {found.header.id: found for _, found in detections(recording)}
+        pictures = list(shots(recording))
+    dataset = COCO(folder / "annotations.json")
+    assert [dataset.cats[number]["name"] for number in dataset.getCatIds()] == ["person"]
+    assert len(dataset.imgs) == len(pictures)
+    for image in dataset.loadImgs(dataset.getImgIds()):
+        pixels = cv2.imread(str(folder / "images" / image["file_name"]))
+        assert pixels is not None
+        assert pixels.shape[:2] == (image["height"], image["width"]) == (180, 320)
+        number = int(image["file_name"].rpartition("-")[2].partition(".")[0])
+        (annotation,) = dataset.loadAnns(dataset.getAnnIds(imgIds=image["id"]))
+        (found,) = expected[number].items
+        assert annotation["bbox"] == [100.0, 50.0, 40.0, 80.0]
+        assert (annotation["score"], annotation["track_id"]) == (0.91, 3)
+        assert annotation["num_keypoints"] == 17
+        assert found.keypoints is not None
+        assert annotation["keypoints"][0] == pytest.approx(float(found.keypoints[0, 0]))
+
+
+def test_pictures_are_as_far_apart_as_asked(tmp_path: Path) -> None:
+    """And stay the files that they were."""
+    path = tmp_path / "flight.mcap"
+    record(path, SyntheticFlight(frames=1.0, rate=5.0, hover=0.5))
+    with Recording.open(path) as recording:
+        folder = write_coco(recording, tmp_path, interval=10.0)
+        kept = {bytes(shot.record.value.data) for shot in shots(recording)}
+        with pytest.raises(RecordingError, match="already exists"):
+            write_coco(recording, tmp_path)
+    images = list((folder / "images").iterdir())
+    assert 5 < len(images) < len(kept) / 5
+    assert {image.read_bytes() for image in images} <= kept
+
+
+def test_a_recording_without_pictures_is_told(tmp_path: Path) -> None:
+    """As by the other exports."""
+    path = tmp_path / "bare.mcap"
+    with FlightRecorder(path, config=RecordingConfig(), provenance=PROVENANCE):
+        pass
+    with Recording.open(path) as recording, pytest.raises(RecordingError, match="no pictures"):
+        write_coco(recording, tmp_path)
