@@ -136,7 +136,8 @@ def _fields(value: Any) -> dict[str, Any]:  # noqa: ANN401 - any object
     if callable(dump):
         data = dump()
         return data if isinstance(data, dict) else {"data": data}
-    names, further = _declared(type(value))
+    kind: Any = type(value)
+    names, further = _declared(kind)
     if further:
         held = getattr(value, "__dict__", {})
         names = (*names, *(name for name in held if not name.startswith("__")))

@@ -173,12 +173,15 @@ class SetpointFilter:
         names: list[str] = []
         sweeps = 4  # alternating projections; scaling down below removes the remainder
         for _ in range(sweeps):
+            before = velocity
             for bound in bounds:
                 excess = float(velocity @ bound.towards) - bound.speed
                 if excess > 0.0:
                     velocity = velocity - excess * bound.towards
                     if bound.name not in names:
                         names.append(bound.name)
+            if velocity is before:
+                return velocity, names  # within all bounds, as further sweeps would leave it
         for bound in bounds:
             closing = float(velocity @ bound.towards)
             if closing > bound.speed:
