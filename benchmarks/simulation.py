@@ -2,8 +2,9 @@
 
 Farm Survey flies whole, in lockstep: physics, a camera of 640 x 360 at 15 a second, streams,
 recording with JPEG pictures. The processor's time is that of the actors in flight, as the recording
-has it; unlike the wall's, other work on the machine changes it little. "side by side" is `aerodaas
-run --seeds`, whose wall time includes all that comes before and after the flights.
+has it; Ray's threads cost some of it for each second of the wall, so it wants a quiet machine, too.
+A turn of the setpoint loop, by itself (`_turns.py`), does not. "side by side" is `aerodaas run
+--seeds`, whose wall time includes all that comes before and after the flights.
 """
 
 from __future__ import annotations
@@ -80,11 +81,21 @@ def processor(recording: Path) -> dict[str, float]:
     return dict(used)
 
 
-def fly_seeds(checkout: Path | None, folder: Path, seeds: int) -> dict[str, float]:
+def turn(checkout: Path | None) -> float:
+    """Microseconds of the processor that a turn of a drone takes, by itself."""
+    environment = {**os.environ, **({"PYTHONPATH": str(checkout)} if checkout else {})}
+    command = [sys.executable, str(Path(__file__).with_name("_turns.py"))]
+    done = subprocess.run(  # noqa: S603 - ours
+        command, capture_output=True, text=True, check=True, env=environment
+    )
+    return float(done.stdout)
+
+
+def fly_seeds(folder: Path, seeds: int) -> dict[str, float]:
     """Fly several seeds side by side; returns the figures of all together."""
     table, began = folder / "table.json", time.monotonic()
     folder.mkdir()
-    run(checkout, folder / "runs", "--seeds", str(seeds), "--json", str(table))
+    run(None, folder / "runs", "--seeds", str(seeds), "--json", str(table))
     wall = time.monotonic() - began
     mission = sum(row["flight s"] for row in jsons.loads(table.read_text()))
     figures = {"simulated": mission, "wall": wall, "factor": mission / wall}
@@ -119,10 +130,12 @@ def main(
                     place = folder / f"{number}-{prefix}{case}"
                     flights[prefix + case].append(fly(checkout, place, words))
         if seeds:
-            flights[_SIDE_BY_SIDE].append(fly_seeds(None, folder / _SIDE_BY_SIDE, seeds))
+            flights[_SIDE_BY_SIDE].append(fly_seeds(folder / _SIDE_BY_SIDE, seeds))
     for case, flown in flights.items():
         report.row(case, {unit: statistics.median(one[unit] for one in flown) for unit in UNITS})
     report.note(f"medians of {rounds} flights; {seeds} seeds side by side, once")
+    for prefix, checkout in checkouts.items():
+        report.note(f"{prefix}{turn(checkout):.0f} us of the processor for a drone's turn, alone")
     report.show()
     if json is not None:
         report.write(json)
