@@ -1,6 +1,6 @@
 """Runs of one application with several seeds, side by side, each in a process of its own.
 
-All share one local Ray, which is most of what a run of its own would start: 5 s of a core, 200 MB.
+All share one local Ray: one for each would cost 5 s of a core and 200 MB more.
 """
 
 from __future__ import annotations
