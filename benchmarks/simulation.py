@@ -1,15 +1,24 @@
-"""Simulated seconds per wall second: Farm Survey with its camera at 640 x 360, 15 per second.
+"""Simulated seconds per wall second, and the processor's time that each of them takes.
 
-The whole application flies: physics, rendering, streams, recording with JPEG pictures.
+Farm Survey flies whole, in lockstep: physics, a camera of 640 x 360 at 15 a second, streams,
+recording with JPEG pictures. The processor's time is that of the actors in flight, as the recording
+has it; Ray's threads cost some of it for each second of the wall, so it wants a quiet machine, too.
+A turn of the setpoint loop, by itself (`_turns.py`), does not. "side by side" is `aerodaas run
+--seeds`, whose wall time includes all that comes before and after the flights.
 """
 
 from __future__ import annotations
 
+import json as jsons
+import os
 import re
 import statistics
 import subprocess
 import sys
 import tempfile
+import time
+from collections import defaultdict
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -17,50 +26,129 @@ import typer
 from _report import Report
 from rich.progress import track
 
-APPLICATION = Path(__file__).parents[1] / "apps" / "farm_survey.py"
+from aerodaas.recording.reader import Recording
+from aerodaas.types.clock import NANOSECONDS
+
+_APPS = Path(__file__).parents[1] / "apps"
+APPLICATION = _APPS / "farm_survey.py"
+_ACTORS = {"drone": "drone", "sensor": "camera", "analytics": "analyses", "recorder": "recorder"}
+"""Name of an actor's figure, by the first part of its own."""
 UNITS = {"simulated": "s", "wall": "s", "factor": "s/s", "ready after": "s"}
+UNITS |= dict.fromkeys((*_ACTORS.values(), "actors"), "ms of processor/s")
 _LINE = re.compile(r"flew ([\d.]+) s in ([\d.]+) s, .*ready after ([\d.]+) s")
+_SIDE_BY_SIDE = "side by side"
 
 
-def fly(folder: Path, *settings: str) -> tuple[float, float, float]:
-    """Fly once; returns mission seconds, wall seconds in flight, and seconds until ready."""
+def run(checkout: Path | None, folder: Path, *words: str) -> str:
+    """Run Farm Survey, by another checkout's code if there is one; returns what it prints."""
     command = [sys.executable, "-m", "aerodaas", "run", str(APPLICATION), "--speed", "max"]
-    for setting in settings:
-        command += ["--set", setting]
-    command += ["--record", str(folder)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603 - ours
-    found = _LINE.search(done.stdout)
-    if found is None:
+    environment = {**os.environ, **({"PYTHONPATH": str(checkout)} if checkout else {})}
+    done = subprocess.run(  # noqa: S603 - ours
+        [*command, "--record", str(folder), *words],
+        capture_output=True,
+        text=True,
+        check=False,
+        env=environment,
+    )
+    if done.returncode:
         sys.exit(f"the flight failed:\n{done.stdout}\n{done.stderr}")
+    return done.stdout
+
+
+def fly(checkout: Path | None, folder: Path, words: Sequence[str]) -> dict[str, float]:
+    """Fly once; returns the figures."""
+    found = _LINE.search(run(checkout, folder, *words))
+    assert found is not None  # noqa: S101 - it has flown
     mission, wall, ready = (float(text) for text in found.groups())
-    return mission, wall, ready
+    used = processor(folder / "flight.mcap")
+    figures = {"simulated": mission, "wall": wall, "factor": mission / wall, "ready after": ready}
+    return {**dict.fromkeys(UNITS, 0.0), **figures, **used, "actors": sum(used.values())}
+
+
+def processor(recording: Path) -> dict[str, float]:
+    """Milliseconds of the processor for a simulated second, by kind of actor."""
+    readings: dict[str, list[tuple[int, float]]] = defaultdict(list)
+    with Recording.open(recording) as opened:
+        for record in opened.records(schemas=("aerodaas.Vitals",)):
+            value = record.value
+            readings[value["actor"]].append((value["stamp"], value["cpu_seconds"]))
+    used: dict[str, float] = defaultdict(float)
+    for actor, found in readings.items():
+        kind = _ACTORS.get(actor.partition("/")[0])
+        (began, before), (ended, after) = found[0], found[-1]
+        if kind is not None and ended > began:
+            used[kind] += 1000 * (after - before) / ((ended - began) / NANOSECONDS)
+    return dict(used)
+
+
+def turn(checkout: Path | None) -> float:
+    """Microseconds of the processor that a turn of a drone takes, by itself."""
+    environment = {**os.environ, **({"PYTHONPATH": str(checkout)} if checkout else {})}
+    command = [sys.executable, str(Path(__file__).with_name("_turns.py"))]
+    done = subprocess.run(  # noqa: S603 - ours
+        command, capture_output=True, text=True, check=True, env=environment
+    )
+    return float(done.stdout)
+
+
+def fly_seeds(folder: Path, seeds: int) -> dict[str, float]:
+    """Fly several seeds side by side; returns the figures of all together."""
+    table, began = folder / "table.json", time.monotonic()
+    folder.mkdir()
+    run(None, folder / "runs", "--seeds", str(seeds), "--json", str(table))
+    wall = time.monotonic() - began
+    mission = sum(row["flight s"] for row in jsons.loads(table.read_text()))
+    figures = {"simulated": mission, "wall": wall, "factor": mission / wall}
+    return {**dict.fromkeys(UNITS, float("nan")), **figures}
 
 
 def main(
     rounds: Annotated[int, typer.Option(min=1, help="Flights of each kind.")] = 3,
+    seeds: Annotated[int, typer.Option(min=0, help="Seeds side by side; 0 for none.")] = 4,
+    against: Annotated[
+        Path | None, typer.Option(help="Another checkout, whose flights take turns with ours.")
+    ] = None,
     json: Annotated[Path | None, typer.Option(help="Write the figures to this file.")] = None,
 ) -> None:
-    """Fly Farm Survey as fast as the machine goes, with and without recording pictures.
+    """Fly Farm Survey as fast as the machine goes, with and without pictures and camera.
 
     python benchmarks/simulation.py --rounds 3 --json simulation.json
     """
     report = Report("Farm Survey, simulated", UNITS, packages=["ray", "panda3d"])
-    cases = {"as the app is": (), "pictures not recorded": ("recording.images=none",)}
-    flights: dict[str, list[tuple[float, float, float]]] = {name: [] for name in cases}
-    with tempfile.TemporaryDirectory() as folder:
+    checkouts = {"": None, **({"before: ": against.resolve()} if against else {})}
+    flights: dict[str, list[dict[str, float]]] = defaultdict(list)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        cases = {
+            "as the app is": (),
+            "pictures not recorded": ("--set", "recording.images=none"),
+            "no camera": ("--env", str(_without_camera(folder))),
+        }
         for number in track(range(rounds), description="flying"):
-            for index, (name, settings) in enumerate(cases.items()):
-                place = Path(folder) / f"{number}-{index}"
-                flights[name].append(fly(place, *settings))
-    for name, flown in flights.items():
-        mission, wall, ready = (statistics.median(column) for column in zip(*flown, strict=True))
-        factor = statistics.median(one / two for one, two, _ in flown)
-        figures = (mission, wall, factor, ready)
-        report.row(name, dict(zip(UNITS, figures, strict=True)))
-    report.note(f"medians of {rounds} flights")
+            for case, words in cases.items():
+                for prefix, checkout in checkouts.items():
+                    place = folder / f"{number}-{prefix}{case}"
+                    flights[prefix + case].append(fly(checkout, place, words))
+        if seeds:
+            flights[_SIDE_BY_SIDE].append(fly_seeds(folder / _SIDE_BY_SIDE, seeds))
+    for case, flown in flights.items():
+        report.row(case, {unit: statistics.median(one[unit] for one in flown) for unit in UNITS})
+    report.note(f"medians of {rounds} flights; {seeds} seeds side by side, once")
+    for prefix, checkout in checkouts.items():
+        report.note(f"{prefix}{turn(checkout):.0f} us of the processor for a drone's turn, alone")
     report.show()
     if json is not None:
         report.write(json)
+
+
+def _without_camera(folder: Path) -> Path:
+    """Environment file of the same drone, without its camera."""
+    content = jsons.loads((_APPS / "environments" / "farm.json").read_text())
+    for robot in content["robots"]:
+        robot["sensors"] = [one for one in robot["sensors"] if one["type"] != "camera"]
+    path = folder / "environment.json"
+    path.write_text(jsons.dumps(content))
+    return path
 
 
 if __name__ == "__main__":

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import traceback
 from pathlib import Path
 from typing import Annotated
 
@@ -14,6 +13,7 @@ from aerodaas.cli.application import build_application, run_application, speed_o
 from aerodaas.cli.check import check
 from aerodaas.cli.examples import examples
 from aerodaas.cli.export import export
+from aerodaas.cli.failure import failure_of, show_failure
 from aerodaas.cli.help_examples import ExampleGroup
 from aerodaas.cli.import_bag import import_bag
 from aerodaas.cli.init import init
@@ -23,19 +23,11 @@ from aerodaas.cli.report import compare, report
 from aerodaas.cli.serve import serve
 from aerodaas.cli.shipped import find_application
 from aerodaas.cli.view import view
-from aerodaas.config.options import RunOptions, current_options
-from aerodaas.types.errors import (
-    AeroDaaSError,
-    ConfigError,
-    GraphError,
-    InvalidWaypointError,
-    UnknownIdError,
-)
+from aerodaas.config.options import RunOptions
+from aerodaas.types.errors import ConfigError
 
 __all__ = ["app", "main", "run_typer"]
 
-_CAUSED_BY_A_LINE = (GraphError, InvalidWaypointError, UnknownIdError)
-"""Errors reported with the application's own line."""
 _PROVIDER = "At a provider"
 
 _WORDS = {"allow_extra_args": True}
@@ -90,7 +82,25 @@ def run(
         Path | None,
         typer.Option(help="Where recording, plots and summary go. Default: a folder in runs/."),
     ] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the simulation.")] = None,
+    seed: Annotated[
+        int | None,
+        typer.Option(min=0, help="Seed of the simulation; with --seeds, the first (0)."),
+    ] = None,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Fly this many seeds side by side, and compare them in a table.",
+            metavar="N",
+        ),
+    ] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, help="Runs of --seeds at a time; default one per core.")
+    ] = None,
+    json_path: Annotated[
+        Path | None, typer.Option("--json", help="File for the table of --seeds.")
+    ] = None,
+    csv_path: Annotated[Path | None, typer.Option("--csv", help="The same as CSV.")] = None,
     address: Annotated[
         str | None, typer.Option(help="Ray cluster to join. Default: RAY_ADDRESS, or none.")
     ] = None,
@@ -143,6 +153,7 @@ def run(
         aerodaas run farm_survey
         aerodaas run my_app.py --speed 5 --seed 7 --record /tmp/farm
         aerodaas run farm_survey --console
+        aerodaas run farm_survey --seeds 16 --csv farm.csv
         aerodaas run farm_survey --set quadrotor_base.limits.cruise_speed=1
         aerodaas run mine.py --guest theirs.py --grant theirs=sense:cam1,compute:edge
         aerodaas run watch_frames -- pictures/ yolov8n.onnx --rate 5
@@ -168,9 +179,24 @@ def run(
         grants=parse_words(grant or ()),
         application=application.resolve(),
     )
+    if seeds is not None:
+        from aerodaas.cli.seeds.command import run_seeds  # noqa: PLC0415 - loads ray
+        from aerodaas.cli.seeds.job import Job  # noqa: PLC0415 - as above
+
+        job = Job(application, context.args, options)
+        run_seeds(job, seeds, jobs=jobs, json_path=json_path, csv_path=csv_path)
+        return
+    _require_seeds({"--jobs": jobs, "--json": json_path, "--csv": csv_path})
     if live:
         typer.echo(f"live: open ws://{live_address} in Foxglove")
     run_application(application, context.args, options)
+
+
+def _require_seeds(given: dict[str, object]) -> None:
+    """Raise ConfigError for what only --seeds takes."""
+    for name, value in given.items():
+        if value is not None:
+            raise ConfigError(f"{name} belongs to --seeds: say how many, as in --seeds 16")
 
 
 @app.command("compile", context_settings=_WORDS)
@@ -301,33 +327,7 @@ def run_typer(typer_app: typer.Typer, name: str | None = None) -> None:
     """Run a Typer application as a program; errors become one message and an exit code."""
     try:
         typer_app(standalone_mode=True, prog_name=name)
-    except AeroDaaSError as error:
-        line = _application_line(error) if isinstance(error, _CAUSED_BY_A_LINE) else ""
-        _say(str(error) + (f"\n  at {line}" if line and "\n  at " not in str(error) else ""))
-        sys.exit(error.exit_code)
-    except SyntaxError as error:
-        _say(f"{error.filename}:{error.lineno}: {error.msg}: {(error.text or '').strip()}")
-        sys.exit(1)
     except Exception as error:  # noqa: BLE001 - the application may raise anything
-        line = _application_line(error)
-        _say(f"{type(error).__name__}: {error}" + (f"\n  at {line}" if line else ""))
-        sys.exit(1)
-
-
-def _application_line(error: Exception) -> str:
-    """The application's own last line in an error's traceback, as `file:line: code`, or empty."""
-    application = current_options.get().application
-    if application is None:
-        return ""
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        path = Path(frame.filename)
-        if path.is_file() and path.resolve().is_relative_to(application.parent):
-            return f"{path.name}:{frame.lineno}: {frame.line}"
-    return ""
-
-
-def _say(text: str) -> None:
-    from rich.console import Console  # noqa: PLC0415 - only when there is something to say
-    from rich.text import Text  # noqa: PLC0415
-
-    Console(stderr=True).print(Text("error: ", style="bold red") + Text(text), soft_wrap=True)
+        failure = failure_of(error)
+        show_failure(failure)
+        sys.exit(failure.code)

@@ -10,7 +10,6 @@ from math import isnan
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from aerodaas.config.extras import require_extra
@@ -29,9 +28,10 @@ from aerodaas.schedulers.lab.metrics import Score, score
 from aerodaas.schedulers.lab.run import Spread
 from aerodaas.schedulers.lab.workload import SIX
 from aerodaas.terminal.figures import Row, show_figures
+from aerodaas.terminal.progress import show_progress
 from aerodaas.types.clock import NANOSECONDS
 
-__all__ = ["registered", "show_progress", "spread_of", "study", "workload_of"]
+__all__ = ["registered", "spread_of", "study", "workload_of"]
 
 _BOUND_EDGES = 10
 """Most edges for which the clairvoyant bound is computed unasked."""
@@ -176,12 +176,6 @@ def _loads(
     workload = flown_workload(flight)
     tasks = workload.tasks(0, random.Random())
     return [workload], flight.resources, score(tasks, flown_trace(flight, tasks))
-
-
-def show_progress() -> Progress:
-    """A bar that is gone once all is done."""
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn())
-    return Progress(*columns, TimeRemainingColumn(), console=Console(), transient=True)
 
 
 def _plot(result: LabResult, names: list[str], resources: Resources, folder: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import math
 import re
 from collections.abc import Sequence
@@ -11,11 +10,13 @@ from typing import Any
 
 from rich.console import Console
 
-from aerodaas.cli.lab_study import show_progress, spread_of, workload_of
+from aerodaas.cli.lab_study import spread_of, workload_of
+from aerodaas.cli.rows import write_csv
 from aerodaas.config.extras import has_extra
 from aerodaas.schedulers.lab.significance import seeds_needed
 from aerodaas.schedulers.lab.sweep import PARAMETERS, SweepResult, run_sweep
 from aerodaas.terminal.figures import Row, show_figures
+from aerodaas.terminal.progress import show_progress
 from aerodaas.types.errors import ConfigError, UnknownIdError
 
 __all__ = ["parse_sweeps", "sweep"]
@@ -156,8 +157,8 @@ def _write(result: SweepResult, out: Path) -> list[str]:
     """Write the tidy table, and the summary of each figure; returns the files' names."""
     try:
         out.mkdir(parents=True, exist_ok=True)
-        _write_csv(out / _CSV, result.rows)
-        _write_csv(out / _SUMMARY, [row for name in result.figures for row in result.summary(name)])
+        write_csv(out / _CSV, result.rows)
+        write_csv(out / _SUMMARY, [row for name in result.figures for row in result.summary(name)])
     except OSError as error:
         raise ConfigError(f"cannot write into {out}: {error.strerror}") from None
     try:
@@ -167,13 +168,6 @@ def _write(result: SweepResult, out: Path) -> list[str]:
         return [_CSV, _SUMMARY]
     parquet.write_table(pa.Table.from_pylist(result.rows), out / _PARQUET)
     return [_CSV, _PARQUET, _SUMMARY]
-
-
-def _write_csv(path: Path, rows: list[dict[str, Any]]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
 
 
 def _plot(result: SweepResult, figures: Sequence[str], out: Path) -> list[str]:

@@ -61,8 +61,9 @@ class RunOptions:
     """Settings by `id.setting`, such as `camera.rate`."""
     view: bool = True
     """Show the live terminal view."""
-    report: bool = True
-    """Write the report beside the recording."""
+    report: Literal["page", "figures"] | None = "page"
+    """What to write beside the recording: the report's page, plots and summary, or only the
+    summary as JSON."""
     live: str | None = None
     """Serve Foxglove's WebSocket at this `host:port` while flying."""
     console: str | None = None

@@ -14,7 +14,7 @@ from aerodaas.mission.commands import Answer, Command
 if TYPE_CHECKING:
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
-__all__ = ["MissionRun", "recording_path"]
+__all__ = ["MissionRun", "recording_folder", "recording_path"]
 
 _RECORDING = "flight.mcap"
 
@@ -53,9 +53,13 @@ def recording_path(options: RunOptions, config: EnvironmentConfig, number: int) 
         return None
     wanted = options.record or (Path(config.recording.path) if config.recording.path else None)
     if wanted is None:
-        name = options.application.stem if options.application else config.name
-        now = datetime.now().astimezone()
-        wanted = Path("runs") / f"{name}-{now:%Y%m%d-%H%M%S}"
+        wanted = recording_folder(options.application.stem if options.application else config.name)
     path = wanted if wanted.suffix == ".mcap" else wanted / _RECORDING
     # One environment may fly several times.
     return path if number == 1 else path.with_stem(f"{path.stem}-{number}")
+
+
+def recording_folder(name: str) -> Path:
+    """Folder for what is recorded from now on under `name`, where none is asked for."""
+    now = datetime.now().astimezone()
+    return Path("runs") / f"{name}-{now:%Y%m%d-%H%M%S}"

@@ -440,9 +440,8 @@ class Run:
         show_speed(
             self.options, seconds(max(stamps, default=0)), flown, self._launched - self._began
         )
-        if self.options.report:
-            source = self.config.recording.application_source
-            show_results(self.options, self._flight.recording, source_recorded=source)
+        source = self.config.recording.application_source
+        show_results(self.options, self._flight.recording, source_recorded=source)
         if self._flight.headless:
             show_headless(self._flight.headless, self._flight.recording)
 

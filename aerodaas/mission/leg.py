@@ -5,12 +5,10 @@ from __future__ import annotations
 import enum
 import math
 
-import numpy as np
-
 from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, wrap_angle
+from aerodaas.types.geometry import Vector, length, wrap_angle
 from aerodaas.types.vehicle import PositionSetpoint
 
 __all__ = ["Leg", "LegPhase", "setpoint_towards"]
@@ -60,7 +58,7 @@ class Leg:
     def advance(self, odometry: Odometry, now: int, elapsed: float) -> LegPhase:
         """Update with the odometry, `elapsed` seconds after the last call, and return the phase."""
         stop = self.stop
-        distance = float(np.linalg.norm(stop.waypoint.position - odometry.position))
+        distance = length(stop.waypoint.position - odometry.position)
         if stop.arrived:
             stop.remaining_hover -= elapsed
         stop.arrived = stop.arrived or (

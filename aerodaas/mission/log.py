@@ -7,11 +7,9 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Alert, Header
-from aerodaas.types.geometry import Vector
+from aerodaas.types.geometry import Vector, length
 from aerodaas.types.status import RECENT
 
 __all__ = ["MissionLog", "words"]
@@ -65,7 +63,7 @@ class MissionLog:
         if self._counted_at is None:
             self._counted_at = position
             return
-        way = float(np.linalg.norm(position - self._counted_at))
+        way = length(position - self._counted_at)
         if way >= _STRIDE:
             self.distance += way
             self._counted_at = position

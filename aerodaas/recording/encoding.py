@@ -82,7 +82,7 @@ def json_schema(name: str, **properties: str | dict[str, Any]) -> Schema:
 def json_bytes(value: dict[str, Any]) -> bytes:
     """Encode a dictionary as strict JSON; values of other types are converted by `plain`."""
     try:
-        return json.dumps(value, default=plain, allow_nan=False, separators=(",", ":")).encode()
+        return _STRICT.encode(value).encode()
     except (ValueError, TypeError, RecursionError):
         # NaN, infinity, keys that are no strings, cycles, lone surrogates: rare, hence a slow path.
         return json.dumps(plain(value), separators=(",", ":")).encode()
@@ -105,6 +105,10 @@ def plain(value: object, depth: int = 0) -> Any:  # noqa: ANN401 - any JSON valu
         with suppress(Exception):
             return _plain_container(value, depth + 1)
     return f"<{type(value).__name__}>"
+
+
+_STRICT = json.JSONEncoder(default=plain, allow_nan=False, separators=(",", ":"))
+"""Made once: `json.dumps` makes one for each call."""
 
 
 def _plain_container(value: object, depth: int) -> Any:  # noqa: ANN401 - any JSON value
@@ -132,12 +136,23 @@ def _fields(value: Any) -> dict[str, Any]:  # noqa: ANN401 - any object
     if callable(dump):
         data = dump()
         return data if isinstance(data, dict) else {"data": data}
-    names = [field.name for field in dataclasses.fields(value)] if is_dataclass(value) else []
-    if type(value).__module__.partition(".")[0] not in sys.stdlib_module_names:
-        slots = (getattr(one, "__slots__", ()) for one in type(value).__mro__)
-        names += [name for some in slots for name in ((some,) if isinstance(some, str) else some)]
-        names += [name for name in getattr(value, "__dict__", {}) if not name.startswith("__")]
+    kind: Any = type(value)
+    names, further = _declared(kind)
+    if further:
+        held = getattr(value, "__dict__", {})
+        names = (*names, *(name for name in held if not name.startswith("__")))
     return {name: getattr(value, name) for name in names if hasattr(value, name)}
+
+
+@lru_cache(maxsize=1024)
+def _declared(kind: type) -> tuple[tuple[str, ...], bool]:
+    """Fields and slots of a class, and whether its objects' further attributes are data, too."""
+    names = [field.name for field in dataclasses.fields(kind)] if is_dataclass(kind) else []
+    own = kind.__module__.partition(".")[0] not in sys.stdlib_module_names
+    if own:
+        slots = (getattr(one, "__slots__", ()) for one in kind.__mro__)
+        names += [name for some in slots for name in ((some,) if isinstance(some, str) else some)]
+    return tuple(dict.fromkeys(names)), own
 
 
 def _words(value: object) -> str:

@@ -226,15 +226,19 @@ def show_headless(head: str, recording: Path | None) -> None:
 def show_results(
     options: RunOptions, recording: Path | None, *, source_recorded: bool = False
 ) -> None:
-    """Write plots and summary of a closed recording, and print the places of all files."""
-    if recording is None:
+    """Write what `options` ask for of a closed recording; print the places of a report's files."""
+    if recording is None or options.report is None:
         return
     from aerodaas.recording.report.report import (  # noqa: PLC0415 - matplotlib is slow to load
         write_report,
+        write_summary,
     )
 
     console = Console(highlight=False, soft_wrap=True)
     try:
+        if options.report == "figures":
+            write_summary(recording, recording.parent)
+            return
         report = write_report(recording, recording.parent)
     except RecordingError as error:
         console.print(f"no report: {error}", markup=False)

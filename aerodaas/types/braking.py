@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from aerodaas.types.geometry import Vector, wrap_angle
+from aerodaas.types.geometry import Vector, length, wrap_angle
 from aerodaas.types.vehicle import PositionSetpoint, VelocitySetpoint
 
 __all__ = ["braking_speed", "limit_length", "stopping_point", "velocity_towards"]
@@ -26,14 +26,14 @@ def braking_speed(distance: float, deceleration: float, reaction_time: float) ->
 
 def stopping_point(position: Vector, velocity: Vector, deceleration: float) -> Vector:
     """Where a drone comes to rest that brakes now: v²/(2 a) ahead."""
-    speed = float(np.linalg.norm(velocity))
+    speed = length(velocity)
     return position + velocity * (speed / (2.0 * deceleration))
 
 
 def limit_length(vector: Vector, longest: float) -> Vector:
     """`vector`, shortened to `longest` where it is longer."""
-    length = float(np.linalg.norm(vector))
-    return vector if length <= longest else vector * (longest / length)
+    long = length(vector)
+    return vector if long <= longest else vector * (longest / long)
 
 
 def velocity_towards(
@@ -51,9 +51,9 @@ def velocity_towards(
     At most `speed` m/s (or the target's own) and `yaw_rate` rad/s.
     """
     way = target.position - position
-    distance = float(np.linalg.norm(way))
+    distance = length(way)
     wanted = min(target.speed or speed, braking_speed(distance, deceleration, reaction_time))
     velocity = way * (wanted / distance) if distance > 0.0 else np.zeros(3)
     gain = 1.5  # 1/s; turns settle in about two seconds
     error = 0.0 if target.yaw is None else wrap_angle(target.yaw - yaw)
-    return VelocitySetpoint(velocity, float(np.clip(gain * error, -yaw_rate, yaw_rate)))
+    return VelocitySetpoint(velocity, min(max(gain * error, -yaw_rate), yaw_rate))

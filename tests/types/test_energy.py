@@ -35,6 +35,17 @@ def test_power_has_the_known_shape() -> None:
     assert model.power(np.array([0.0, 0.0, -2.0])) == pytest.approx(1.0)
 
 
+@given(st.lists(st.tuples(*[st.floats(-1e200, 1e200) | st.floats(-30, 30)] * 3), min_size=1))
+def test_the_power_of_one_velocity_is_that_of_many(
+    velocities: list[tuple[float, float, float]],
+) -> None:
+    """By number and by array the same, and nothing raises, however large a number."""
+    model, many = EnergyModel(wind=np.array([3.0, -2.0, 0.5])), np.array(velocities)
+    with np.errstate(all="ignore"):
+        one_by_one = [model.power(velocity) for velocity in many]
+        np.testing.assert_array_equal(one_by_one, model.powers(many))
+
+
 def test_a_head_wind_costs() -> None:
     """The same leg, against strong wind and with it."""
     model = EnergyModel(wind=np.array([-12.0, 0.0, 0.0]))

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
+import pymap3d
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
@@ -98,6 +99,8 @@ def test_positive_pitch_looks_down_and_positive_roll_lowers_the_right() -> None:
     assert (rotation_from_rpy(0.3, 0, 0) @ [0, -1, 0])[2] < 0
 
 
+heights = st.floats(-400, 9000)
+far = st.tuples(*[st.floats(-50_000, 50_000)] * 2, st.floats(-100, 3000)).map(np.array)
 origins = st.builds(GeodeticOrigin, st.floats(-80, 80), st.floats(-180, 180), st.floats(-100, 3000))
 
 
@@ -106,6 +109,17 @@ def test_geodetic_and_local_undo_each_other(origin: GeodeticOrigin, position: Ve
     """Local to geodetic and back is the identity to a tenth of a millimetre."""
     back = origin.to_local(*origin.to_geodetic(position))
     np.testing.assert_allclose(back, position, atol=1e-4)
+
+
+@given(st.builds(GeodeticOrigin, st.floats(-90, 90), st.floats(-180, 180), heights), far)
+def test_geodetic_coordinates_are_those_of_a_library(
+    origin: GeodeticOrigin, position: Vector
+) -> None:
+    """At any place of the earth, poles included, to a hundredth of a millimetre."""
+    latitude, longitude, altitude = origin.to_geodetic(position)
+    expected = pymap3d.enu2geodetic(*position, origin.latitude, origin.longitude, origin.altitude)
+    apart = pymap3d.geodetic2enu(latitude, longitude, altitude, *map(float, expected))
+    assert math.hypot(*apart) < 1e-5
 
 
 def test_a_degree_of_latitude_is_110_to_112_kilometres() -> None:

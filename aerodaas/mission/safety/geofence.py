@@ -11,7 +11,7 @@ from shapely.geometry.base import BaseGeometry
 
 from aerodaas.config.model import GeofenceConfig
 from aerodaas.types.errors import ConfigError
-from aerodaas.types.geometry import Vector
+from aerodaas.types.geometry import Vector, length
 
 __all__ = ["Geofence"]
 
@@ -31,7 +31,10 @@ class Geofence:
         self.area: BaseGeometry | None = None
         self.inner: BaseGeometry | None = None
         self._starts: NDArray[np.float64] = np.empty((0, 2))
-        self._ends: NDArray[np.float64] = np.empty((0, 2))
+        self._along: NDArray[np.float64] = np.empty((0, 2))
+        """From each edge's start to its end."""
+        self._squared: NDArray[np.float64] = np.empty(0)
+        """Their lengths squared; 1 for an edge without length."""
         if not (config.polygon or config.no_fly):
             return
         unbounded = 1e6
@@ -57,7 +60,9 @@ class Geofence:
             for ring in (shapely.get_coordinates(r) for r in (part.exterior, *part.interiors))
         ]
         self._starts = np.concatenate([start for start, _ in edges])
-        self._ends = np.concatenate([end for _, end in edges])
+        self._along = np.concatenate([end for _, end in edges]) - self._starts
+        squared = np.einsum("ij,ij->i", self._along, self._along)
+        self._squared = np.where(squared, squared, 1)
 
     def contains(self, position: Vector) -> bool:
         """Return whether the drone may be at `position`."""
@@ -94,7 +99,7 @@ class Geofence:
         """As `nearest_allowed`, at most `reach` metres from `centre`; None if there is none."""
         nearest = self.nearest_allowed(position)
         rounding = 1e-9
-        if float(np.linalg.norm(nearest - centre)) <= reach + rounding:
+        if length(nearest - centre) <= reach + rounding:
             return nearest
         upright = float(nearest[2] - centre[2])
         if abs(upright) >= reach:
@@ -117,10 +122,9 @@ class Geofence:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Edges within `reach` metres: unit vectors towards them (N, 2) and distances (N,)."""
         point = np.asarray(position[:2])
-        along = self._ends - self._starts
-        squared = np.einsum("ij,ij->i", along, along)
-        share = np.einsum("ij,ij->i", point - self._starts, along) / np.where(squared, squared, 1)
-        nearest = self._starts + np.clip(share, 0.0, 1.0)[:, None] * along
+        share = np.einsum("ij,ij->i", point - self._starts, self._along) / self._squared
+        within = np.minimum(np.maximum(share, 0.0), 1.0)
+        nearest = self._starts + within[:, None] * self._along
         way = nearest - point
         distance = np.hypot(way[:, 0], way[:, 1])
         near = distance < reach

@@ -18,7 +18,7 @@ from aerodaas.config.model import LimitsConfig
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.types.braking import braking_speed, limit_length, velocity_towards
 from aerodaas.types.data import Odometry
-from aerodaas.types.geometry import Vector, is_close, is_finite
+from aerodaas.types.geometry import Vector, is_close, is_finite, length
 from aerodaas.types.vehicle import PositionSetpoint, Setpoint, VelocitySetpoint
 
 __all__ = ["FilteredSetpoint", "Neighbour", "SetpointFilter"]
@@ -158,12 +158,12 @@ class SetpointFilter:
 
     def _speed_towards(self, way: Vector, speed: float) -> float:
         """The highest speed along `way` within both the horizontal and the vertical speed limit."""
-        length = float(np.linalg.norm(way))
+        distance = length(way)
         level, upright = math.hypot(way[0], way[1]), abs(float(way[2]))
         if level > 0.0:
-            speed = min(speed, self.limits.max_speed * length / level)
+            speed = min(speed, self.limits.max_speed * distance / level)
         if upright > 0.0:
-            speed = min(speed, self.limits.max_climb * length / upright)
+            speed = min(speed, self.limits.max_climb * distance / upright)
         return speed
 
     def _stop_before_boundaries(
@@ -173,12 +173,15 @@ class SetpointFilter:
         names: list[str] = []
         sweeps = 4  # alternating projections; scaling down below removes the remainder
         for _ in range(sweeps):
+            before = velocity
             for bound in bounds:
                 excess = float(velocity @ bound.towards) - bound.speed
                 if excess > 0.0:
                     velocity = velocity - excess * bound.towards
                     if bound.name not in names:
                         names.append(bound.name)
+            if velocity is before:
+                return velocity, names  # within all bounds, as further sweeps would leave it
         for bound in bounds:
             closing = float(velocity @ bound.towards)
             if closing > bound.speed:
@@ -189,13 +192,13 @@ class SetpointFilter:
         position = odometry.position
         bounds = [*self._fence_bounds(odometry), *self._height_bounds(odometry)]
         outwards = position - self.home
-        away = float(np.linalg.norm(outwards))
+        away = length(outwards)
         if away > 0.0:
             room = self.limits.max_range - away
             bounds.append(self._bound("max_range", outwards / away, room, odometry))
         for neighbour in neighbours:
             way = neighbour.position - position
-            distance = float(np.linalg.norm(way))
+            distance = length(way)
             # Both drones brake, so each may use half of the room between them.
             room = (distance - self.limits.separation) / 2
             if self.limits.separation > 0.0 and distance > 0.0:

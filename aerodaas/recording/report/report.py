@@ -18,7 +18,10 @@ from aerodaas.recording.report.sheet import contact_sheet
 from aerodaas.recording.report.summary import FlightSummary
 from aerodaas.types.errors import RecordingError
 
-__all__ = ["Report", "ReportFiles", "read_report", "write_report"]
+__all__ = ["SUMMARY", "Report", "ReportFiles", "read_report", "write_report", "write_summary"]
+
+SUMMARY = "summary.json"
+"""Name of the file that holds a flight's figures."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,12 +57,18 @@ def read_report(recording: str | Path) -> Report:
         RecordingError: If the recording cannot be read or holds no flight.
     """
     with Recording.open(recording) as opened:
-        flight = RecordedFlight.read(opened)
-        if not flight.robots and not flight.latencies:
-            raise RecordingError(f"{recording} holds no flight: no vehicle states and no latencies")
+        flight, summary = _read(opened)
         moments = picture_moments(opened, key_moments(flight))
-        summary = FlightSummary.of(opened, flight)
     return Report(summary, _plots(flight), moments)
+
+
+def _read(recording: Recording) -> tuple[RecordedFlight, FlightSummary]:
+    flight = RecordedFlight.read(recording)
+    if not flight.robots and not flight.latencies:
+        raise RecordingError(
+            f"{recording.path} holds no flight: no vehicle states and no latencies"
+        )
+    return flight, FlightSummary.of(recording, flight)
 
 
 def _plots(flight: RecordedFlight) -> list[Plot]:
@@ -89,7 +98,7 @@ def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
     files = ReportFiles(
         report.summary,
         folder / "report.html",
-        folder / "summary.json",
+        folder / SUMMARY,
         folder / "summary.txt",
         tuple(folder / f"{plot.name}.png" for plot in report.plots),
     )
@@ -100,13 +109,40 @@ def write_report(recording: str | Path, folder: str | Path) -> ReportFiles:
     summary = report.summary
     contents |= {
         files.page: flight_page(summary, report.plots, report.moments).encode(),
-        files.summary_json: (json.dumps(summary.as_dict(), indent=2) + "\n").encode(),
+        files.summary_json: _as_json(summary),
         files.summary_text: f"{summary}\n".encode(),
     }
+    _write(folder, contents)
+    return files
+
+
+def write_summary(recording: str | Path, folder: str | Path) -> FlightSummary:
+    """Write `summary.json` alone, which takes a fifth of a report's time.
+
+    Args:
+        recording: The MCAP file.
+        folder: Folder of the file, created if necessary.
+
+    Returns:
+        The summary.
+
+    Raises:
+        RecordingError: As `write_report`.
+    """
+    with Recording.open(recording) as opened:
+        _, summary = _read(opened)
+    _write(Path(folder), {Path(folder) / SUMMARY: _as_json(summary)})
+    return summary
+
+
+def _as_json(summary: FlightSummary) -> bytes:
+    return (json.dumps(summary.as_dict(), indent=2) + "\n").encode()
+
+
+def _write(folder: Path, contents: dict[Path, bytes]) -> None:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for path, data in contents.items():
             path.write_bytes(data)
     except OSError as error:
         raise RecordingError(f"cannot write the report to {folder}: {error.strerror}") from None
-    return files

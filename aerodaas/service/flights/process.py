@@ -119,7 +119,7 @@ class Flying:
                 record=self._folder.recording,
                 address=order.address,
                 view=False,
-                report=not order.rehearsal,
+                report=None if order.rehearsal else "page",
             )
         )
         environment = self._environment = Environment(order.fleet)

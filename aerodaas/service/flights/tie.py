@@ -12,7 +12,7 @@ __all__ = ["end_with_starter"]
 def end_with_starter() -> None:
     """End this process, and all of its group, once the process that started it is gone.
 
-    Its standard input must be a pipe whose other end its starter alone holds, and never writes to:
+    Its standard input must be a pipe whose other end its starter alone holds, and leaves alone:
     the system closes that end however the starter ends, also by SIGKILL. (Linux' signal at a
     parent's death goes by the thread that started a process, and reaches no grandchildren.)
     """

@@ -1,0 +1,1 @@
+"""`aerodaas run --seeds`: one application with many seeds, side by side."""

@@ -1,0 +1,80 @@
+"""The work of `aerodaas run --seeds`: runs, progress, table and files."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import replace
+from pathlib import Path
+
+from rich.console import Console
+
+from aerodaas.cli.rows import write_csv
+from aerodaas.cli.seeds.figures import rows, show
+from aerodaas.cli.seeds.job import Job
+from aerodaas.cli.seeds.runs import SeededRun, fly_seeds
+from aerodaas.config.options import RunOptions
+from aerodaas.environment.mission_run import recording_folder
+from aerodaas.terminal.progress import show_progress
+from aerodaas.types.errors import ConfigError, MissionError
+
+__all__ = ["run_seeds"]
+
+
+def run_seeds(
+    job: Job, seeds: int, *, jobs: int | None, json_path: Path | None, csv_path: Path | None
+) -> None:
+    """Fly `job` with this number of seeds, from its own on; print a table and write files.
+
+    Raises ConfigError for options that many runs cannot have, MissionError if a run failed.
+    """
+    first = job.options.seed or 0
+    job = replace(job, options=_shared_options(job))
+    name = job.application.stem
+    done: list[SeededRun] = []
+    try:
+        with show_progress() as progress:
+            bar = progress.add_task(name, total=seeds)
+
+            def note(run: SeededRun) -> None:
+                done.append(run)
+                progress.update(bar, completed=len(done))
+                if run.failure:
+                    said = f"seed {run.seed} failed: {run.failure}"
+                    progress.console.print(said, highlight=False, markup=False, soft_wrap=True)
+
+            fly_seeds(job, range(first, first + seeds), jobs or os.cpu_count() or 1, note)
+    finally:
+        # Also after Ctrl-C, of those that have ended.
+        if done:
+            done.sort(key=lambda run: run.seed)
+            _tell(done, f"{name}: {len(done)} of {seeds} seeds", json_path, csv_path)
+            Console().print(f"in {job.options.record}", highlight=False, soft_wrap=True)
+    failed = [str(run.seed) for run in done if run.failure]
+    if failed:
+        raise MissionError(f"{len(failed)} of {seeds} runs failed: seeds {', '.join(failed)}")
+
+
+def _shared_options(job: Job) -> RunOptions:
+    options = job.options
+    if options.lockstep is False:
+        raise ConfigError("--seeds flies as fast as the machine goes: leave --speed out")
+    for given, name in ((options.live, "--live"), (options.console, "--console")):
+        if given is not None:
+            raise ConfigError(f"{name} shows one flight, and --seeds flies several: leave it out")
+    if options.record is not None and options.record.suffix == ".mcap":
+        raise ConfigError("with --seeds, --record names a folder: each run gets one below it")
+    record = options.record or recording_folder(job.application.stem)
+    return replace(options, lockstep=True, record=record.absolute(), view=False, report="figures")
+
+
+def _tell(runs: list[SeededRun], title: str, json_path: Path | None, csv_path: Path | None) -> None:
+    show(runs, title)
+    found = rows(runs)
+    try:
+        if json_path is not None:
+            json_path.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+        if csv_path is not None:
+            write_csv(csv_path, found)
+    except OSError as error:
+        raise ConfigError(f"cannot write {error.filename}: {error.strerror}") from None
