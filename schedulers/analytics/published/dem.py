@@ -26,10 +26,10 @@ class Dem(EdgeCloudEdf):
         victims = self._victims(place, finish)
         if victims and sum(self.loss(v, now) for v in victims) >= self.loss(task, now):
             return self.to_cloud(task, now)
-        self.queue.insert(place, task)
+        self.insert(place, task)
         decisions: list[Decision] = []
         for victim in victims:
-            self.queue.remove(victim)
+            self.remove(self.queue.index(victim))
             decisions.extend(self.to_cloud(victim, now, MIGRATED))
         return decisions
 

@@ -42,33 +42,33 @@ class Dems(Dem):
         """Let the task wait until its latest start in the cloud, or on the edge."""
         profile = task.profile
         pays = profile.cloud_gain > 0 and self.resources.cloud_slots > 0
-        if pays and now + self.cloud_time(task) > task.deadline:
+        takes = self.cloud_time(task) if pays else profile.edge_time
+        if pays and now + takes > task.deadline:
             return [self.drop(task, now, "no time left for the cloud")]
-        leave = task.deadline - MARGIN - (self.cloud_time(task) if pays else profile.edge_time)
+        leave = task.deadline - MARGIN - takes
         if leave <= now:
-            return self.leave(task, now, reason)
+            return [self.leave(task, now, reason)]
         self.tentative[task] = reason
         heappush(self._leaves, (leave, self._waited, task))
         self._waited += 1
         return [WakeAt(leave)]
 
-    def leave(self, task: Task, now: int, reason: str) -> Iterable[Decision]:
+    def leave(self, task: Task, now: int, reason: str) -> Decision:
         """The task can wait no longer."""
         if task.profile.cloud_gain > 0 and self.resources.cloud_slots:
-            return [self.send(task, reason)]
-        return [self.drop(task, now, "not stolen, and the cloud costs more than it is worth")]
+            return self.send(task, reason)
+        return self.drop(task, now, "not stolen, and the cloud costs more than it is worth")
 
     def timer(self, now: int) -> Iterable[Decision]:
         """Send or drop the tasks whose latest start has come."""
+        leaves, tentative = self._leaves, self.tentative
         due: list[tuple[int, Task]] = []
-        while self._leaves and self._leaves[0][0] <= now:
-            _, number, task = heappop(self._leaves)
-            if task in self.tentative:
+        while leaves and leaves[0][0] <= now:
+            _, number, task = heappop(leaves)
+            if task in tentative:
                 due.append((number, task))
-        decisions: list[Decision] = []
-        for _, task in sorted(due):
-            decisions.extend(self.leave(task, now, self.tentative.pop(task)))
-        return decisions
+        due.sort()
+        return [self.leave(task, now, tentative.pop(task)) for _, task in due]
 
     def executor_idle(self, now: int) -> Iterable[Decision]:
         """Steal a task that fits before the queue, else run the queue's head."""
@@ -88,10 +88,12 @@ class Dems(Dem):
             if room < PUBLISHED_GATE:
                 return None
             return self._steal_as_published(now, room)
-        for task in sorted(self.tentative, key=_rank):
-            if task.profile.edge_time <= room and now + task.profile.edge_time <= task.deadline:
-                return task
-        return None
+        fitting = [
+            task
+            for task in self.tentative
+            if (takes := task.profile.edge_time) <= room and now + takes <= task.deadline
+        ]
+        return min(fitting, key=_rank, default=None)
 
     def _steal_as_published(self, now: int, room: int) -> Task | None:
         best: Task | None = None

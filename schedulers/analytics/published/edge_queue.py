@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_right, insort_right
 from collections.abc import Iterable, Mapping
+from itertools import accumulate
 
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
@@ -21,13 +22,18 @@ __all__ = ["EdgeQueue"]
 class EdgeQueue(AnalyticsScheduler):
     """Tasks ordered by `key`, each start checked just in time against its expected time.
 
-    Ties keep the order of arrival. By itself it admits everything (edge only).
+    Ties keep the order of arrival. By itself it admits everything (edge only). Subclasses change
+    the queue by `insert` and `remove` only, which keep what is looked up with each arrival.
     """
 
     def __init__(self) -> None:
         self.queue: list[Task] = []
         self.free_at = 0
         """When the running task is expected to end."""
+        self._keys: list[float] | None = None
+        """Of the queue's tasks, from the first newcomer on that is offered a slot."""
+        self._ahead: list[int] | None = None
+        """Time that the first n of the queue occupy the edge for, by n; None once it changed."""
 
     def key(self, task: Task) -> float:
         """Order of the queue, the smallest first."""
@@ -43,12 +49,26 @@ class EdgeQueue(AnalyticsScheduler):
         queue = self.queue
         decisions: list[Decision] = []
         while queue:
-            task = queue.pop(0)
+            task = self.remove(0)
             if now + task.profile.edge_time <= self.due(task):
                 decisions.append(self.run(task, now))
                 break
             decisions.append(self.drop(task, now, "no time left on the edge"))
         return decisions
+
+    def insert(self, place: int, task: Task) -> None:
+        """Put `task` before the one that has this place in the queue."""
+        self.queue.insert(place, task)
+        if self._keys is not None:
+            self._keys.insert(place, self.key(task))
+        self._ahead = None
+
+    def remove(self, place: int) -> Task:
+        """Take the task of this place out of the queue."""
+        if self._keys is not None:
+            del self._keys[place]
+        self._ahead = None
+        return self.queue.pop(place)
 
     def run(self, task: Task, now: int, reason: str = "first in the edge queue") -> RunOnEdge:
         """Start `task`, expected to take its profile's time."""
@@ -87,9 +107,13 @@ class EdgeQueue(AnalyticsScheduler):
 
     def slot(self, task: Task, now: int) -> tuple[int, int]:
         """Place of a newcomer in the queue, and when it would finish there."""
-        place = bisect_right(self.queue, self.key(task), key=self.key)
-        ahead = sum(map(self.occupied, self.queue[:place]))
-        return place, max(self.free_at, now) + ahead + self.occupied(task)
+        if self._keys is None:
+            self._keys = [self.key(other) for other in self.queue]
+        place = bisect_right(self._keys, self.key(task))
+        if self._ahead is None:
+            self._ahead = list(accumulate(map(self.occupied, self.queue), initial=0))
+        begin = self.free_at if self.free_at > now else now
+        return place, begin + self._ahead[place] + self.occupied(task)
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
         """The edge is free as soon as its task is back."""

@@ -31,8 +31,11 @@ class Gems(DemsA):
 
     def __init__(self, *, published: bool = False) -> None:
         super().__init__(published=published)
+        self.adapts = not published
         self._counts: dict[str, list[int]] = {}
         """Per model: number of the window, tasks in time, tasks ended."""
+        self._below: set[str] = set()
+        """Models below their share when one of their tasks last ended."""
         self._changed = False
 
     def drop(self, task: Task, now: int, reason: str) -> Drop:
@@ -57,10 +60,6 @@ class Gems(DemsA):
         self._count(result.task, now, done=result.outcome is TaskOutcome.DONE)
         return self._and_rescue(super().task_finished(result, now), now)
 
-    def cloud_time(self, task: Task) -> int:
-        """The estimate; the profile's time if as published."""
-        return task.profile.cloud_time if self.published else super().cloud_time(task)
-
     def to_cloud(
         self, task: Task, now: int, reason: str = "no room on the edge"
     ) -> Iterable[Decision]:
@@ -77,6 +76,11 @@ class Gems(DemsA):
         counts[1] += done
         counts[2] += 1
         self._changed = True
+        profile = task.profile
+        if profile.qoe is not None and counts[1] < profile.qoe.share * counts[2]:
+            self._below.add(profile.model)
+        else:
+            self._below.discard(profile.model)
 
     def _current(self, task: Task, now: int) -> list[int]:
         window = now // (task.profile.qoe or _NO_GOAL).window
@@ -86,11 +90,14 @@ class Gems(DemsA):
         return counts
 
     def _and_rescue(self, decisions: Iterable[Decision], now: int) -> Iterable[Decision]:
+        if not self._changed:
+            return decisions
         found = list(decisions)
         while self._changed:
             self._changed = False
-            for task in [task for task in self.queue if self._in_danger(task, now)]:
-                self.queue.remove(task)
+            below = [task for task in self.queue if task.profile.model in self._below]
+            for task in [task for task in below if self._in_danger(task, now)]:
+                self.remove(self.queue.index(task))
                 found.append(self.send(task, MIGRATED))
         return found
 
