@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
+from math import erf, inf
 from operator import itemgetter
 from typing import Any
 
-from aerodaas.schedulers.analytics.estimates import TimeEstimate, chance
+from aerodaas.schedulers.analytics.estimates import CERTAIN, SQRT_HALF, TimeEstimate
 
 __all__ = ["Job", "Lane", "plan"]
 
@@ -34,23 +34,23 @@ class Lane:
     jobs: list[Job]
 
 
-_Chain = tuple[Any, float, Lane, Job] | None
-"""The chain before, a start, a lane and a job."""
-_State = tuple[float, float, int, _Chain]
-"""Merit, time when the executor is free, the lanes' positions, the plan.
+_Step = tuple[float, Lane, Job]
+"""When a job starts, and its lane."""
+_State = tuple[float, float, int, "_State | None", _Step | None]
+"""Merit, time when the executor is free, the lanes' positions; the state before, the step from it.
 
 A lane's position, the number of its jobs taken or passed over, is one digit of an integer: such
 keys are much cheaper to make and to compare than tuples, and they are made most of the time.
 """
-
 _merit = itemgetter(0)
 _IDLE_SHARE = 0.5
 """Share of the price that idle time costs where no job is known: some will arrive."""
+_NEVER = Job(None, inf, inf, 0.0, 0.0)
 
 
 def plan(
     lanes: Sequence[Lane], start: float, until: float, price: float, *, width: int, gap: float
-) -> list[tuple[float, Lane, Job]]:
+) -> list[_Step]:
     """Choose jobs and their starts from `start` to about `until`, by beam search.
 
     A state's merit is the expected gains so far less `price` per nanosecond passed, so that
@@ -58,64 +58,78 @@ def plan(
     survive each step, and no idle time above `gap` is considered. Takes at most
     width x lanes x steps evaluations of a gain.
     """
-    beam: list[_State] = [(0.0, start, 0, None)]
-    longest = max((len(lane.jobs) for lane in lanes), default=0)
-    digits = longest.bit_length()
-    places = [(number * digits, lane) for number, lane in enumerate(lanes)]
+    digits = max((len(lane.jobs) for lane in lanes), default=0).bit_length()
     mask = (1 << digits) - 1
+    places = [
+        (number * digits, 1 << number * digits, _rows(lane), lane.time.mean, lane.time.sigma)
+        for number, lane in enumerate(lanes)
+    ]
+    until = float(until)
+    beam: list[_State] = [(0.0, float(start), 0, None, None)]
     best_merit = -inf
-    best: _Chain = None
+    best = beam[0]
     while beam:
         grown: dict[int, _State] = {}
         for state in beam:
-            successors = _successors(state, places, mask, price, gap)
-            for successor in successors:
-                merit, free, taken, chain = successor
-                if free >= until:
-                    if merit > best_merit:
-                        best_merit, best = merit, chain
+            merit, free, taken, _, _ = state
+            is_last = True
+            for shift, one, rows, mean, sigma in places:
+                position = taken >> shift & mask
+                release, deadline, gain, job, lane = rows[position]
+                after = taken + one
+                while deadline < free + mean - sigma:
+                    position += 1
+                    release, deadline, gain, job, lane = rows[position]
+                    after += one
+                if release <= free:
+                    begin = free
+                elif release - free <= gap:
+                    begin = release
+                else:
                     continue
-                # Of two ways to the same merit, the one that is done earlier leaves more room.
-                rival = grown.get(taken)
-                if rival is None or rival[0] < merit or (rival[0] == merit and rival[1] > free):
-                    grown[taken] = successor
-            if not successors:
-                merit = state[0] - price * _IDLE_SHARE * (until - state[1])
-                if merit > best_merit:
-                    best_merit, best = merit, state[3]
+                # The `chance` to be in time, written out: most of the time is spent here.
+                z = (deadline - begin - mean) / sigma
+                if z <= CERTAIN:
+                    if z < -CERTAIN:
+                        continue
+                    gain = job.benefit * (0.5 + 0.5 * erf(z * SQRT_HALF)) - job.loss
+                if gain <= 0:
+                    continue
+                is_last = False
+                end = begin + mean
+                earned = merit + gain - price * (end - free)
+                if end < until:
+                    # Of two ways to the same merit, the one that is done earlier leaves more room.
+                    rival = grown.get(after)
+                    if rival is None or rival[0] < earned or (rival[0] == earned and rival[1] > end):
+                        grown[after] = (earned, end, after, state, (begin, lane, job))
+                elif earned > best_merit:
+                    best_merit, best = earned, (earned, end, after, state, (begin, lane, job))
+            if is_last:
+                earned = merit - price * _IDLE_SHARE * (until - free)
+                if earned > best_merit:
+                    best_merit, best = earned, state
         beam = sorted(grown.values(), key=_merit, reverse=True)[:width]
-    steps: list[tuple[float, Lane, Job]] = []
-    while best is not None:
-        best, begin, lane, job = best
-        steps.append((begin, lane, job))
+    return _steps_to(best)
+
+
+def _rows(lane: Lane) -> list[tuple[float, float, float, Job, Lane]]:
+    """Of each job its release, deadline, gain for certain; at last one that is never released.
+
+    As floats, for Python compares those with each other several times faster than with integers.
+    """
+    return [
+        (float(job.release), float(job.deadline), float(job.benefit - job.loss), job, lane)
+        for job in (*lane.jobs, _NEVER)
+    ]
+
+
+def _steps_to(state: _State) -> list[_Step]:
+    steps: list[_Step] = []
+    last: _State | None = state
+    while last is not None:
+        _, _, _, last, step = last
+        if step is not None:
+            steps.append(step)
     steps.reverse()
     return steps
-
-
-def _successors(
-    state: _State, places: Sequence[tuple[int, Lane]], mask: int, price: float, gap: float
-) -> list[_State]:
-    """What each lane's next job makes of `state`; a lane's place is that of its digit, in bits."""
-    merit, free, taken, chain = state
-    found: list[_State] = []
-    for shift, lane in places:
-        jobs, belief = lane.jobs, lane.time
-        mean = belief.mean
-        position = index = taken >> shift & mask
-        hopeless = free + mean - belief.sigma
-        for job in jobs[position:] if position else jobs:
-            index += 1
-            if job.deadline < hopeless:
-                continue
-            release = job.release
-            begin = max(free, release)
-            if begin - free <= gap:
-                gain = job.benefit * chance(belief, job.deadline - begin) - job.loss
-                if gain > 0:
-                    end = begin + mean
-                    after = taken + (index - position << shift)
-                    found.append(
-                        (merit + gain - price * (end - free), end, after, (chain, begin, lane, job))
-                    )
-            break
-    return found
