@@ -42,6 +42,11 @@ _State = tuple[float, float, int, "_State | None", _Step | None]
 A lane's position, the number of its jobs taken or passed over, is one digit of an integer: such
 keys are much cheaper to make and to compare than tuples, and they are made most of the time.
 """
+_Row = tuple[float, float, float, Job, Lane]
+"""Release, deadline and gain for certain of a job, the job, its lane."""
+_Place = tuple[int, int, list[_Row], float, float]
+"""Place in bits of a lane's digit, 1 in that place, jobs, mean and deviation of their time."""
+
 _merit = itemgetter(0)
 _IDLE_SHARE = 0.5
 """Share of the price that idle time costs where no job is known: some will arrive."""
@@ -59,64 +64,78 @@ def plan(
     width x lanes x steps evaluations of a gain.
     """
     digits = max((len(lane.jobs) for lane in lanes), default=0).bit_length()
-    mask = (1 << digits) - 1
     places = [
         (number * digits, 1 << number * digits, _rows(lane), lane.time.mean, lane.time.sigma)
         for number, lane in enumerate(lanes)
     ]
-    until = float(until)
+    search = _Search(places, (1 << digits) - 1, float(until), price, gap)
     beam: list[_State] = [(0.0, float(start), 0, None, None)]
-    best_merit = -inf
-    best = beam[0]
     while beam:
         grown: dict[int, _State] = {}
         for state in beam:
-            merit, free, taken, _, _ = state
-            is_last = True
-            for shift, one, rows, mean, sigma in places:
-                position = taken >> shift & mask
-                release, deadline, gain, job, lane = rows[position]
-                after = taken + one
-                while deadline < free + mean - sigma:
-                    position += 1
-                    release, deadline, gain, job, lane = rows[position]
-                    after += one
-                if release <= free:
-                    begin = free
-                elif release - free <= gap:
-                    begin = release
-                else:
-                    continue
-                # The `chance` to be in time, written out: most of the time is spent here.
-                z = (deadline - begin - mean) / sigma
-                if z <= CERTAIN:
-                    if z < -CERTAIN:
-                        continue
-                    gain = job.benefit * (0.5 + 0.5 * erf(z * SQRT_HALF)) - job.loss
-                if gain <= 0:
-                    continue
-                is_last = False
-                end = begin + mean
-                earned = merit + gain - price * (end - free)
-                if end < until:
-                    # Of two ways to the same merit, the one that is done earlier leaves more room.
-                    rival = grown.get(after)
-                    if rival is None or rival[0] < earned or (rival[0] == earned and rival[1] > end):
-                        grown[after] = (earned, end, after, state, (begin, lane, job))
-                elif earned > best_merit:
-                    best_merit, best = earned, (earned, end, after, state, (begin, lane, job))
-            if is_last:
-                earned = merit - price * _IDLE_SHARE * (until - free)
-                if earned > best_merit:
-                    best_merit, best = earned, state
+            search.grow(state, grown)
         beam = sorted(grown.values(), key=_merit, reverse=True)[:width]
-    return _steps_to(best)
+    return _steps_to(max(search.ended, key=_merit))
 
 
-def _rows(lane: Lane) -> list[tuple[float, float, float, Job, Lane]]:
-    """Of each job its release, deadline, gain for certain; at last one that is never released.
+class _Search:
+    """What all states have in common, and the plans that have come to their end."""
 
-    As floats, for Python compares those with each other several times faster than with integers.
+    def __init__(
+        self, places: list[_Place], mask: int, until: float, price: float, gap: float
+    ) -> None:
+        self.ended: list[_State] = []
+        self._common = (places, mask, until, price, gap)
+
+    def grow(self, state: _State, grown: dict[int, _State]) -> None:  # noqa: C901 - written out
+        """Add what each lane's next job makes of `state`; it ends where none gains anything.
+
+        Half of the time of all decisions is spent here, so it calls no function of ours: the
+        chance to be in time is that of `estimates.chance`.
+        """
+        places, mask, until, price, gap = self._common
+        merit, free, taken, _, _ = state
+        is_last = True
+        for shift, one, rows, mean, sigma in places:
+            position = taken >> shift & mask
+            after = taken + one
+            release, deadline, gain, job, lane = rows[position]
+            while deadline < free + mean - sigma:
+                position += 1
+                after += one
+                release, deadline, gain, job, lane = rows[position]
+            if release <= free:
+                begin = free
+            elif release - free <= gap:
+                begin = release
+            else:
+                continue
+            z = (deadline - begin - mean) / sigma
+            if z <= CERTAIN:
+                if z < -CERTAIN:
+                    continue
+                gain = job.benefit * (0.5 + 0.5 * erf(z * SQRT_HALF)) - job.loss
+            if gain <= 0:
+                continue
+            is_last = False
+            end = begin + mean
+            earned = merit + gain - price * (end - free)
+            if end >= until:
+                self.ended.append((earned, end, after, state, (begin, lane, job)))
+                continue
+            # Of two ways to the same merit, the one that is done earlier leaves more room.
+            rival = grown.get(after)
+            if rival is None or rival[0] < earned or (rival[0] == earned and rival[1] > end):
+                grown[after] = (earned, end, after, state, (begin, lane, job))
+        if is_last:
+            earned = merit - price * _IDLE_SHARE * (until - free)
+            self.ended.append((earned, until, taken, state, None))
+
+
+def _rows(lane: Lane) -> list[_Row]:
+    """A row for each job, and at last one for a job that is never released.
+
+    In floats, for Python compares those with each other several times faster than with integers.
     """
     return [
         (float(job.release), float(job.deadline), float(job.benefit - job.loss), job, lane)

@@ -20,7 +20,8 @@ class QoeWindows:
 
     def arrived(self, *tasks: Task) -> None:
         """Count tasks; one whose model has no goal does not count."""
-        self._goals.update({p.model: p.qoe for task in tasks if (p := task.profile).qoe is not None})
+        goals = [(task.profile.model, task.profile.qoe) for task in tasks]
+        self._goals.update((model, goal) for model, goal in goals if goal is not None)
         self._arrived.update(_windows(tasks))
 
     def done(self, *tasks: Task) -> None:

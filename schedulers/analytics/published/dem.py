@@ -42,8 +42,9 @@ class Dem(EdgeCloudEdf):
 
     def _victims(self, place: int, finish: int) -> list[Task]:
         victims = []
-        for index, other in enumerate(self.queue[place:]):
-            finish += self.occupied(other)
+        lengths = self._lengths[place:]
+        for index, (other, length) in enumerate(zip(self.queue[place:], lengths, strict=True)):
+            finish += length
             if finish > other.deadline and not (self.published and index == 0):
                 victims.append(other)
         return victims

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from heapq import heappop, heappush
+from itertools import accumulate
 
 from aerodaas.schedulers.analytics.base import MILLISECOND, STOLEN, Decision, Task, WakeAt
 from aerodaas.schedulers.analytics.published.dem import Dem
@@ -108,14 +109,10 @@ class Dems(Dem):
 
     def _room(self, now: int) -> int:
         """Time that can be put before the queue without making a task in it miss."""
-        room = 1 << 62
-        finish = now
-        for task in self.queue:
-            finish += self.occupied(task)
-            spare = task.deadline - finish
-            if spare >= 0:
-                room = min(room, spare)
-        return room
+        ends = accumulate(self._lengths, initial=now)
+        next(ends)
+        spares = [task.deadline - end for task, end in zip(self.queue, ends, strict=True)]
+        return min([spare for spare in spares if spare >= 0], default=1 << 62)
 
 
 def _rank(task: Task) -> tuple[bool, float]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bisect import bisect_right, insort_right
 from collections.abc import Iterable, Mapping
-from itertools import accumulate
 
 from aerodaas.schedulers.analytics.base import (
     AnalyticsScheduler,
@@ -32,8 +31,8 @@ class EdgeQueue(AnalyticsScheduler):
         """When the running task is expected to end."""
         self._keys: list[float] | None = None
         """Of the queue's tasks, from the first newcomer on that is offered a slot."""
-        self._ahead: list[int] | None = None
-        """Time that the first n of the queue occupy the edge for, by n; None once it changed."""
+        self._lengths: list[int] = []
+        """How long each of them will occupy the edge, likewise."""
 
     def key(self, task: Task) -> float:
         """Order of the queue, the smallest first."""
@@ -61,13 +60,12 @@ class EdgeQueue(AnalyticsScheduler):
         self.queue.insert(place, task)
         if self._keys is not None:
             self._keys.insert(place, self.key(task))
-        self._ahead = None
+            self._lengths.insert(place, self.occupied(task))
 
     def remove(self, place: int) -> Task:
         """Take the task of this place out of the queue."""
         if self._keys is not None:
-            del self._keys[place]
-        self._ahead = None
+            del self._keys[place], self._lengths[place]
         return self.queue.pop(place)
 
     def run(self, task: Task, now: int, reason: str = "first in the edge queue") -> RunOnEdge:
@@ -109,11 +107,14 @@ class EdgeQueue(AnalyticsScheduler):
         """Place of a newcomer in the queue, and when it would finish there."""
         if self._keys is None:
             self._keys = [self.key(other) for other in self.queue]
+            self._lengths = [self.occupied(other) for other in self.queue]
         place = bisect_right(self._keys, self.key(task))
-        if self._ahead is None:
-            self._ahead = list(accumulate(map(self.occupied, self.queue), initial=0))
-        begin = self.free_at if self.free_at > now else now
-        return place, begin + self._ahead[place] + self.occupied(task)
+        begin = max(self.free_at, now)
+        return place, begin + sum(self._lengths[:place]) + self.occupied(task)
+
+    def measure_queue(self) -> None:
+        """Reckon anew how long the queue's tasks will occupy the edge, whose share changed."""
+        self._lengths = [self.occupied(task) for task in self.queue]
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
         """The edge is free as soon as its task is back."""
