@@ -26,7 +26,7 @@ from aerodaas.schedulers.lab import (
     run_lab,
 )
 from aerodaas.schedulers.lab.metrics import Score, score
-from aerodaas.schedulers.lab.run import Spread
+from aerodaas.schedulers.lab.spreading import Spread
 from aerodaas.schedulers.lab.workload import SIX
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.types.clock import NANOSECONDS
@@ -46,6 +46,7 @@ def study(
     network: str,
     times: str,
     duration: float | None,
+    edges: int | None,
     cloud_slots: int | None,
     bound: bool | None,
     jobs: int | None,
@@ -57,7 +58,7 @@ def study(
     """Compare schedulers and print the tables; the arguments are those of `aerodaas lab run`."""
     results: list[LabResult] = []
     names = [name.strip() for name in scheduler.split(",")]
-    loads, resources, as_flown = _loads(workload, flown, duration)
+    loads, resources, as_flown = _loads(workload, flown, duration, edges)
     if cloud_slots is not None:
         resources = Resources(cloud_slots=cloud_slots)
     spread, wanted = spread_of(address, names)
@@ -144,9 +145,11 @@ def _show(result: LabResult) -> None:
     show_figures(title, "scheduler", headings, rows)
 
 
-def workload_of(name: str, duration: float | None) -> Workload:
+def workload_of(name: str, duration: float | None, edges: int | None) -> Workload:
     """The workload of a name or a JSON file; raises UnknownIdError, SchedulerError."""
     found = load_workload(name) if name.endswith(".json") else Workload.named(name)
+    if edges is not None:
+        found = found.on_edges(edges)
     return found if duration is None else found.lasting(round(duration * NANOSECONDS))
 
 
@@ -162,18 +165,20 @@ def spread_of(
 
 
 def _loads(
-    names: str, flown: Path | None, duration: float | None
+    names: str, flown: Path | None, duration: float | None, edges: int | None
 ) -> tuple[list[Workload], Resources, Score | None]:
     """The workloads, their resources, and the score of a recorded flight itself."""
     if flown is None:
         wanted = SIX if names == "six" else names.split(",")
-        return [workload_of(name.strip(), duration) for name in wanted], Resources(), None
+        return [workload_of(name.strip(), duration, edges) for name in wanted], Resources(), None
     # Reading a recording takes libraries that simulating does not.
     from aerodaas.cli.flown_tasks import Flown  # noqa: PLC0415
     from aerodaas.cli.flown_workload import flown_trace, flown_workload  # noqa: PLC0415
 
     flight = Flown.read(flown)
     workload = flown_workload(flight)
+    if edges is not None:
+        workload = workload.on_edges(edges)
     tasks = workload.tasks(0, random.Random())
     return [workload], flight.resources, score(tasks, flown_trace(flight, tasks))
 
