@@ -121,9 +121,12 @@ def registered() -> None:
 
 def _show(result: LabResult) -> None:
     """Print the table of `run`."""
+    seeds = f"{len(result.seeds)} seeds" if len(result.seeds) > 1 else "1 seed"
+    if result.edges and result.workload.edges > 1:
+        seeds += f", intervals over {result.workload.edges} edges"
     title = (
         f"{result.workload.name}: {result.workload.duration / 1e9:g} s, "
-        f"{result.network.name} network, {result.times.name} times, {len(result.seeds)} seeds"
+        f"{result.network.name} network, {result.times.name} times, {seeds}"
     )
     shares = ("completion", "late", "dropped", "migrated", "stolen", "edge use", "of bound")
     columns = ["qos per s", "of bound", "completion", "qoe per s", "late", "dropped"]

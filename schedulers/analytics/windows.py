@@ -20,8 +20,8 @@ class QoeWindows:
 
     def arrived(self, *tasks: Task) -> None:
         """Count tasks; one whose model has no goal does not count."""
-        goals = [(task.profile.model, task.profile.qoe) for task in tasks]
-        self._goals.update((model, goal) for model, goal in goals if goal is not None)
+        profiles = [task.profile for task in tasks]
+        self._goals.update({one.model: one.qoe for one in profiles if one.qoe is not None})
         self._arrived.update(_windows(tasks))
 
     def done(self, *tasks: Task) -> None:
