@@ -304,7 +304,7 @@ class Margin(AnalyticsScheduler):
         """Make a new plan if the present one is wrong or runs out."""
         if not self._stale and self._plan_end > now + REPLAN:
             return
-        begin = max(self._free_at, now)
+        begin = float(max(self._free_at, now))
         self._plan_end = begin + HORIZON
         lanes = [
             lane for model in self._models.values() if (lane := self._lane(model, begin, now)).jobs
@@ -330,13 +330,13 @@ class Margin(AnalyticsScheduler):
                 room = task.deadline - now
                 elsewhere = 0.0 if kept else self.cloud.value(profile, room, bonus)
                 cost = profile.edge_cost + elsewhere
-                jobs.append(Job(task, begin, task.deadline, benefit, cost))
+                jobs.append(Job(task, begin, float(task.deadline), benefit, cost))
                 if len(jobs) == _LOOK:
                     return Lane(belief, jobs)
         cost = profile.edge_cost + self.cloud.value(profile, profile.deadline, bonus)
         for at, source in model.forecast.due(now, int(begin + HORIZON)):
             what = (profile.model, source)
-            jobs.append(Job(what, at, at + profile.deadline, benefit, cost))
+            jobs.append(Job(what, float(at), float(at + profile.deadline), benefit, cost))
             if len(jobs) == _LOOK:
                 break
         return Lane(belief, jobs)

@@ -15,7 +15,11 @@ __all__ = ["Job", "Lane", "plan"]
 
 @dataclass(slots=True)
 class Job:
-    """Something the executor could run."""
+    """Something the executor could run.
+
+    Its figures are better floats than integers, which Python compares with floats several times
+    slower than floats with each other.
+    """
 
     what: Any
     """A task, or the source of one that is forecast."""
@@ -42,15 +46,14 @@ _State = tuple[float, float, int, "_State | None", _Step | None]
 A lane's position, the number of its jobs taken or passed over, is one digit of an integer: such
 keys are much cheaper to make and to compare than tuples, and they are made most of the time.
 """
-_Row = tuple[float, float, float, Job, Lane]
-"""Release, deadline and gain for certain of a job, the job, its lane."""
-_Place = tuple[int, int, list[_Row], float, float]
-"""Place in bits of a lane's digit, 1 in that place, jobs, mean and deviation of their time."""
+_Place = tuple[int, int, Lane, list[Job], float, float]
+"""Place in bits of a lane's digit, 1 in that place, its jobs, mean and deviation of their time."""
 
 _merit = itemgetter(0)
 _IDLE_SHARE = 0.5
 """Share of the price that idle time costs where no job is known: some will arrive."""
 _NEVER = Job(None, inf, inf, 0.0, 0.0)
+"""The last job of each lane: it is never released."""
 
 
 def plan(
@@ -65,7 +68,10 @@ def plan(
     """
     digits = max((len(lane.jobs) for lane in lanes), default=0).bit_length()
     places = [
-        (number * digits, 1 << number * digits, _rows(lane), lane.time.mean, lane.time.sigma)
+        (
+            *(number * digits, 1 << number * digits),
+            *(lane, [*lane.jobs, _NEVER], lane.time.mean, lane.time.sigma),
+        )
         for number, lane in enumerate(lanes)
     ]
     search = _Search(places, (1 << digits) - 1, float(until), price, gap)
@@ -96,24 +102,27 @@ class _Search:
         places, mask, until, price, gap = self._common
         merit, free, taken, _, _ = state
         is_last = True
-        for shift, one, rows, mean, sigma in places:
+        for shift, one, lane, jobs, mean, sigma in places:
             position = taken >> shift & mask
             after = taken + one
-            release, deadline, gain, job, lane = rows[position]
-            while deadline < free + mean - sigma:
+            job = jobs[position]
+            while job.deadline < free + mean - sigma:
                 position += 1
                 after += one
-                release, deadline, gain, job, lane = rows[position]
+                job = jobs[position]
+            release = job.release
             if release <= free:
                 begin = free
             elif release - free <= gap:
                 begin = release
             else:
                 continue
-            z = (deadline - begin - mean) / sigma
-            if z <= CERTAIN:
-                if z < -CERTAIN:
-                    continue
+            z = (job.deadline - begin - mean) / sigma
+            if z > CERTAIN:
+                gain = job.benefit - job.loss
+            elif z < -CERTAIN:
+                continue
+            else:
                 gain = job.benefit * (0.5 + 0.5 * erf(z * SQRT_HALF)) - job.loss
             if gain <= 0:
                 continue
@@ -130,17 +139,6 @@ class _Search:
         if is_last:
             earned = merit - price * _IDLE_SHARE * (until - free)
             self.ended.append((earned, until, taken, state, None))
-
-
-def _rows(lane: Lane) -> list[_Row]:
-    """A row for each job, and at last one for a job that is never released.
-
-    In floats, for Python compares those with each other several times faster than with integers.
-    """
-    return [
-        (float(job.release), float(job.deadline), float(job.benefit - job.loss), job, lane)
-        for job in (*lane.jobs, _NEVER)
-    ]
 
 
 def _steps_to(state: _State) -> list[_Step]:
