@@ -203,10 +203,9 @@ class SfqDems(AnalyticsScheduler):
     def _fill(self, now: int) -> list[Decision]:
         """Start what waits for the cloud, as far as there are slots, in the order of start tags."""
         started: list[Decision] = []
-        while waiting := [name for name, one in self._tenants.items() if one.held]:
-            waiting = [name for name in waiting if self._may_send(name, now)]
-            if not waiting:
-                break
+        while waiting := [
+            name for name, one in self._tenants.items() if one.held and self._may_send(name, now)
+        ]:
             name = min(waiting, key=self._cloud.tag)
             tenant = self._tenants[name]
             decision = tenant.held.pop(0)

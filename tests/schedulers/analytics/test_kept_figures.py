@@ -5,7 +5,6 @@ from __future__ import annotations
 import random
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Iterable
 
 import pytest
 from hypothesis import given
@@ -14,7 +13,6 @@ from hypothesis import strategies as st
 from aerodaas.schedulers.analytics.base import (
     MIGRATED,
     MILLISECOND,
-    Decision,
     Profile,
     QoeGoal,
     Resources,
@@ -178,16 +176,24 @@ def test_an_estimate_is_the_mean_of_its_window(times: list[tuple[int, bool]]) ->
 
 
 class _PlainGems(Gems):
-    """Looks at each queued task after each end, as it is written down."""
+    """Counts anew which tasks ended in the present window, each time that it looks at one."""
 
-    def _and_rescue(self, decisions: Iterable[Decision], now: int) -> Iterable[Decision]:
-        found = list(decisions)
-        while self._changed:
-            self._changed = False
-            for task in [task for task in self.queue if self._in_danger(task, now)]:
-                self.remove(self.queue.index(task))
-                found.append(self.send(task, MIGRATED))
-        return found
+    def __init__(self) -> None:
+        super().__init__()
+        self.ends: list[tuple[int, str, bool]] = []
+
+    def _count(self, task: Task, now: int, *, done: bool) -> None:
+        self.ends.append((now, task.profile.model, done))
+        self._changed = True
+
+    def _in_danger(self, task: Task, now: int) -> bool:
+        profile = task.profile
+        assert profile.qoe is not None
+        begun = now // profile.qoe.window * profile.qoe.window
+        ends = [done for at, model, done in self.ends if at >= begun and model == profile.model]
+        is_below = sum(ends) < profile.qoe.share * len(ends)
+        fits = now + self.cloud_time(task) < task.deadline
+        return is_below and fits and profile.cloud_gain > 0
 
 
 @pytest.mark.parametrize("network", ["steady", "trapezium", "outage"])
