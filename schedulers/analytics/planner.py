@@ -67,13 +67,10 @@ def plan(
     width x lanes x steps evaluations of a gain.
     """
     digits = max((len(lane.jobs) for lane in lanes), default=0).bit_length()
-    places = [
-        (
-            *(number * digits, 1 << number * digits),
-            *(lane, [*lane.jobs, _NEVER], lane.time.mean, lane.time.sigma),
-        )
-        for number, lane in enumerate(lanes)
-    ]
+    places: list[_Place] = []
+    for number, lane in enumerate(lanes):
+        shift, time = number * digits, lane.time
+        places.append((shift, 1 << shift, lane, [*lane.jobs, _NEVER], time.mean, time.sigma))
     search = _Search(places, (1 << digits) - 1, float(until), price, gap)
     beam: list[_State] = [(0.0, float(start), 0, None, None)]
     while beam:

@@ -25,7 +25,6 @@ __all__ = ["LabResult", "Wanted", "run_lab", "scheduler_label"]
 
 Wanted = str | type[AnalyticsScheduler] | AnalyticsScheduler
 
-
 _RATE = " per s"
 """What the names of rates end with, which are sums over the edges."""
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right, insort_right
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 
 from aerodaas.schedulers.analytics.base import (
@@ -40,7 +40,7 @@ class EdgeQueue(AnalyticsScheduler):
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:  # noqa: ARG002
         """Queue the task."""
-        insort_right(self.queue, task, key=self.key)
+        self.insert(bisect_right(self.queue, self.key(task), key=self.key), task)
         return ()
 
     def executor_idle(self, now: int) -> Iterable[Decision]:
