@@ -44,7 +44,7 @@ def main(
     names = scheduler_names() if scheduler == "all" else scheduler.split(",")
     cases = [(case, name) for name in names for case in loads]
     for case, name in track(cases, "simulating", transient=True):
-        taken = cpu = inf
+        taken, cpu, tasks = inf, inf, 0
         for _ in range(rounds):
             began, worked = time.perf_counter(), time.process_time()
             result = run_lab(loads[case], [name], [0], bound=False, jobs=jobs, spread=spread)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
 from itertools import count
@@ -59,7 +60,7 @@ class _SimulatedHost:
     def __init__(self, path: SamplePath, resources: Resources, *, record: bool) -> None:
         self.trace = Trace()
         self.heap: list[tuple[int, int, int, Task | None]] = []
-        self.closed = self.trace.results.append
+        self.closed: Callable[..., None] = self.trace.results.append
         self._numbers = count()
         self._path = path
         self._network = None if path.network.is_steady else path.network
