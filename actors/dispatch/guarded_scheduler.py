@@ -7,6 +7,7 @@ import queue
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from aerodaas.schedulers.analytics.dispatch import Dispatch
@@ -34,8 +35,11 @@ class GuardedDispatch(Dispatch):
     _thinker: _Thinker | None = None
     _slow = 0
 
-    def ask(self, event: Callable[..., Any], *args: Any) -> Any:  # noqa: ANN401
-        """Call the scheduler's `event` and return its answer, within the timeout."""
+    def guarded(self, event: Callable[..., Any]) -> Callable[..., Any]:
+        """The call of an event, which returns its answer within the timeout."""
+        return partial(self._ask, event)
+
+    def _ask(self, event: Callable[..., Any], *args: Any) -> Any:  # noqa: ANN401
         if self._thinker is None:
             self._thinker = _Thinker()
         patient = not self.hurried or event.__name__ == "start"

@@ -43,9 +43,17 @@ Names = Annotated[
 Duration = Annotated[
     float | None, typer.Option(help="Simulated seconds; default 300, or the file's.")
 ]
+Edges = Annotated[
+    int | None,
+    typer.Option(
+        help="Simulate so many edges, each with the workload's drones; all cores share them.",
+        min=1,
+    ),
+]
 Jobs = Annotated[int | None, typer.Option(help="Processes; default one per core.", min=1)]
 Address = Annotated[
-    str | None, typer.Option(help="Ray cluster (`host:port`, `auto`) whose cores share the seeds.")
+    str | None,
+    typer.Option(help="Ray cluster (`host:port`, `auto`) whose cores share the edges and seeds."),
 ]
 
 
@@ -98,6 +106,7 @@ def run(
         ),
     ] = "nominal",
     duration: Duration = None,
+    edges: Edges = None,
     cloud_slots: Annotated[
         int | None,
         typer.Option(help="Executions in the cloud at once; default 32, or the flight's.", min=0),
@@ -123,6 +132,8 @@ def run(
 
         aerodaas lab run -w 2D-A,4D-A -s ec_edf,dems,margin --times lognormal:0.15 --plots out
 
+        aerodaas lab run --edges 1000 --seeds 1 --address auto -s dems,margin
+
         aerodaas lab run --from runs/patrol/flight.mcap -s dems,margin,mine.py:Mine
     """
     from aerodaas.cli.lab_study import study  # noqa: PLC0415 - loads numpy and the lab
@@ -136,6 +147,7 @@ def run(
             network=network,
             times=times,
             duration=duration,
+            edges=edges,
             cloud_slots=cloud_slots,
             bound=bound,
             jobs=jobs,
@@ -179,6 +191,7 @@ def sweep(
     network: Annotated[str, typer.Option(help="As for `run`, where it is not swept.")] = "steady",
     times: Annotated[str, typer.Option(help="As for `run`, where they are not swept.")] = "nominal",
     duration: Duration = None,
+    edges: Edges = None,
     cloud_slots: Annotated[
         int | None, typer.Option(help="Executions in the cloud at once; default 32.", min=0)
     ] = None,
@@ -214,6 +227,7 @@ def sweep(
             network=network,
             times=times,
             duration=duration,
+            edges=edges,
             cloud_slots=cloud_slots,
             figures=figure or _FIGURES,
             bound=bound,

@@ -25,7 +25,7 @@ from aerodaas.schedulers.lab import (
     run_lab,
 )
 from aerodaas.schedulers.lab.metrics import Score, score
-from aerodaas.schedulers.lab.run import Spread
+from aerodaas.schedulers.lab.spreading import Spread
 from aerodaas.schedulers.lab.workload import SIX
 from aerodaas.terminal.figures import Row, show_figures
 from aerodaas.terminal.progress import show_progress
@@ -46,6 +46,7 @@ def study(
     network: str,
     times: str,
     duration: float | None,
+    edges: int | None,
     cloud_slots: int | None,
     bound: bool | None,
     jobs: int | None,
@@ -57,7 +58,7 @@ def study(
     """Compare schedulers and print the tables; the arguments are those of `aerodaas lab run`."""
     results: list[LabResult] = []
     names = [name.strip() for name in scheduler.split(",")]
-    loads, resources, as_flown = _loads(workload, flown, duration)
+    loads, resources, as_flown = _loads(workload, flown, duration, edges)
     if cloud_slots is not None:
         resources = Resources(cloud_slots=cloud_slots)
     spread, wanted = spread_of(address, names)
@@ -120,9 +121,12 @@ def registered() -> None:
 
 def _show(result: LabResult) -> None:
     """Print the table of `run`."""
+    seeds = f"{len(result.seeds)} seeds" if len(result.seeds) > 1 else "1 seed"
+    if result.edges and result.workload.edges > 1:
+        seeds += f", intervals over {result.workload.edges} edges"
     title = (
         f"{result.workload.name}: {result.workload.duration / 1e9:g} s, "
-        f"{result.network.name} network, {result.times.name} times, {len(result.seeds)} seeds"
+        f"{result.network.name} network, {result.times.name} times, {seeds}"
     )
     shares = ("completion", "late", "dropped", "migrated", "stolen", "edge use", "of bound")
     columns = ["qos per s", "of bound", "completion", "qoe per s", "late", "dropped"]
@@ -144,9 +148,11 @@ def _show(result: LabResult) -> None:
     show_figures(title, "scheduler", headings, rows)
 
 
-def workload_of(name: str, duration: float | None) -> Workload:
+def workload_of(name: str, duration: float | None, edges: int | None) -> Workload:
     """The workload of a name or a JSON file; raises UnknownIdError, SchedulerError."""
     found = load_workload(name) if name.endswith(".json") else Workload.named(name)
+    if edges is not None:
+        found = found.on_edges(edges)
     return found if duration is None else found.lasting(round(duration * NANOSECONDS))
 
 
@@ -162,18 +168,20 @@ def spread_of(
 
 
 def _loads(
-    names: str, flown: Path | None, duration: float | None
+    names: str, flown: Path | None, duration: float | None, edges: int | None
 ) -> tuple[list[Workload], Resources, Score | None]:
     """The workloads, their resources, and the score of a recorded flight itself."""
     if flown is None:
         wanted = SIX if names == "six" else names.split(",")
-        return [workload_of(name.strip(), duration) for name in wanted], Resources(), None
+        return [workload_of(name.strip(), duration, edges) for name in wanted], Resources(), None
     # Reading a recording takes libraries that simulating does not.
     from aerodaas.cli.flown_tasks import Flown  # noqa: PLC0415
     from aerodaas.cli.flown_workload import flown_trace, flown_workload  # noqa: PLC0415
 
     flight = Flown.read(flown)
     workload = flown_workload(flight)
+    if edges is not None:
+        workload = workload.on_edges(edges)
     tasks = workload.tasks(0, random.Random())
     return [workload], flight.resources, score(tasks, flown_trace(flight, tasks))
 

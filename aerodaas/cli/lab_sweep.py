@@ -37,6 +37,7 @@ def sweep(
     network: str,
     times: str,
     duration: float | None,
+    edges: int | None,
     cloud_slots: int | None,
     figures: Sequence[str],
     bound: bool,
@@ -48,11 +49,11 @@ def sweep(
     names = [name.strip() for name in scheduler.split(",")]
     spread, wanted = spread_of(address, names)
     with show_progress() as progress:
-        bar = progress.add_task("cases", total=None)
+        bar = progress.add_task("edges", total=None)
         result = run_sweep(
             wanted,
             parse_sweeps(sweeps),
-            workload=workload_of(workload, duration),
+            workload=workload_of(workload, duration, edges),
             seeds=range(seeds),
             baseline=baseline,
             network=network,

@@ -175,11 +175,13 @@ class Result:
     @property
     def utility(self) -> float:
         """QoS utility: the gain if in time, minus the cost if it ran in vain, 0 if it never ran."""
-        if self.place is TaskPlace.NOWHERE:
-            return 0.0
         profile = self.task.profile
-        cost = profile.edge_cost if self.place is TaskPlace.EDGE else profile.cloud_cost
-        return profile.benefit - cost if self.outcome is TaskOutcome.DONE else -cost
+        in_time = self.outcome is TaskOutcome.DONE
+        if self.place is TaskPlace.CLOUD:
+            return profile.cloud_gain if in_time else -profile.cloud_cost
+        if self.place is TaskPlace.EDGE:
+            return profile.edge_gain if in_time else -profile.edge_cost
+        return 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,6 +27,12 @@ EXECUTOR_DOWN = "its executor on the edge is down"
 """Reason of sending or dropping a task that the scheduler wanted to run there."""
 
 
+_OF_TASKS = (SendToCloud, RunOnEdge, Drop)
+# Members of an enumeration are looked up slowly.
+_DONE, _LATE = TaskOutcome.DONE, TaskOutcome.LATE
+_EDGE, _CLOUD = TaskPlace.EDGE, TaskPlace.CLOUD
+
+
 class Host(Protocol):
     """Executors and a clock: simulated ones in the lab, actors in flight.
 
@@ -64,7 +70,6 @@ class Dispatch:
     """
 
     def __init__(self, scheduler: AnalyticsScheduler, resources: Resources, host: Host) -> None:
-        self.scheduler = scheduler
         self.resources = resources
         self.undecided: dict[int, Task] = {}
         self.running: Task | None = None
@@ -79,6 +84,7 @@ class Dispatch:
         """Ends not yet passed on to the scheduler."""
         self._has_cloud = resources.cloud_slots > 0
         self._host = host
+        self._adopt(scheduler)
 
     @property
     def cloud_waiting(self) -> int:
@@ -87,41 +93,47 @@ class Dispatch:
 
     def start(self, now: int) -> None:
         """Begin a run."""
-        self.ask(self.scheduler.start, self.resources, now)
+        self.guarded(self.scheduler.start)(self.resources, now)
 
-    def ask(self, event: Callable[..., Any], *args: Any) -> Any:  # noqa: ANN401
-        """Call the scheduler; a host that does not trust it overrides this."""
-        return event(*args)
+    def guarded(self, event: Callable[..., Any]) -> Callable[..., Any]:
+        """The call of an event; a host that does not trust the scheduler overrides this."""
+        return event
 
     def arrived(self, task: Task, now: int) -> None:
         """A task has reached the edge."""
         self.undecided[task.id] = task
-        self._carry_out(self.ask(self.scheduler.task_arrived, task, now), now)
+        self._obey(self._task_arrived(task, now), now)
+        if self._ended:
+            self._tell_ends(now)
         if self.running is None:
             self._offer_edge(now)
 
     def timer(self, now: int) -> None:
         """A time asked for with `Host.wake_at` has come."""
-        self._carry_out(self.ask(self.scheduler.timer, now), now)
+        self._obey(self._timer(now), now)
+        if self._ended:
+            self._tell_ends(now)
         if self.running is None:
             self._offer_edge(now)
 
     def finished(self, task: Task, now: int, failure: TaskOutcome | None = None) -> None:
         """An execution has ended: with a result, or with TIMEOUT or FAILED as its `failure`."""
         in_time = now <= task.deadline + task.reserve
-        outcome = failure or (TaskOutcome.DONE if in_time else TaskOutcome.LATE)
+        outcome = failure or (_DONE if in_time else _LATE)
         if task is self.running:
             self.running = None
-            result = Result(task, outcome, TaskPlace.EDGE, self._edge_started, now)
+            result = Result(task, outcome, _EDGE, self._edge_started, now)
         else:
             started = self._cloud_started.pop(task.id)
             self.in_cloud -= 1
-            result = Result(task, outcome, TaskPlace.CLOUD, started, now)
+            result = Result(task, outcome, _CLOUD, started, now)
         self._host.closed(result)
         if self._cloud_queue:
             self._fill_cloud(now)
-        self._ended.append(result)
-        self._tell_ends(now)
+            self._tell_ends(now)
+        self._obey(self._task_finished(result, now), now)
+        if self._ended:
+            self._tell_ends(now)
         if self.running is None:
             self._offer_edge(now)
 
@@ -130,33 +142,42 @@ class Dispatch:
         self.resources = resources
         while self._cloud_queue and not resources.cloud_slots:
             self._give_up(self._cloud_queue.popleft().task, now)
-        self._carry_out(self.ask(self.scheduler.resources_changed, resources, now), now)
+        self._obey(self.guarded(self.scheduler.resources_changed)(resources, now), now)
+        if self._ended:
+            self._tell_ends(now)
         if self.running is None:
             self._offer_edge(now)
 
     def replace(self, scheduler: AnalyticsScheduler, now: int) -> None:
         """Go on with another scheduler, which gets the undecided tasks as new ones."""
-        self.scheduler = scheduler
+        self._adopt(scheduler)
         self._ended.clear()
         self.start(now)
         self._fill_cloud(now)
         for task in list(self.undecided.values()):
-            self._carry_out(self.ask(scheduler.task_arrived, task, now), now)
+            self._obey(self._task_arrived(task, now), now)
+            if self._ended:
+                self._tell_ends(now)
         if self.running is None:
             self._offer_edge(now)
+
+    def _adopt(self, scheduler: AnalyticsScheduler) -> None:
+        # Events come by the million in the lab, so each is looked up and guarded once.
+        self.scheduler = scheduler
+        self._task_arrived = self.guarded(scheduler.task_arrived)
+        self._executor_idle = self.guarded(scheduler.executor_idle)
+        self._task_finished = self.guarded(scheduler.task_finished)
+        self._timer = self.guarded(scheduler.timer)
 
     def _offer_edge(self, now: int) -> None:
         undecided = self.undecided
         while undecided and self.running is None:
             before = len(undecided)
-            self._carry_out(self.ask(self.scheduler.executor_idle, now), now)
+            self._obey(self._executor_idle(now), now)
+            if self._ended:
+                self._tell_ends(now)
             if len(undecided) == before:
                 return
-
-    def _carry_out(self, decisions: Iterable[Decision] | None, now: int) -> None:
-        self._obey(decisions, now)
-        if self._ended:
-            self._tell_ends(now)
 
     def _obey(self, decisions: Iterable[Decision] | None, now: int) -> None:
         if decisions is None:
@@ -170,27 +191,22 @@ class Dispatch:
                 if not now <= decision.at:
                     raise self._refusal(decision, f"it lies in the past, now is {now}")
                 self._host.wake_at(decision.at)
-            elif isinstance(decision, SendToCloud):
-                self._require_undecided(decision)
+                continue
+            if not isinstance(decision, _OF_TASKS):
+                raise self._refusal(decision, "that is none of the decisions of the protocol")
+            task = decision.task
+            if self.undecided.get(task.id) is not task:
+                raise self._refusal(decision, "the task never arrived or was decided before")
+            if not isinstance(decision.reason, str):
+                raise self._refusal(decision, f"its reason {decision.reason!r} is no text")
+            if isinstance(decision, SendToCloud):
                 self._send(decision, now)
             elif isinstance(decision, RunOnEdge):
-                self._require_undecided(decision)
                 self._run_edge(decision, now)
-            elif isinstance(decision, Drop):
-                self._require_undecided(decision)
-                task = decision.task
+            else:
                 del self.undecided[task.id]
                 self._host.decided(decision, now)
                 self._host.closed(Result(task, TaskOutcome.DROPPED, TaskPlace.NOWHERE, now, now))
-            else:
-                raise self._refusal(decision, "that is none of the decisions of the protocol")
-
-    def _require_undecided(self, decision: RunOnEdge | SendToCloud | Drop) -> None:
-        task = decision.task
-        if self.undecided.get(task.id) is not task:
-            raise self._refusal(decision, "the task never arrived or was decided before")
-        if not isinstance(decision.reason, str):
-            raise self._refusal(decision, f"its reason {decision.reason!r} is no text")
 
     def _run_edge(self, decision: RunOnEdge, now: int) -> None:
         task = decision.task
@@ -252,7 +268,7 @@ class Dispatch:
     def _tell_ends(self, now: int) -> None:
         while self._ended:
             result = self._ended.popleft()
-            self._obey(self.ask(self.scheduler.task_finished, result, now), now)
+            self._obey(self._task_finished(result, now), now)
 
     def _refusal(self, decision: object, why: str) -> SchedulerError:
         name = type(self.scheduler).__name__

@@ -17,7 +17,9 @@ _SLOWEST = 0.02
 _DRIFT = (15.0 * MILLISECOND) ** 2 / NANOSECONDS
 """Variance that the shared delay gains per nanosecond: 15 ms after one second."""
 _LEAST_VARIANCE = MILLISECOND * MILLISECOND
-_CERTAIN = 4.0
+CERTAIN = 4.0
+"""Standard deviations from the mean beyond which a chance counts as none or as certainty."""
+SQRT_HALF = 0.7071067811865476
 
 
 @dataclass(slots=True)
@@ -47,9 +49,10 @@ class TimeEstimates:
 
     def observe(self, profile: Profile, taken: int, now: int) -> None:
         """Learn from one execution."""
-        model = self._model(profile)
+        model = self._models.get(profile.model) or self._model(profile)
         offset, variance, count = model
-        error = taken - self._nominal(profile) - offset - self.delay
+        nominal = profile.cloud_time if self._shared else profile.edge_time
+        error = taken - nominal - offset - self.delay
         if not self._shared:
             error_left = error
             self._cache.pop(profile.model, None)
@@ -71,18 +74,16 @@ class TimeEstimates:
         found = self._cache.get(profile.model)
         if found is None:
             offset, variance, _ = self._models.get(profile.model) or self._model(profile)
-            mean = self._nominal(profile) + offset + self.delay
+            nominal = profile.cloud_time if self._shared else profile.edge_time
+            mean = nominal + offset + self.delay
             spread = variance + self._uncertainty + _LEAST_VARIANCE
             found = self._cache[profile.model] = TimeEstimate(mean, sqrt(spread))
         return found
 
-    def _nominal(self, profile: Profile) -> int:
-        return profile.cloud_time if self._shared else profile.edge_time
-
     def _model(self, profile: Profile) -> list[float]:
         found = self._models.get(profile.model)
         if found is None:
-            nominal = self._nominal(profile)
+            nominal = profile.cloud_time if self._shared else profile.edge_time
             found = self._models[profile.model] = [0.0, (_PRIOR_VARIATION * nominal) ** 2, 0]
         return found
 
@@ -90,8 +91,8 @@ class TimeEstimates:
 def chance(belief: TimeEstimate, room: float) -> float:
     """Probability that an execution takes at most `room` nanoseconds."""
     z = (room - belief.mean) / belief.sigma
-    if z > _CERTAIN:
+    if z > CERTAIN:
         return 1.0
-    if z < -_CERTAIN:
+    if z < -CERTAIN:
         return 0.0
-    return 0.5 + 0.5 * erf(z * 0.7071067811865476)
+    return 0.5 + 0.5 * erf(z * SQRT_HALF)

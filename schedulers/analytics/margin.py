@@ -99,6 +99,8 @@ class Margin(AnalyticsScheduler):
         self._free_at = 0.0
         self._steps: list[tuple[float, Lane, Job]] = []
         self._planned: set[Task] = set()
+        self._awaited: dict[tuple[str, str], Job] = {}
+        """Jobs of the plan that are forecast, by model and source."""
         self._plan_end = 0.0
         self._stale = True
 
@@ -114,7 +116,7 @@ class Margin(AnalyticsScheduler):
         model.rate = model.rate * exp((model.seen - now) / _MEMORY) + 1 / _MEMORY
         model.seen = now
         self._stale |= not model.forecast.arrived(task.source, now)
-        if self._steps:
+        if self._awaited:
             self._fill_step(task)
         self.cloud.listen(now)
         value = self._cloud_value(model, task, now)
@@ -129,20 +131,21 @@ class Margin(AnalyticsScheduler):
         model.waiting[task] = False
         due = self._due_at(model, task, now, value)
         if due <= now and not (self._due and self._due[0][0] <= due):
-            first = self._settle(model, task, value, due, now)
-            return [*first, *self._decide(now)]
-        heappush(self._due, (due, task.id, task))
-        return self._decide(now)
+            decisions = self._settle(model, task, value, due, now)
+        else:
+            heappush(self._due, (due, task.id, task))
+            decisions = []
+        return self._decide(now, decisions)
 
     def timer(self, now: int) -> Iterable[Decision]:
         """Decide about the tasks for which waiting no longer pays."""
         while self._wakes and self._wakes[0] <= now:
             heappop(self._wakes)
         self.cloud.listen(now)
-        return self._decide(now)
+        return self._decide(now, [])
 
-    def _decide(self, now: int) -> list[Decision]:
-        decisions: list[Decision] = []
+    def _decide(self, now: int, decisions: list[Decision]) -> list[Decision]:
+        """Add what is due to the decisions, and the next time at which something will be."""
         while self._due and self._due[0][0] <= now:
             task = heappop(self._due)[2]
             model = self._models[task.profile.model]
@@ -152,23 +155,24 @@ class Margin(AnalyticsScheduler):
             value = 0.0 if kept else self._cloud_value(model, task, now)
             due = self._due_at(model, task, now, value)
             decisions += self._settle(model, task, value, due, now)
-        decisions += self._wake_up(now)
+        if self._due:
+            decisions += self._wake_up(now, self._due[0][0])
         return decisions
 
     def _settle(
         self, model: _Model, task: Task, value: float, due: int, now: int
-    ) -> Iterable[Decision]:
+    ) -> list[Decision]:
         """Let the task wait until it is due; if it is, keep it for the edge, send or drop it."""
         if due <= now and value > 0:
             self._refresh(now)
             if task not in self._planned:
-                return (self._send(model, task, now),)
+                return [self._send(model, task, now)]
             model.waiting[task] = True
             due = self._due_at(model, task, now, 0.0)
         if due <= now:
-            return (self._drop(model, task),)
+            return [self._drop(model, task)]
         heappush(self._due, (due, task.id, task))
-        return ()
+        return []
 
     def executor_idle(self, now: int) -> Iterable[Decision]:
         """Follow the plan: run its first task, or wait for one that is due to arrive."""
@@ -176,6 +180,8 @@ class Margin(AnalyticsScheduler):
         if self._steps and not isinstance(self._steps[0][2].what, Task):
             expected = int(self._steps[0][2].release) + LATENESS
             if now < expected:
+                if self._due and self._due[0][0] < expected:
+                    expected = self._due[0][0]
                 return self._wake_up(now, expected)
             self._stale = True
             self._refresh(now)
@@ -195,7 +201,7 @@ class Margin(AnalyticsScheduler):
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
         """Learn from the result."""
         task = result.task
-        model = self._model(task.profile)
+        model = self._models.get(task.profile.model) or self._model(task.profile)
         model.quality.ended(task.arrival, in_time=result.outcome is TaskOutcome.DONE)
         if result.place is TaskPlace.EDGE:
             self._stale |= abs(self._free_at - now) > SURPRISE
@@ -204,7 +210,8 @@ class Margin(AnalyticsScheduler):
                 self.edge.observe(task.profile, result.finished - result.started, now)
         else:
             self.cloud.finished(result, now)
-            return self._fill_slots(now)
+            if self._hopeful and not self.cloud.crowded:
+                return self._fill_slots(now)
         return ()
 
     def resources_changed(self, resources: Resources, now: int) -> Iterable[Decision]:
@@ -224,10 +231,9 @@ class Margin(AnalyticsScheduler):
         }
 
     def _model(self, profile: Profile) -> _Model:
-        model = self._models.get(profile.model)
-        if model is None:
-            model = _Model(profile, QualityWatch(profile.qoe or QoeGoal(0.0)))
-            self._models[profile.model] = model
+        """Begin to watch a model."""
+        model = _Model(profile, QualityWatch(profile.qoe or QoeGoal(0.0)))
+        self._models[profile.model] = model
         return model
 
     def _is_cheapest(self, model: _Model) -> bool:
@@ -268,10 +274,8 @@ class Margin(AnalyticsScheduler):
         profile = self._models[name].profile
         return profile.cloud_gain / profile.cloud_time
 
-    def _wake_up(self, now: int, at: int | None = None) -> list[Decision]:
-        if self._due and (at is None or self._due[0][0] < at):
-            at = self._due[0][0]
-        if at is None or (self._wakes and self._wakes[0] <= at):
+    def _wake_up(self, now: int, at: int) -> list[Decision]:
+        if self._wakes and self._wakes[0] <= at:
             return []
         at = max(at, now)
         heappush(self._wakes, at)
@@ -291,24 +295,27 @@ class Margin(AnalyticsScheduler):
 
     def _fill_step(self, task: Task) -> None:
         """Put a task that came as forecast into its place in the plan."""
-        wanted = (task.profile.model, task.source)
-        for _, _, job in self._steps:
-            if job.what == wanted:
-                job.what = task
-                self._planned.add(task)
-                return
+        job = self._awaited.pop((task.profile.model, task.source), None)
+        if job is not None:
+            job.what = task
+            self._planned.add(task)
 
     def _refresh(self, now: int) -> None:
         """Make a new plan if the present one is wrong or runs out."""
         if not self._stale and self._plan_end > now + REPLAN:
             return
-        begin = max(self._free_at, now)
+        begin = float(max(self._free_at, now))
         self._plan_end = begin + HORIZON
         lanes = [
             lane for model in self._models.values() if (lane := self._lane(model, begin, now)).jobs
         ]
         self._steps = plan(lanes, begin, self._plan_end, self._price(now), width=WIDTH, gap=GAP)
-        self._planned = {job.what for _, _, job in self._steps if isinstance(job.what, Task)}
+        self._planned, self._awaited = set(), {}
+        for _, _, job in self._steps:
+            if isinstance(job.what, Task):
+                self._planned.add(job.what)
+            else:
+                self._awaited[job.what] = job
         self._stale = False
 
     def _lane(self, model: _Model, begin: float, now: int) -> Lane:
@@ -323,13 +330,13 @@ class Margin(AnalyticsScheduler):
                 room = task.deadline - now
                 elsewhere = 0.0 if kept else self.cloud.value(profile, room, bonus)
                 cost = profile.edge_cost + elsewhere
-                jobs.append(Job(task, begin, task.deadline, benefit, cost))
+                jobs.append(Job(task, begin, float(task.deadline), benefit, cost))
                 if len(jobs) == _LOOK:
                     return Lane(belief, jobs)
         cost = profile.edge_cost + self.cloud.value(profile, profile.deadline, bonus)
         for at, source in model.forecast.due(now, int(begin + HORIZON)):
             what = (profile.model, source)
-            jobs.append(Job(what, at, at + profile.deadline, benefit, cost))
+            jobs.append(Job(what, float(at), float(at + profile.deadline), benefit, cost))
             if len(jobs) == _LOOK:
                 break
         return Lane(belief, jobs)

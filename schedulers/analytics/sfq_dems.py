@@ -8,7 +8,7 @@ Sciences 4(2), 1990.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from aerodaas.schedulers.analytics.base import (
@@ -37,12 +37,17 @@ class _TenantDems(Dems):
 
     def __init__(self) -> None:
         super().__init__()
-        self.share = 1.0
+        self._share = 1.0
         """Of the edge, 0 to 1."""
+
+    def take_share(self, share: float) -> None:
+        """Plan for another share of the edge."""
+        self._share = share
+        self.measure_queue()
 
     def occupied(self, task: Task) -> int:
         """The task's time on the tenant's share of the edge."""
-        return round(task.profile.edge_time / self.share)
+        return round(task.profile.edge_time / self._share)
 
 
 @dataclass
@@ -91,6 +96,10 @@ class SfqDems(AnalyticsScheduler):
         self._tenants: dict[str, _Tenant] = {}
         self._edge = _Server()
         self._cloud = _Server()
+        self._in_cloud = 0
+        """Tasks of all tenants there."""
+        self._sharing: list[_Tenant] = []
+        """Between whom the edge is divided."""
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
         """Give the task to its tenant's DEMS."""
@@ -126,25 +135,29 @@ class SfqDems(AnalyticsScheduler):
             self._tell_edge(now)
         else:
             tenant.in_cloud -= 1
-        yield from self._gated(name, tenant.dems.task_finished(result, now), now)
-        yield from self._fill(now)
+            self._in_cloud -= 1
+        decisions = self._gated(name, tenant.dems.task_finished(result, now), now)
+        return decisions + self._fill(now)
 
     def timer(self, now: int) -> Iterable[Decision]:
         """Let tasks leave whose latest start has come, and give up those that no slot took."""
+        decisions: list[Decision] = []
         for name, tenant in self._tenants.items():
-            yield from self._gated(name, tenant.dems.timer(now), now)
-            yield from _expired(tenant, now)
-        yield from self._fill(now)
+            decisions += self._gated(name, tenant.dems.timer(now), now)
+            if tenant.held:
+                decisions += _expired(tenant, now)
+        return decisions + self._fill(now)
 
     def resources_changed(self, resources: Resources, now: int) -> Iterable[Decision]:
         """Tell all tenants' DEMS; without a cloud, nothing waits for it."""
         self.resources = resources
+        decisions: list[Decision] = []
         for name, tenant in self._tenants.items():
-            yield from self._gated(name, tenant.dems.resources_changed(resources, now), now)
+            decisions += self._gated(name, tenant.dems.resources_changed(resources, now), now)
             if not resources.cloud_slots:
-                yield from (Drop(one.task, "the cloud is gone") for one in tenant.held)
+                decisions += [Drop(one.task, "the cloud is gone") for one in tenant.held]
                 tenant.held.clear()
-        yield from self._fill(now)
+        return decisions + self._fill(now)
 
     def observe(self) -> Mapping[str, float]:
         """Lengths of the queues, over all tenants."""
@@ -155,50 +168,63 @@ class SfqDems(AnalyticsScheduler):
             "held from the cloud": sum(len(one.held) for one in tenants),
         }
 
-    def _active(self, now: int) -> Iterator[_Tenant]:
-        return (one for one in self._tenants.values() if now - one.seen <= _ACTIVE)
+    def _active(self, now: int) -> list[_Tenant]:
+        return [one for one in self._tenants.values() if now - one.seen <= _ACTIVE]
 
     def _divide(self, now: int) -> None:
         """Divide the edge by weight between the tenants that are there."""
-        whole = sum(one.weight for one in self._active(now))
-        for one in self._active(now):
-            one.dems.share = one.weight / whole
+        sharing = self._active(now)
+        if sharing == self._sharing:
+            return
+        self._sharing = sharing
+        whole = sum(one.weight for one in sharing)
+        for one in sharing:
+            one.dems.take_share(one.weight / whole)
 
     def _tell_edge(self, free_at: int) -> None:
         """All tenants' DEMS expect the edge to be free at the same time."""
         for one in self._tenants.values():
             one.dems.free_at = free_at
 
-    def _gated(self, name: str, decisions: Iterable[Decision], now: int) -> Iterator[Decision]:
+    def _gated(self, name: str, decisions: Iterable[Decision], now: int) -> list[Decision]:
         """Decisions of a tenant's DEMS; what it sends waits until a slot is its own."""
+        gated: list[Decision] = []
         for decision in decisions:
-            if isinstance(decision, SendToCloud):
-                self._tenants[name].held.append(decision)
-                yield from self._fill(now)
-                if decision in self._tenants[name].held and decision.latest_start is not None:
-                    yield WakeAt(max(now, decision.latest_start) + 1)
-            else:
-                yield decision
+            if not isinstance(decision, SendToCloud):
+                gated.append(decision)
+                continue
+            held = self._tenants[name].held
+            held.append(decision)
+            gated += self._fill(now)
+            if decision in held and decision.latest_start is not None:
+                gated.append(WakeAt(max(now, decision.latest_start) + 1))
+        return gated
 
-    def _fill(self, now: int) -> Iterator[Decision]:
+    def _fill(self, now: int) -> list[Decision]:
         """Start what waits for the cloud, as far as there are slots, in the order of start tags."""
-        while waiting := [name for name, one in self._tenants.items() if one.held]:
-            waiting = [name for name in waiting if self._may_send(name, now)]
-            if not waiting:
-                return
+        started: list[Decision] = []
+        while waiting := [
+            name for name, one in self._tenants.items() if one.held and self._may_send(name, now)
+        ]:
             name = min(waiting, key=self._cloud.tag)
             tenant = self._tenants[name]
             decision = tenant.held.pop(0)
             if decision.latest_start is not None and decision.latest_start < now:
-                yield Drop(decision.task, "no slot in the cloud")
+                started.append(Drop(decision.task, "no slot in the cloud"))
                 continue
             tenant.in_cloud += 1
+            self._in_cloud += 1
             self._cloud.serve(name, decision.task.profile.cloud_time / tenant.weight)
-            yield decision
+            started.append(decision)
+        return started
 
     def _may_send(self, name: str, now: int) -> bool:
-        slots, active = self.resources.cloud_slots, list(self._active(now))
-        free = slots - sum(one.in_cloud for one in self._tenants.values())
+        slots = self.resources.cloud_slots
+        free = slots - self._in_cloud
+        if free <= 0 or free >= len(self._tenants):
+            # At most one slot is kept for each other tenant.
+            return free > 0
+        active = self._active(now)
         whole = sum(one.weight for one in active)
 
         def is_below(one: _Tenant) -> bool:
@@ -210,8 +236,8 @@ class SfqDems(AnalyticsScheduler):
         return free > kept
 
 
-def _expired(tenant: _Tenant, now: int) -> Iterator[Decision]:
+def _expired(tenant: _Tenant, now: int) -> list[Decision]:
     late = [one for one in tenant.held if one.latest_start is not None and one.latest_start < now]
     for one in late:
         tenant.held.remove(one)
-        yield Drop(one.task, "no slot in the cloud")
+    return [Drop(one.task, "no slot in the cloud") for one in late]

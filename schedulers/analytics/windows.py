@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterable
 
 from aerodaas.schedulers.analytics.base import QoeGoal, Task
 
@@ -17,18 +18,15 @@ class QoeWindows:
         self._arrived: Counter[tuple[str, int]] = Counter()
         self._done: Counter[tuple[str, int]] = Counter()
 
-    def arrived(self, task: Task) -> None:
-        """Count a task; one whose model has no goal does not count."""
-        profile = task.profile
-        if (goal := profile.qoe) is not None:
-            self._goals[profile.model] = goal
-            self._arrived[profile.model, task.arrival // goal.window] += 1
+    def arrived(self, *tasks: Task) -> None:
+        """Count tasks; one whose model has no goal does not count."""
+        profiles = [task.profile for task in tasks]
+        self._goals.update({one.model: one.qoe for one in profiles if one.qoe is not None})
+        self._arrived.update(_windows(tasks))
 
-    def done(self, task: Task) -> None:
-        """Count a task that finished in time."""
-        profile = task.profile
-        if (goal := profile.qoe) is not None:
-            self._done[profile.model, task.arrival // goal.window] += 1
+    def done(self, *tasks: Task) -> None:
+        """Count tasks that finished in time."""
+        self._done.update(_windows(tasks))
 
     @property
     def utility(self) -> float:
@@ -48,3 +46,11 @@ class QoeWindows:
             for window, count in self._arrived.items()
             if self._done[window] >= self._goals[window[0]].share * count
         ]
+
+
+def _windows(tasks: Iterable[Task]) -> list[tuple[str, int]]:
+    return [
+        (profile.model, task.arrival // profile.qoe.window)
+        for task in tasks
+        if (profile := task.profile).qoe is not None
+    ]

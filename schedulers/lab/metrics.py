@@ -67,7 +67,7 @@ def score(tasks: Sequence[Task], trace: Trace) -> Score:
         undecided=len(trace.undecided),
         migrated=trace.reasons[MIGRATED],
         stolen=trace.reasons[STOLEN],
-        tasks_by_model=dict(Counter(task.profile.model for task in tasks)),
+        tasks_by_model=dict(Counter([task.profile.model for task in tasks])),
     )
     edge, cloud, in_time = TaskPlace.EDGE, TaskPlace.CLOUD, TaskOutcome.DONE
     on_edge = [result for result in trace.results if result.place is edge]
@@ -91,11 +91,9 @@ def score(tasks: Sequence[Task], trace: Trace) -> Score:
 
 def _bonuses(tasks: Sequence[Task], trace: Trace) -> float:
     windows = QoeWindows()
-    for task in tasks:
-        windows.arrived(task)
-    for result in trace.results:
-        if result.outcome is TaskOutcome.DONE:
-            windows.done(result.task)
+    in_time = TaskOutcome.DONE
+    windows.arrived(*tasks)
+    windows.done(*[result.task for result in trace.results if result.outcome is in_time])
     return windows.utility
 
 

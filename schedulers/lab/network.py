@@ -64,6 +64,11 @@ class Network:
             network = cls(wanted, latency, outages, bandwidth)
         return network
 
+    @property
+    def is_steady(self) -> bool:
+        """Whether executions take their nominal time."""
+        return not (self.latency or self.outages or self.bandwidth)
+
     def latency_at(self, stamp: int) -> int:
         """Latency that is added at `stamp`, both in nanoseconds."""
         return int(_linear(self.latency, stamp)) if self.latency else 0

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import gc
-import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, nullcontext
 from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Any
@@ -17,17 +15,18 @@ from aerodaas.schedulers.lab.bound import clairvoyant_bound
 from aerodaas.schedulers.lab.metrics import Mean, Score, mean_of, score
 from aerodaas.schedulers.lab.network import Network
 from aerodaas.schedulers.lab.sample import SamplePath
-from aerodaas.schedulers.lab.simulator import simulate
+from aerodaas.schedulers.lab.simulator import Trace, simulate
+from aerodaas.schedulers.lab.spreading import Spread, over_processes
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
-from aerodaas.types.errors import SchedulerError
+from aerodaas.types.errors import SchedulerError, failure_line
 
-__all__ = ["LabResult", "Spread", "Wanted", "run_lab", "scheduler_label"]
+__all__ = ["LabResult", "Wanted", "run_lab", "scheduler_label"]
 
 Wanted = str | type[AnalyticsScheduler] | AnalyticsScheduler
-Spread = Callable[[Callable[[Any], Any], Iterable[Any]], Iterable[Any]]
-"""Something like `map`, such as `Pool.imap` of multiprocessing, or
-`aerodaas.actors.cluster.ray_map.spread_over(address)` for a Ray cluster."""
+
+_RATE = " per s"
+"""What the names of rates end with, which are sums over the edges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,20 +39,42 @@ class LabResult:
     seeds: tuple[int, ...]
     scores: dict[str, list[Score]]
     bounds: list[float] | None
+    edges: dict[str, list[Score]]
+    """Scores of each edge where there is a single seed; else nothing."""
 
     def figures(self, scheduler: str) -> dict[str, Mean]:
-        """Figures of a scheduler: means over the seeds with confidence intervals."""
-        return {name: mean_of(values) for name, values in self.values(scheduler).items()}
+        """Figures of a scheduler: means over the seeds with confidence intervals.
+
+        With a single seed, the intervals are those over its edges, each of which draws its own
+        arrivals and times.
+        """
+        means = {name: mean_of(values) for name, values in self.values(scheduler).items()}
+        edges = self.edges.get(scheduler, [])
+        if len(edges) > 1:
+            for name, values in self._values(edges, self.workload.duration).items():
+                margin = mean_of(values).margin
+                total = len(edges) if name.endswith(_RATE) else 1
+                means[name] = Mean(means[name].value, margin * total)
+        return means
 
     def values(self, scheduler: str) -> dict[str, list[float]]:
         """Figures of a scheduler, one for each seed.
 
         Rates are per second of the workload and summed over its edges; shares are 0 to 1.
         """
-        seconds = self.workload.duration / 1e9
-        busy = self.workload.duration * self.workload.edges
         scores = self.scores[scheduler]
-        figures = {
+        figures = self._values(scores, self.workload.duration * self.workload.edges)
+        if self.bounds is not None:
+            figures["of bound"] = [
+                s.qos / bound if bound else 1.0
+                for s, bound in zip(scores, self.bounds, strict=True)
+            ]
+        return figures
+
+    def _values(self, scores: Sequence[Score], busy: int) -> dict[str, list[float]]:
+        """Figures of some scores; `busy` is how long their executors could be, nanoseconds."""
+        seconds = self.workload.duration / 1e9
+        return {
             "completion": [s.completion for s in scores],
             "qos per s": [s.qos / seconds for s in scores],
             "qoe per s": [s.qoe / seconds for s in scores],
@@ -65,12 +86,6 @@ class LabResult:
             "cloud use": [s.cloud_busy / busy for s in scores],
             "cost per s": [s.cost / seconds for s in scores],
         }
-        if self.bounds is not None:
-            figures["of bound"] = [
-                s.qos / bound if bound else 1.0
-                for s, bound in zip(scores, self.bounds, strict=True)
-            ]
-        return figures
 
     def as_json(self) -> dict[str, Any]:
         """Everything, for a file: means with half widths of 95 % intervals, and raw scores."""
@@ -121,7 +136,8 @@ def run_lab(
     `jobs` processes share the work (by default one per core; 1 for none); `spread` takes their
     place, for example to use a Ray cluster. `progress` is told how many of how many parts are
     done. The same seeds give the same result, however the work is spread. Raises SchedulerError
-    or UnknownIdError for a scheduler that cannot be loaded or that decides what cannot be done.
+    or UnknownIdError for a scheduler that cannot be loaded, and SchedulerError, with the seed and
+    the edge, for one that raises or decides what cannot be done.
     """
     if not seeds or not schedulers:
         raise SchedulerError("a run of the lab needs at least one seed and one scheduler")
@@ -140,19 +156,24 @@ def run_lab(
     )
     parts = [(seed, edge) for seed in seeds for edge in range(workload.edges)]
     scores = {name: [Score() for _ in seeds] for name in names}
+    edges: dict[str, list[Score]] = {name: [] for name in names} if len(seeds) == 1 else {}
     bounds = [0.0] * len(seeds)
     position = {seed: number for number, seed in enumerate(seeds)}
-    with _spreader(spread, jobs, len(parts)) as apply:
+    with nullcontext(spread) if spread else over_processes(jobs, len(parts)) as apply:
         answers = apply(partial(_one_part, study), parts)
         for count, (seed, found, ceiling) in enumerate(answers, 1):
             number = position[seed]
             bounds[number] += ceiling
             for name, one in zip(names, found, strict=True):
                 scores[name][number] += one
+                if edges:
+                    edges[name].append(one)
             if progress is not None:
                 progress(count, len(parts))
     return LabResult(
-        workload, study.network, study.times, tuple(seeds), scores, bounds if bound else None
+        *(workload, study.network, study.times, tuple(seeds), scores),
+        bounds=bounds if bound else None,
+        edges=edges,
     )
 
 
@@ -173,10 +194,22 @@ def _one_part(study: _Study, part: tuple[int, int]) -> tuple[int, list[Score], f
     with _uncollected():
         path = SamplePath.draw(study.workload, edge, seed, study.times, study.network)
         scores = [
-            score(path.tasks, simulate(path, load_scheduler(wanted), study.resources))
+            score(path.tasks, _simulated(path, wanted, study.resources, seed, edge))
             for wanted in study.schedulers
         ]
     return seed, scores, clairvoyant_bound(path) if study.bound else 0.0
+
+
+def _simulated(
+    path: SamplePath, wanted: Wanted, resources: Resources, seed: int, edge: int
+) -> Trace:
+    try:
+        return simulate(path, load_scheduler(wanted), resources)
+    except Exception as error:
+        # As text, for an exception of a class that only one process knows does not travel.
+        what = str(error) if isinstance(error, SchedulerError) else failure_line(error)
+        where = f"{scheduler_label(wanted)} with seed {seed} on edge {edge}"
+        raise SchedulerError(f"{where}: {what}") from error
 
 
 def scheduler_label(wanted: Wanted) -> str:
@@ -184,22 +217,3 @@ def scheduler_label(wanted: Wanted) -> str:
     if isinstance(wanted, str):
         return wanted
     return wanted.__name__ if isinstance(wanted, type) else type(wanted).__name__
-
-
-class _spreader:  # noqa: N801 - a context manager, used as a function
-    """Gives something like `map`, and stops its processes afterwards."""
-
-    def __init__(self, spread: Spread | None, jobs: int | None, parts: int) -> None:
-        workers = min(jobs or os.cpu_count() or 1, parts)
-        self._pool = ProcessPoolExecutor(workers) if spread is None and workers > 1 else None
-        self._spread = spread
-        self._chunk = max(1, parts // (8 * workers))
-
-    def __enter__(self) -> Spread:
-        if self._pool is not None:
-            return partial(self._pool.map, chunksize=self._chunk)
-        return self._spread or map
-
-    def __exit__(self, *_: object) -> None:
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)

@@ -34,11 +34,11 @@ class SamplePath:
         edge_factors = times.factors(len(tasks), random.Random(f"{seed}/{edge}/edge"))
         cloud_factors = times.factors(len(tasks), random.Random(f"{seed}/{edge}/cloud"))
         edge_times = [
-            max(1, int(task.profile.edge_time * factor))
+            int(task.profile.edge_time * factor) or 1
             for task, factor in zip(tasks, edge_factors, strict=True)
         ]
         cloud_times = [
-            max(1, int(task.profile.cloud_time * factor))
+            int(task.profile.cloud_time * factor) or 1
             for task, factor in zip(tasks, cloud_factors, strict=True)
         ]
         for number, arrival in enumerate(workload.arrivals_at(edge)):

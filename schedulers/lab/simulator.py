@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import copy
 from collections import Counter
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from heapq import heappop, heappush
+from itertools import count
+from math import inf
 
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
@@ -57,35 +60,34 @@ class _SimulatedHost:
     def __init__(self, path: SamplePath, resources: Resources, *, record: bool) -> None:
         self.trace = Trace()
         self.heap: list[tuple[int, int, int, Task | None]] = []
-        self._count = 0
+        self.closed: Callable[..., None] = self.trace.results.append
+        self._numbers = count()
         self._path = path
+        self._network = None if path.network.is_steady else path.network
+        self._reasons = self.trace.reasons
         self._timeout = resources.cloud_timeout
         self._record = record
 
     def run_edge(self, task: Task, now: int) -> None:
-        self._push(now + self._path.edge_times[task.id], _FINISH, task)
+        ends = now + self._path.edge_times[task.id]
+        heappush(self.heap, (ends, _FINISH, next(self._numbers), task))
 
     def run_cloud(self, task: Task, now: int) -> None:
-        taken = self._path.network.cloud_time(self._path.cloud_times[task.id], now)
+        taken: int | None = self._path.cloud_times[task.id]
+        if self._network is not None:
+            taken = self._network.cloud_time(self._path.cloud_times[task.id], now)
         if taken is None or taken > self._timeout:
-            self._push(now + self._timeout, _LOST, task)
+            heappush(self.heap, (now + self._timeout, _LOST, next(self._numbers), task))
         else:
-            self._push(now + taken, _FINISH, task)
+            heappush(self.heap, (now + taken, _FINISH, next(self._numbers), task))
 
     def wake_at(self, at: int) -> None:
-        self._push(at, _TIMER, None)
+        heappush(self.heap, (at, _TIMER, next(self._numbers), None))
 
     def decided(self, decision: RunOnEdge | SendToCloud | Drop, now: int) -> None:
-        self.trace.reasons[decision.reason] += 1
+        self._reasons[decision.reason] += 1
         if self._record:
             self.trace.decisions.append((now, decision))
-
-    def closed(self, result: Result) -> None:
-        self.trace.results.append(result)
-
-    def _push(self, at: int, kind: int, task: Task | None) -> None:
-        self._count += 1
-        heappush(self.heap, (at, kind, self._count, task))
 
 
 def simulate(
@@ -109,27 +111,29 @@ def simulate(
     now = 0
     look_at = 0
     for task in path.tasks:
-        arrival = task.arrival
-        while heap and heap[0][0] <= arrival:
-            now, kind, _, ended = heappop(heap)
-            _deliver(dispatch, kind, ended, now)
-        now = arrival
+        now = task.arrival
+        if heap and heap[0][0] <= now:
+            _deliver(dispatch, heap, now)
         dispatch.arrived(task, now)
         if record and now >= look_at:
             trace.observations.append(SchedulerObservation(now, dict(dispatch.scheduler.observe())))
             look_at = now + _EVERY
-    while heap:
-        now, kind, _, ended = heappop(heap)
-        _deliver(dispatch, kind, ended, now)
-    trace.end = now
+    trace.end = max(now, _deliver(dispatch, heap, inf))
     trace.undecided = list(dispatch.undecided.values())
     return trace
 
 
-def _deliver(dispatch: Dispatch, kind: int, task: Task | None, now: int) -> None:
-    if task is None:
-        dispatch.timer(now)
-    elif kind == _FINISH:
-        dispatch.finished(task, now)
-    else:
-        dispatch.finished(task, now, TaskOutcome.TIMEOUT)
+def _deliver(
+    dispatch: Dispatch, heap: list[tuple[int, int, int, Task | None]], until: float
+) -> int:
+    """Tell all that happens until then, and return when the last of it did."""
+    now = 0
+    while heap and heap[0][0] <= until:
+        now, kind, _, task = heappop(heap)
+        if task is None:
+            dispatch.timer(now)
+        elif kind == _FINISH:
+            dispatch.finished(task, now)
+        else:
+            dispatch.finished(task, now, TaskOutcome.TIMEOUT)
+    return now

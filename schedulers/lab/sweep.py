@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import inspect
 import itertools
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,8 +14,9 @@ from aerodaas.schedulers.analytics.published.profiles import ACTIVE, PASSIVE, PU
 from aerodaas.schedulers.analytics.registry import load_scheduler
 from aerodaas.schedulers.lab.metrics import mean_of
 from aerodaas.schedulers.lab.network import Network
-from aerodaas.schedulers.lab.run import LabResult, Spread, Wanted, run_lab, scheduler_label
+from aerodaas.schedulers.lab.run import LabResult, Wanted, run_lab, scheduler_label
 from aerodaas.schedulers.lab.significance import SIGNIFICANT, Comparison, compare, holm
+from aerodaas.schedulers.lab.spreading import Spread, over_processes
 from aerodaas.schedulers.lab.times import ExecutionTimes
 from aerodaas.schedulers.lab.workload import Workload
 from aerodaas.types.clock import NANOSECONDS
@@ -153,7 +152,7 @@ def run_sweep(
         bound: Compute the clairvoyant bound, too, which takes longer than simulating.
         jobs: Processes that share seeds and edges; None: one per core.
         spread: In their place, such as over a Ray cluster.
-        progress: Told how many of how many cases are done.
+        progress: Told how many of how many parts are done, one for each case, seed and edge.
 
     Raises:
         SchedulerError: For parameters that cannot be, or schedulers that cannot be loaded.
@@ -177,10 +176,16 @@ def run_sweep(
     # What cannot be shall be told before the first case is simulated.
     prepared = [_prepared(base, {**fixed, **case}) for case in combinations]
     cases: list[tuple[Row, LabResult]] = []
-    with _shared(spread, jobs) as share:
-        for number, (case, (load, link, drawn, slots)) in enumerate(
-            zip(combinations, prepared, strict=True), 1
-        ):
+    total = len(seeds) * sum(load.edges for load, *_ in prepared)
+    before = 0
+
+    def advance(done: int, _: int) -> None:
+        if progress is not None:
+            progress(before + done, total)
+
+    # One set of processes for all cases, which take a moment to start.
+    with nullcontext(spread) if spread else over_processes(jobs) as share:
+        for case, (load, link, drawn, slots) in zip(combinations, prepared, strict=True):
             result = run_lab(
                 load,
                 [_built(one, case) for one in schedulers],
@@ -189,12 +194,11 @@ def run_sweep(
                 times=drawn,
                 resources=slots,
                 bound=bound,
-                jobs=1,
                 spread=share,
+                progress=advance,
             )
             cases.append((case, result))
-            if progress is not None:
-                progress(number, len(combinations))
+            before += len(seeds) * load.edges
     return SweepResult(tuple(parameters), labels, baseline, tuple(seeds), tuple(cases))
 
 
@@ -255,17 +259,3 @@ def _built(wanted: Wanted, case: Mapping[str, Any]) -> Wanted:
 
 def _figures_of(values: Mapping[str, Sequence[float]], place: int) -> Row:
     return {name: series[place] for name, series in values.items()}
-
-
-@contextmanager
-def _shared(spread: Spread | None, jobs: int | None) -> Iterator[Spread]:
-    """One set of processes for all cases, which take a moment to start."""
-    workers = jobs or os.cpu_count() or 1
-    if spread is not None or workers == 1:
-        yield spread or map
-        return
-    pool = ProcessPoolExecutor(workers)
-    try:
-        yield pool.map
-    finally:
-        pool.shutdown(cancel_futures=True)

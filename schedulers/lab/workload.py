@@ -78,6 +78,16 @@ class Workload:
             duration,
         )
 
+    def on_edges(self, edges: int) -> Workload:
+        """The same on so many edges, each with as many drones as an edge has here.
+
+        Raises SchedulerError for a workload that lists its tasks, which are its edges' own.
+        """
+        if self.arrivals:
+            raise SchedulerError(f"{self.name} lists its tasks, so its edges are its own")
+        name = f"{self.name} on {edges} edges"
+        return replace(self, name=name, drones=self.drones * edges // self.edges, edges=edges)
+
     def lasting(self, duration: int) -> Workload:
         """The same for another duration."""
         return replace(self, duration=duration)

@@ -27,14 +27,15 @@ class Dedas(Sjf):
             finish += other.profile.edge_time
             if finish > other.deadline:
                 victims.append(other)
-        inserted = [*self.queue[:place], task, *self.queue[place:]]
         if not victims:
-            self.queue = inserted
+            self.insert(place, task)
             return ()
+        inserted = [*self.queue[:place], task, *self.queue[place:]]
         inserted.remove(victims[0])
         if len(victims) > 1 or _total_completion(inserted) >= _total_completion(self.queue):
             return self.to_cloud(task, now)
-        self.queue = inserted
+        self.insert(place, task)
+        self.remove(self.queue.index(victims[0]))
         return self.to_cloud(victims[0], now, MIGRATED)
 
     def to_cloud(

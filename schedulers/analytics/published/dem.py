@@ -26,10 +26,10 @@ class Dem(EdgeCloudEdf):
         victims = self._victims(place, finish)
         if victims and sum(self.loss(v, now) for v in victims) >= self.loss(task, now):
             return self.to_cloud(task, now)
-        self.queue.insert(place, task)
+        self.insert(place, task)
         decisions: list[Decision] = []
         for victim in victims:
-            self.queue.remove(victim)
+            self.remove(self.queue.index(victim))
             decisions.extend(self.to_cloud(victim, now, MIGRATED))
         return decisions
 
@@ -42,8 +42,9 @@ class Dem(EdgeCloudEdf):
 
     def _victims(self, place: int, finish: int) -> list[Task]:
         victims = []
-        for index, other in enumerate(self.queue[place:]):
-            finish += self.occupied(other)
+        lengths = self._lengths[place:]
+        for index, (other, length) in enumerate(zip(self.queue[place:], lengths, strict=True)):
+            finish += length
             if finish > other.deadline and not (self.published and index == 0):
                 victims.append(other)
         return victims

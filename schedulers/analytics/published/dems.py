@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from heapq import heappop, heappush
+from itertools import accumulate
 
 from aerodaas.schedulers.analytics.base import MILLISECOND, STOLEN, Decision, Task, WakeAt
 from aerodaas.schedulers.analytics.published.dem import Dem
@@ -42,33 +43,33 @@ class Dems(Dem):
         """Let the task wait until its latest start in the cloud, or on the edge."""
         profile = task.profile
         pays = profile.cloud_gain > 0 and self.resources.cloud_slots > 0
-        if pays and now + self.cloud_time(task) > task.deadline:
+        takes = self.cloud_time(task) if pays else profile.edge_time
+        if pays and now + takes > task.deadline:
             return [self.drop(task, now, "no time left for the cloud")]
-        leave = task.deadline - MARGIN - (self.cloud_time(task) if pays else profile.edge_time)
+        leave = task.deadline - MARGIN - takes
         if leave <= now:
-            return self.leave(task, now, reason)
+            return [self.leave(task, now, reason)]
         self.tentative[task] = reason
         heappush(self._leaves, (leave, self._waited, task))
         self._waited += 1
         return [WakeAt(leave)]
 
-    def leave(self, task: Task, now: int, reason: str) -> Iterable[Decision]:
+    def leave(self, task: Task, now: int, reason: str) -> Decision:
         """The task can wait no longer."""
         if task.profile.cloud_gain > 0 and self.resources.cloud_slots:
-            return [self.send(task, reason)]
-        return [self.drop(task, now, "not stolen, and the cloud costs more than it is worth")]
+            return self.send(task, reason)
+        return self.drop(task, now, "not stolen, and the cloud costs more than it is worth")
 
     def timer(self, now: int) -> Iterable[Decision]:
         """Send or drop the tasks whose latest start has come."""
+        leaves, tentative = self._leaves, self.tentative
         due: list[tuple[int, Task]] = []
-        while self._leaves and self._leaves[0][0] <= now:
-            _, number, task = heappop(self._leaves)
-            if task in self.tentative:
+        while leaves and leaves[0][0] <= now:
+            _, number, task = heappop(leaves)
+            if task in tentative:
                 due.append((number, task))
-        decisions: list[Decision] = []
-        for _, task in sorted(due):
-            decisions.extend(self.leave(task, now, self.tentative.pop(task)))
-        return decisions
+        due.sort()
+        return [self.leave(task, now, tentative.pop(task)) for _, task in due]
 
     def executor_idle(self, now: int) -> Iterable[Decision]:
         """Steal a task that fits before the queue, else run the queue's head."""
@@ -88,10 +89,12 @@ class Dems(Dem):
             if room < PUBLISHED_GATE:
                 return None
             return self._steal_as_published(now, room)
-        for task in sorted(self.tentative, key=_rank):
-            if task.profile.edge_time <= room and now + task.profile.edge_time <= task.deadline:
-                return task
-        return None
+        fitting = [
+            task
+            for task in self.tentative
+            if (takes := task.profile.edge_time) <= room and now + takes <= task.deadline
+        ]
+        return min(fitting, key=_rank, default=None)
 
     def _steal_as_published(self, now: int, room: int) -> Task | None:
         best: Task | None = None
@@ -106,14 +109,10 @@ class Dems(Dem):
 
     def _room(self, now: int) -> int:
         """Time that can be put before the queue without making a task in it miss."""
-        room = 1 << 62
-        finish = now
-        for task in self.queue:
-            finish += self.occupied(task)
-            spare = task.deadline - finish
-            if spare >= 0:
-                room = min(room, spare)
-        return room
+        ends = accumulate(self._lengths, initial=now)
+        next(ends)
+        spares = [task.deadline - end for task, end in zip(self.queue, ends, strict=True)]
+        return min([spare for spare in spares if spare >= 0], default=1 << 62)
 
 
 def _rank(task: Task) -> tuple[bool, float]:

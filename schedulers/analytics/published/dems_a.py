@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from aerodaas.schedulers.analytics.base import (
     MILLISECOND,
     Decision,
+    Drop,
     Result,
     Task,
     TaskOutcome,
@@ -31,9 +32,28 @@ _ANSWERED = (TaskOutcome.DONE, TaskOutcome.LATE)
 @dataclass(slots=True)
 class _Estimate:
     cloud_time: int
-    observed: deque[int] = field(default_factory=lambda: deque(maxlen=WINDOW))
+    observed: deque[int] = field(default_factory=deque)
+    total: int = 0
+    """Sum of what was observed."""
     cooling_until: int | None = None
     probe: Task | None = None
+
+    def observe(self, taken: int) -> None:
+        """Let the mean of a full window replace an estimate that differs from it."""
+        self.observed.append(taken)
+        self.total += taken
+        if len(self.observed) > WINDOW:
+            self.total -= self.observed.popleft()
+        if len(self.observed) == WINDOW:
+            mean = self.total // WINDOW
+            if abs(mean - self.cloud_time) > TOLERANCE:
+                self.cloud_time = mean
+
+    def refill(self, taken: int) -> None:
+        """Take a probe's time for all of the window."""
+        self.observed = deque([taken] * WINDOW)
+        self.total = taken * WINDOW
+        self.cloud_time = taken
 
 
 class DemsA(Dems):
@@ -48,17 +68,28 @@ class DemsA(Dems):
 
     def __init__(self, *, published: bool = False) -> None:
         super().__init__(published=published)
+        self.adapts = True
+        """Whether the estimates replace the profiles' times."""
         self._models: dict[str, _Estimate] = {}
         self._fixed: dict[Task, int] = {}
+        """Estimates at their arrival of the tasks that have not ended."""
+
+    def drop(self, task: Task, now: int, reason: str) -> Drop:
+        """Forget the task's estimate."""
+        self._fixed.pop(task, None)
+        return super().drop(task, now, reason)
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
         """Fix the estimate of the new task, then as DEMS."""
-        self._fixed[task] = self._model(task).cloud_time
+        model = self._model(task)
+        if self.adapts:
+            self._fixed[task] = model.cloud_time
         return super().task_arrived(task, now)
 
     def cloud_time(self, task: Task) -> int:
         """The estimate at the task's arrival."""
-        return self._fixed.get(task, task.profile.cloud_time)
+        fixed = self._fixed.get(task)
+        return task.profile.cloud_time if fixed is None else fixed
 
     def to_cloud(
         self, task: Task, now: int, reason: str = "no room on the edge"
@@ -84,15 +115,12 @@ class DemsA(Dems):
         if model.probe is task:
             model.probe = None
             if result.outcome is TaskOutcome.DONE and result.place is TaskPlace.CLOUD:
-                model.observed.extend([taken] * WINDOW)
-                model.cloud_time, model.cooling_until = taken, None
+                model.refill(taken)
+                model.cooling_until = None
             elif result.place is not TaskPlace.EDGE:
                 model.cooling_until = now + COOLING
         elif result.place is TaskPlace.CLOUD and result.outcome in _ANSWERED:
-            model.observed.append(taken)
-            mean = sum(model.observed) // len(model.observed)
-            if len(model.observed) == WINDOW and abs(mean - model.cloud_time) > TOLERANCE:
-                model.cloud_time = mean
+            model.observe(taken)
         return super().task_finished(result, now)
 
     def observe(self) -> Mapping[str, float]:

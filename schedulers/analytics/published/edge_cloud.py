@@ -28,7 +28,7 @@ class EdgeCloudEdf(EdgeQueue):
         """Edge if the newcomer finishes before its deadline there, else the cloud path."""
         place, finish = self.slot(task, now)
         if finish < task.deadline:
-            self.queue.insert(place, task)
+            self.insert(place, task)
             return ()
         return self.to_cloud(task, now)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right, insort_right
+from bisect import bisect_right
 from collections.abc import Iterable, Mapping
 
 from aerodaas.schedulers.analytics.base import (
@@ -21,13 +21,18 @@ __all__ = ["EdgeQueue"]
 class EdgeQueue(AnalyticsScheduler):
     """Tasks ordered by `key`, each start checked just in time against its expected time.
 
-    Ties keep the order of arrival. By itself it admits everything (edge only).
+    Ties keep the order of arrival. By itself it admits everything (edge only). Subclasses change
+    the queue by `insert` and `remove` only, which keep what is looked up with each arrival.
     """
 
     def __init__(self) -> None:
         self.queue: list[Task] = []
         self.free_at = 0
         """When the running task is expected to end."""
+        self._keys: list[float] | None = None
+        """Of the queue's tasks, from the first newcomer on that is offered a slot."""
+        self._lengths: list[int] = []
+        """How long each of them will occupy the edge, likewise."""
 
     def key(self, task: Task) -> float:
         """Order of the queue, the smallest first."""
@@ -35,7 +40,7 @@ class EdgeQueue(AnalyticsScheduler):
 
     def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:  # noqa: ARG002
         """Queue the task."""
-        insort_right(self.queue, task, key=self.key)
+        self.insert(bisect_right(self.queue, self.key(task), key=self.key), task)
         return ()
 
     def executor_idle(self, now: int) -> Iterable[Decision]:
@@ -43,12 +48,25 @@ class EdgeQueue(AnalyticsScheduler):
         queue = self.queue
         decisions: list[Decision] = []
         while queue:
-            task = queue.pop(0)
+            task = self.remove(0)
             if now + task.profile.edge_time <= self.due(task):
                 decisions.append(self.run(task, now))
                 break
             decisions.append(self.drop(task, now, "no time left on the edge"))
         return decisions
+
+    def insert(self, place: int, task: Task) -> None:
+        """Put `task` before the one that has this place in the queue."""
+        self.queue.insert(place, task)
+        if self._keys is not None:
+            self._keys.insert(place, self.key(task))
+            self._lengths.insert(place, self.occupied(task))
+
+    def remove(self, place: int) -> Task:
+        """Take the task of this place out of the queue."""
+        if self._keys is not None:
+            del self._keys[place], self._lengths[place]
+        return self.queue.pop(place)
 
     def run(self, task: Task, now: int, reason: str = "first in the edge queue") -> RunOnEdge:
         """Start `task`, expected to take its profile's time."""
@@ -87,9 +105,16 @@ class EdgeQueue(AnalyticsScheduler):
 
     def slot(self, task: Task, now: int) -> tuple[int, int]:
         """Place of a newcomer in the queue, and when it would finish there."""
-        place = bisect_right(self.queue, self.key(task), key=self.key)
-        ahead = sum(map(self.occupied, self.queue[:place]))
-        return place, max(self.free_at, now) + ahead + self.occupied(task)
+        if self._keys is None:
+            self._keys = [self.key(other) for other in self.queue]
+            self._lengths = [self.occupied(other) for other in self.queue]
+        place = bisect_right(self._keys, self.key(task))
+        begin = max(self.free_at, now)
+        return place, begin + sum(self._lengths[:place]) + self.occupied(task)
+
+    def measure_queue(self) -> None:
+        """Reckon anew how long the queue's tasks will occupy the edge, whose share changed."""
+        self._lengths = [self.occupied(task) for task in self.queue]
 
     def task_finished(self, result: Result, now: int) -> Iterable[Decision]:
         """The edge is free as soon as its task is back."""

@@ -31,8 +31,11 @@ class Gems(DemsA):
 
     def __init__(self, *, published: bool = False) -> None:
         super().__init__(published=published)
+        self.adapts = not published
         self._counts: dict[str, list[int]] = {}
         """Per model: number of the window, tasks in time, tasks ended."""
+        self._below: dict[str, int] = {}
+        """Models below their share when one of their tasks last ended, and the window of that."""
         self._changed = False
 
     def drop(self, task: Task, now: int, reason: str) -> Drop:
@@ -57,10 +60,6 @@ class Gems(DemsA):
         self._count(result.task, now, done=result.outcome is TaskOutcome.DONE)
         return self._and_rescue(super().task_finished(result, now), now)
 
-    def cloud_time(self, task: Task) -> int:
-        """The estimate; the profile's time if as published."""
-        return task.profile.cloud_time if self.published else super().cloud_time(task)
-
     def to_cloud(
         self, task: Task, now: int, reason: str = "no room on the edge"
     ) -> Iterable[Decision]:
@@ -73,30 +72,35 @@ class Gems(DemsA):
         return None if self.published and not self.queue else super()._steal(now)
 
     def _count(self, task: Task, now: int, *, done: bool) -> None:
-        counts = self._current(task, now)
+        profile = task.profile
+        goal = profile.qoe or _NO_GOAL
+        window = now // goal.window
+        counts = self._counts.get(profile.model)
+        if counts is None or counts[0] != window:
+            counts = self._counts[profile.model] = [window, 0, 0]
         counts[1] += done
         counts[2] += 1
+        if counts[1] < goal.share * counts[2]:
+            self._below[profile.model] = window
+        else:
+            self._below.pop(profile.model, None)
         self._changed = True
 
-    def _current(self, task: Task, now: int) -> list[int]:
-        window = now // (task.profile.qoe or _NO_GOAL).window
-        counts = self._counts.get(task.profile.model)
-        if counts is None or counts[0] != window:
-            counts = self._counts[task.profile.model] = [window, 0, 0]
-        return counts
-
     def _and_rescue(self, decisions: Iterable[Decision], now: int) -> Iterable[Decision]:
+        if not self._changed:
+            return decisions
         found = list(decisions)
         while self._changed:
             self._changed = False
             for task in [task for task in self.queue if self._in_danger(task, now)]:
-                self.queue.remove(task)
+                self.remove(self.queue.index(task))
                 found.append(self.send(task, MIGRATED))
         return found
 
     def _in_danger(self, task: Task, now: int) -> bool:
         profile = task.profile
-        if profile.qoe is None or profile.cloud_gain <= 0 or not self.resources.cloud_slots:
+        if profile.qoe is None or self._below.get(profile.model) != now // profile.qoe.window:
             return False
-        _, done, ended = self._current(task, now)
-        return done < profile.qoe.share * ended and now + self.cloud_time(task) < task.deadline
+        if profile.cloud_gain <= 0 or not self.resources.cloud_slots:
+            return False
+        return now + self.cloud_time(task) < task.deadline

@@ -48,7 +48,7 @@ class Kalmia(Fifo):
     def _place(self, task: Task, now: int) -> list[Decision] | None:
         place, finish = self.slot(task, now)
         if finish < self.due(task):
-            self.queue.insert(place, task)
+            self.insert(place, task)
             return []
         if self.resources.cloud_slots and now + self.cloud_time(task) < self.due(task):
             return [self.send(task, "no room on the edge")]

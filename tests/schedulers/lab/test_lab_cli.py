@@ -59,6 +59,24 @@ def test_options_given_several_times_all_count(tmp_path: Path) -> None:
     assert all(0.0 <= float(row["mean"]) <= 1.0 for row in rows if row["figure"] == "completion")
 
 
+def test_edges_are_one_option(tmp_path: Path) -> None:
+    """Six drones on three edges are two on each; the sweep has it, too."""
+    out = tmp_path / "out.json"
+    short = ("--edges", "3", "--seeds", "1", "--duration", "3", "-s", "edf", "--jobs", "1")
+    code, text = _run("run", "-w", "2D-P", *short, "--json", str(out))
+    assert code == 0, text
+    assert "intervals over 3 edges" in text
+    found = json.loads(out.read_text())[0]
+    assert (found["drones"], found["edges"]) == (6, 3)
+    code, text = _run(
+        *("sweep", "-w", "2D-P", *short, "--sweep", "models=P,A", "-o", str(tmp_path / "sweep"))
+    )
+    assert code == 0, text
+    rows = list(csv.DictReader((tmp_path / "sweep" / "runs.csv").open(encoding="utf-8")))
+    # A rate is the sum over the edges.
+    assert float(rows[0]["qos per s"]) > 3 * 100
+
+
 def test_the_list_names_what_there_is() -> None:
     """Schedulers with their idea, models with their figures."""
     code, text = _run("list")

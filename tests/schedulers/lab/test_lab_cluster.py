@@ -48,3 +48,16 @@ def test_a_class_of_ones_own_travels_to_the_cluster(runtime: None, tmp_path: Pat
     outcome = CliRunner().invoke(app, arguments, env={"COLUMNS": "220"})
     assert outcome.exit_code == 0, outcome.output
     assert re.search(r"Mine .* 0\.0", outcome.output)
+
+
+@pytest.mark.slow
+def test_what_a_scheduler_raises_there_is_told_here(runtime: None, tmp_path: Path) -> None:  # noqa: ARG001 - starts Ray
+    """In one line, with the seed and the edge, and without the other process' traceback."""
+    mine = tmp_path / "breaking.py"
+    mine.write_text(_MINE.replace("return [Drop(task)]", "raise RuntimeError(task.source)"))
+    arguments = ["run", "-w", "1D-P", "--edges", "2", "-s", f"{mine}:Mine", "--seeds", "1"]
+    arguments += ["--duration", "3", "--address", _address()]
+    outcome = CliRunner().invoke(app, arguments, env={"COLUMNS": "220"})
+    assert outcome.exit_code == 2
+    assert "Mine with seed 0 on edge 0: RuntimeError: drone0" in outcome.output
+    assert "Traceback" not in outcome.output

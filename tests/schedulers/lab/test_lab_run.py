@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 import pytest
 
-from aerodaas.schedulers.analytics.base import MILLISECOND, Profile, QoeGoal, Resources, Task
+from aerodaas.schedulers.analytics.base import (
+    MILLISECOND,
+    Decision,
+    Profile,
+    QoeGoal,
+    Resources,
+    Task,
+)
 from aerodaas.schedulers.analytics.published.cloud_only import CloudOnly
 from aerodaas.schedulers.analytics.published.edge_only import Fifo
 from aerodaas.schedulers.analytics.registry import load_scheduler
@@ -18,7 +26,7 @@ from aerodaas.schedulers.lab.run import run_lab
 from aerodaas.schedulers.lab.sample import SamplePath
 from aerodaas.schedulers.lab.simulator import simulate
 from aerodaas.schedulers.lab.times import ExecutionTimes
-from aerodaas.schedulers.lab.workload import Workload
+from aerodaas.schedulers.lab.workload import Arrival, Workload
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import SchedulerError, UnknownIdError
 
@@ -141,3 +149,56 @@ def test_plots_are_drawn(tmp_path: Path) -> None:
     plot_observations(traces, path, tmp_path / "over_time.png")
     sizes = [(tmp_path / f"{n}.png").stat().st_size for n in ("bars", "timeline", "over_time")]
     assert min(sizes) > 5000
+
+
+def test_a_workload_on_more_edges_has_as_many_drones_on_each() -> None:
+    """Of 80 on 7 edges, 34 on 3."""
+    assert SHORT.on_edges(5).drones == 10
+    fleet = Workload.named("80D-A/7").on_edges(3)
+    assert (fleet.drones, fleet.edges) == (34, 3)
+    listed = Workload("listed", SHORT.models, arrivals=(Arrival(0, "HV"),))
+    with pytest.raises(SchedulerError, match="lists its tasks"):
+        listed.on_edges(2)
+
+
+def test_one_seed_has_intervals_over_its_edges() -> None:
+    """Rates are sums over the edges, and so their intervals; of two seeds it is over those."""
+    fleet = SHORT.on_edges(4)
+    result = run_lab(fleet, ["ec_edf"], [2], times=VARYING, bound=False, jobs=1)
+    scores = result.edges["ec_edf"]
+    figures = result.figures("ec_edf")
+    rate = figures["qos per s"]
+    assert rate.value == sum(one.qos for one in scores) / 10
+    assert rate.margin == pytest.approx(4 * mean_of([one.qos / 10 for one in scores]).margin)
+    share = mean_of([one.completion for one in scores])
+    assert figures["completion"].margin == share.margin
+    several = run_lab(fleet, ["ec_edf"], [2, 3], times=VARYING, bound=False, jobs=1)
+    assert several.edges == {}
+    assert several.figures("ec_edf")["qos per s"] == mean_of(
+        [one.qos / 10 for one in several.scores["ec_edf"]]
+    )
+
+
+class Fragile(Fifo):
+    """Raises an exception of its own where a certain drone's task comes."""
+
+    class BrokenError(Exception):
+        """Cannot be made of its text alone, and so not be pickled."""
+
+        def __init__(self, what: str, where: int) -> None:
+            super().__init__(f"{what} {where}")
+
+    def task_arrived(self, task: Task, now: int) -> Iterable[Decision]:
+        """Break at drone 3."""
+        if task.source == "drone3":
+            raise self.BrokenError("no", 3)
+        return super().task_arrived(task, now)
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_an_error_is_told_with_its_seed_and_edge(jobs: int) -> None:
+    """Drone 3 of four is the second of edge 1; by processes, too."""
+    fleet = Workload.named("4D-P/2", NANOSECONDS)
+    told = r"^Fragile with seed 5 on edge 1: BrokenError: no 3 at test_lab_run.py:\d+$"
+    with pytest.raises(SchedulerError, match=told):
+        run_lab(fleet, [Fragile], [5, 6], bound=False, jobs=jobs)
