@@ -6,7 +6,7 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -15,6 +15,9 @@ from aerodaas.cli.provider_output import At, Json, client_at, moment, print_json
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import ProviderOptions, RunOptions
 from aerodaas.types.errors import ConfigError, MissionError
+
+if TYPE_CHECKING:
+    from aerodaas.protocol.schemas import RobotOut
 
 __all__ = ["cancel", "fetch", "fleet", "login", "missions", "submit", "watch"]
 
@@ -58,7 +61,7 @@ def login(
 
 
 def fleet(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
-    """Show a provider's drones: free or leased, their charge, where they are.
+    """Show a provider's drones: free or leased, their charge, where they are, and their health.
 
     aerodaas fleet --at https://provider.example
     aerodaas fleet --json | jq '.robots[] | select(.lease == null) | .id'
@@ -73,11 +76,12 @@ def fleet(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
             _use(one.enabled, one.lease, one.mission, one.tenant),
             "-" if one.battery is None else f"{one.battery:.0%}",
             _place(one.position),
+            _health(one),
             ", ".join(sensor.rpartition("/")[2] for sensor in one.sensors),
         )
         for one in found.robots
     ]
-    print_table(found.name, ("robot", "use", "battery", "where", "sensors"), rows)
+    print_table(found.name, ("robot", "use", "battery", "where", "health", "sensors"), rows)
 
 
 def submit(
@@ -279,6 +283,14 @@ def _use(enabled: bool, lease: str | None, mission: str | None, tenant: str | No
     if lease is None:
         return "free"
     return f"flies {mission}" if mission else f"leased by {tenant}" if tenant else "leased"
+
+
+def _health(robot: RobotOut) -> str:
+    """The link, and what speaks against a flight; of a drone in flight, its complaints."""
+    said = robot.objection or "; ".join(robot.faults)
+    if robot.link.value == "lost":
+        return said or "does not answer"
+    return f"{robot.link.value}: {said}" if said else robot.link.value
 
 
 def _place(position: tuple[float, float, float] | None) -> str:

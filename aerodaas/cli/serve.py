@@ -41,6 +41,9 @@ def serve(
     rehearse: Annotated[  # noqa: FBT002 - Typer's flags
         bool, typer.Option(help="Fly each mission in simulation before it flies.")
     ] = True,
+    monitor: Annotated[  # noqa: FBT002 - as above
+        bool, typer.Option(help="Hold the connection to each drone between its missions.")
+    ] = True,
     approval: Annotated[  # noqa: FBT002 - as above
         bool, typer.Option("--approval", help="Have an operator approve each mission.")
     ] = False,
@@ -91,6 +94,7 @@ def serve(
         config=located(EnvironmentConfig.load(fleet), fleet.absolute().parent),
         state=state.absolute(),
         rehearse=rehearse,
+        monitor=monitor,
         approval=approval,
         speed="max" if lockstep else factor or 1.0,
         address=address,

@@ -28,6 +28,7 @@ __all__ = [
     "LeaseIn",
     "LeaseOut",
     "LeaseState",
+    "LinkState",
     "MissionIn",
     "MissionOut",
     "MissionPhase",
@@ -128,6 +129,20 @@ class StreamKind(str, enum.Enum):
     DETECTIONS = "detections"
 
 
+class LinkState(str, enum.Enum):
+    """Who is connected to a drone, and whether it answers."""
+
+    UNWATCHED = "unwatched"
+    """Nobody is: it is out of service, or this service does not watch."""
+    CONNECTING = "connecting"
+    CONNECTED = "connected"
+    """The service is, between missions."""
+    MISSION = "mission"
+    """The mission that flies it is."""
+    LOST = "lost"
+    """It does not answer."""
+
+
 class RefusalOut(AnswerModel):
     """Answer to each request that is not carried out, with the HTTP status."""
 
@@ -154,6 +169,15 @@ class RobotOut(AnswerModel):
     """Moment of battery and position."""
     enabled: bool = True
     """False after an operator has taken it out of service."""
+    link: LinkState = LinkState.UNWATCHED
+    since: float | None = None
+    """Moment since which the link is so; of a lost one, when it was last heard."""
+    mode: str | None = None
+    """What the vehicle says that it does, one of `VehicleMode`."""
+    faults: list[str] = Field(default_factory=list)
+    """What the vehicle complains of."""
+    objection: str = ""
+    """Why it can be neither leased nor flown now; empty if it can, or is in flight."""
 
 
 class FleetOut(AnswerModel):

@@ -13,11 +13,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.protocol.piloting import ControlsIn, RearrangeIn
 from aerodaas.protocol.schemas import (
     CommandIn,
     LeaseState,
+    LinkState,
     MissionIn,
     MissionOut,
     MissionPhase,
@@ -30,14 +31,17 @@ from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
-from aerodaas.service.garage import Garage
+from aerodaas.service.garage import OUT_OF_SERVICE, Garage
 from aerodaas.service.idempotency import fingerprint
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
 from aerodaas.service.models import ModelShelf, require_room
+from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.records import shown
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
 from aerodaas.types.errors import AeroDaaSError, MissionError
+from aerodaas.types.status import MissionState
+from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["MissionDesk"]
 
@@ -60,13 +64,18 @@ class MissionDesk:
         bookings: Bookings,
         garage: Garage,
         models: ModelShelf,
+        monitor: FleetMonitor | None = None,
     ) -> None:
-        """Take up the missions that the database has; `start` moves them on."""
+        """Take up the missions that the database has; `start` moves them on.
+
+        `monitor` holds the drones that no mission flies; None for nobody.
+        """
         self._settings = settings
         self._store = store
         self._bookings = bookings
         self._garage = garage
         self._models = models
+        self._monitor = monitor
         self._briefing = Briefing(settings, store, bookings, garage)
         self._lock = threading.RLock()
         self._closed = threading.Event()
@@ -90,6 +99,8 @@ class MissionDesk:
         with self._lock:
             for one in self._missions.values():
                 one.close()
+        if self._monitor is not None:
+            self._monitor.close()
 
     def submit(self, principal: Principal, wanted: MissionIn, key: str | None = None) -> MissionOut:
         """Take a mission in, or find the one that was submitted before with the same `key`.
@@ -103,7 +114,7 @@ class MissionDesk:
             return known
         require_room(self._settings.state)
         robots = self._briefing.check(principal, wanted.document)
-        self._garage.require_enabled(robots)
+        self._garage.require_fit(robots)
         self._bookings.require_quota(principal.tenant, wanted.minutes * len(robots))
         if wanted.lease is not None:
             self._bookings.require(principal, wanted.lease, robots)
@@ -321,6 +332,17 @@ class MissionDesk:
                     del self._missions[one.row.id]
                     self._texts.pop(one.row.id, None)
                     self._heard.pop(one.row.id, None)
+            self._have_watched()
+
+    def _have_watched(self) -> None:
+        """Have the monitor hold each drone in service that no mission has, or is to have next."""
+        if self._monitor is None:
+            return
+        taken = self._busy() | {
+            robot for one in self._missions.values() if one.handing_over for robot in one.row.robots
+        }
+        states = self._garage.states.values()
+        self._monitor.watch({one.id for one in states if one.enabled and one.id not in taken})
 
     def _move(self, one: ActiveMission) -> None:
         """Move one mission on; what it meets is its own failure, unless the database is gone."""
@@ -379,10 +401,29 @@ class MissionDesk:
             lease = self._bookings.lease(one.row.lease)
         if lease.state is LeaseState.ENDED:
             self._end(one, MissionPhase.REFUSED, f"its lease has ended: {lease.reason}")
-        elif lease.state is LeaseState.GRANTED and self._has_place(one):
+        elif lease.state is LeaseState.GRANTED and self._has_place(one) and self._handed_over(one):
             one.brief(self._briefing.flight(one.row, lease), self._models)
             one.to(MissionPhase.FLYING, started=time.time())
+            self._garage.hand(one.row.robots, LinkState.MISSION)
             one.take_off()
+
+    def _handed_over(self, one: ActiveMission) -> bool:
+        """Whether the monitor has let go of a mission's drones, each of which was fit to fly.
+
+        A flight begins only then, so that one process at a time is connected with a drone.
+        """
+        if self._monitor is None:
+            return True
+        robots = one.row.robots
+        if one.handing_over:
+            # One that somebody else has armed meanwhile is not let go of.
+            one.handing_over = not any(map(self._garage.objection, robots))
+            return one.handing_over and self._monitor.released(robots)
+        held_up = [f"{name}: {why}" for name in robots if (why := self._garage.waits_for(name))]
+        one.handing_over = not held_up
+        if held_up:
+            one.wait_for(f"waits for {'; '.join(held_up)}")
+        return False
 
     def _has_place(self, wanted: ActiveMission) -> bool:
         """Whether a flight may begin: its drones may be on their way home from the last one."""
@@ -405,21 +446,25 @@ class MissionDesk:
         try:
             outcome = one.flown()
         except LostFlightError as error:
-            reason = (
-                f"its process died in flight ({error}); its drones are out of service until an "
-                "operator has looked"
-            )
+            reason = f"its process died in flight ({error}); its drones are {OUT_OF_SERVICE}"
             self._garage.take_out(one.row.robots)
+            self._garage.hand(one.row.robots, LinkState.UNWATCHED)
             self._end(one, MissionPhase.FAILED, reason)
             return
         if outcome is None:
             return
         self._garage.note(outcome.status, now=True)
+        self._garage.hand(one.row.robots, LinkState.UNWATCHED)
         self._store.usage.put(usage_of(one.row, outcome, one.flight.recording))
         phase = MissionPhase.LANDED if outcome.landed else MissionPhase.FAILED
         if outcome.landed and outcome.reason.startswith(CANCELLED_BY):
             phase = MissionPhase.CANCELLED
-        self._end(one, phase, outcome.reason)
+        reason = outcome.reason
+        if up := [name for name, last in outcome.status.items() if _may_fly(last)]:
+            # Its actor may fly it still, or a pilot: nobody else connects with it before a look.
+            self._garage.take_out(up)
+            reason += f"; {', '.join(up)}: not known to be down, {OUT_OF_SERVICE}"
+        self._end(one, phase, reason)
 
     def _end(self, one: ActiveMission, phase: MissionPhase, reason: str) -> None:
         one.to(phase, reason, ended=time.time())
@@ -452,3 +497,9 @@ class MissionDesk:
         found = self.mission(principal, mission)
         if found.tenant != principal.tenant and not principal.role.reaches(Role.OPERATOR):
             raise RefusedError(403, f"{mission} is {found.tenant}'s: you may watch it")
+
+
+def _may_fly(last: StatusOut) -> bool:
+    """Whether a drone whose mission has ended is not known to stand on the ground."""
+    down = last.mode in {None, VehicleMode.GROUNDED.value}
+    return not down and last.state != MissionState.LANDED.value

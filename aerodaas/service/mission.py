@@ -53,6 +53,8 @@ class ActiveMission:
         self.link: FlightLink | None = None
         self.version = 0
         """Counts the changes."""
+        self.handing_over = False
+        """Whether the monitor is to let go of its drones, for it flies next."""
         self._save = save
         self._rehearsing: subprocess.Popen[bytes] | None = None
         self._flying: subprocess.Popen[bytes] | None = None
@@ -93,6 +95,11 @@ class ActiveMission:
         self._save(row)
         self.row = row
         self.version += 1
+
+    def wait_for(self, what: str) -> None:
+        """Tell what a queued mission waits for, if that is news."""
+        if what != self.row.reason:
+            self.change(reason=what)
 
     @property
     def rehearsal_lost(self) -> bool:

@@ -24,6 +24,8 @@ class ServiceSettings:
     """Folder of the database, models, and flights."""
     rehearse: bool = True
     """Fly each mission in simulation first."""
+    monitor: bool = True
+    """Hold the connection to each drone between its missions."""
     approval: bool = False
     """An operator has to approve each mission after its rehearsal."""
     speed: Literal["max"] | float = 1.0
