@@ -19,7 +19,7 @@ from aerodaas.types.errors import ConfigError, MissionError
 if TYPE_CHECKING:
     from aerodaas.protocol.schemas import RobotOut
 
-__all__ = ["cancel", "fetch", "fleet", "login", "missions", "submit", "watch"]
+__all__ = ["cancel", "fetch", "fleet", "grant", "login", "missions", "submit", "watch"]
 
 _LOOK_SECONDS = 0.5
 MissionId = Annotated[str, typer.Argument(metavar="MISSION", help="Its id; `missions` lists them.")]
@@ -113,6 +113,16 @@ def submit(
         float | None, typer.Option(min=1, help="After how long. Default: 30.")
     ] = None,
     share: Annotated[list[str] | None, typer.Option(help="A tenant that may watch, too.")] = None,
+    grant: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="TENANT[=SENSOR,…]", help="A tenant that may attach missions to its cameras."
+        ),
+    ] = None,
+    attach: Annotated[
+        str | None,
+        typer.Option(metavar="MISSION", help="Sense only, by the cameras of a mission in flight."),
+    ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Seed of the simulation, if the drones are.")
     ] = None,
@@ -138,6 +148,7 @@ def submit(
         aerodaas submit farm_survey --to https://provider.example
         aerodaas submit farm.json --minutes 5 --silence return
         aerodaas submit my_app.py --no-wait --json | jq -r .id
+        aerodaas submit crowd_watch --attach 3f1a6c0d9b2e
     """
     from aerodaas.environment.provider.logins import default_url  # noqa: PLC0415 - slow to load
 
@@ -151,6 +162,8 @@ def submit(
         silence=silence,
         silence_seconds=silence_seconds,
         share=tuple(share or ()),
+        grant=tuple(grant or ()),
+        attach=attach,
         report=print_json if as_json else None,
     )
     options = RunOptions(
@@ -226,6 +239,35 @@ def watch(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # 
         raise MissionError(f"mission {found.id} {found.phase.value}: {found.reason}")
     if not as_json:
         typer.echo(f"landed; aerodaas fetch {found.id} brings the recording")
+
+
+def grant(
+    mission: MissionId,
+    tenant: Annotated[str, typer.Argument(help="Who may attach missions that sense only.")],
+    sensors: Annotated[
+        list[str] | None, typer.Argument(metavar="[SENSOR]…", help="Cameras. Default: all.")
+    ] = None,
+    withdraw: Annotated[  # noqa: FBT002
+        bool, typer.Option("--withdraw", help="Withdraw it: what is attached ends.")
+    ] = False,
+    at: At = None,
+    as_json: Json = False,  # noqa: FBT002
+) -> None:
+    """Share the cameras of your mission in flight with another tenant's applications.
+
+    aerodaas grant 3f1a6c0d9b2e city one/cam
+    aerodaas grant 3f1a6c0d9b2e city --withdraw
+    """
+    client = client_at(at)
+    if withdraw:
+        found = client.withdraw(mission, tenant)
+    else:
+        found = client.grant(mission, tenant, sensors or ())
+    if as_json:
+        print_json(found)
+        return
+    granted = [f"{name} ({', '.join(one) or 'all cameras'})" for name, one in found.grants.items()]
+    typer.echo(f"{found.id} shares its cameras with {'; '.join(granted) or 'nobody'}")
 
 
 def cancel(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # noqa: FBT002

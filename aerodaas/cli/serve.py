@@ -47,6 +47,9 @@ def serve(
     approval: Annotated[  # noqa: FBT002 - as above
         bool, typer.Option("--approval", help="Have an operator approve each mission.")
     ] = False,
+    most_attached: Annotated[
+        int, typer.Option(min=0, help="Missions that may share one flight's cameras; 0: none.")
+    ] = 0,
     address: Annotated[str | None, typer.Option(help="Ray cluster that flights join.")] = None,
     oidc_issuer: Annotated[
         str | None,
@@ -97,6 +100,7 @@ def serve(
         monitor=monitor,
         approval=approval,
         speed="max" if lockstep else factor or 1.0,
+        most_attached=most_attached,
         address=address,
         oidc=_oidc(
             oidc_issuer,

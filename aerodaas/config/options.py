@@ -36,6 +36,10 @@ class ProviderOptions:
     silence_seconds: float | None = None
     share: tuple[str, ...] = ()
     """Tenants that may watch."""
+    attach: str | None = None
+    """A flying mission whose cameras are shared: the application senses only."""
+    grant: tuple[str, ...] = ()
+    """Tenants that may attach missions to its cameras: `TENANT`, or `TENANT=SENSOR,…`."""
     report: Callable[[Any], None] | None = None
     """Told of each mission that has ended, a `MissionOut`."""
 
@@ -46,6 +50,9 @@ class RunOptions:
 
     environment: Path | None = None
     """Environment file instead of the application's own."""
+    senses_only: bool = False
+    """Run without a robot that navigates, as long as the cameras have pictures: a mission that is
+    attached to another one's cameras."""
     config: EnvironmentConfig | None = None
     """Environment itself, in the place of the file's content; relative paths are the file's."""
     speed: float | None = None

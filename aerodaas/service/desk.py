@@ -26,6 +26,7 @@ from aerodaas.protocol.schemas import (
     Role,
 )
 from aerodaas.service.access import Principal, sees
+from aerodaas.service.attachments import Attachments
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError, StoreError
@@ -83,6 +84,7 @@ class MissionDesk:
         self._texts: dict[str, tuple[int, str, bool]] = {}
         """Version, JSON and whether it is over, by mission that is watched."""
         self._missions: dict[str, ActiveMission] = {}
+        self._attachments = Attachments(settings, bookings, self._missions)
         bookings.flying = self._busy
         bookings.on_end.append(self._recall)
         bookings.on_extension.append(self._prolong)
@@ -113,7 +115,11 @@ class MissionDesk:
         if known is not None:
             return known
         require_room(self._settings.state)
-        robots = self._briefing.check(principal, wanted.document)
+        attached = wanted.attach is not None
+        robots = self._briefing.check(principal, wanted.document, attached=attached)
+        if attached:
+            with self._lock:
+                self._attachments.check(principal, wanted)
         self._garage.require_fit(robots)
         self._bookings.require_quota(principal.tenant, wanted.minutes * len(robots))
         if wanted.lease is not None:
@@ -201,6 +207,27 @@ class MissionDesk:
         """The order of a mission that flies and that this account may command."""
         return FlightOrder.read(self._flown(principal, mission).flight.order)
 
+    def grant(
+        self, principal: Principal, mission: str, tenant: str, sensors: list[str] | None
+    ) -> MissionOut:
+        """Let a tenant attach missions to a mission's cameras; none at all for `sensors` None."""
+        self._require_own(principal, mission)
+        with self._lock:
+            one = self._one(mission)
+            if sensors is None:
+                self._attachments.withdrawn(one, tenant)
+            else:
+                self._attachments.granted(one, tenant, sensors)
+            return shown(one)
+
+    def shared(self, robot: str, tenant: str) -> tuple[str | None, list[str]]:
+        """The mission that flies a robot, and its cameras that a tenant may attach missions to."""
+        host = next((one for one in self._flying() if robot in one.row.robots), None)
+        if host is None:
+            return None, []
+        own = {one.full_id for one in self._settings.config.all_sensors() if one.robot == robot}
+        return host.row.id, [one for one in self._attachments.shared(host, tenant) if one in own]
+
     def _ask(self, principal: Principal, mission: str, **request: Any) -> AnswerOut:  # noqa: ANN401
         one = self._flown(principal, mission)
         with self._lock:
@@ -214,6 +241,9 @@ class MissionDesk:
             one = self._one(mission)
             if one.phase is not MissionPhase.FLYING:
                 raise RefusedError(409, f"{mission} is not flying: {one.phase.value}")
+            if one.attached_to is not None:
+                text = f"{mission} is attached to {one.attached_to}: it senses only"
+                raise RefusedError(403, text)
             return one
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
@@ -249,10 +279,6 @@ class MissionDesk:
         """A number that grows with each change of a mission; -1 once it is over."""
         one = self._missions.get(mission)
         return -1 if one is None else one.version
-
-    def flying(self, robot: str) -> str | None:
-        """The mission that flies a robot now; None if none does."""
-        return next((one.row.id for one in self._flying() if robot in one.row.robots), None)
 
     def flies(self, principal: Principal, mission: str) -> bool:
         """Whether a mission is this account's own, so that its presence counts."""
@@ -369,7 +395,7 @@ class MissionDesk:
             step(one)
 
     def _begin(self, one: ActiveMission) -> None:
-        if not self._settings.rehearse:
+        if not self._settings.rehearse or one.attached_to is not None:
             self._admit(one)
             return
         one.rehearse(self._briefing.rehearsal(one.row), self._models)
@@ -394,6 +420,11 @@ class MissionDesk:
             one.to(MissionPhase.QUEUED, "waits for its drones")
 
     def _take_off(self, one: ActiveMission) -> None:
+        if one.attached_to is not None:
+            if self._has_place(one):
+                attached = self._attachments.begin(one)
+                self._begin_flight(one, self._briefing.attached(one.row, attached))
+            return
         if one.row.lease is None:
             lease = self._bookings.for_mission(one.row)
             one.change(lease=lease.id)
@@ -402,10 +433,13 @@ class MissionDesk:
         if lease.state is LeaseState.ENDED:
             self._end(one, MissionPhase.REFUSED, f"its lease has ended: {lease.reason}")
         elif lease.state is LeaseState.GRANTED and self._has_place(one) and self._handed_over(one):
-            one.brief(self._briefing.flight(one.row, lease), self._models)
-            one.to(MissionPhase.FLYING, started=time.time())
-            self._garage.hand(one.row.robots, LinkState.MISSION)
-            one.take_off()
+            self._begin_flight(one, self._briefing.flight(one.row, lease))
+
+    def _begin_flight(self, one: ActiveMission, order: FlightOrder) -> None:
+        one.brief(order, self._models)
+        one.to(MissionPhase.FLYING, started=time.time())
+        self._garage.hand(one.row.robots, LinkState.MISSION)
+        one.take_off()
 
     def _handed_over(self, one: ActiveMission) -> bool:
         """Whether the monitor has let go of a mission's drones, each of which was fit to fly.
@@ -443,10 +477,14 @@ class MissionDesk:
         one.take_off()
         link = one.follow()
         self._garage.note(link.news.status)
+        if one.attached_to is not None:
+            self._attachments.watch(one)
         try:
             outcome = one.flown()
         except LostFlightError as error:
-            reason = f"its process died in flight ({error}); its drones are {OUT_OF_SERVICE}"
+            reason = f"its process died in flight ({error})"
+            if one.row.robots:
+                reason += f"; its drones are {OUT_OF_SERVICE}"
             self._garage.take_out(one.row.robots)
             self._garage.hand(one.row.robots, LinkState.UNWATCHED)
             self._end(one, MissionPhase.FAILED, reason)
@@ -468,6 +506,8 @@ class MissionDesk:
 
     def _end(self, one: ActiveMission, phase: MissionPhase, reason: str) -> None:
         one.to(phase, reason, ended=time.time())
+        if one.attached_to is not None:
+            self._attachments.leave(one)
         if one.row.lease is not None:
             self._bookings.give_back(one.row)
 

@@ -102,6 +102,17 @@ class ActiveMission:
             self.change(reason=what)
 
     @property
+    def attached_to(self) -> str | None:
+        """The mission by whose cameras this one senses; None for one that flies itself."""
+        found: str | None = self.row.request.get("attach")
+        return found
+
+    @property
+    def grants(self) -> dict[str, list[str]]:
+        """Cameras by tenant that may attach missions; an empty list is all of them."""
+        return dict(self.row.request.get("grants", {}))
+
+    @property
     def rehearsal_lost(self) -> bool:
         """Whether a former service began the rehearsal, which ended with it, without a result."""
         return self._rehearsing is None and self.rehearsal.outcome() is None
@@ -150,6 +161,12 @@ class ActiveMission:
         document = self.document()
         folder.make(order, document.text())
         models.lend(document, folder.models)
+
+    def end_flight(self) -> None:
+        """End the process of an attached mission, which has no drone, and all it has started."""
+        if self._flying is not None and self._flying.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._flying.pid, signal.SIGKILL)
 
     def follow(self) -> FlightLink:
         """The link to the flight, made when it is first needed."""

@@ -36,6 +36,8 @@ class ServiceSettings:
     """OpenID Connect issuer whose tokens are good, too."""
     rehearsal_seconds: float = 300.0
     """Most wall seconds of a rehearsal."""
+    most_attached: int = 0
+    """Most missions that sense by the cameras of one flight; 0: cameras are not shared."""
     most_flights: int = 16
     """Most flights at once."""
 

@@ -2,122 +2,20 @@
 
 from __future__ import annotations
 
-import json
 import time
-from collections.abc import Collection, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
-from served import document, fleet, robot
+from desks import PILOT, Monitor, Provider
 
-from aerodaas.analytics.remote.schemas import StatusOut
-from aerodaas.config.model import EnvironmentConfig
-from aerodaas.protocol.schemas import LinkState, MissionIn, MissionOut, MissionPhase, Role, Scope
-from aerodaas.service import mission as missions
-from aerodaas.service.access import Principal, Quotas
-from aerodaas.service.bookings import Bookings
+from aerodaas.protocol.schemas import LeaseIn, LinkState, MissionPhase
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.fleet_view import FleetView
-from aerodaas.service.flights.order import Outcome
-from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.monitor.news import VehicleNews
-from aerodaas.service.settings import ServiceSettings
-from aerodaas.service.store import Account, Store, Tenant
-
-PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(Scope), "t")
-
-
-class Monitor:
-    """A monitor whose letting go a test decides."""
-
-    def __init__(self, garage: Garage) -> None:
-        self._garage = garage
-        self._news: dict[str, VehicleNews] = {}
-        self.wanted: set[str] = set()
-        self.held: set[str] = set()
-
-    def watch(self, robots: Collection[str]) -> None:
-        """Hold these; what was held stays so until a test lets go of it."""
-        self.wanted = set(robots)
-        self.held |= self.wanted
-
-    def released(self, robots: Collection[str]) -> bool:
-        """Whether it holds none of these."""
-        return self.held.isdisjoint(robots)
-
-    def close(self) -> None:
-        """Nothing."""
-
-    def see(self, name: str, **changes: object) -> None:
-        """Tell of one drone, as connected and fit but for the changes."""
-        fit: dict[str, Any] = {"link": LinkState.CONNECTED, "heard": time.time(), "battery": 0.9}
-        self._news[name] = VehicleNews(**{"held": True, **fit, **changes})
-        self._garage.observe(self._news)
-
-
-class Provider:
-    """A desk with two drones, in whose flights a test is the process."""
-
-    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-        path = folder / "fleet.json"
-        path.write_text(json.dumps(fleet(robot("one"), robot("two", 10))), encoding="utf-8")
-        self.started: list[Any] = []
-        monkeypatch.setattr(missions, "start_process", lambda folder, **_: self._start(folder))
-        config = EnvironmentConfig.load(path)
-        settings = ServiceSettings(path, config, folder / "s", rehearse=False)
-        settings.state.mkdir()
-        self.store = Store.open(folder / "service.db")
-        self.store.tenants.add(Tenant("farm"))
-        self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
-        self.garage = Garage(config, self.store)
-        self.bookings = Bookings(config, self.store, self.garage, Quotas(self.store))
-        self.monitor = Monitor(self.garage)
-        self.desk = MissionDesk(
-            settings,
-            self.store,
-            bookings=self.bookings,
-            garage=self.garage,
-            models=ModelShelf(settings.models),
-            monitor=self.monitor,  # type: ignore[arg-type] - what the desk calls of one
-        )
-        self.fleet = FleetView(config, {}, self.garage, self.bookings, self.desk)
-
-    def _start(self, folder: Any) -> Any:  # noqa: ANN401
-        self.started.append(folder)
-
-        class Process:
-            def poll(self) -> int | None:
-                return None if folder.outcome() is None else 0
-
-        return Process()
-
-    def submit(self, name: str = "one") -> MissionOut:
-        """Submit a mission for one drone."""
-        content = {"document": document(name, (5, 0))}
-        return self.desk.submit(PILOT, MissionIn.model_validate(content))
-
-    def turns(self, count: int = 4) -> None:
-        """Let the desk move on."""
-        for _ in range(count):
-            self.desk.turn()
-
-    def phase(self, mission: MissionOut) -> MissionPhase:
-        """Present phase of a mission."""
-        return self.desk.shown(mission.id).phase
-
-    def land(self, **changes: object) -> None:
-        """End the newest flight, with its drone on the ground but for the changes."""
-        numbers = ("time", "distance", "waypoints_visited", "waypoints_known")
-        lists = ("pending", "visited", "given_up", "faults")
-        content: dict[str, Any] = {"state": "landed", "reason": "", "target": None}
-        content |= {"mode": "grounded", "battery": 0.7, **dict.fromkeys(numbers, 1)}
-        status = StatusOut(**{**content, **{name: [] for name in lists}, **changes})
-        self.started[-1].end(
-            Outcome(landed=True, began=0.0, ended=1.0, status={"one": status}, reason="over")
-        )
+from aerodaas.service.monitor.process import FleetMonitor
 
 
 @pytest.fixture
@@ -195,10 +93,8 @@ def test_what_cannot_fly_is_neither_leased_nor_submitted_to(
     assert any_one.robots == ("two",)
 
 
-def wish(*robots: str) -> Any:  # noqa: ANN401 - a request
+def wish(*robots: str) -> LeaseIn:
     """A request of these drones, or of any one."""
-    from aerodaas.protocol.schemas import LeaseIn  # noqa: PLC0415 - a request
-
     return LeaseIn(robots=list(robots) or None)
 
 
@@ -229,7 +125,9 @@ def test_one_that_is_not_known_to_be_down_is_nobodys(provider: Provider) -> None
     assert provider.monitor.wanted == {"one", "two"}
 
 
-def test_drones_in_flight_are_left_alone_after_a_restart(provider: Provider) -> None:
+def test_drones_in_flight_are_left_alone_after_a_restart(
+    provider: Provider, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A new service finds them in the database before it lets the monitor hold anything."""
     provider.monitor.see("one")
     provider.submit()
@@ -239,14 +137,14 @@ def test_drones_in_flight_are_left_alone_after_a_restart(provider: Provider) -> 
     assert len(provider.started) == 1
     seen: list[set[str]] = []
     monitor = Monitor(provider.garage)
-    monitor.watch = lambda robots: seen.append(set(robots))  # type: ignore[method-assign]
+    monkeypatch.setattr(monitor, "watch", lambda robots: seen.append(set(robots)))
     again = MissionDesk(
-        provider.desk._settings,
+        provider.settings,
         provider.store,
         bookings=provider.bookings,
         garage=provider.garage,
-        models=ModelShelf(provider.desk._settings.models),
-        monitor=monitor,  # type: ignore[arg-type]
+        models=ModelShelf(provider.settings.models),
+        monitor=cast("FleetMonitor", monitor),
     )
     again.turn()
     again.close()

@@ -13,7 +13,7 @@ from aerodaas.config.json_text import read_json
 from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
 from aerodaas.service.limits import TenantLimits
 
-__all__ = ["FlightOrder", "OtherLease", "Outcome"]
+__all__ = ["Attached", "FlightOrder", "OtherLease", "Outcome"]
 
 
 class _Record(BaseModel):
@@ -25,6 +25,16 @@ class OtherLease(_Record):
 
     id: str
     area: Area
+
+
+class Attached(_Record):
+    """The flight by whose cameras a mission senses."""
+
+    mission: str
+    control: Path
+    """Its control socket."""
+    sensors: list[str]
+    """Cameras that are shared, by full id."""
 
 
 class FlightOrder(_Record):
@@ -50,6 +60,8 @@ class FlightOrder(_Record):
     seed: int | None = None
     address: str | None = None
     """Ray cluster to join; None for one of its own."""
+    attached: Attached | None = None
+    """For a mission that senses only, which has no robots."""
     rehearsal: bool = False
     """Fly in simulation, and judge the recording."""
     battery: dict[str, float] = Field(default_factory=dict)
