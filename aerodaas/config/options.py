@@ -45,6 +45,16 @@ class ProviderOptions:
 
 
 @dataclass(frozen=True)
+class EdgeShare:
+    """Share of an edge that several flights of a provider use."""
+
+    turns: Path
+    """Socket of the service that gives turns."""
+    tenant: str
+    weight: float = 1.0
+
+
+@dataclass(frozen=True)
 class RunOptions:
     """Options of one run; None keeps the setting of the application or its environment file."""
 
@@ -64,6 +74,8 @@ class RunOptions:
     """Folder for the recording, the plots and the summary."""
     address: str | None = None
     """Ray cluster to join."""
+    edge: EdgeShare | None = None
+    """Share the edge with other flights of a provider."""
     overrides: dict[str, Any] = field(default_factory=dict)
     """Settings by `id.setting`, such as `camera.rate`."""
     view: bool = True

@@ -320,7 +320,11 @@ class Run:
         self._change_models()
         application = self._application()
         session = Session(
-            self.config, speed, timetables=self._timetables(), application=application
+            self.config,
+            speed,
+            timetables=self._timetables(),
+            edge=None if self.lockstep else self.options.edge,
+            application=application,
         )
         compute = self._environment.compute()
         joins = self.options.address or os.environ.get("RAY_ADDRESS")

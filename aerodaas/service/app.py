@@ -15,6 +15,7 @@ from aerodaas.console.page import page_routes
 from aerodaas.service.access import Access, Accounts, Audit, OidcVerifier, Quotas, RateLimiter
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
+from aerodaas.service.edge import EdgeArbiter
 from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
 from aerodaas.service.gate import Gate
@@ -66,11 +67,19 @@ def build_service(
     shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)
     fleet = FleetView(settings.config, shown, garage, bookings, desk)
 
+    edge = None
+    if settings.edge_slots is not None:
+        edge = EdgeArbiter(settings.edge_turns, settings.edge_slots)
+
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         desk.start()
+        if edge is not None:
+            edge.start()
         yield
         desk.close()
+        if edge is not None:
+            edge.close()
 
     app = FastAPI(
         title="AeroDaaS",

@@ -11,7 +11,13 @@ from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Principal, require
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.flights.order import Attached, FlightOrder, OtherLease, Outcome
+from aerodaas.service.flights.order import (
+    Attached,
+    EdgeTurnsOrder,
+    FlightOrder,
+    OtherLease,
+    Outcome,
+)
 from aerodaas.service.garage import Garage
 from aerodaas.service.limits import TenantLimits
 from aerodaas.service.settings import ServiceSettings
@@ -77,6 +83,7 @@ class Briefing:
         return order.model_copy(
             update={
                 "rehearsal": True,
+                "edge": None,
                 "speed": "max",
                 "battery": battery,
                 "others": others,
@@ -111,7 +118,15 @@ class Briefing:
             speed=self._settings.speed,
             seed=mission.request["seed"],
             address=self._settings.address,
+            edge=self._edge(mission.tenant),
         )
+
+    def _edge(self, tenant: str) -> EdgeTurnsOrder | None:
+        settings = self._settings
+        if settings.edge_slots is None:
+            return None
+        weight = settings.weights.get(tenant, 1.0)
+        return EdgeTurnsOrder(turns=settings.edge_turns, tenant=tenant, weight=weight)
 
 
 def robots_of(document: MissionDocument) -> list[str]:

@@ -69,6 +69,8 @@ class Dispatch:
         self.undecided: dict[int, Task] = {}
         self.running: Task | None = None
         """Task on the edge executor."""
+        self.edge_open = True
+        """Whether the idle edge is offered: a host that shares it closes it between its turns."""
         self.in_cloud = 0
         self.down: set[str] = set()
         """Models whose executor on the edge is down; their tasks go to the cloud or nowhere."""
@@ -145,9 +147,14 @@ class Dispatch:
         if self.running is None:
             self._offer_edge(now)
 
+    def offer(self, now: int) -> None:
+        """The edge is open: tasks that wait for it may start."""
+        if self.running is None:
+            self._offer_edge(now)
+
     def _offer_edge(self, now: int) -> None:
         undecided = self.undecided
-        while undecided and self.running is None:
+        while self.edge_open and undecided and self.running is None:
             before = len(undecided)
             self._carry_out(self.ask(self.scheduler.executor_idle, now), now)
             if len(undecided) == before:

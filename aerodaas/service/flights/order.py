@@ -13,7 +13,7 @@ from aerodaas.config.json_text import read_json
 from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
 from aerodaas.service.limits import TenantLimits
 
-__all__ = ["Attached", "FlightOrder", "OtherLease", "Outcome"]
+__all__ = ["Attached", "EdgeTurnsOrder", "FlightOrder", "OtherLease", "Outcome"]
 
 
 class _Record(BaseModel):
@@ -35,6 +35,15 @@ class Attached(_Record):
     """Its control socket."""
     sensors: list[str]
     """Cameras that are shared, by full id."""
+
+
+class EdgeTurnsOrder(_Record):
+    """The tenant's share of the edge."""
+
+    turns: Path
+    """Socket of the service that gives turns."""
+    tenant: str
+    weight: float
 
 
 class FlightOrder(_Record):
@@ -60,6 +69,8 @@ class FlightOrder(_Record):
     seed: int | None = None
     address: str | None = None
     """Ray cluster to join; None for one of its own."""
+    edge: EdgeTurnsOrder | None = None
+    """None where flights use the edge as they like."""
     attached: Attached | None = None
     """For a mission that senses only, which has no robots."""
     rehearsal: bool = False

@@ -20,7 +20,7 @@ from aerodaas.analytics.here.analysis import HereSite
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.model import EnvironmentConfig, RemoteConfig
-from aerodaas.config.options import RunOptions, current_options
+from aerodaas.config.options import EdgeShare, RunOptions, current_options
 from aerodaas.console.meter import FlightMeter
 from aerodaas.console.packed_reader import PackedReader, drawn_streams
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
@@ -129,6 +129,7 @@ class Flying:
                 seed=order.seed,
                 record=self._folder.recording,
                 address=order.address,
+                edge=None if order.edge is None else EdgeShare(**dict(order.edge)),
                 view=False,
                 report=not (order.rehearsal or order.attached),
             )
