@@ -15,7 +15,7 @@ from typing import Annotated, Any
 
 import typer
 from _report import Report
-from service import served
+from _served import served
 
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.protocol.schemas import AccountIn, AnalyticsOut, MissionIn, TokenIn

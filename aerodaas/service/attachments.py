@@ -63,11 +63,8 @@ class Attachments:
             raise RefusedError(
                 403, f"{host.row.id} does not share {', '.join(missing)}; it shares {told}"
             )
-        beside = [one for one in self._missions.values() if one.attached_to == host.row.id]
-        if len(beside) >= self._most:
-            raise RefusedError(
-                409, f"{self._most} missions are attached to {host.row.id}, the most that may be"
-            )
+        if len(self._beside(host)) >= self._most:
+            raise RefusedError(409, self._full(host))
 
     def shared(self, host: ActiveMission, tenant: str) -> list[str]:
         """Running cameras of a flying mission to which a tenant may attach missions."""
@@ -77,7 +74,8 @@ class Attachments:
         if tenant != host.row.tenant and tenant not in grants:
             return []
         granted = grants.get(tenant, [])
-        streams = host.follow().news.streams
+        # Without a link of its own: requests ask for this in any thread.
+        streams = {} if host.link is None else host.link.news.streams
         running = [name for name, kind in streams.items() if kind is StreamKind.PICTURES]
         cameras = [name for name in running if name in self._cameras]
         return [name for name in cameras if not granted or name in granted]
@@ -87,6 +85,8 @@ class Attachments:
         host = self._missions.get(str(one.attached_to))
         if host is None or host.phase is not MissionPhase.FLYING:
             raise MissionError(f"{one.attached_to} is not flying any more")
+        if len([other for other in self._beside(host) if other is not one]) >= self._most:
+            raise MissionError(self._full(host))
         wanted = one.document().sensors
         if not set(wanted) <= set(self.shared(host, one.row.tenant)):
             raise MissionError(f"{one.attached_to} does not share its cameras any more")
@@ -125,17 +125,23 @@ class Attachments:
         for one in self._of(host, tenant):
             self.watch(one)
 
+    def _beside(self, host: ActiveMission) -> list[ActiveMission]:
+        """Missions that are attached to a flight, or are to be."""
+        return [one for one in self._missions.values() if one.attached_to == host.row.id]
+
+    def _full(self, host: ActiveMission) -> str:
+        return f"{self._most} missions are attached to {host.row.id}, the most that may be"
+
     def _grant(self, host: ActiveMission, grants: Mapping[str, list[str]]) -> None:
         host.change(request={**host.row.request, "grants": dict(grants)})
 
     def _of(self, host: ActiveMission, tenant: str) -> list[ActiveMission]:
         """Missions of another tenant that are attached to a flight."""
+        others = tenant != host.row.tenant
         return [
             one
-            for one in self._missions.values()
-            if one.attached_to == host.row.id
-            and one.row.tenant == tenant != host.row.tenant
-            and one.phase is MissionPhase.FLYING
+            for one in self._beside(host)
+            if others and one.row.tenant == tenant and one.phase is MissionPhase.FLYING
         ]
 
     def _host(self, principal: Principal, name: str) -> ActiveMission:

@@ -102,9 +102,17 @@ class VehicleWatcher:
 
     def _watch(self, vehicle: Vehicle) -> str:
         """Read until it is wanted no more, or silent; returns why it is lost."""
+        armed = False
         while True:
-            state, objections = vehicle.read(), vehicle.preflight()
-            now = time.time()
+            try:
+                state, objections = vehicle.read(), vehicle.preflight()
+            except Exception as error:
+                if not armed:
+                    raise
+                self._lose(failure_line(error))
+                time.sleep(_READ_SECONDS)
+                continue
+            armed, now = state.armed, time.time()
             if state.mode is VehicleMode.LOST:
                 self._lose("; ".join(state.faults) or "it is silent")
             else:

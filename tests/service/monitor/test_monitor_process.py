@@ -65,6 +65,15 @@ def test_what_is_wanted_is_held_and_what_is_not_is_let_go(told: Told) -> None:
     assert not told.monitor.released(["one", "two"])
 
 
+def test_what_it_was_told_last_counts_before_it_has_obeyed(told: Told) -> None:
+    """Its older news say nothing of what it is about to open."""
+    told.monitor.watch(["one"])
+    told.monitor.watch([])
+    assert not told.monitor.released(["one"])
+    told.until(lambda: told.monitor.released(["one"]))
+    assert told.link("one") is not LinkState.CONNECTED
+
+
 def test_a_monitor_that_is_killed_is_started_again(told: Told) -> None:
     """Meanwhile it holds nothing, and says nothing of what it held."""
     told.until(lambda: told.link("one") is LinkState.CONNECTED, "one")

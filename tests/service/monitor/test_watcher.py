@@ -96,6 +96,21 @@ def test_one_that_falls_silent_is_connected_anew(watcher: VehicleWatcher, script
     until(lambda: script.asked.count("connect") > 1)
 
 
+def test_a_driver_that_raises_in_the_air_is_not_closed(
+    watcher: VehicleWatcher, script: Script
+) -> None:
+    """It is lost meanwhile, and asked again."""
+    watcher.want(wanted=True)
+    script.mode, script.armed = VehicleMode.MANUAL, True
+    until(lambda: watcher.news.mode == "manual")
+    script.breaks = OSError("no such device")
+    until(lambda: watcher.news.link is LinkState.LOST)
+    time.sleep(0.1)
+    assert "close" not in script.asked
+    script.breaks, script.armed = None, False
+    until(lambda: watcher.news.link is LinkState.CONNECTED)
+
+
 def test_what_is_armed_is_not_let_go_of(watcher: VehicleWatcher, script: Script) -> None:
     """Some drivers land what they are closed over: not with somebody else at the controls."""
     watcher.want(wanted=True)
