@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
+import psutil
 import pytest
 from served import Served, document, fleet, robot
 from websockets.sync.client import connect
@@ -58,8 +59,18 @@ def items(provider: Served, mission: str, token: str, count: int) -> list[Any]:
     return found
 
 
+def process_of(provider: Served, mission: str) -> psutil.Process:
+    """The process of a mission."""
+    folder = str(provider.folder / "s" / "m" / mission)
+    for process in psutil.process_iter(["cmdline"]):
+        line = process.info["cmdline"] or [""]
+        if "aerodaas.service.flights" in line and line[-1].startswith(folder):
+            return process
+    raise AssertionError(mission)
+
+
 def test_another_tenant_senses_beside_the_flight(provider: Served) -> None:
-    """By what its owner grants and until that is withdrawn; the flight lands as it would have."""
+    """By what its owner grants, until that is withdrawn; that it hangs costs the flight nothing."""
     users = {name: provider.user(name, f"t{name}") for name in ("asha", "bela", "eve")}
     narrow = {"account": "bela", "scopes": ["sense", "compute"]}
     bela = provider.ask("POST", "/v1/tokens", narrow)["secret"]
@@ -79,6 +90,12 @@ def test_another_tenant_senses_beside_the_flight(provider: Served) -> None:
     for path in (f"/v1/missions/{id_}", f"/v1/missions/{id_}/recording"):
         assert provider.send("GET", path, token=users["asha"])[0] == 404
     assert provider.send("GET", f"/v1/missions/{host}", token=bela)[0] == 404
+    stuck = process_of(provider, id_)
+    stuck.suspend()
+    flown = provider.mission(host)["status"]["one"]["distance"]
+    provider.until(lambda: provider.mission(host)["status"]["one"]["distance"] > flown + 4.0)
+    stuck.resume()
+    assert provider.mission(host)["alerts"] == []
     provider.ask("DELETE", f"/v1/missions/{host}/grants/tbela", None, users["asha"])
     ended = provider.until_phase(id_)
     assert (ended["phase"], ended["reason"]) == ("landed", "tasha has withdrawn its grant")
