@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 
 from aerodaas.actors.run.application import Application
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.options import EdgeShare
 from aerodaas.types.clock import NANOSECONDS, Clock, LockstepClock, ScaledClock, host_time_ns
 
 __all__ = [
@@ -45,6 +46,8 @@ class Session:
     """Host time at which mission time is zero."""
     timetables: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     """Sorted timestamps in nanoseconds at which sources without a rate are due."""
+    edge: EdgeShare | None = None
+    """Share of an edge that other flights use, too; None in lockstep, which waits for all work."""
     application: Application = field(default_factory=Application)
     """Definitions from the application's own files."""
 

@@ -12,12 +12,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
-import re
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
@@ -26,6 +24,7 @@ import numpy as np
 import psutil
 import typer
 from _report import Report
+from _served import served
 from rich.progress import track
 from websockets.asyncio.client import connect
 
@@ -35,7 +34,6 @@ from aerodaas.types.errors import AeroDaaSError
 
 T = TypeVar("T")
 UNITS = {"count": "", "median": "ms", "p99": "ms", "rate": "per s"}
-_START_SECONDS = 60.0
 _COMMANDS = 500
 _EVERY = 0.02
 """Seconds between two commands, and between two looks at a mission."""
@@ -81,31 +79,6 @@ def document(drones: int) -> dict[str, Any]:
         for number in range(drones)
     ]
     return {"format": "aerodaas-mission", "version": 1, "name": "load", "navigation": navigation}
-
-
-@contextlib.contextmanager
-def served(content: dict[str, Any], *words: str) -> Iterator[tuple[ProviderClient, str, int]]:
-    """A service; yields a client with the administrator's token, the token, and the process' id."""
-    with tempfile.TemporaryDirectory(prefix="load-", dir="/tmp") as temporary:
-        folder = Path(temporary)
-        (folder / "fleet.json").write_text(json.dumps(content), encoding="utf-8")
-        command = [sys.executable, "-m", "aerodaas", "serve", str(folder / "fleet.json")]
-        command += ["--state", str(folder / "s"), "--port", "0", "--no-rehearse", *words]
-        with (
-            (folder / "log").open("w") as log,
-            subprocess.Popen(command, stdout=log, stderr=log) as process,  # noqa: S603 - ours
-        ):
-            try:
-                said, until = "", time.monotonic() + _START_SECONDS
-                while not (found := re.search(r"at (http://\S+)", said)):
-                    if process.poll() is not None or time.monotonic() > until:
-                        raise SystemExit(f"the service did not start: {said}")
-                    time.sleep(_EVERY)
-                    said = (folder / "log").read_text()
-                token = re.findall(r"once: (\S+)", said)[0]
-                yield ProviderClient(found[1], token), token, process.pid
-            finally:
-                process.terminate()
 
 
 async def watch(url: str, token: str, watchers: int, seconds: float) -> list[float]:

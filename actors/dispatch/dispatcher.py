@@ -24,6 +24,7 @@ from aerodaas.actors.base import StreamActor
 from aerodaas.actors.cluster.liveness import Life, LivenessMonitor
 from aerodaas.actors.dispatch.deadline_reserve import DeadlineReserve
 from aerodaas.actors.dispatch.decisions import Counts, DecisionLog
+from aerodaas.actors.dispatch.edge_turns import EdgeTurns
 from aerodaas.actors.dispatch.estimates import Estimates
 from aerodaas.actors.dispatch.executor_pool import ExecutorPool
 from aerodaas.actors.dispatch.guarded_scheduler import GuardedDispatch
@@ -130,6 +131,9 @@ class DispatcherActor(StreamActor):
         self._complaints: deque[str] = deque(maxlen=_COMPLAINTS_KEPT)
         """Failures in the cloud that have raised an alert."""
         self._counts = Counts()
+        self._turns: EdgeTurns | None = None
+        """Turns on an edge that other flights use, too; None for one of this flight alone."""
+        self._dispatch.edge_open = session.edge is None
         self._cloud: ExecutorPool | None = None
         self._liveness_monitor: LivenessMonitor | None = None
         self._lives: deque[tuple[str, Life]] = deque()
@@ -151,6 +155,9 @@ class DispatcherActor(StreamActor):
         self._cloud = (
             ExecutorPool(cloud, timeout, wake, self.session.speed or 1.0) if cloud else None
         )
+
+        if self.session.edge is not None:
+            self._turns = EdgeTurns(self.session.edge, wake)
 
         def tell(model: str, life: Life) -> None:
             self._lives.append((model, life))
@@ -282,7 +289,24 @@ class DispatcherActor(StreamActor):
             self._dispatch.down.add(model)
             self._lose(running, "it did not answer", now)
         elif running is None:
+            self._take_turns(now)
             self._require_decisions(now)
+
+    def _take_turns(self, now: int) -> None:
+        """On a shared edge: start a task in each turn, and ask for the next while there is one."""
+        turns, dispatch = self._turns, self._dispatch
+        if turns is None:
+            return
+        if turns.used:
+            turns.release(again=bool(dispatch.undecided))
+        if dispatch.undecided:
+            turns.ask()
+        if turns.granted:
+            dispatch.edge_open = True
+            self._guarded("offer", now)
+            dispatch.edge_open = False
+            if dispatch.running is None:
+                turns.release()
 
     def _wake_scheduler(self) -> None:
         """Deliver due timers to the scheduler before later events."""
@@ -333,6 +357,9 @@ class DispatcherActor(StreamActor):
 
     def _require_decisions(self, now: int) -> None:
         oldest = next(iter(self._dispatch.undecided.values()), None)
+        if self._turns is not None:
+            # It decides in its turns, and those that wait for one grow old meanwhile.
+            return
         if oldest is None or self._replaced or now <= oldest.deadline + _FORGOTTEN:
             return
         self._replace(f"left {self._log.label(oldest)} undecided beyond its deadline", now)
@@ -398,6 +425,8 @@ class DispatcherActor(StreamActor):
     def run_edge(self, task: Task, now: int) -> None:
         """Send a task to its analysis' executor on the edge."""
         self._edge_since = now
+        if self._turns is not None:
+            self._dispatch.edge_open, self._turns.used = False, True
         self._send_task(task, self._references.item(self._frames[task.id]))
 
     def _send_task(self, task: Task, item: object) -> None:
@@ -487,6 +516,8 @@ class DispatcherActor(StreamActor):
             self._liveness_monitor.end()
         if self._cloud is not None:
             self._cloud.finish(_LAST_ANSWERS)
+        if self._turns is not None:
+            self._turns.close()
         self._dispatch.close()
 
     def _values(self) -> dict[str, Any]:

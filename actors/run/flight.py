@@ -136,6 +136,8 @@ class Flight:
         self._awaited: dict[str, Future[int]] = {}
         """The pending call to each drone's actor that returns with the next one."""
         self._stopped = False
+        self._sensed = False
+        """Whether a run without drones is to end before its cameras do."""
 
     def __enter__(self) -> Self:
         """Return the run, whose actors are stopped on exit."""
@@ -184,7 +186,17 @@ class Flight:
         for name in set(self._drones.values()):
             robots.update(self._robots_of(name, newest))
         over = all(self._members[name].report.phase in {"done", "failed"} for name in self._ids())
+        if not self._drones:
+            over = self._sensed or self._cameras_finished()
         return FlightState(robots, self.reports(), over)
+
+    def end_sensing(self) -> None:
+        """End a run without drones, which otherwise goes on as long as its cameras."""
+        self._sensed = True
+
+    def _cameras_finished(self) -> bool:
+        reports = [self._members[f"sensor/{one.stream}"].report for one in self.plan.cameras]
+        return all(one.phase == "failed" or one.values.get("finished") for one in reports)
 
     def await_change(self, timeout: float) -> None:
         """Return once a mission has changed, or after `timeout` seconds; for one thread only.
@@ -192,6 +204,8 @@ class Flight:
         One call is pending in each drone's actor. That of an actor that has died returns at once:
         the next `poll` raises the error.
         """
+        if not self._drones:
+            time.sleep(timeout)
         for name in self._ids() - set(self._awaited):
             method = self._members[name].handle.await_change.options(concurrency_group=CHANGES)
             self._awaited[name] = method.remote(self._changes.get(name, 0), _HELD).future()

@@ -127,6 +127,15 @@ class LiveReader:
                 raise TimeoutError(f"nothing arrived within {timeout} s")
         return self._waiting.popleft()
 
+    def latest_message(self, timeout: float | None) -> Message[Any]:
+        """Return the newest message that has not been returned; raises as `next_message` does."""
+        message = self.next_message(timeout)
+        self._take(0.0)
+        if self._waiting:
+            message = self._waiting[-1]
+            self._waiting.clear()
+        return message
+
     def newest(self, timeout: float | None) -> Any:  # noqa: ANN401 - the stream's item
         """Return the newest item, again if there is none newer; raises like `next` without one."""
         self._take(0.0)

@@ -149,7 +149,7 @@ class _Planner:
         return [node for node in self.graph.nodes.values() if node.kind != "sensor"]
 
     def robot_of(self, node: Node) -> str:
-        return node.robot or self.robots[0].id
+        return node.robot or (self.robots or self.session.environment.robots)[0].id
 
     def state_of(self, node: Node) -> str:
         return state_stream(self.robot_of(node))
@@ -385,15 +385,16 @@ def make_plan(
     dispatch_with: AnalyticsScheduler | None = None,
     *,
     here: bool = True,
+    senses_only: bool = False,
 ) -> FlightPlan:
     """Plan the actors of a graph.
 
     The analytics scheduler `dispatch_with`, if any, decides when and where `scheduled` analyses
-    run; `here` is False if actors may run on other machines. Raises the project's errors, with
-    remedies, for a graph that cannot fly.
+    run; `here` is False if actors may run on other machines. A graph that `senses_only` need not
+    navigate. Raises the project's errors, with remedies, for a graph that cannot fly.
     """
     planner = _Planner(session, graph, compute, scheduler, dispatch_with)
-    if not planner.robots:
+    if not planner.robots and not senses_only:
         raise GraphError("no robot navigates: call drone.navigate(…) before start_mission()")
     check_graph(graph, session.environment, {robot.id for robot in planner.robots})
     if dispatch_with is not None:

@@ -309,6 +309,7 @@ for _command in (
     provider.missions,
     provider.watch,
     provider.cancel,
+    provider.grant,
     provider.fetch,
 ):
     app.command(rich_help_panel=_PROVIDER)(_command)

@@ -6,7 +6,7 @@ import json
 import os
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,7 +16,10 @@ from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import ProviderOptions, RunOptions
 from aerodaas.types.errors import ConfigError, MissionError
 
-__all__ = ["cancel", "fetch", "fleet", "login", "missions", "submit", "watch"]
+if TYPE_CHECKING:
+    from aerodaas.protocol.schemas import RobotOut
+
+__all__ = ["cancel", "fetch", "fleet", "grant", "login", "missions", "submit", "watch"]
 
 _LOOK_SECONDS = 0.5
 MissionId = Annotated[str, typer.Argument(metavar="MISSION", help="Its id; `missions` lists them.")]
@@ -58,7 +61,7 @@ def login(
 
 
 def fleet(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
-    """Show a provider's drones: free or leased, their charge, where they are.
+    """Show a provider's drones: free or leased, their charge, where they are, and their health.
 
     aerodaas fleet --at https://provider.example
     aerodaas fleet --json | jq '.robots[] | select(.lease == null) | .id'
@@ -73,11 +76,12 @@ def fleet(at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
             _use(one.enabled, one.lease, one.mission, one.tenant),
             "-" if one.battery is None else f"{one.battery:.0%}",
             _place(one.position),
+            _health(one),
             ", ".join(sensor.rpartition("/")[2] for sensor in one.sensors),
         )
         for one in found.robots
     ]
-    print_table(found.name, ("robot", "use", "battery", "where", "sensors"), rows)
+    print_table(found.name, ("robot", "use", "battery", "where", "health", "sensors"), rows)
 
 
 def submit(
@@ -109,6 +113,16 @@ def submit(
         float | None, typer.Option(min=1, help="After how long. Default: 30.")
     ] = None,
     share: Annotated[list[str] | None, typer.Option(help="A tenant that may watch, too.")] = None,
+    grant: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="TENANT[=SENSOR,…]", help="A tenant that may attach missions to its cameras."
+        ),
+    ] = None,
+    attach: Annotated[
+        str | None,
+        typer.Option(metavar="MISSION", help="Sense only, by the cameras of a mission in flight."),
+    ] = None,
     seed: Annotated[
         int | None, typer.Option(min=0, help="Seed of the simulation, if the drones are.")
     ] = None,
@@ -134,6 +148,7 @@ def submit(
         aerodaas submit farm_survey --to https://provider.example
         aerodaas submit farm.json --minutes 5 --silence return
         aerodaas submit my_app.py --no-wait --json | jq -r .id
+        aerodaas submit crowd_watch --attach 3f1a6c0d9b2e
     """
     from aerodaas.environment.provider.logins import default_url  # noqa: PLC0415 - slow to load
 
@@ -147,6 +162,8 @@ def submit(
         silence=silence,
         silence_seconds=silence_seconds,
         share=tuple(share or ()),
+        grant=tuple(grant or ()),
+        attach=attach,
         report=print_json if as_json else None,
     )
     options = RunOptions(
@@ -224,6 +241,35 @@ def watch(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # 
         typer.echo(f"landed; aerodaas fetch {found.id} brings the recording")
 
 
+def grant(
+    mission: MissionId,
+    tenant: Annotated[str, typer.Argument(help="Who may attach missions that sense only.")],
+    sensors: Annotated[
+        list[str] | None, typer.Argument(metavar="[SENSOR]…", help="Cameras. Default: all.")
+    ] = None,
+    withdraw: Annotated[  # noqa: FBT002
+        bool, typer.Option("--withdraw", help="Withdraw it: what is attached ends.")
+    ] = False,
+    at: At = None,
+    as_json: Json = False,  # noqa: FBT002
+) -> None:
+    """Share the cameras of your mission in flight with another tenant's applications.
+
+    aerodaas grant 3f1a6c0d9b2e city one/cam
+    aerodaas grant 3f1a6c0d9b2e city --withdraw
+    """
+    client = client_at(at)
+    if withdraw:
+        found = client.withdraw(mission, tenant)
+    else:
+        found = client.grant(mission, tenant, sensors or ())
+    if as_json:
+        print_json(found)
+        return
+    granted = [f"{name} ({', '.join(one) or 'all cameras'})" for name, one in found.grants.items()]
+    typer.echo(f"{found.id} shares its cameras with {'; '.join(granted) or 'nobody'}")
+
+
 def cancel(mission: MissionId, at: At = None, as_json: Json = False) -> None:  # noqa: FBT002
     """Cancel a mission; drones in flight come home and land.
 
@@ -279,6 +325,14 @@ def _use(enabled: bool, lease: str | None, mission: str | None, tenant: str | No
     if lease is None:
         return "free"
     return f"flies {mission}" if mission else f"leased by {tenant}" if tenant else "leased"
+
+
+def _health(robot: RobotOut) -> str:
+    """The link, and what speaks against a flight; of a drone in flight, its complaints."""
+    said = robot.objection or "; ".join(robot.faults)
+    if robot.link.value == "lost":
+        return said or "does not answer"
+    return f"{robot.link.value}: {said}" if said else robot.link.value
 
 
 def _place(position: tuple[float, float, float] | None) -> str:

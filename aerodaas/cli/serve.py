@@ -41,9 +41,27 @@ def serve(
     rehearse: Annotated[  # noqa: FBT002 - Typer's flags
         bool, typer.Option(help="Fly each mission in simulation before it flies.")
     ] = True,
+    monitor: Annotated[  # noqa: FBT002 - as above
+        bool, typer.Option(help="Hold the connection to each drone between its missions.")
+    ] = True,
     approval: Annotated[  # noqa: FBT002 - as above
         bool, typer.Option("--approval", help="Have an operator approve each mission.")
     ] = False,
+    most_attached: Annotated[
+        int, typer.Option(min=0, help="Missions that may share one flight's cameras; 0: none.")
+    ] = 0,
+    edge_slots: Annotated[
+        int | None,
+        typer.Option(
+            min=1,
+            help="Analyses that flights with an analytics scheduler run at once on the edge, all "
+            "together, shared by tenants' weights. Default: each flight as it likes.",
+        ),
+    ] = None,
+    weight: Annotated[
+        list[str] | None,
+        typer.Option(metavar="TENANT=W", help="A tenant's weight on the edge. Default: 1."),
+    ] = None,
     address: Annotated[str | None, typer.Option(help="Ray cluster that flights join.")] = None,
     oidc_issuer: Annotated[
         str | None,
@@ -91,8 +109,12 @@ def serve(
         config=located(EnvironmentConfig.load(fleet), fleet.absolute().parent),
         state=state.absolute(),
         rehearse=rehearse,
+        monitor=monitor,
         approval=approval,
         speed="max" if lockstep else factor or 1.0,
+        most_attached=most_attached,
+        edge_slots=edge_slots,
+        weights=dict(map(_weight, weight or ())),
         address=address,
         oidc=_oidc(
             oidc_issuer,
@@ -111,6 +133,18 @@ def serve(
         key=key,
         tell=typer.echo,
     )
+
+
+def _weight(text: str) -> tuple[str, float]:
+    """Tenant and weight of `TENANT=W`; raises ConfigError."""
+    tenant, _, number = text.rpartition("=")
+    try:
+        found = float(number)
+    except ValueError:
+        found = 0.0
+    if not tenant or not 0.0 < found < float("inf"):
+        raise ConfigError(f"--weight is TENANT=W with a positive number, not {text!r}")
+    return tenant, found
 
 
 def _oidc(

@@ -36,8 +36,22 @@ class ProviderOptions:
     silence_seconds: float | None = None
     share: tuple[str, ...] = ()
     """Tenants that may watch."""
+    attach: str | None = None
+    """A flying mission whose cameras are shared: the application senses only."""
+    grant: tuple[str, ...] = ()
+    """Tenants that may attach missions to its cameras: `TENANT`, or `TENANT=SENSOR,…`."""
     report: Callable[[Any], None] | None = None
     """Told of each mission that has ended, a `MissionOut`."""
+
+
+@dataclass(frozen=True)
+class EdgeShare:
+    """Share of an edge that several flights of a provider use."""
+
+    turns: Path
+    """Socket of the service that gives turns."""
+    tenant: str
+    weight: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -46,6 +60,9 @@ class RunOptions:
 
     environment: Path | None = None
     """Environment file instead of the application's own."""
+    senses_only: bool = False
+    """Run without a robot that navigates, as long as the cameras have pictures: a mission that is
+    attached to another one's cameras."""
     config: EnvironmentConfig | None = None
     """Environment itself, in the place of the file's content; relative paths are the file's."""
     speed: float | None = None
@@ -57,6 +74,8 @@ class RunOptions:
     """Folder for the recording, the plots and the summary."""
     address: str | None = None
     """Ray cluster to join."""
+    edge: EdgeShare | None = None
+    """Share the edge with other flights of a provider."""
     overrides: dict[str, Any] = field(default_factory=dict)
     """Settings by `id.setting`, such as `camera.rate`."""
     view: bool = True

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from aerodaas.analytics.wire_items import pack
@@ -23,8 +24,17 @@ class PackedReader:
 
     def next_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
         """The next item; None if there was none within `timeout` wall seconds."""
+        return self._packed(self._reader.next_message, timeout)
+
+    def latest_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
+        """The newest item that was not returned; None if there was none within `timeout`."""
+        return self._packed(self._reader.latest_message, timeout)
+
+    def _packed(
+        self, read: Callable[[float], Message[Any]], timeout: float
+    ) -> tuple[dict[str, Any], bytes] | None:
         try:
-            message: Message[Any] = self._reader.next_message(timeout)
+            message = read(timeout)
         except (TimeoutError, StopIteration):
             return None
         item, blob = pack(message.item)

@@ -204,7 +204,8 @@ class MissionDocument(_Entry):
     """Sensors that run, by full id."""
     analyses: list[AnalysisEntry] = Field(default_factory=list, max_length=_MOST)
     """Each after those that it reads."""
-    navigation: list[NavigationDocument] = Field(min_length=1, max_length=_MOST)
+    navigation: list[NavigationDocument] = Field(default_factory=list, max_length=_MOST)
+    """Empty for one that senses only, which a provider attaches to another flight's cameras."""
     trajectory_scheduler: SchedulerEntry | None = None
     analytics_scheduler: _Word | None = None
 

@@ -198,6 +198,11 @@ class Run:
         assert self._console is not None  # noqa: S101 - started
         return self._console.address(viewer=viewer)
 
+    def end_sensing(self) -> None:
+        """End a run without drones."""
+        if self._flight is not None:
+            self._flight.end_sensing()
+
     def note(self, kind: str, text: str) -> None:
         """Publish an alert of this process; nothing once the run is over."""
         if self._flight is not None and not self._finished.is_set():
@@ -315,11 +320,23 @@ class Run:
         self._change_models()
         application = self._application()
         session = Session(
-            self.config, speed, timetables=self._timetables(), application=application
+            self.config,
+            speed,
+            timetables=self._timetables(),
+            edge=None if self.lockstep else self.options.edge,
+            application=application,
         )
         compute = self._environment.compute()
         joins = self.options.address or os.environ.get("RAY_ADDRESS")
-        plan = make_plan(session, self.graph, compute, scheduler, dispatch_with, here=not joins)
+        plan = make_plan(
+            session,
+            self.graph,
+            compute,
+            scheduler,
+            dispatch_with,
+            here=not joins,
+            senses_only=self.options.senses_only,
+        )
         for spec in (one for group in plan.drones for one in group):
             rehearse(spec.robot, spec.initial, self.config, spec.scheduler)
         return plan

@@ -25,9 +25,11 @@ __all__ = [
     "AuditOut",
     "CommandIn",
     "FleetOut",
+    "GrantIn",
     "LeaseIn",
     "LeaseOut",
     "LeaseState",
+    "LinkState",
     "MissionIn",
     "MissionOut",
     "MissionPhase",
@@ -50,6 +52,7 @@ Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Word = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]{0,63}$")]
 Area = Annotated[list[tuple[Number, Number]], Field(min_length=3, max_length=100)]
 """A polygon's corners (east, north) in metres of the provider's local frame."""
+_SensorId = Annotated[str, Field(pattern=r"^[^\W\d][\w\-]{0,63}(/[^\W\d][\w\-]{0,63})?$")]
 _MOST_ROBOTS = 64
 _MOST_MINUTES = 24 * 60
 _YEAR_DAYS = 366
@@ -128,6 +131,20 @@ class StreamKind(str, enum.Enum):
     DETECTIONS = "detections"
 
 
+class LinkState(str, enum.Enum):
+    """Who is connected to a drone, and whether it answers."""
+
+    UNWATCHED = "unwatched"
+    """Nobody is: it is out of service, or this service does not watch."""
+    CONNECTING = "connecting"
+    CONNECTED = "connected"
+    """The service is, between missions."""
+    MISSION = "mission"
+    """The mission that flies it is."""
+    LOST = "lost"
+    """It does not answer."""
+
+
 class RefusalOut(AnswerModel):
     """Answer to each request that is not carried out, with the HTTP status."""
 
@@ -146,7 +163,9 @@ class RobotOut(AnswerModel):
     tenant: str | None = None
     """Tenant of that lease; shown to operators and to the tenant itself."""
     mission: str | None = None
-    """Mission that flies it; shown as the tenant is."""
+    """Mission that flies it; shown as the tenant is, and to tenants that it shares cameras with."""
+    shared: list[str] = Field(default_factory=list)
+    """Cameras of that mission that one's own tenant may attach a mission to, by full id."""
     battery: float | None = None
     position: tuple[float, float, float] | None = None
     """Metres east, north and up of home, where it was last heard of."""
@@ -154,6 +173,15 @@ class RobotOut(AnswerModel):
     """Moment of battery and position."""
     enabled: bool = True
     """False after an operator has taken it out of service."""
+    link: LinkState = LinkState.UNWATCHED
+    since: float | None = None
+    """Moment since which the link is so; of a lost one, when it was last heard."""
+    mode: str | None = None
+    """What the vehicle says that it does, one of `VehicleMode`."""
+    faults: list[str] = Field(default_factory=list)
+    """What the vehicle complains of."""
+    objection: str = ""
+    """Why it can be neither leased nor flown now; empty if it can, or is in flight."""
 
 
 class FleetOut(AnswerModel):
@@ -201,8 +229,15 @@ class LeaseOut(AnswerModel):
     area: list[tuple[float, float]] | None = None
 
 
+class GrantIn(RequestModel):
+    """What a tenant may attach missions to."""
+
+    sensors: list[_SensorId] = Field(default_factory=list, max_length=_MOST_ROBOTS)
+    """Cameras by full id; none for all of the mission's."""
+
+
 class MissionIn(RequestModel):
-    """A mission to be flown."""
+    """A mission to be flown, or to be attached to one in flight."""
 
     document: MissionDocument
     lease: str | None = None
@@ -212,8 +247,13 @@ class MissionIn(RequestModel):
     silence: SilencePolicy = SilencePolicy.CONTINUE
     silence_seconds: Annotated[float, Field(ge=1, le=3600)] = 30.0
     """Seconds without any request of the user after which the policy applies."""
+    attach: str | None = None
+    """A mission in flight that shares its cameras. The document then navigates nothing, and there
+    is no lease: it runs until that flight ends, it is withdrawn, or its minutes are over."""
     share: list[Word] = Field(default_factory=list, max_length=_MOST_ROBOTS)
     """Tenants that may watch it."""
+    grants: dict[Word, list[_SensorId]] = Field(default_factory=dict, max_length=_MOST_ROBOTS)
+    """Tenants that may attach missions to its cameras, as `GrantIn` says for each."""
     seed: Annotated[int, Field(ge=0)] | None = None
     """Of a simulated fleet."""
 
@@ -281,6 +321,10 @@ class MissionOut(AnswerModel):
     lease: str | None = None
     share: list[str] = Field(default_factory=list)
     """Tenants that may watch it."""
+    attach: str | None = None
+    """The mission in flight by whose cameras it senses; None for one that flies itself."""
+    grants: dict[str, list[str]] = Field(default_factory=dict)
+    """Tenants that may attach missions, with the cameras; no camera for all of them."""
     submitted: float
     started: float | None = None
     ended: float | None = None

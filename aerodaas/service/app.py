@@ -15,10 +15,12 @@ from aerodaas.console.page import page_routes
 from aerodaas.service.access import Access, Accounts, Audit, OidcVerifier, Quotas, RateLimiter
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
+from aerodaas.service.edge import EdgeArbiter
 from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.garage import Garage
 from aerodaas.service.gate import Gate
 from aerodaas.service.models import ModelShelf
+from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.routes.accounts import AccountRoutes
 from aerodaas.service.routes.admission import Admission
 from aerodaas.service.routes.fleet import FleetRoutes
@@ -54,17 +56,30 @@ def build_service(
     quotas, garage = Quotas(store), Garage(settings.config, store)
     models = ModelShelf(settings.models)
     bookings = Bookings(settings.config, store, garage, quotas)
-    desk = MissionDesk(settings, store, bookings=bookings, garage=garage, models=models)
+    monitor = None
+    if settings.monitor:
+        monitor = FleetMonitor(settings.fleet, settings.state / "monitor.log", garage.observe)
+    desk = MissionDesk(
+        settings, store, bookings=bookings, garage=garage, models=models, monitor=monitor
+    )
     hub = StreamHub(desk.items)
     admission = Admission(access, audit, RateLimiter(_RATE, _BURST))
     shown: dict[str, Any] = catalogue(settings.config).model_dump(mode="json", by_alias=True)
     fleet = FleetView(settings.config, shown, garage, bookings, desk)
 
+    edge = None
+    if settings.edge_slots is not None:
+        edge = EdgeArbiter(settings.edge_turns, settings.edge_slots)
+
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
         desk.start()
+        if edge is not None:
+            edge.start()
         yield
         desk.close()
+        if edge is not None:
+            edge.close()
 
     app = FastAPI(
         title="AeroDaaS",

@@ -152,7 +152,7 @@ class Bookings:
                 camera=any(one.type == "camera" for one in robot.sensors),
                 position=(place[0], place[1]),
                 battery_minutes=usable * robot.limits.endurance / 60.0,
-                enabled=state.enabled,
+                objection="" if robot.id in busy else self._garage.objection(robot.id),
                 busy=robot.id in busy,
             )
         return fleet

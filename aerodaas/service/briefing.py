@@ -11,7 +11,13 @@ from aerodaas.protocol.schemas import Role, Scope
 from aerodaas.service.access import Principal, require
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.errors import RefusedError
-from aerodaas.service.flights.order import FlightOrder, OtherLease, Outcome
+from aerodaas.service.flights.order import (
+    Attached,
+    EdgeTurnsOrder,
+    FlightOrder,
+    OtherLease,
+    Outcome,
+)
 from aerodaas.service.garage import Garage
 from aerodaas.service.limits import TenantLimits
 from aerodaas.service.settings import ServiceSettings
@@ -34,8 +40,13 @@ class Briefing:
         self._bookings = bookings
         self._garage = garage
 
-    def check(self, principal: Principal, document: MissionDocument) -> list[str]:
-        """Robots that a document flies; raises RefusedError for what cannot be had here."""
+    def check(
+        self, principal: Principal, document: MissionDocument, *, attached: bool = False
+    ) -> list[str]:
+        """Robots that a document flies, none for one that is `attached` to another mission.
+
+        Raises RefusedError for what cannot be had here.
+        """
         config = self._settings.config
         robots = robots_of(document)
         _require_known("robot", robots, {robot.id for robot in config.robots})
@@ -47,6 +58,9 @@ class Briefing:
         for one in document.analyses:
             if one.analysis is not None:
                 require_plugin("analytics", one.analysis)
+        if not (robots or attached):
+            text = "its navigation is empty: it flies no drone, and is attached to no mission"
+            raise RefusedError(_UNPROCESSABLE, text)
         if cameras & set(document.sensors):
             require(principal, Role.PILOT, Scope.SENSE)
         if document.analyses:
@@ -69,6 +83,7 @@ class Briefing:
         return order.model_copy(
             update={
                 "rehearsal": True,
+                "edge": None,
                 "speed": "max",
                 "battery": battery,
                 "others": others,
@@ -79,6 +94,11 @@ class Briefing:
     def flight(self, mission: Mission, lease: Lease) -> FlightOrder:
         """The order of a mission's flight under a granted lease."""
         return self._order(mission, lease.id, lease)
+
+    def attached(self, mission: Mission, to: Attached) -> FlightOrder:
+        """The order of a mission that senses by the cameras of another one, in real time."""
+        order = self._order(mission, "attached", None)
+        return order.model_copy(update={"attached": to, "speed": 1.0, "address": None})
 
     def _order(self, mission: Mission, lease: str, granted: Lease | None) -> FlightOrder:
         minutes = float(mission.request["minutes"])
@@ -98,7 +118,15 @@ class Briefing:
             speed=self._settings.speed,
             seed=mission.request["seed"],
             address=self._settings.address,
+            edge=self._edge(mission.tenant),
         )
+
+    def _edge(self, tenant: str) -> EdgeTurnsOrder | None:
+        settings = self._settings
+        if settings.edge_slots is None:
+            return None
+        weight = settings.weights.get(tenant, 1.0)
+        return EdgeTurnsOrder(turns=settings.edge_turns, tenant=tenant, weight=weight)
 
 
 def robots_of(document: MissionDocument) -> list[str]:

@@ -13,11 +13,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from aerodaas.analytics.remote.schemas import AnswerOut
+from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
 from aerodaas.protocol.piloting import ControlsIn, RearrangeIn
 from aerodaas.protocol.schemas import (
     CommandIn,
     LeaseState,
+    LinkState,
     MissionIn,
     MissionOut,
     MissionPhase,
@@ -25,19 +26,23 @@ from aerodaas.protocol.schemas import (
     Role,
 )
 from aerodaas.service.access import Principal, sees
+from aerodaas.service.attachments import Attachments
 from aerodaas.service.bookings import Bookings
 from aerodaas.service.briefing import Briefing, usage_of
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.order import FlightOrder
-from aerodaas.service.garage import Garage
+from aerodaas.service.garage import OUT_OF_SERVICE, Garage
 from aerodaas.service.idempotency import fingerprint
 from aerodaas.service.mission import CANCELLED_BY, ActiveMission, LostFlightError
 from aerodaas.service.models import ModelShelf, require_room
+from aerodaas.service.monitor.process import FleetMonitor
 from aerodaas.service.records import shown
 from aerodaas.service.settings import ServiceSettings
 from aerodaas.service.store import Lease, Mission, Store
 from aerodaas.types.errors import AeroDaaSError, MissionError
+from aerodaas.types.status import MissionState
+from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["MissionDesk"]
 
@@ -60,13 +65,18 @@ class MissionDesk:
         bookings: Bookings,
         garage: Garage,
         models: ModelShelf,
+        monitor: FleetMonitor | None = None,
     ) -> None:
-        """Take up the missions that the database has; `start` moves them on."""
+        """Take up the missions that the database has; `start` moves them on.
+
+        `monitor` holds the drones that no mission flies; None for nobody.
+        """
         self._settings = settings
         self._store = store
         self._bookings = bookings
         self._garage = garage
         self._models = models
+        self._monitor = monitor
         self._briefing = Briefing(settings, store, bookings, garage)
         self._lock = threading.RLock()
         self._closed = threading.Event()
@@ -74,6 +84,7 @@ class MissionDesk:
         self._texts: dict[str, tuple[int, str, bool]] = {}
         """Version, JSON and whether it is over, by mission that is watched."""
         self._missions: dict[str, ActiveMission] = {}
+        self._attachments = Attachments(settings, bookings, self._missions)
         bookings.flying = self._busy
         bookings.on_end.append(self._recall)
         bookings.on_extension.append(self._prolong)
@@ -90,6 +101,8 @@ class MissionDesk:
         with self._lock:
             for one in self._missions.values():
                 one.close()
+        if self._monitor is not None:
+            self._monitor.close()
 
     def submit(self, principal: Principal, wanted: MissionIn, key: str | None = None) -> MissionOut:
         """Take a mission in, or find the one that was submitted before with the same `key`.
@@ -102,8 +115,12 @@ class MissionDesk:
         if known is not None:
             return known
         require_room(self._settings.state)
-        robots = self._briefing.check(principal, wanted.document)
-        self._garage.require_enabled(robots)
+        attached = wanted.attach is not None
+        robots = self._briefing.check(principal, wanted.document, attached=attached)
+        if attached:
+            with self._lock:
+                self._attachments.check(principal, wanted)
+        self._garage.require_fit(robots)
         self._bookings.require_quota(principal.tenant, wanted.minutes * len(robots))
         if wanted.lease is not None:
             self._bookings.require(principal, wanted.lease, robots)
@@ -190,6 +207,27 @@ class MissionDesk:
         """The order of a mission that flies and that this account may command."""
         return FlightOrder.read(self._flown(principal, mission).flight.order)
 
+    def grant(
+        self, principal: Principal, mission: str, tenant: str, sensors: list[str] | None
+    ) -> MissionOut:
+        """Let a tenant attach missions to a mission's cameras; none at all for `sensors` None."""
+        self._require_own(principal, mission)
+        with self._lock:
+            one = self._one(mission)
+            if sensors is None:
+                self._attachments.withdrawn(one, tenant)
+            else:
+                self._attachments.granted(one, tenant, sensors)
+            return shown(one)
+
+    def shared(self, robot: str, tenant: str) -> tuple[str | None, list[str]]:
+        """The mission that flies a robot, and its cameras that a tenant may attach missions to."""
+        host = next((one for one in self._flying() if robot in one.row.robots), None)
+        if host is None:
+            return None, []
+        own = {one.full_id for one in self._settings.config.all_sensors() if one.robot == robot}
+        return host.row.id, [one for one in self._attachments.shared(host, tenant) if one in own]
+
     def _ask(self, principal: Principal, mission: str, **request: Any) -> AnswerOut:  # noqa: ANN401
         one = self._flown(principal, mission)
         with self._lock:
@@ -203,6 +241,9 @@ class MissionDesk:
             one = self._one(mission)
             if one.phase is not MissionPhase.FLYING:
                 raise RefusedError(409, f"{mission} is not flying: {one.phase.value}")
+            if one.attached_to is not None:
+                text = f"{mission} is attached to {one.attached_to}: it senses only"
+                raise RefusedError(403, text)
             return one
 
     def mission(self, principal: Principal, mission: str) -> MissionOut:
@@ -238,10 +279,6 @@ class MissionDesk:
         """A number that grows with each change of a mission; -1 once it is over."""
         one = self._missions.get(mission)
         return -1 if one is None else one.version
-
-    def flying(self, robot: str) -> str | None:
-        """The mission that flies a robot now; None if none does."""
-        return next((one.row.id for one in self._flying() if robot in one.row.robots), None)
 
     def flies(self, principal: Principal, mission: str) -> bool:
         """Whether a mission is this account's own, so that its presence counts."""
@@ -321,6 +358,17 @@ class MissionDesk:
                     del self._missions[one.row.id]
                     self._texts.pop(one.row.id, None)
                     self._heard.pop(one.row.id, None)
+            self._have_watched()
+
+    def _have_watched(self) -> None:
+        """Have the monitor hold each drone in service that no mission has, or is to have next."""
+        if self._monitor is None:
+            return
+        taken = self._busy() | {
+            robot for one in self._missions.values() if one.handing_over for robot in one.row.robots
+        }
+        states = self._garage.states.values()
+        self._monitor.watch({one.id for one in states if one.enabled and one.id not in taken})
 
     def _move(self, one: ActiveMission) -> None:
         """Move one mission on; what it meets is its own failure, unless the database is gone."""
@@ -347,7 +395,7 @@ class MissionDesk:
             step(one)
 
     def _begin(self, one: ActiveMission) -> None:
-        if not self._settings.rehearse:
+        if not self._settings.rehearse or one.attached_to is not None:
             self._admit(one)
             return
         one.rehearse(self._briefing.rehearsal(one.row), self._models)
@@ -372,6 +420,11 @@ class MissionDesk:
             one.to(MissionPhase.QUEUED, "waits for its drones")
 
     def _take_off(self, one: ActiveMission) -> None:
+        if one.attached_to is not None:
+            if self._has_place(one):
+                attached = self._attachments.begin(one)
+                self._begin_flight(one, self._briefing.attached(one.row, attached))
+            return
         if one.row.lease is None:
             lease = self._bookings.for_mission(one.row)
             one.change(lease=lease.id)
@@ -379,10 +432,32 @@ class MissionDesk:
             lease = self._bookings.lease(one.row.lease)
         if lease.state is LeaseState.ENDED:
             self._end(one, MissionPhase.REFUSED, f"its lease has ended: {lease.reason}")
-        elif lease.state is LeaseState.GRANTED and self._has_place(one):
-            one.brief(self._briefing.flight(one.row, lease), self._models)
-            one.to(MissionPhase.FLYING, started=time.time())
-            one.take_off()
+        elif lease.state is LeaseState.GRANTED and self._has_place(one) and self._handed_over(one):
+            self._begin_flight(one, self._briefing.flight(one.row, lease))
+
+    def _begin_flight(self, one: ActiveMission, order: FlightOrder) -> None:
+        one.brief(order, self._models)
+        one.to(MissionPhase.FLYING, started=time.time())
+        self._garage.hand(one.row.robots, LinkState.MISSION)
+        one.take_off()
+
+    def _handed_over(self, one: ActiveMission) -> bool:
+        """Whether the monitor has let go of a mission's drones, each of which was fit to fly.
+
+        A flight begins only then, so that one process at a time is connected with a drone.
+        """
+        if self._monitor is None:
+            return True
+        robots = one.row.robots
+        if one.handing_over:
+            # One that somebody else has armed meanwhile is not let go of.
+            one.handing_over = not any(map(self._garage.objection, robots))
+            return one.handing_over and self._monitor.released(robots)
+        held_up = [f"{name}: {why}" for name in robots if (why := self._garage.waits_for(name))]
+        one.handing_over = not held_up
+        if held_up:
+            one.wait_for(f"waits for {'; '.join(held_up)}")
+        return False
 
     def _has_place(self, wanted: ActiveMission) -> bool:
         """Whether a flight may begin: its drones may be on their way home from the last one."""
@@ -402,27 +477,37 @@ class MissionDesk:
         one.take_off()
         link = one.follow()
         self._garage.note(link.news.status)
+        if one.attached_to is not None:
+            self._attachments.watch(one)
         try:
             outcome = one.flown()
         except LostFlightError as error:
-            reason = (
-                f"its process died in flight ({error}); its drones are out of service until an "
-                "operator has looked"
-            )
+            reason = f"its process died in flight ({error})"
+            if one.row.robots:
+                reason += f"; its drones are {OUT_OF_SERVICE}"
             self._garage.take_out(one.row.robots)
+            self._garage.hand(one.row.robots, LinkState.UNWATCHED)
             self._end(one, MissionPhase.FAILED, reason)
             return
         if outcome is None:
             return
         self._garage.note(outcome.status, now=True)
+        self._garage.hand(one.row.robots, LinkState.UNWATCHED)
         self._store.usage.put(usage_of(one.row, outcome, one.flight.recording))
         phase = MissionPhase.LANDED if outcome.landed else MissionPhase.FAILED
         if outcome.landed and outcome.reason.startswith(CANCELLED_BY):
             phase = MissionPhase.CANCELLED
-        self._end(one, phase, outcome.reason)
+        reason = outcome.reason
+        if up := [name for name, last in outcome.status.items() if _may_fly(last)]:
+            # Its actor may fly it still, or a pilot: nobody else connects with it before a look.
+            self._garage.take_out(up)
+            reason += f"; {', '.join(up)}: not known to be down, {OUT_OF_SERVICE}"
+        self._end(one, phase, reason)
 
     def _end(self, one: ActiveMission, phase: MissionPhase, reason: str) -> None:
         one.to(phase, reason, ended=time.time())
+        if one.attached_to is not None:
+            self._attachments.leave(one)
         if one.row.lease is not None:
             self._bookings.give_back(one.row)
 
@@ -452,3 +537,9 @@ class MissionDesk:
         found = self.mission(principal, mission)
         if found.tenant != principal.tenant and not principal.role.reaches(Role.OPERATOR):
             raise RefusedError(403, f"{mission} is {found.tenant}'s: you may watch it")
+
+
+def _may_fly(last: StatusOut) -> bool:
+    """Whether a drone whose mission has ended is not known to stand on the ground."""
+    down = last.mode in {None, VehicleMode.GROUNDED.value}
+    return not down and last.state != MissionState.LANDED.value

@@ -41,15 +41,23 @@ class FleetView:
 
     def _robot(self, robot: RobotConfig, state: RobotState, principal: Principal) -> RobotOut:
         lease = self._bookings.holder(robot.id)
+        news = self._garage.news(robot.id)
+        flying, shared = self._desk.shared(robot.id, principal.tenant)
         mine = lease is not None and sees(principal, lease.tenant)
         return RobotOut(
             id=robot.id,
             sensors=[sensor.full_id for sensor in robot.sensors],
             lease=None if lease is None else lease.id,
             tenant=lease.tenant if lease is not None and mine else None,
-            mission=self._desk.flying(robot.id) if mine else None,
+            mission=flying if mine or shared else None,
+            shared=shared,
             battery=state.battery,
             position=state.position,
             heard=state.heard,
             enabled=state.enabled,
+            link=news.link,
+            since=news.since or None,
+            mode=news.mode or None,
+            faults=list(news.faults),
+            objection="" if flying is not None else self._garage.objection(robot.id),
         )

@@ -2,20 +2,33 @@
 
 from __future__ import annotations
 
+import contextlib
+import math
 import threading
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.model import EnvironmentConfig
-from aerodaas.service.errors import RefusedError
+from aerodaas.protocol.schemas import LinkState
+from aerodaas.service.errors import RefusedError, StoreError
+from aerodaas.service.monitor.news import VehicleNews
 from aerodaas.service.store import RobotState, Store
+from aerodaas.types.vehicle import VehicleMode
 
-__all__ = ["Garage"]
+__all__ = ["OUT_OF_SERVICE", "Garage"]
 
+OUT_OF_SERVICE = "out of service until an operator has looked"
 _WRITE_SECONDS = 5.0
 """Seconds between two rows of one robot: its charge and place of a moment are not worth more."""
+_STILL_SECONDS = 60.0
+"""The same for a drone that stands, with the same charge."""
+_CHARGE, _METRES = 0.01, 1.0
+"""Changes of a drone that stands which are written down earlier."""
+_HOME = (0.0, 0.0, 0.0)
+_DROPOUT_SECONDS = 3.0
+"""Seconds for which a link may be lost before its drone counts as out of reach."""
 
 
 class Garage:
@@ -26,7 +39,9 @@ class Garage:
         self._store = store
         self._lock = threading.Lock()
         self._states: dict[str, RobotState] = {}
-        self._written: dict[str, float] = {}
+        self._written: dict[str, tuple[float, RobotState]] = {}
+        self._return_at = {robot.id: robot.limits.battery_return for robot in config.robots}
+        self._news = {robot.id: VehicleNews() for robot in config.robots}
         for robot in config.robots:
             self._states[robot.id] = store.robots.get(robot.id) or RobotState(robot.id)
 
@@ -36,27 +51,75 @@ class Garage:
         with self._lock:
             return dict(self._states)
 
+    def news(self, robot: str) -> VehicleNews:
+        """Link, mode and faults of a robot."""
+        with self._lock:
+            return self._news[robot]
+
     def note(self, status: Mapping[str, StatusOut], *, now: bool = False) -> None:
-        """Take over where drones are and what charge they have; `now` writes it down at once."""
+        """Take over what missions tell of their drones; `now` writes it down at once."""
         for name, one in status.items():
-            known = one.position is not None and None not in one.position
-            place = tuple(axis for axis in one.position or () if axis is not None)
-            with self._lock:
-                before = self._states.get(name)
-                if before is None:
-                    continue
-                state = self._states[name] = replace(
-                    before,
-                    battery=before.battery if one.battery is None else one.battery,
-                    position=(place[0], place[1], place[2]) if known else before.position,
-                    heard=time.time(),
+            if name not in self._news:
+                continue
+            heard = time.time()
+            lost = one.mode == VehicleMode.LOST.value
+            link = LinkState.LOST if lost else LinkState.MISSION
+            before = self.news(name)
+            news = VehicleNews(
+                link=link,
+                since=before.since if before.link is link else heard,
+                heard=before.heard if lost else heard,
+                battery=one.battery,
+                position=_known(one.position),
+                mode=one.mode or "",
+                faults=tuple(one.faults),
+            )
+            self._take(name, news, heard=heard, least=0.0 if now else _WRITE_SECONDS)
+
+    def observe(self, news: Mapping[str, VehicleNews]) -> None:
+        """Take over what the monitor tells of the drones on the ground; without any, it is gone."""
+        for name, before in list(self._news.items()):
+            one = news.get(name, VehicleNews(reason="the service looks for it again"))
+            if one.link is LinkState.UNWATCHED and before.link is LinkState.MISSION:
+                continue
+            if one.heard is None and one.link is LinkState.LOST:
+                one = one.model_copy(update={"since": self._states[name].heard or one.since})
+            moved = self._moved(name, one)
+            # While the database fails, the newest state is kept here, and written later.
+            with contextlib.suppress(StoreError):
+                self._take(
+                    name, one, heard=one.heard, least=_WRITE_SECONDS if moved else _STILL_SECONDS
                 )
-                moment = time.monotonic()
-                due = now or moment - self._written.get(name, 0.0) >= _WRITE_SECONDS
-                if due:
-                    self._written[name] = moment
-            if due:
-                self._store.robots.put(state)
+
+    def hand(self, robots: Iterable[str], link: LinkState) -> None:
+        """Note that drones are a mission's from now on, or nobody's."""
+        with self._lock:
+            for name in robots:
+                self._news[name] = VehicleNews(link=link, since=time.time())
+
+    def objection(self, robot: str) -> str:
+        """Why a drone on the ground can be neither leased nor flown now; empty if it can."""
+        with self._lock:
+            enabled, news = self._states[robot].enabled, self._news[robot]
+        if not enabled:
+            return OUT_OF_SERVICE
+        if news.link is LinkState.LOST and time.time() - news.since > _DROPOUT_SECONDS:
+            return f"not reachable since {_moment(news.since)}: {news.reason}"
+        if news.link is not LinkState.CONNECTED:
+            return ""
+        least = self._return_at[robot]
+        if news.battery is not None and news.battery <= least:
+            return (
+                f"its battery holds {news.battery:.0%}, and it comes home at {least:.0%}: charge it"
+            )
+        return "; ".join(news.objections)
+
+    def waits_for(self, robot: str) -> str:
+        """Why a mission cannot have a drone from the monitor yet; empty if it can."""
+        with self._lock:
+            link = self._news[robot].link
+        known = link is LinkState.CONNECTED
+        return self.objection(robot) or ("" if known else "the service connects to it")
 
     def take_out(self, robots: Iterable[str]) -> None:
         """Take drones out of service until `enable`."""
@@ -69,16 +132,52 @@ class Garage:
             raise RefusedError(404, f"there is no robot {robot}")
         return self._change(robot, enabled=enabled)
 
-    def require_enabled(self, robots: Iterable[str]) -> None:
-        """Raise RefusedError for a drone that is out of service."""
-        out = [name for name in robots if not self._states[name].enabled]
-        if out:
-            raise RefusedError(
-                409, f"{', '.join(out)}: out of service until an operator has looked"
+    def require_fit(self, robots: Iterable[str]) -> None:
+        """Raise RefusedError for a drone that cannot be flown now."""
+        for name in robots:
+            if objection := self.objection(name):
+                raise RefusedError(409, f"{name}: {objection}")
+
+    def _moved(self, name: str, news: VehicleNews) -> bool:
+        """Whether a drone's charge or place differs from what was written down."""
+        if name not in self._written:
+            return True
+        row = self._written[name][1]
+        charged = abs((news.battery or 0.0) - (row.battery or 0.0)) >= _CHARGE
+        return charged or math.dist(news.position or _HOME, row.position or _HOME) >= _METRES
+
+    def _take(self, name: str, news: VehicleNews, *, heard: float | None, least: float) -> None:
+        """Take over news, and write them down if the last row is `least` seconds old."""
+        with self._lock:
+            self._news[name] = news
+            if heard is None:
+                return
+            before = self._states[name]
+            state = self._states[name] = replace(
+                before,
+                battery=before.battery if news.battery is None else news.battery,
+                position=news.position or before.position,
+                heard=heard,
             )
+            moment = time.monotonic()
+            due = moment - self._written.get(name, (-math.inf, state))[0] >= least
+            if due:
+                self._written[name] = moment, state
+        if due:
+            self._store.robots.put(state)
 
     def _change(self, robot: str, *, enabled: bool) -> RobotState:
         with self._lock:
             state = self._states[robot] = replace(self._states[robot], enabled=enabled)
         self._store.robots.put(state)
         return state
+
+
+def _moment(unix: float) -> str:
+    return time.strftime("%Y-%m-%d %H:%M:%S UTC", time.gmtime(unix))
+
+
+def _known(position: Sequence[float | None] | None) -> tuple[float, float, float] | None:
+    """A place all of whose axes are known; None for any other."""
+    axes = [axis for axis in position or () if axis is not None]
+    return (axes[0], axes[1], axes[2]) if len(axes) == len(_HOME) else None

@@ -53,6 +53,8 @@ class ActiveMission:
         self.link: FlightLink | None = None
         self.version = 0
         """Counts the changes."""
+        self.handing_over = False
+        """Whether the monitor is to let go of its drones, for it flies next."""
         self._save = save
         self._rehearsing: subprocess.Popen[bytes] | None = None
         self._flying: subprocess.Popen[bytes] | None = None
@@ -93,6 +95,22 @@ class ActiveMission:
         self._save(row)
         self.row = row
         self.version += 1
+
+    def wait_for(self, what: str) -> None:
+        """Tell what a queued mission waits for, if that is news."""
+        if what != self.row.reason:
+            self.change(reason=what)
+
+    @property
+    def attached_to(self) -> str | None:
+        """The mission by whose cameras this one senses; None for one that flies itself."""
+        found: str | None = self.row.request.get("attach")
+        return found
+
+    @property
+    def grants(self) -> dict[str, list[str]]:
+        """Cameras by tenant that may attach missions; an empty list is all of them."""
+        return dict(self.row.request.get("grants", {}))
 
     @property
     def rehearsal_lost(self) -> bool:
@@ -143,6 +161,12 @@ class ActiveMission:
         document = self.document()
         folder.make(order, document.text())
         models.lend(document, folder.models)
+
+    def end_flight(self) -> None:
+        """End the process of an attached mission, which has no drone, and all it has started."""
+        if self._flying is not None and self._flying.poll() is None:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(self._flying.pid, signal.SIGKILL)
 
     def follow(self) -> FlightLink:
         """The link to the flight, made when it is first needed."""

@@ -29,6 +29,8 @@ def shown(one: ActiveMission) -> MissionOut:
         robots=list(row.robots),
         lease=row.lease,
         share=list(row.request.get("share", ())),
+        attach=one.attached_to,
+        grants=one.grants,
         submitted=row.submitted,
         started=row.started,
         ended=row.ended,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
@@ -24,6 +25,8 @@ class ServiceSettings:
     """Folder of the database, models, and flights."""
     rehearse: bool = True
     """Fly each mission in simulation first."""
+    monitor: bool = True
+    """Hold the connection to each drone between its missions."""
     approval: bool = False
     """An operator has to approve each mission after its rehearsal."""
     speed: Literal["max"] | float = 1.0
@@ -34,6 +37,13 @@ class ServiceSettings:
     """OpenID Connect issuer whose tokens are good, too."""
     rehearsal_seconds: float = 300.0
     """Most wall seconds of a rehearsal."""
+    most_attached: int = 0
+    """Most missions that sense by the cameras of one flight; 0: cameras are not shared."""
+    edge_slots: int | None = None
+    """Analyses that flights with an analytics scheduler run at once on this machine's edge, all
+    together, by their tenants' weights; None: each flight runs its own as it likes."""
+    weights: Mapping[str, float] = field(default_factory=dict)
+    """Weight of a tenant on the edge; 1 for all others."""
     most_flights: int = 16
     """Most flights at once."""
 
@@ -41,6 +51,11 @@ class ServiceSettings:
     def models(self) -> Path:
         """Folder of the models that users have brought."""
         return self.state / "models"
+
+    @property
+    def edge_turns(self) -> Path:
+        """Socket at which flights take turns on the edge."""
+        return self.state / "edge"
 
     @property
     def missions(self) -> Path:

@@ -9,6 +9,10 @@ export type Role = "viewer" | "pilot" | "operator" | "admin";
  */
 export type Scope = "fly" | "sense" | "compute";
 /**
+ * Who is connected to a drone, and whether it answers.
+ */
+export type LinkState = "unwatched" | "connecting" | "connected" | "mission" | "lost";
+/**
  * State of a submitted mission at the service; its drones have states of their own.
  */
 export type MissionPhase =
@@ -93,12 +97,18 @@ export interface FleetOut {
 export interface RobotOut {
   battery: number | null;
   enabled: boolean;
+  faults: string[];
   heard: number | null;
   id: string;
   lease: string | null;
+  link: LinkState;
   mission: string | null;
+  mode: string | null;
+  objection: string;
   position: [number, number, number] | null;
   sensors: string[];
+  shared: string[];
+  since: number | null;
   tenant: string | null;
 }
 /**
@@ -108,7 +118,11 @@ export interface MissionOut {
   account: string;
   alerts: string[];
   analytics: AnalyticsOut | null;
+  attach: string | null;
   ended: number | null;
+  grants: {
+    [k: string]: string[];
+  };
   id: string;
   lease: string | null;
   name: string;

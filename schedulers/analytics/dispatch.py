@@ -74,6 +74,8 @@ class Dispatch:
         self.undecided: dict[int, Task] = {}
         self.running: Task | None = None
         """Task on the edge executor."""
+        self.edge_open = True
+        """Whether the idle edge is offered: a host that shares it closes it between its turns."""
         self.in_cloud = 0
         self.down: set[str] = set()
         """Models whose executor on the edge is down; their tasks go to the cloud or nowhere."""
@@ -161,6 +163,11 @@ class Dispatch:
         if self.running is None:
             self._offer_edge(now)
 
+    def offer(self, now: int) -> None:
+        """The edge is open: tasks that wait for it may start."""
+        if self.running is None:
+            self._offer_edge(now)
+
     def _adopt(self, scheduler: AnalyticsScheduler) -> None:
         # Events come by the million in the lab, so each is looked up and guarded once.
         self.scheduler = scheduler
@@ -171,7 +178,7 @@ class Dispatch:
 
     def _offer_edge(self, now: int) -> None:
         undecided = self.undecided
-        while undecided and self.running is None:
+        while self.edge_open and undecided and self.running is None:
             before = len(undecided)
             self._obey(self._executor_idle(now), now)
             if self._ended:

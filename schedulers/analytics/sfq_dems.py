@@ -1,9 +1,7 @@
 """SFQ-DEMS: DEMS for each tenant, and start-time fair queueing of edge and cloud between them.
 
-Start-time fair queueing: Goyal, Vin, Cheng, "Start-time fair queueing: a scheduling algorithm for
-integrated services packet switching networks", SIGCOMM 1996. Trunk reservation: Key, "Optimal
-control and trunk reservation in loss networks", Probability in the Engineering and Informational
-Sciences 4(2), 1990.
+Start-time fair queueing: see `FairQueue`. Trunk reservation: Key, "Optimal control and trunk
+reservation in loss networks", Probability in the Engineering and Informational Sciences 4(2), 1990.
 """
 
 from __future__ import annotations
@@ -23,6 +21,7 @@ from aerodaas.schedulers.analytics.base import (
     TaskPlace,
     WakeAt,
 )
+from aerodaas.schedulers.analytics.fair_queue import FairQueue
 from aerodaas.schedulers.analytics.published.dems import Dems
 from aerodaas.types.clock import NANOSECONDS
 
@@ -51,25 +50,6 @@ class _TenantDems(Dems):
 
 
 @dataclass
-class _Server:
-    """Start-time fair queueing of one server: the start tag with the least virtual time is next."""
-
-    now: float = 0.0
-    """Virtual time: start tag of the newest execution, nanoseconds over weight."""
-    finish: dict[str, float] = field(default_factory=dict)
-    """Finish tag of each tenant's newest execution."""
-
-    def tag(self, tenant: str) -> float:
-        """Start tag of the tenant's next execution."""
-        return max(self.now, self.finish.get(tenant, 0.0))
-
-    def serve(self, tenant: str, taken: float) -> None:
-        """An execution of `taken` nanoseconds over the tenant's weight has started."""
-        self.now = self.tag(tenant)
-        self.finish[tenant] = self.now + taken
-
-
-@dataclass
 class _Tenant:
     """One tenant's scheduler and what it has in hand."""
 
@@ -94,8 +74,8 @@ class SfqDems(AnalyticsScheduler):
 
     def __init__(self) -> None:
         self._tenants: dict[str, _Tenant] = {}
-        self._edge = _Server()
-        self._cloud = _Server()
+        self._edge = FairQueue()
+        self._cloud = FairQueue()
         self._in_cloud = 0
         """Tasks of all tenants there."""
         self._sharing: list[_Tenant] = []

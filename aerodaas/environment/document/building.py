@@ -11,6 +11,7 @@ from aerodaas.analytics.guests.answers import AnsweredCondition
 from aerodaas.analytics.here.analysis import HERE, HereAnalysis, HereConditions, HereSite
 from aerodaas.config.checked import checked
 from aerodaas.config.model import TaskConfig
+from aerodaas.config.options import current_options
 from aerodaas.config.plugins import load_plugin, require_plugin
 from aerodaas.dataflow.graph import AeroStreamData, NavigationEdge
 from aerodaas.dataflow.mission_document import (
@@ -53,6 +54,12 @@ def build_mission(
         raise GraphError(
             f"{', '.join(document.here)}: code of the application, which stays at its user's side, "
             "and there is none here: fly the application itself, or submit it from there"
+        )
+    options = current_options.get()
+    if not (document.navigation or options.senses_only or options.provider.attach is not None):
+        raise GraphError(
+            "its navigation is empty: it senses only, by the cameras of another mission in flight "
+            "at a provider (`aerodaas submit … --attach MISSION`)"
         )
     _Builder(environment, models, here).build(document)
 

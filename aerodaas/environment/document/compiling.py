@@ -13,6 +13,7 @@ from aerodaas.analytics.base import Analytics
 from aerodaas.analytics.commanding import CommandingAnalytics
 from aerodaas.config.checked import explained
 from aerodaas.config.model import TaskConfig
+from aerodaas.config.options import current_options
 from aerodaas.config.plugins import PluginKind
 from aerodaas.dataflow.graph import NavigationEdge, Node, Trigger
 from aerodaas.dataflow.mission_document import (
@@ -107,7 +108,8 @@ class _Compiler:
             what = "hooks of on_start or on_end" if hooks else "callbacks of subscribe()"
             raise GraphError(f"a document has no {what}, which are the application's own code")
         edges = self._graph.navigation
-        if not edges and not self._environment.navigation_waiting():
+        attached = current_options.get().provider.attach is not None
+        if not (edges or attached or self._environment.navigation_waiting()):
             raise GraphError("nothing flies: call navigate() before start_mission()")
 
     def _entries(self, work: Analytics[Any]) -> Iterator[dict[str, Any]]:

@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import time
 import uuid
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 from urllib.parse import quote, urlencode
@@ -26,6 +26,7 @@ from aerodaas.protocol.schemas import (
     AuditOut,
     CommandIn,
     FleetOut,
+    GrantIn,
     LeaseIn,
     LeaseOut,
     MissionIn,
@@ -164,6 +165,16 @@ class ProviderClient:
     def cancel(self, mission: str) -> MissionOut:
         """Cancel a mission; drones in flight come home."""
         return self._ask(MissionOut, "DELETE", f"/v1/missions/{_part(mission)}")
+
+    def grant(self, mission: str, tenant: str, sensors: Sequence[str] = ()) -> MissionOut:
+        """Let a tenant attach missions to a mission's cameras; to all of them without a name."""
+        path = f"/v1/missions/{_part(mission)}/grants/{_part(tenant)}"
+        return self._ask(MissionOut, "PUT", path, GrantIn(sensors=list(sensors)))
+
+    def withdraw(self, mission: str, tenant: str) -> MissionOut:
+        """Withdraw what a tenant was granted; what it has attached ends."""
+        path = f"/v1/missions/{_part(mission)}/grants/{_part(tenant)}"
+        return self._ask(MissionOut, "DELETE", path)
 
     def approve(self, mission: str) -> MissionOut:
         """Approve a mission that waits for it, as an operator."""

@@ -243,7 +243,7 @@ class ProvidedRun:
         from aerodaas.terminal.provided import phase_text  # noqa: PLC0415 - slow to load
 
         follower, mission = self._following, self._following.mission
-        while not (mission.phase is MissionPhase.FLYING and mission.status):
+        while not (mission.phase is MissionPhase.FLYING and (mission.status or mission.attach)):
             if mission.phase.over:
                 if mission.phase is not MissionPhase.LANDED:
                     raise MissionError(self._reason(mission))

@@ -56,11 +56,19 @@ def _order(document: MissionDocument, options: RunOptions) -> MissionIn:
         "lease": wanted.lease,
         "silence": wanted.silence,
         "silence_seconds": wanted.silence_seconds,
+        "attach": wanted.attach,
         "share": list(wanted.share),
+        "grants": dict(map(_granted, wanted.grant)),
         "seed": options.seed,
     }
     content = {name: value for name, value in given.items() if value is not None}
     return MissionIn(document=document, **content)
+
+
+def _granted(text: str) -> tuple[str, list[str]]:
+    """Tenant and cameras of `TENANT`, or `TENANT=SENSOR,…`."""
+    tenant, _, sensors = text.partition("=")
+    return tenant, [one.strip() for one in sensors.split(",") if one.strip()]
 
 
 def _content(path: Path) -> bytes:

@@ -1,7 +1,8 @@
 """Control socket of a flight: commands from the service, status and items to it.
 
-Each connection begins with what it is for: `command`, `follow`, `items` or `here`. Messages are
-JSON with one blob. The socket lies in the flight's folder, which is open to its user alone.
+Each connection begins with what it is for: `command`, `follow`, `items`, `share` or `here`.
+Messages are JSON with one blob. The socket lies in the flight's folder, which is open to its user
+alone.
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from aerodaas.protocol.commands import COMMANDS
 from aerodaas.protocol.piloting import ControlsIn, RearrangeIn
 from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.sharing import Sharing
 from aerodaas.service.flights.watch import LeaseWatch
-from aerodaas.types.errors import AeroDaaSError
+from aerodaas.types.errors import AeroDaaSError, MissionError
 
 __all__ = ["ControlServer", "Flown", "Reader"]
 
@@ -33,6 +35,8 @@ _MOST_CONNECTIONS = 64
 _SEND_SECONDS = 5.0
 _QUESTIONS = 64
 """Questions to the user's side that wait to be sent; a fuller queue refuses them."""
+_PICTURE_SECONDS = 0.2
+"""Longest wait for a picture that is asked for."""
 _RATE = 10.0
 """Status messages a second."""
 
@@ -47,6 +51,10 @@ _BODIES: Mapping[str, type[NavigationIn | RearrangeIn | ControlsIn]] = {
 
 class Reader(Protocol):
     """Reader of one stream."""
+
+    def latest_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
+        """The newest item that was not returned; None if there was none within `timeout`."""
+        ...
 
     def next_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
         """The next item as a message with its blob; None if there was none within `timeout`."""
@@ -92,6 +100,7 @@ class ControlServer:
         self._flown = flown
         self._lease = lease
         self._relay = relay
+        self._sharing = Sharing()
         self._places = threading.BoundedSemaphore(_MOST_CONNECTIONS)
         path = folder.socket
         path.unlink(missing_ok=True)
@@ -131,6 +140,7 @@ class ControlServer:
                 "command": self._commands,
                 "follow": self._follow,
                 "items": self._items,
+                "share": self._share,
                 "here": self._here,
             }
             purposes[first["for"]](channel, first)
@@ -152,19 +162,31 @@ class ControlServer:
             return AnswerOut(accepted=False, text=str(error)).model_dump()
 
     def _done(self, request: dict[str, Any]) -> AnswerOut:
+        own = self._done_for_service(request)
+        if own is not None:
+            return own
+        if self._lease.reason and not request.get("operator"):
+            return AnswerOut(accepted=False, text=f"the drones come home: {self._lease.reason}")
+        if request["do"] == "share":
+            self._sharing.share(str(request["mission"]), map(str, request["streams"]))
+            return AnswerOut(accepted=True)
+        return AnswerOut.of(self._commanded(request))
+
+    def _done_for_service(self, request: dict[str, Any]) -> AnswerOut | None:
+        """Do what the service asks for itself, whatever became of the lease; None for the rest."""
+        accepted = True
         match request["do"]:
             case "heard":
                 self._lease.hear()
-                return AnswerOut(accepted=True)
             case "extend":
-                extended = self._lease.extend(float(request["ends"]))
-                return AnswerOut(accepted=extended, text="" if extended else self._lease.reason)
+                accepted = self._lease.extend(float(request["ends"]))
             case "end":
                 self._lease.end(str(request["reason"]))
-                return AnswerOut(accepted=True)
-        if self._lease.reason and not request.get("operator"):
-            return AnswerOut(accepted=False, text=f"the drones come home: {self._lease.reason}")
-        return AnswerOut.of(self._commanded(request))
+            case "withdraw":
+                self._sharing.withdraw(str(request["mission"]))
+            case _:
+                return None
+        return AnswerOut(accepted=accepted, text="" if accepted else self._lease.reason)
 
     def _commanded(self, request: dict[str, Any]) -> Answer:
         content, word = request.get("content"), request["do"]
@@ -207,6 +229,29 @@ class ControlServer:
             message, blob = found if found is not None else ({}, b"")
             # An empty message tells whether the other side is still there.
             channel.send(message, blob, timeout=_SEND_SECONDS)
+
+    def _share(self, channel: Channel, first: dict[str, Any]) -> None:
+        """Answer each request of an attached mission by the newest picture of a camera."""
+        mission, stream = str(first["mission"]), str(first["stream"])
+        try:
+            if not self._sharing.allows(mission, stream):
+                raise MissionError(f"{stream} is not shared with {mission}")
+            reader = self._flown.reader(stream)
+        except AeroDaaSError as error:
+            channel.send({"refused": str(error)}, timeout=_SEND_SECONDS)
+            return
+        channel.send({}, timeout=_SEND_SECONDS)
+        while True:
+            channel.receive()
+            found = reader.latest_packed(_PICTURE_SECONDS)
+            # After the wait: what was withdrawn meanwhile is not sent.
+            if (
+                self._closed.is_set()
+                or self._flown.over
+                or not self._sharing.allows(mission, stream)
+            ):
+                return
+            channel.send(*(found if found is not None else ({}, b"")), timeout=_SEND_SECONDS)
 
     def _here(self, channel: Channel, _: dict[str, Any]) -> None:
         """Connect the user's side: questions go out by a bounded queue, answers come in."""

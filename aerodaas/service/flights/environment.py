@@ -5,6 +5,7 @@ from __future__ import annotations
 from aerodaas.config.model import EnvironmentConfig
 from aerodaas.config.overrides import located
 from aerodaas.service.flights.order import FlightOrder
+from aerodaas.service.flights.shared_camera import attached_config
 from aerodaas.service.limits import limited
 from aerodaas.service.rehearsal import rehearsal_config
 
@@ -13,8 +14,11 @@ __all__ = ["environment_of"]
 
 def environment_of(order: FlightOrder) -> EnvironmentConfig:
     """The environment of a flight; raises ConfigError where the limits leave no room for it."""
+    whole = located(EnvironmentConfig.load(order.fleet), order.fleet.parent)
+    if order.attached is not None:
+        return attached_config(whole, order.attached, order.mission)
     config = limited(
-        located(EnvironmentConfig.load(order.fleet), order.fleet.parent),
+        whole,
         order.robots,
         tenant=order.limits,
         area=order.area,

@@ -13,7 +13,7 @@ from aerodaas.config.json_text import read_json
 from aerodaas.protocol.schemas import Area, SilencePolicy, VerdictOut
 from aerodaas.service.limits import TenantLimits
 
-__all__ = ["FlightOrder", "OtherLease", "Outcome"]
+__all__ = ["Attached", "EdgeTurnsOrder", "FlightOrder", "OtherLease", "Outcome"]
 
 
 class _Record(BaseModel):
@@ -25,6 +25,25 @@ class OtherLease(_Record):
 
     id: str
     area: Area
+
+
+class Attached(_Record):
+    """The flight by whose cameras a mission senses."""
+
+    mission: str
+    control: Path
+    """Its control socket."""
+    sensors: list[str]
+    """Cameras that are shared, by full id."""
+
+
+class EdgeTurnsOrder(_Record):
+    """The tenant's share of the edge."""
+
+    turns: Path
+    """Socket of the service that gives turns."""
+    tenant: str
+    weight: float
 
 
 class FlightOrder(_Record):
@@ -50,6 +69,10 @@ class FlightOrder(_Record):
     seed: int | None = None
     address: str | None = None
     """Ray cluster to join; None for one of its own."""
+    edge: EdgeTurnsOrder | None = None
+    """None where flights use the edge as they like."""
+    attached: Attached | None = None
+    """For a mission that senses only, which has no robots."""
     rehearsal: bool = False
     """Fly in simulation, and judge the recording."""
     battery: dict[str, float] = Field(default_factory=dict)

@@ -20,7 +20,7 @@ from aerodaas.analytics.here.analysis import HereSite
 from aerodaas.analytics.here.relay import HereRelay
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.config.model import EnvironmentConfig, RemoteConfig
-from aerodaas.config.options import RunOptions, current_options
+from aerodaas.config.options import EdgeShare, RunOptions, current_options
 from aerodaas.console.meter import FlightMeter
 from aerodaas.console.packed_reader import PackedReader, drawn_streams
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
@@ -41,6 +41,8 @@ __all__ = ["Flying", "fly"]
 
 _USER_SECONDS = 30.0
 """Wall seconds for the user's side to connect before take-off."""
+_NICENESS = 10
+"""Of an attached mission and all that it starts: the flight has the processor first."""
 _LOOK_SECONDS = 0.1
 """Wall seconds between two looks at the drones."""
 
@@ -53,6 +55,8 @@ def fly(path: Path) -> None:
     folder = FlightFolder(path)
     order = FlightOrder.read(folder.order)
     os.chdir(folder.path)
+    if order.attached is not None:
+        os.nice(_NICENESS)
     with folder.claim():
         folder.end(Flying(folder, order).outcome())
 
@@ -96,9 +100,14 @@ class Flying:
         run = self._run
         if run is not None and run.state is not None:
             self._meter.note(run.state)
+        ended = ""
+        if self._order.attached is not None:
+            ended = "the cameras are shared no more"
+            # Also where the end came first: a camera that is withdrawn cannot be opened.
+            reason = "" if self._lease.reason else reason
         return Outcome(
             landed=not reason,
-            reason=reason or self._lease.reason,
+            reason=reason or self._lease.reason or ended,
             began=self._began,
             ended=time.time(),
             status=self._meter.status,
@@ -108,22 +117,25 @@ class Flying:
 
     def _fly(self) -> None:
         order, document = self._order, read_mission(self._folder.document)
+        lockstep = order.speed == "max"
         self.config = environment_of(order).model_copy(update={"remote": _closed_remote()})
         current_options.set(
             RunOptions(
                 environment=order.fleet,
                 config=self.config,
                 speed=None if order.speed == "max" else order.speed,
-                lockstep=order.speed == "max",
+                lockstep=lockstep,
+                senses_only=order.attached is not None,
                 seed=order.seed,
                 record=self._folder.recording,
                 address=order.address,
+                edge=None if order.edge is None else EdgeShare(**dict(order.edge)),
                 view=False,
-                report=None if order.rehearsal else "page",
+                report=None if order.rehearsal or order.attached else "page",
             )
         )
         environment = self._environment = Environment(order.fleet)
-        here = HereSite(self._relay.path, lossless=order.speed == "max")
+        here = HereSite(self._relay.path, lossless=lockstep)
         build_mission(document, environment, self._folder.models, here)
         server = ControlServer(self._folder, self, self._lease, self._relay)
         try:
@@ -168,6 +180,9 @@ class Flying:
         """Call every drone home, once; one that does not answer is called again by `_look`."""
         run = self._run
         if run is None or run.over:
+            return
+        if self._order.attached is not None:
+            run.end_sensing()
             return
         for robot in self._order.robots:
             if robot in self._called or not self._navigates(robot):

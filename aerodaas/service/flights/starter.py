@@ -8,10 +8,15 @@ import sys
 
 from aerodaas.service.flights.folder import FlightFolder
 
-__all__ = ["start_process"]
+__all__ = ["service_free_environment", "start_process"]
 
 _KEPT_OUT = "AERODAAS_"
 """Variables of the service itself, which hold its tokens."""
+
+
+def service_free_environment() -> dict[str, str]:
+    """The environment's variables without the service's own."""
+    return {name: value for name, value in os.environ.items() if not name.startswith(_KEPT_OUT)}
 
 
 def start_process(folder: FlightFolder, *, tied: bool) -> subprocess.Popen[bytes]:
@@ -20,9 +25,6 @@ def start_process(folder: FlightFolder, *, tied: bool) -> subprocess.Popen[bytes
     A flight goes on when the service ends, and Ctrl-C at the service's terminal does not reach
     it. A rehearsal is `tied`: it ends with the service, whatever ends that (see `tie`).
     """
-    environment = {
-        name: value for name, value in os.environ.items() if not name.startswith(_KEPT_OUT)
-    }
     with folder.log.open("ab") as log:
         return subprocess.Popen(  # noqa: S603 - our own module
             [sys.executable, "-m", "aerodaas.service.flights", str(folder.path)],
@@ -30,5 +32,5 @@ def start_process(folder: FlightFolder, *, tied: bool) -> subprocess.Popen[bytes
             stdout=log,
             stderr=log,
             start_new_session=True,
-            env=environment,
+            env=service_free_environment(),
         )

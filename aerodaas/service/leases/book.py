@@ -48,7 +48,7 @@ class LeaseBook:
       before an earlier one only if they share no robot that the earlier one waits for.
     - A lease of any one that fits waits for all that fit now: those whose charge, place or camera
       does not suffice may go to others meanwhile.
-    - A lease that names a robot out of service waits, and holds up nobody.
+    - A lease that names a robot which cannot be flown now waits, and holds up nobody.
     - A drone that still comes home from an ended lease is granted when it has landed.
     - A granted lease ends after its minutes at the latest; from then on it holds nothing, even
       before `tick` has told so.
@@ -93,9 +93,9 @@ class LeaseBook:
             The new lease, and all leases changed, this one among them if it is granted.
 
         Raises:
-            RefusedError: With status 404 for an unknown robot; 409 for one that is out of
-                service, or if no drone of the fleet has the camera that is asked for; 422 for a
-                robot named twice; 429 if the tenant, or all of them, wait for too many.
+            RefusedError: With status 404 for an unknown robot; 409 for one that cannot be flown
+                now, or if no drone of the fleet has the camera that is asked for; 422 for a robot
+                named twice; 429 if the tenant, or all of them, wait for too many.
             StoreError: If the database does not take it; nothing is asked for then.
         """
         check_wish(wish, fleet)

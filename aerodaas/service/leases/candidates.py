@@ -22,7 +22,8 @@ class Candidate:
     """Metres east and north; None if unknown, which is within no distance."""
     battery_minutes: float | None = None
     """Minutes of flight that its charge lasts; None if unknown, which is enough for none."""
-    enabled: bool = True
+    objection: str = ""
+    """Why it cannot be flown now: out of service, out of reach, low; empty if it can."""
     busy: bool = False
     """Whether it still flies, for a lease that holds it or one that has ended: no other lease gets
     it before it has landed."""
@@ -35,11 +36,11 @@ Fleet: TypeAlias = Mapping[str, Candidate]
 def waited_for(lease: Lease, fleet: Fleet) -> frozenset[str]:
     """Robots that a queued lease could use now, were they all free.
 
-    All of those that it names, if none is missing or out of service; or each one that fits.
+    All of those that it names, if each can be flown; or each one that fits.
     """
     if not lease.wanted:
         return frozenset(id_ for id_, robot in fleet.items() if _fits(lease, robot))
-    ready = all(id_ in fleet and fleet[id_].enabled for id_ in lease.wanted)
+    ready = all(id_ in fleet and not fleet[id_].objection for id_ in lease.wanted)
     return frozenset(lease.wanted) if ready else frozenset()
 
 
@@ -50,7 +51,7 @@ def distance(lease: Lease, robot: Candidate) -> float:
 
 def _fits(lease: Lease, robot: Candidate) -> bool:
     return (
-        robot.enabled
+        not robot.objection
         and (robot.camera or not lease.camera)
         and (lease.within is None or distance(lease, robot) <= lease.within)
         and (lease.battery_minutes or 0.0) <= (robot.battery_minutes or 0.0)

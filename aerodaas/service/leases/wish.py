@@ -23,9 +23,9 @@ def check_wish(wish: LeaseIn, fleet: Fleet) -> None:
     if unknown:
         known = ", ".join(sorted(fleet)) or "none"
         raise RefusedError(404, f"the fleet has no robot {', '.join(unknown)}; it has: {known}")
-    resting = [name for name in names if not fleet[name].enabled]
-    if resting:
-        raise RefusedError(409, f"{', '.join(resting)} is out of service: ask for another")
+    for name in names:
+        if fleet[name].objection:
+            raise RefusedError(409, f"{name}: {fleet[name].objection}; ask for another")
     if not names and not any(robot.camera or not wish.camera for robot in fleet.values()):
         raise RefusedError(409, "no drone of the fleet could ever fit")
 

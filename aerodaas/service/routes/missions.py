@@ -18,11 +18,13 @@ from aerodaas.console.playback import (
 )
 from aerodaas.protocol.schemas import (
     CommandIn,
+    GrantIn,
     MissionIn,
     MissionOut,
     NavigationIn,
     Role,
     Scope,
+    Word,
 )
 from aerodaas.service.access import Audit
 from aerodaas.service.desk import MissionDesk
@@ -52,6 +54,9 @@ class MissionRoutes:
         router.add_api_route("/{mission}/approve", self.approve, methods=["POST"])
         router.add_api_route("/{mission}/commands", self.command, methods=["POST"])
         router.add_api_route("/{mission}/navigation", self.navigation, methods=["POST"])
+        grants = "/{mission}/grants/{tenant}"
+        router.add_api_route(grants, self.grant, methods=["PUT"])
+        router.add_api_route(grants, self.withdraw, methods=["DELETE"])
         files: dict[str, Any] = {"response_class": FileResponse}
         router.add_api_route("/{mission}/recording", self.recording, **files)
         router.add_api_route("/{mission}/rehearsal.png", self.picture, **files)
@@ -71,7 +76,8 @@ class MissionRoutes:
         The same document with the same `Idempotency-Key` is the same mission, however often it
         is sent.
         """
-        principal = self._admission.require(request, Role.PILOT, Scope.FLY)
+        scope = Scope.FLY if wanted.attach is None else Scope.SENSE
+        principal = self._admission.require(request, Role.PILOT, scope)
         with self._admission.auditing(principal, request):
             found = self._desk.submit(principal, wanted, read_key(idempotency_key))
         self._audit.write(principal, "mission.submit", found.id, found.name, accepted=True)
@@ -105,12 +111,33 @@ class MissionRoutes:
         self._audit.write(principal, "mission.approve", mission, accepted=True)
         return found
 
+    def grant(self, mission: str, tenant: Word, body: GrantIn, request: Request) -> MissionOut:
+        """Let a tenant attach missions to this one's cameras, and no others than these."""
+        principal = self._admission.require(request, Role.PILOT, Scope.SENSE)
+        with self._admission.auditing(principal, request):
+            found = self._desk.grant(principal, mission, tenant, body.sensors)
+        said = f"to {tenant}: {', '.join(body.sensors) or 'all cameras'}"
+        self._audit.write(principal, "mission.grant", mission, said, accepted=True)
+        return found
+
+    def withdraw(self, mission: str, tenant: Word, request: Request) -> MissionOut:
+        """Withdraw what a tenant was granted; what it has attached gets no further picture."""
+        principal = self._admission.require(request, Role.PILOT)
+        with self._admission.auditing(principal, request):
+            found = self._desk.grant(principal, mission, tenant, None)
+        said = f"from {tenant}"
+        self._audit.write(
+            principal, "mission.withdraw", mission, said, accepted=True, required=False
+        )
+        return found
+
     def command(
         self, mission: str, body: CommandIn, request: Request, later: BackgroundTasks
     ) -> AnswerOut:
         """Give one of the mission's robots a command; answers what the drone said."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        answer = self._desk.command(principal, mission, body)
+        with self._admission.auditing(principal, request):
+            answer = self._desk.command(principal, mission, body)
         later.add_task(
             self._audit.note_answer, principal, body.command, f"{mission}/{body.robot}", answer
         )
@@ -121,7 +148,8 @@ class MissionRoutes:
     ) -> AnswerOut:
         """Add waypoints to the queue of one of the mission's robots."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        answer = self._desk.fly(principal, mission, body)
+        with self._admission.auditing(principal, request):
+            answer = self._desk.fly(principal, mission, body)
         later.add_task(
             self._audit.note_answer, principal, "navigation", f"{mission}/{body.robot}", answer
         )

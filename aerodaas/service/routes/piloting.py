@@ -55,7 +55,8 @@ class PilotingRoutes:
     ) -> AnswerOut:
         """Change the order of a robot's coming waypoints, or remove some."""
         principal = self._admission.require(request, Role.PILOT, Scope.FLY)
-        answer = self._desk.fly(principal, mission, body)
+        with self._admission.auditing(principal, request):
+            answer = self._desk.fly(principal, mission, body)
         later.add_task(
             self._audit.note_answer, principal, "plan", f"{mission}/{body.robot}", answer
         )
@@ -65,7 +66,8 @@ class PilotingRoutes:
         """Have a robot flown by hand, until the sender lets go or falls silent."""
         try:
             principal = self._admission.require(socket, Role.PILOT, Scope.FLY)
-            await asyncio.to_thread(self._desk.order, principal, mission)
+            with self._admission.auditing(principal, socket):
+                await asyncio.to_thread(self._desk.order, principal, mission)
         except AeroDaaSError as error:
             await refuse(socket.scope, socket.send, error)
             return

@@ -472,3 +472,23 @@ def test_a_task_is_in_time_at_its_deadline_and_may_leave_at_its_latest_start() -
     assert host.asked[-1] == ("cloud", 1, 40)
     dispatch.finished(second, second.deadline)
     assert [end.outcome for end in host.results] == [TaskOutcome.DONE] * 2
+
+
+def test_a_closed_edge_is_offered_to_nobody() -> None:
+    """Whatever happens meanwhile; what waits starts when it is opened, one at a time."""
+    dispatch, host = _dispatch_of(_Scripted(idle=True))
+    dispatch.edge_open = False
+    dispatch.arrived(_task(0), 0)
+    dispatch.arrived(_task(1), 1)
+    dispatch.timer(2)
+    dispatch.change_resources(Resources(cloud_slots=2), 3)
+    dispatch.offer(4)
+    assert host.asked == []
+    dispatch.edge_open = True
+    dispatch.offer(5)
+    assert host.asked == [("edge", 0, 5)]
+    dispatch.offer(6)
+    assert dispatch.running is not None
+    dispatch.edge_open = False
+    dispatch.finished(dispatch.running, 7)
+    assert host.asked == [("edge", 0, 5)]

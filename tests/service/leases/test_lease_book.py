@@ -128,8 +128,8 @@ def test_a_drone_out_of_service_is_refused_and_holds_up_nobody(book: LeaseBook) 
     """One that goes out of service while it is waited for."""
     held = ask(book, "near")
     both = ask(book, "near", "far")
-    resting = FLEET | {"near": replace(FLEET["near"], enabled=False)}
-    with pytest.raises(RefusedError, match="near is out of service") as refused:
+    resting = FLEET | {"near": replace(FLEET["near"], objection="out of service")}
+    with pytest.raises(RefusedError, match="near: out of service") as refused:
         book.request(LeaseIn(robots=["near"]), "farm", "pilot", NOW, resting)
     assert refused.value.status == 409
     later, _ = book.request(LeaseIn(robots=["far"]), "farm", "pilot", NOW, resting)

@@ -83,7 +83,7 @@ class Leases(RuleBasedStateMachine):
     @rule(wish=WISHES, tenant=st.sampled_from(TENANTS))
     def request(self, wish: LeaseIn, tenant: str) -> None:
         """Refused for a robot out of service, and not carried out while the database fails."""
-        resting = any(not self.fleet[id_].enabled for id_ in wish.robots or ())
+        resting = any(self.fleet[id_].objection for id_ in wish.robots or ())
         try:
             lease, news = self.book.request(wish, tenant, "pilot", self.now, self.fleet)
         except StoreError:
@@ -155,18 +155,22 @@ class Leases(RuleBasedStateMachine):
 
     @rule(
         id_=st.sampled_from(ROBOTS),
-        enabled=st.booleans(),
+        objection=st.sampled_from(["", "out of service"]),
         busy=st.booleans(),
         minutes=st.sampled_from([None, 5.0, 30.0]),
         east=st.sampled_from([None, 0.0, 100.0]),
     )
     def change_robot(
-        self, id_: str, *, enabled: bool, busy: bool, minutes: float | None, east: float | None
+        self, id_: str, *, objection: str, busy: bool, minutes: float | None, east: float | None
     ) -> None:
         """It is charged, moved, or taken out of service."""
         position = None if east is None else (east, 0.0)
         self.fleet[id_] = replace(
-            self.fleet[id_], enabled=enabled, busy=busy, battery_minutes=minutes, position=position
+            self.fleet[id_],
+            objection=objection,
+            busy=busy,
+            battery_minutes=minutes,
+            position=position,
         )
 
     @rule(fails=st.booleans())
@@ -244,13 +248,12 @@ class Leases(RuleBasedStateMachine):
     def usable(self, lease: Lease) -> set[str]:
         """What a lease could have now, in the words of the request."""
         if lease.wanted:
-            return (
-                set(lease.wanted) if all(self.fleet[one].enabled for one in lease.wanted) else set()
-            )
+            ready = not any(self.fleet[one].objection for one in lease.wanted)
+            return set(lease.wanted) if ready else set()
         return {
             one.id
             for one in self.fleet.values()
-            if one.enabled
+            if not one.objection
             and not (lease.camera and not one.camera)
             and not (
                 lease.within is not None

@@ -1,0 +1,199 @@
+"""Attachments: missions that sense by the cameras of another one in flight.
+
+They are missions like others, in a process and a Ray of their own; but their cameras are the other
+flight's, whose process sends pictures as long as they are shared, and they have no drone.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from aerodaas.analytics.commanding import CommandingAnalytics
+from aerodaas.config.plugins import load_plugin
+from aerodaas.protocol.schemas import LeaseState, MissionIn, MissionPhase, StreamKind
+from aerodaas.service.access import Principal, sees
+from aerodaas.service.bookings import Bookings
+from aerodaas.service.errors import RefusedError
+from aerodaas.service.flights.order import Attached
+from aerodaas.service.mission import ActiveMission
+from aerodaas.service.settings import ServiceSettings
+from aerodaas.types.errors import MissionError
+
+if TYPE_CHECKING:
+    from aerodaas.dataflow.mission_document import MissionDocument
+
+__all__ = ["Attachments"]
+
+_UNPROCESSABLE = 422
+_ENDING_SECONDS = 60.0
+"""Seconds after which the process of an attached mission that was told to end is ended."""
+
+
+class Attachments:
+    """Attached missions among the desk's; called with its lock held."""
+
+    def __init__(
+        self, settings: ServiceSettings, bookings: Bookings, missions: Mapping[str, ActiveMission]
+    ) -> None:
+        """Attach to the desk's `missions`, by the provider's settings."""
+        self._most = settings.most_attached
+        self._cameras = {
+            one.full_id for one in settings.config.all_sensors() if one.type == "camera"
+        }
+        self._bookings = bookings
+        self._missions = missions
+        self._told: dict[str, float] = {}
+        """When an attached mission was told to end, by `time.monotonic`."""
+
+    def check(self, principal: Principal, wanted: MissionIn) -> None:
+        """Raise RefusedError for what cannot be attached: by the provider, its owner or itself."""
+        if self._most == 0:
+            raise RefusedError(403, "this provider shares no cameras between applications")
+        if wanted.lease is not None:
+            raise RefusedError(_UNPROCESSABLE, "an attached mission has no lease: leave it out")
+        _require_senses_only(wanted.document)
+        host = self._host(principal, str(wanted.attach))
+        shared = self.shared(host, principal.tenant)
+        missing = [name for name in wanted.document.sensors if name not in shared]
+        if missing:
+            told = ", ".join(shared) or "none that is running"
+            raise RefusedError(
+                403, f"{host.row.id} does not share {', '.join(missing)}; it shares {told}"
+            )
+        if len(self._beside(host)) >= self._most:
+            raise RefusedError(409, self._full(host))
+
+    def shared(self, host: ActiveMission, tenant: str) -> list[str]:
+        """Running cameras of a flying mission to which a tenant may attach missions."""
+        grants = host.grants
+        if self._most == 0 or host.phase is not MissionPhase.FLYING or host.attached_to:
+            return []
+        if tenant != host.row.tenant and tenant not in grants:
+            return []
+        granted = grants.get(tenant, [])
+        # Without a link of its own: requests ask for this in any thread.
+        streams = {} if host.link is None else host.link.news.streams
+        running = [name for name, kind in streams.items() if kind is StreamKind.PICTURES]
+        cameras = [name for name in running if name in self._cameras]
+        return [name for name in cameras if not granted or name in granted]
+
+    def begin(self, one: ActiveMission) -> Attached:
+        """Have the flight share its cameras with a mission; raises MissionError if it does not."""
+        host = self._missions.get(str(one.attached_to))
+        if host is None or host.phase is not MissionPhase.FLYING:
+            raise MissionError(f"{one.attached_to} is not flying any more")
+        if len([other for other in self._beside(host) if other is not one]) >= self._most:
+            raise MissionError(self._full(host))
+        wanted = one.document().sensors
+        if not set(wanted) <= set(self.shared(host, one.row.tenant)):
+            raise MissionError(f"{one.attached_to} does not share its cameras any more")
+        answer = host.follow().ask(do="share", mission=one.row.id, streams=wanted)
+        if not answer.accepted:
+            raise MissionError(answer.text)
+        return Attached(mission=host.row.id, control=host.flight.socket, sensors=wanted)
+
+    def watch(self, one: ActiveMission) -> None:
+        """End an attached mission whose flight has ended, or that may sense no more."""
+        host = self._missions.get(str(one.attached_to))
+        if host is None or host.phase is not MissionPhase.FLYING:
+            self._end(one, "the flight that it was attached to has ended")
+        elif one.row.tenant != host.row.tenant and one.row.tenant not in host.grants:
+            self._withdraw(host, one)
+            self._end(one, f"{host.row.tenant} has withdrawn its grant")
+
+    def leave(self, one: ActiveMission) -> None:
+        """Share no more with a mission that is over."""
+        self._told.pop(one.row.id, None)
+        host = self._missions.get(str(one.attached_to))
+        if host is not None:
+            self._withdraw(host, one)
+
+    def granted(self, host: ActiveMission, tenant: str, sensors: list[str]) -> None:
+        """Let a tenant attach missions to these cameras; what it has attached to others ends."""
+        self._grant(host, {**host.grants, tenant: sensors})
+        for one in self._of(host, tenant):
+            if sensors and not set(one.document().sensors) <= set(sensors):
+                self._withdraw(host, one)
+                self._end(one, f"{host.row.tenant} has withdrawn its grant")
+
+    def withdrawn(self, host: ActiveMission, tenant: str) -> None:
+        """Share nothing with a tenant any more, from the next picture on."""
+        self._grant(host, {name: one for name, one in host.grants.items() if name != tenant})
+        for one in self._of(host, tenant):
+            self.watch(one)
+
+    def _beside(self, host: ActiveMission) -> list[ActiveMission]:
+        """Missions that are attached to a flight, or are to be."""
+        return [one for one in self._missions.values() if one.attached_to == host.row.id]
+
+    def _full(self, host: ActiveMission) -> str:
+        return f"{self._most} missions are attached to {host.row.id}, the most that may be"
+
+    def _grant(self, host: ActiveMission, grants: Mapping[str, list[str]]) -> None:
+        host.change(request={**host.row.request, "grants": dict(grants)})
+
+    def _of(self, host: ActiveMission, tenant: str) -> list[ActiveMission]:
+        """Missions of another tenant that are attached to a flight."""
+        others = tenant != host.row.tenant
+        return [
+            one
+            for one in self._beside(host)
+            if others and one.row.tenant == tenant and one.phase is MissionPhase.FLYING
+        ]
+
+    def _host(self, principal: Principal, name: str) -> ActiveMission:
+        """The mission to attach to; for whom it neither is nor shares with, there is none."""
+        host = self._missions.get(name)
+        own = host is not None and host.row.tenant == principal.tenant
+        granted = host is not None and principal.tenant in host.grants
+        if host is not None and (own or granted):
+            if host.phase is not MissionPhase.FLYING or host.attached_to is not None:
+                what = "senses only" if host.attached_to else f"is {host.phase.value}"
+                raise RefusedError(409, f"{name} {what}: attach to a mission in flight")
+            lease = self._bookings.lease(str(host.row.lease))
+            if lease.state is LeaseState.ENDED:
+                raise RefusedError(409, f"{name}: its lease has ended, and its drones come home")
+            return host
+        if host is not None and sees(principal, host.row.tenant, host.row.request.get("share", ())):
+            raise RefusedError(403, f"{host.row.tenant} has not granted {name}'s cameras to you")
+        raise RefusedError(404, f"there is no mission {name!r} in flight")
+
+    def _withdraw(self, host: ActiveMission, one: ActiveMission) -> None:
+        # A flight that does not answer shares no more either once it is over.
+        with contextlib.suppress(MissionError):
+            host.follow().ask(do="withdraw", mission=one.row.id)
+
+    def _end(self, one: ActiveMission, reason: str) -> None:
+        """Tell an attached mission to end; one that does not is ended after a while."""
+        now = time.monotonic()
+        if one.row.id not in self._told:
+            self._told[one.row.id] = now
+            # Its cameras end in any case.
+            with contextlib.suppress(MissionError):
+                one.follow().ask(do="end", reason=reason)
+        elif now - self._told[one.row.id] > _ENDING_SECONDS:
+            one.end_flight()
+
+
+def _require_senses_only(document: MissionDocument) -> None:
+    """Raise RefusedError for a document that navigates, commands, or reads nothing."""
+    if document.navigation:
+        raise RefusedError(
+            _UNPROCESSABLE,
+            "an attached mission senses only, and this one navigates "
+            f"{document.navigation[0].robot}",
+        )
+    for entry in document.analyses:
+        commands = [one.command for one in entry.triggers if one.command is not None]
+        kind = None if entry.analysis is None else load_plugin("analytics", entry.analysis)
+        if commands or (isinstance(kind, type) and issubclass(kind, CommandingAnalytics)):
+            what = commands[0] if commands else f"its {entry.analysis}"
+            raise RefusedError(
+                _UNPROCESSABLE,
+                f"an attached mission senses only: {entry.id} would command the drone by {what}",
+            )
+    if not document.sensors:
+        raise RefusedError(_UNPROCESSABLE, "an attached mission reads at least one camera")

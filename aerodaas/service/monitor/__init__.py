@@ -1,0 +1,1 @@
+"""The monitor: holds the connection to each vehicle between missions, and only reads."""

@@ -1,0 +1,53 @@
+"""What the service and its monitor's process say to each other: one JSON object a line."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from aerodaas.protocol.schemas import LinkState
+
+__all__ = ["MonitorNews", "VehicleNews", "Wanted"]
+
+
+class _Line(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Wanted(_Line):
+    """Vehicles that the monitor is to hold; it lets go of all others."""
+
+    number: int
+    """Counts the lines."""
+    robots: frozenset[str]
+
+
+class VehicleNews(_Line):
+    """One vehicle as the monitor sees it."""
+
+    held: bool = False
+    """Whether the monitor has the vehicle open, or is opening or closing it."""
+    link: LinkState = LinkState.UNWATCHED
+    since: float = 0.0
+    """Unix seconds since which the link is so; of a lost one, when it was last heard."""
+    reason: str = ""
+    """Why it is not connected."""
+    heard: float | None = None
+    """Unix seconds of battery and position."""
+    battery: float | None = None
+    """Charge left, 0 to 1."""
+    position: tuple[float, float, float] | None = None
+    """Metres east, north and up of home."""
+    mode: str = ""
+    """One of `VehicleMode`."""
+    faults: tuple[str, ...] = ()
+    """What the vehicle complains of."""
+    objections: tuple[str, ...] = ()
+    """Why the vehicle itself would refuse to take off now."""
+
+
+class MonitorNews(_Line):
+    """All vehicles as the monitor sees them."""
+
+    number: int
+    """Of the newest `Wanted` that it obeys."""
+    robots: dict[str, VehicleNews] = Field(default_factory=dict)

@@ -1,0 +1,160 @@
+"""Watcher of one vehicle: connects by the ordinary driver, and reads; it commands nothing."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Callable
+
+from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.plugins import load_plugin
+from aerodaas.protocol.schemas import LinkState
+from aerodaas.service.monitor.news import VehicleNews
+from aerodaas.types.errors import AeroDaaSError, failure_line
+from aerodaas.types.vehicle import Vehicle, VehicleMode, VehicleState
+
+__all__ = ["VehicleWatcher"]
+
+_CONNECT_SECONDS = 5.0
+_READ_SECONDS = 0.5
+_ANEW_SECONDS = 10.0
+"""Seconds without a word after which it is connected anew: it may have been replaced."""
+_PAUSE, _LONGEST_PAUSE = 1.0, 10.0
+"""Seconds between two attempts to connect, which grow."""
+
+
+class VehicleWatcher:
+    """Holds one vehicle while it is wanted, in a thread of its own.
+
+    It calls `connect`, `read`, `preflight` and `close` of the driver and nothing else. A driver
+    lands what it has flown when it is closed, and some land what is in the air, whoever flies it:
+    so a vehicle that is armed is not closed before it has been disarmed.
+    """
+
+    def __init__(
+        self, robot: RobotConfig, environment: EnvironmentConfig, changed: Callable[[], None]
+    ) -> None:
+        """Watch `robot`; `changed` is called in any thread after each change of its link."""
+        # Without its sensors: nobody looks at a camera's video between missions.
+        self._robot = robot.model_copy(update={"sensors": ()})
+        self._environment = environment
+        self._changed = changed
+        self._lock = threading.Condition()
+        self._wanted = False
+        self._news = VehicleNews()
+
+    def start(self) -> None:
+        """Start; holds nothing before it is wanted."""
+        threading.Thread(target=self._run, name=self._robot.id, daemon=True).start()
+
+    def want(self, *, wanted: bool) -> None:
+        """Hold the vehicle from now on, or let go of it."""
+        with self._lock:
+            self._wanted = wanted
+            self._lock.notify_all()
+
+    @property
+    def news(self) -> VehicleNews:
+        """The vehicle as it was last seen."""
+        with self._lock:
+            return self._news
+
+    def _run(self) -> None:
+        pause = _PAUSE
+        while True:
+            with self._lock:
+                self._lock.wait_for(lambda: self._wanted)
+                # Under the lock: from here on it is held, before anything is opened.
+                self._news = self._news.model_copy(update={"held": True})
+            reached = self._hold()
+            pause = _PAUSE if reached else min(2.0 * pause, _LONGEST_PAUSE)
+            with self._lock:
+                self._lock.wait_for(lambda: not self._wanted, pause)
+
+    def _hold(self) -> bool:
+        """Connect, and watch until it is wanted no more or lost; returns whether it was reached."""
+        reached, reason = False, ""
+        if self._news.link is LinkState.UNWATCHED:
+            fresh = VehicleNews(held=True, link=LinkState.CONNECTING, since=time.time())
+            self._tell(**dict(fresh))
+        try:
+            vehicle: Vehicle = load_plugin("drivers", self._robot.driver)(
+                self._robot, self._environment
+            )
+            vehicle.connect(_CONNECT_SECONDS)
+            try:
+                reached = True
+                reason = self._watch(vehicle)
+            finally:
+                vehicle.close()
+        except AeroDaaSError as error:
+            reason = str(error)
+        except Exception as error:  # noqa: BLE001 - a driver of others may raise anything
+            reason = failure_line(error)
+        with self._lock:
+            wanted = self._wanted
+        if wanted:
+            self._lose(reason, held=False)
+        else:
+            self._tell(link=LinkState.UNWATCHED, since=time.time(), held=False, reason="")
+        return reached
+
+    def _watch(self, vehicle: Vehicle) -> str:
+        """Read until it is wanted no more, or silent; returns why it is lost."""
+        armed = False
+        while True:
+            try:
+                state, objections = vehicle.read(), vehicle.preflight()
+            except Exception as error:
+                if not armed:
+                    raise
+                self._lose(failure_line(error))
+                time.sleep(_READ_SECONDS)
+                continue
+            armed, now = state.armed, time.time()
+            if state.mode is VehicleMode.LOST:
+                self._lose("; ".join(state.faults) or "it is silent")
+            else:
+                self._see(state, objections, now)
+            if not state.armed and self._silence(now) > _ANEW_SECONDS:
+                return self._news.reason
+            with self._lock:
+                unwanted = self._lock.wait_for(lambda: not self._wanted, _READ_SECONDS)
+            if unwanted and not state.armed:
+                return ""
+            if unwanted:
+                time.sleep(_READ_SECONDS)
+
+    def _silence(self, now: float) -> float:
+        news = self._news
+        return now - news.since if news.link is LinkState.LOST else 0.0
+
+    def _see(self, state: VehicleState, objections: list[str], now: float) -> None:
+        charge = state.battery.fraction
+        place = tuple(float(axis) for axis in state.odometry.position)
+        connected = self._news.link is LinkState.CONNECTED
+        self._tell(
+            link=LinkState.CONNECTED,
+            since=self._news.since if connected else now,
+            reason="",
+            heard=now,
+            battery=charge if math.isfinite(charge) else None,
+            position=place if all(map(math.isfinite, place)) else None,
+            mode=state.mode.value,
+            faults=tuple(state.faults),
+            objections=tuple(objections),
+        )
+
+    def _lose(self, reason: str, **more: object) -> None:
+        news = self._news
+        before = time.time() if news.heard is None else news.heard
+        since = news.since if news.link is LinkState.LOST else before
+        self._tell(link=LinkState.LOST, since=since, reason=reason, **more)
+
+    def _tell(self, **changes: object) -> None:
+        with self._lock:
+            before, self._news = self._news, self._news.model_copy(update=changes)
+            told = (before.link, before.held) != (self._news.link, self._news.held)
+        if told:
+            self._changed()

@@ -1,0 +1,161 @@
+"""A provider's desk over two drones with cameras, whose monitor and flights are a test's own."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Collection
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from served import document, fleet, robot
+
+from aerodaas.analytics.remote.schemas import AnswerOut, StatusOut
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.schemas import (
+    LinkState,
+    MissionIn,
+    MissionOut,
+    MissionPhase,
+    Role,
+    Scope,
+    StreamKind,
+)
+from aerodaas.service import mission as missions
+from aerodaas.service.access import Principal, Quotas
+from aerodaas.service.bookings import Bookings
+from aerodaas.service.desk import MissionDesk
+from aerodaas.service.fleet_view import FleetView
+from aerodaas.service.flights.link import FlightNews
+from aerodaas.service.flights.order import Outcome
+from aerodaas.service.garage import Garage
+from aerodaas.service.models import ModelShelf
+from aerodaas.service.monitor.news import VehicleNews
+from aerodaas.service.monitor.process import FleetMonitor
+from aerodaas.service.settings import ServiceSettings
+from aerodaas.service.store import Account, Store, Tenant
+
+PILOT = Principal("pilot", "farm", Role.PILOT, frozenset(Scope), "t")
+
+
+class Monitor:
+    """A monitor whose letting go a test decides."""
+
+    def __init__(self, garage: Garage) -> None:
+        self._garage = garage
+        self._news: dict[str, VehicleNews] = {}
+        self.wanted: set[str] = set()
+        self.held: set[str] = set()
+
+    def watch(self, robots: Collection[str]) -> None:
+        """Hold these; what was held stays so until a test lets go of it."""
+        self.wanted = set(robots)
+        self.held |= self.wanted
+
+    def released(self, robots: Collection[str]) -> bool:
+        """Whether it holds none of these."""
+        return self.held.isdisjoint(robots)
+
+    def close(self) -> None:
+        """Nothing."""
+
+    def see(self, name: str, **changes: object) -> None:
+        """Tell of one drone, as connected and fit but for the changes."""
+        fit: dict[str, Any] = {"link": LinkState.CONNECTED, "heard": time.time(), "battery": 0.9}
+        self._news[name] = VehicleNews(**{"held": True, **fit, **changes})
+        self._garage.observe(self._news)
+
+
+class Link:
+    """The link to a flight with two cameras that run; notes what it is asked."""
+
+    def __init__(self) -> None:
+        streams = dict.fromkeys(("one/cam", "one/belly"), StreamKind.PICTURES)
+        self.news = FlightNews(1, streams={**streams, "one/found": StreamKind.DETECTIONS})
+        self.asked: list[dict[str, Any]] = []
+
+    def ask(self, **request: Any) -> AnswerOut:  # noqa: ANN401 - JSON
+        """Accept."""
+        self.asked.append(request)
+        return AnswerOut(accepted=True)
+
+    def close(self) -> None:
+        """Nothing."""
+
+
+class Provider:
+    """A desk with two drones, in whose flights a test is the process."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> None:  # noqa: ANN401
+        path = folder / "fleet.json"
+        robots = robot("one"), robot("two", 10)
+        for one in robots:
+            one["sensors"] += [{"id": name, "type": "camera"} for name in ("cam", "belly")]
+        path.write_text(json.dumps(fleet(*robots)), encoding="utf-8")
+        self.started: list[Any] = []
+        monkeypatch.setattr(missions, "start_process", lambda folder, **_: self._start(folder))
+        config = EnvironmentConfig.load(path)
+        self.settings = ServiceSettings(path, config, folder / "s", rehearse=False, **settings)
+        self.settings.state.mkdir()
+        self.store = Store.open(folder / "service.db")
+        self.store.tenants.add(Tenant("farm"))
+        self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
+        self.garage = Garage(config, self.store)
+        self.bookings = Bookings(config, self.store, self.garage, Quotas(self.store))
+        self.monitor = Monitor(self.garage)
+        self.desk = MissionDesk(
+            self.settings,
+            self.store,
+            bookings=self.bookings,
+            garage=self.garage,
+            models=ModelShelf(self.settings.models),
+            monitor=cast("FleetMonitor", self.monitor),
+        )
+        self.fleet = FleetView(config, {}, self.garage, self.bookings, self.desk)
+
+    def _start(self, folder: Any) -> Any:  # noqa: ANN401
+        self.started.append(folder)
+
+        class Process:
+            def poll(self) -> int | None:
+                return None if folder.outcome() is None else 0
+
+        return Process()
+
+    def submit(self, name: str = "one") -> MissionOut:
+        """Submit a mission for one drone."""
+        content = {"document": document(name, (5, 0))}
+        return self.desk.submit(PILOT, MissionIn.model_validate(content))
+
+    def flying(self, **more: object) -> MissionOut:
+        """Submit a mission for drone `one`, and have it fly."""
+        self.monitor.see("one")
+        content = {"document": document("one", (5, 0)), **more}
+        mission = self.desk.submit(PILOT, MissionIn.model_validate(content))
+        self.turns(2)
+        self.monitor.held.clear()
+        self.desk._missions[mission.id].link = cast("Any", Link())
+        self.turns()
+        assert self.phase(mission) is MissionPhase.FLYING
+        return mission
+
+    def turns(self, count: int = 4) -> None:
+        """Let the desk move on."""
+        for _ in range(count):
+            self.desk.turn()
+
+    def phase(self, mission: MissionOut) -> MissionPhase:
+        """Present phase of a mission."""
+        return self.desk.shown(mission.id).phase
+
+    def land(self, **changes: object) -> None:
+        """End the newest flight, with its drone on the ground but for the changes."""
+        numbers = ("time", "distance", "waypoints_visited", "waypoints_known")
+        lists = ("pending", "visited", "given_up", "faults")
+        content: dict[str, Any] = {"state": "landed", "reason": "", "target": None}
+        content |= {"mode": "grounded", "battery": 0.7, **dict.fromkeys(numbers, 1)}
+        status = StatusOut(**{**content, **{name: [] for name in lists}, **changes})
+        self.started[-1].end(
+            Outcome(landed=True, began=0.0, ended=1.0, status={"one": status}, reason="over")
+        )

@@ -1,0 +1,219 @@
+"""Cameras shared by a flight's control socket: as long as it allows, and at the reader's pace."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from aerodaas.analytics.here.relay import HereRelay
+from aerodaas.analytics.wire_items import pack
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.service.flights.control import ControlServer
+from aerodaas.service.flights.folder import FlightFolder
+from aerodaas.service.flights.link import FlightLink
+from aerodaas.service.flights.order import Attached, FlightOrder
+from aerodaas.service.flights.shared_camera import SharedCamera, attached_config
+from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.types.clock import host_time_ns
+from aerodaas.types.data import Frame, Header
+from aerodaas.types.errors import ConfigError, MissionError, SourceError
+
+FLEET = {
+    "name": "campus",
+    "robots": [
+        {
+            "id": "one",
+            "driver": "mavlink",
+            "settings": {"url": "udpin:10.0.0.7:14540"},
+            "sensors": [
+                {"id": name, "type": "camera", "settings": {"path": f"rtsp://10.0.0.9/{name}"}}
+                for name in ("cam", "belly")
+            ],
+        },
+        {"id": "two"},
+    ],
+}
+
+
+class Pictures:
+    """Reader of a camera whose pictures are counted by their value."""
+
+    def __init__(self) -> None:
+        self.packed = 0
+
+    def next_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:
+        """As the newest."""
+        return self.latest_packed(timeout)
+
+    def latest_packed(self, timeout: float) -> tuple[dict[str, Any], bytes] | None:  # noqa: ARG002
+        """Pack a picture whose value counts."""
+        self.packed += 1
+        image = np.full((8, 16, 3), self.packed, np.uint8)
+        item, blob = pack(
+            Frame(Header(self.packed, 0, "one/cam"), image, None, None), lossless=True
+        )
+        return {"item": item, "captured": host_time_ns(), "blob": True}, blob
+
+
+class Flight:
+    """A flight with a camera, behind its control socket."""
+
+    def __init__(self, path: Path) -> None:
+        self.folder = FlightFolder(path)
+        order = FlightOrder(
+            mission="m", lease="l", fleet=path, robots=["one"], ends=time.time() + 60, minutes=1
+        )
+        self.lease = LeaseWatch(order, lambda _: None)
+        self.over = False
+        self.pictures = Pictures()
+        self.commands: list[object] = []
+        self.server = ControlServer(self.folder, self, self.lease, HereRelay(path / "here"))
+        self.server.start()
+        self.link = FlightLink(self.folder)
+
+    def command(self, robot: str, command: object) -> Any:  # noqa: ANN401
+        """Refuse, and note that it was asked."""
+        self.commands.append((robot, command))
+        raise MissionError("no command was to come")
+
+    def status(self) -> tuple[dict[str, Any], list[str]]:
+        """Nothing to tell."""
+        return {}, []
+
+    def analytics(self) -> None:
+        """None."""
+
+    def streams(self) -> dict[str, Any]:
+        """None."""
+        return {}
+
+    def reader(self, stream: str) -> Pictures:
+        """The camera, of those that run."""
+        if stream != "one/cam":
+            raise ConfigError(f"no stream of this mission is called {stream!r}")
+        return self.pictures
+
+    def close(self) -> None:
+        """End."""
+        self.link.close()
+        self.server.close()
+
+    def camera(self, mission: str, stream: str = "one/cam") -> SharedCamera:
+        """The camera of an attached mission, from its environment."""
+        to = Attached(mission="m", control=self.folder.socket, sensors=[stream])
+        config = attached_config(EnvironmentConfig.model_validate(FLEET), to, mission)
+        (sensor,) = config.all_sensors()
+        return SharedCamera(sensor, config)
+
+
+@pytest.fixture
+def flight() -> Iterator[Flight]:
+    """A flight that shares its camera with the mission `guest`."""
+    with tempfile.TemporaryDirectory(prefix="share-", dir="/tmp") as folder:
+        made = Flight(Path(folder))
+        made.link.ask(do="share", mission="guest", streams=["one/cam"])
+        yield made
+        made.close()
+
+
+def test_each_picture_is_the_newest_and_made_when_it_is_asked_for(flight: Flight) -> None:
+    """A reader that stands still costs the flight nothing."""
+    camera = flight.camera("guest")
+    camera.open()
+    first, second = camera.capture(10**10, None), camera.capture(10**10, None)
+    assert first is not None
+    assert second is not None
+    assert (first.image[0, 0, 0], second.image[0, 0, 0]) == (1, 2)
+    assert 0 <= 10**10 - second.stamp < 10**9
+    time.sleep(0.3)
+    assert flight.pictures.packed == 2
+    camera.close()
+
+
+def test_what_is_withdrawn_ends_with_the_next_picture(flight: Flight) -> None:
+    """The flight itself sends no more, and opens no more."""
+    camera = flight.camera("guest")
+    camera.open()
+    assert camera.capture(0, None) is not None
+    assert flight.link.ask(do="withdraw", mission="guest").accepted
+    assert camera.capture(0, None) is None
+    assert camera.finished
+    with pytest.raises(SourceError, match="one/cam is not shared with guest"):
+        flight.camera("guest").open()
+
+
+@pytest.mark.parametrize(
+    ("mission", "stream", "told"),
+    [
+        ("stranger", "one/cam", "one/cam is not shared with stranger"),
+        ("guest", "one/belly", "one/belly is not shared with guest"),
+    ],
+)
+def test_what_is_not_shared_is_refused_by_the_flight(
+    flight: Flight, mission: str, stream: str, told: str
+) -> None:
+    """Whatever an attached mission's process asks for."""
+    with pytest.raises(SourceError, match=told):
+        flight.camera(mission, stream).open()
+    assert flight.pictures.packed == 0
+
+
+def test_a_camera_ends_with_its_flight(flight: Flight) -> None:
+    """However that ends."""
+    camera = flight.camera("guest")
+    camera.open()
+    flight.over = True
+    assert camera.capture(0, None) is None
+    assert camera.finished
+    late = flight.camera("guest")
+    flight.close()
+    with pytest.raises(SourceError, match="its flight does not answer"):
+        late.open()
+
+
+def test_nothing_is_shared_once_the_drones_come_home(flight: Flight) -> None:
+    """The owner's agreement ends with the lease; withdrawing goes on working."""
+    flight.lease.end("the lease has ended")
+    answer = flight.link.ask(do="share", mission="late", streams=["one/cam"])
+    assert (answer.accepted, answer.text) == (False, "the drones come home: the lease has ended")
+    with pytest.raises(SourceError, match="not shared with late"):
+        flight.camera("late").open()
+    assert flight.link.ask(do="withdraw", mission="guest").accepted
+
+
+def test_an_attached_environment_has_cameras_and_nothing_that_flies() -> None:
+    """No address, driver or setting of a vehicle; no camera that is not shared."""
+    to = Attached(mission="m", control=Path("control"), sensors=["one/cam"])
+    config = attached_config(EnvironmentConfig.model_validate(FLEET), to, "guest")
+    assert [robot.id for robot in config.robots] == ["one"]
+    assert [one.full_id for one in config.all_sensors()] == ["one/cam"]
+    text = config.model_dump_json()
+    assert "10.0.0" not in text
+    assert "mavlink" not in text
+
+
+def test_readers_do_not_wait_for_each_other(flight: Flight) -> None:
+    """One that has asked and does not take its picture holds up nobody."""
+    flight.link.ask(do="share", mission="slow", streams=["one/cam"])
+    slow, quick = flight.camera("slow"), flight.camera("guest")
+    slow.open()
+    quick.open()
+    assert slow._channel is not None
+    slow._channel.send({})
+    done = threading.Event()
+
+    def read() -> None:
+        for _ in range(20):
+            assert quick.capture(0, None) is not None
+        done.set()
+
+    threading.Thread(target=read, daemon=True).start()
+    assert done.wait(10.0)
+    assert flight.commands == []

@@ -1,0 +1,64 @@
+"""A vehicle whose driver does as a test tells it, and notes what is asked of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from aerodaas.types.data import Battery, Odometry
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.vehicle import VehicleMode, VehicleState
+
+
+@dataclass
+class Script:
+    """What the vehicle does, and what was asked of it."""
+
+    there: bool = True
+    """Whether it can be connected."""
+    mode: VehicleMode = VehicleMode.GROUNDED
+    armed: bool = False
+    battery: float = 0.8
+    breaks: Exception | None = None
+    """What `read` raises."""
+    objections: list[str] = field(default_factory=list)
+    asked: list[str] = field(default_factory=list)
+    sensors: list[Any] = field(default_factory=list)
+
+
+SCRIPT = Script()
+"""The one that is now; tests replace what is in it."""
+
+
+class ScriptedVehicle:
+    """Implements `Vehicle`, or as much as a monitor may call; anything else fails."""
+
+    def __init__(self, robot: Any, environment: Any) -> None:  # noqa: ANN401, ARG002
+        SCRIPT.sensors = list(robot.sensors)
+
+    def __getattribute__(self, name: str) -> Any:  # noqa: ANN401
+        if not name.startswith("_"):
+            SCRIPT.asked.append(name)
+        return super().__getattribute__(name)
+
+    def connect(self, timeout: float = 10.0) -> None:  # noqa: ARG002
+        """Connect if it is there."""
+        if not SCRIPT.there:
+            raise VehicleError("nobody answers")
+
+    def read(self) -> VehicleState:
+        """Its state as the script has it."""
+        if SCRIPT.breaks is not None:
+            raise SCRIPT.breaks
+        zero = np.zeros(3)
+        odometry = Odometry(zero, zero, 0.0, 0.0, 0.0, 0.0)
+        return VehicleState(0, odometry, Battery(SCRIPT.battery), SCRIPT.mode, SCRIPT.armed)
+
+    def preflight(self) -> list[str]:
+        """The script's objections."""
+        return SCRIPT.objections
+
+    def close(self) -> None:
+        """Nothing."""

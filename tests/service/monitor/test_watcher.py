@@ -1,0 +1,126 @@
+"""The watcher of one vehicle: it finds it, loses it, finds it again, and commands nothing."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+import scripted_vehicle
+from scripted_fleet import fleet_of
+from scripted_vehicle import Script
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.protocol.schemas import LinkState
+from aerodaas.service.monitor import watcher as watchers
+from aerodaas.service.monitor.watcher import VehicleWatcher
+from aerodaas.types.vehicle import VehicleMode
+
+READING = {"connect", "read", "preflight", "close"}
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> Script:
+    """A new script, and pauses that a test can wait for."""
+    monkeypatch.setattr(scripted_vehicle, "SCRIPT", Script())
+    for name in ("_READ_SECONDS", "_PAUSE", "_LONGEST_PAUSE"):
+        monkeypatch.setattr(watchers, name, 0.02)
+    monkeypatch.setattr(watchers, "_ANEW_SECONDS", 0.3)
+    return scripted_vehicle.SCRIPT
+
+
+@pytest.fixture
+def watcher(script: Script) -> Iterator[VehicleWatcher]:  # noqa: ARG001 - the vehicle's
+    """A watcher of a robot with a camera."""
+    fleet = fleet_of("one", driver="scripted_vehicle:ScriptedVehicle")
+    config = EnvironmentConfig.model_validate(fleet)
+    made = VehicleWatcher(config.robots[0], config, lambda: None)
+    made.start()
+    yield made
+    made.want(wanted=False)
+
+
+def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
+    """Wait until something holds."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end
+        time.sleep(0.005)
+
+
+def test_it_reads_and_commands_nothing(watcher: VehicleWatcher, script: Script) -> None:
+    """From the first connection to the last; no camera's video is switched on."""
+    assert watcher.news.link is LinkState.UNWATCHED
+    script.objections = ["no fix"]
+    watcher.want(wanted=True)
+    until(lambda: watcher.news.link is LinkState.CONNECTED)
+    news = watcher.news
+    assert (news.battery, news.position, news.mode) == (0.8, (0.0, 0.0, 0.0), "grounded")
+    assert (news.objections, news.held) == (("no fix",), True)
+    watcher.want(wanted=False)
+    until(lambda: not watcher.news.held)
+    assert watcher.news.link is LinkState.UNWATCHED
+    assert set(script.asked) == READING
+    assert script.asked[-1] == "close"
+    assert script.sensors == []
+
+
+def test_one_that_is_unplugged_is_lost_and_found_again(
+    watcher: VehicleWatcher, script: Script
+) -> None:
+    """With the moment when it was last heard, kept however often it is looked for."""
+    watcher.want(wanted=True)
+    until(lambda: watcher.news.link is LinkState.CONNECTED)
+    script.there, script.breaks = False, OSError("no such device")
+    until(lambda: watcher.news.reason == "nobody answers")
+    lost = watcher.news
+    assert lost.link is LinkState.LOST
+    assert lost.since == lost.heard
+    script.asked.clear()
+    until(lambda: script.asked.count("connect") > 2)
+    assert watcher.news.since == lost.since
+    script.there, script.breaks = True, None
+    until(lambda: watcher.news.link is LinkState.CONNECTED)
+    assert watcher.news.reason == ""
+
+
+def test_one_that_falls_silent_is_connected_anew(watcher: VehicleWatcher, script: Script) -> None:
+    """It may be another one by then; one in the air is left to its driver, which waits for it."""
+    watcher.want(wanted=True)
+    until(lambda: watcher.news.link is LinkState.CONNECTED)
+    script.mode, script.armed = VehicleMode.LOST, True
+    until(lambda: watcher.news.link is LinkState.LOST)
+    time.sleep(0.5)
+    assert script.asked.count("connect") == 1
+    script.armed = False
+    until(lambda: script.asked.count("connect") > 1)
+
+
+def test_a_driver_that_raises_in_the_air_is_not_closed(
+    watcher: VehicleWatcher, script: Script
+) -> None:
+    """It is lost meanwhile, and asked again."""
+    watcher.want(wanted=True)
+    script.mode, script.armed = VehicleMode.MANUAL, True
+    until(lambda: watcher.news.mode == "manual")
+    script.breaks = OSError("no such device")
+    until(lambda: watcher.news.link is LinkState.LOST)
+    time.sleep(0.1)
+    assert "close" not in script.asked
+    script.breaks, script.armed = None, False
+    until(lambda: watcher.news.link is LinkState.CONNECTED)
+
+
+def test_what_is_armed_is_not_let_go_of(watcher: VehicleWatcher, script: Script) -> None:
+    """Some drivers land what they are closed over: not with somebody else at the controls."""
+    watcher.want(wanted=True)
+    until(lambda: watcher.news.link is LinkState.CONNECTED)
+    script.mode, script.armed = VehicleMode.MANUAL, True
+    until(lambda: watcher.news.mode == "manual")
+    watcher.want(wanted=False)
+    time.sleep(0.2)
+    assert watcher.news.held
+    assert "close" not in script.asked
+    script.mode, script.armed = VehicleMode.GROUNDED, False
+    until(lambda: not watcher.news.held)
+    assert set(script.asked) == READING

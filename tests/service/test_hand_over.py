@@ -1,0 +1,161 @@
+"""Hand-over of drones between the monitor and missions: never two that command, never nobody."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+from desks import PILOT, Monitor, Provider
+
+from aerodaas.protocol.schemas import LeaseIn, LinkState, MissionPhase
+from aerodaas.service.desk import MissionDesk
+from aerodaas.service.errors import RefusedError
+from aerodaas.service.models import ModelShelf
+from aerodaas.service.monitor.news import VehicleNews
+from aerodaas.service.monitor.process import FleetMonitor
+
+
+@pytest.fixture
+def provider(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provider]:
+    """A provider whose monitor is the test's."""
+    made = Provider(tmp_path, monkeypatch)
+    yield made
+    made.desk.close()
+    made.store.close()
+
+
+def test_a_flight_begins_once_the_monitor_has_let_go(provider: Provider) -> None:
+    """Not before, and the monitor takes the drone back once the flight is over."""
+    mission = provider.submit()
+    provider.turns()
+    assert provider.monitor.wanted == {"one", "two"}
+    assert "the service connects to it" in provider.desk.shown(mission.id).reason
+    provider.monitor.see("one")
+    provider.turns()
+    assert provider.monitor.wanted == {"two"}
+    assert provider.phase(mission) is MissionPhase.QUEUED
+    assert provider.started == []
+    provider.monitor.held.remove("one")
+    provider.turns()
+    assert provider.phase(mission) is MissionPhase.FLYING
+    assert len(provider.started) == 1
+    provider.turns()
+    assert provider.monitor.wanted == {"two"}
+    assert provider.garage.news("one").link is LinkState.MISSION
+    provider.land()
+    provider.turns()
+    assert provider.phase(mission) is MissionPhase.LANDED
+    assert provider.monitor.wanted == {"one", "two"}
+
+
+def test_one_that_somebody_arms_meanwhile_is_not_handed_over(provider: Provider) -> None:
+    """The mission waits, and tells for what."""
+    provider.monitor.see("one")
+    mission = provider.submit()
+    provider.turns()
+    assert provider.monitor.wanted == {"two"}
+    provider.monitor.see("one", mode="manual", objections=("already manual",))
+    provider.turns()
+    assert provider.monitor.wanted == {"one", "two"}
+    assert provider.desk.shown(mission.id).reason == "waits for one: already manual"
+
+
+@pytest.mark.parametrize(
+    ("news", "said"),
+    [
+        (
+            {"link": LinkState.LOST, "since": 1000.0, "reason": "no word"},
+            "not reachable since 1970",
+        ),
+        ({"battery": 0.2}, "its battery holds 20%, and it comes home at 25%: charge it"),
+        ({"objections": ("no fix", "hot")}, "no fix; hot"),
+    ],
+    ids=["unreachable", "low", "unhealthy"],
+)
+def test_what_cannot_fly_is_neither_leased_nor_submitted_to(
+    provider: Provider, news: dict[str, Any], said: str
+) -> None:
+    """With the reason, which the catalogue has, too; another one can be had."""
+    provider.monitor.see("one", **news)
+    provider.monitor.see("two")
+    for ask in (provider.submit, lambda: provider.bookings.request(PILOT, wish("one"))):
+        with pytest.raises(RefusedError, match=r"^one: ") as refused:
+            ask()
+        assert refused.value.status == 409
+        assert said in refused.value.text
+    one, two = provider.fleet.seen_by(PILOT).robots
+    assert said in one.objection
+    assert (two.objection, two.link, two.battery) == ("", LinkState.CONNECTED, 0.9)
+    any_one = provider.bookings.request(PILOT, wish())
+    assert any_one.robots == ("two",)
+
+
+def wish(*robots: str) -> LeaseIn:
+    """A request of these drones, or of any one."""
+    return LeaseIn(robots=list(robots) or None)
+
+
+def test_a_dropout_of_a_moment_refuses_nobody(provider: Provider) -> None:
+    """Radio links have them; the mission waits until it is over."""
+    provider.monitor.see("one", link=LinkState.LOST, since=time.time())
+    mission = provider.submit()
+    provider.turns()
+    assert "the service connects to it" in provider.desk.shown(mission.id).reason
+    assert provider.monitor.wanted == {"one", "two"}
+
+
+def test_one_that_is_not_known_to_be_down_is_nobodys(provider: Provider) -> None:
+    """Its actor may fly it still: neither the monitor nor a mission connects before a look."""
+    provider.monitor.see("one")
+    mission = provider.submit()
+    provider.turns()
+    provider.monitor.held.clear()
+    provider.turns()
+    provider.land(state="aborted", mode="manual")
+    provider.turns()
+    assert "not known to be down" in provider.desk.shown(mission.id).reason
+    assert provider.monitor.wanted == {"two"}
+    with pytest.raises(RefusedError, match="out of service until an operator has looked"):
+        provider.submit()
+    provider.garage.enable("one", enabled=True)
+    provider.turns()
+    assert provider.monitor.wanted == {"one", "two"}
+
+
+def test_drones_in_flight_are_left_alone_after_a_restart(
+    provider: Provider, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A new service finds them in the database before it lets the monitor hold anything."""
+    provider.monitor.see("one")
+    provider.submit()
+    provider.turns()
+    provider.monitor.held.clear()
+    provider.turns()
+    assert len(provider.started) == 1
+    seen: list[set[str]] = []
+    monitor = Monitor(provider.garage)
+    monkeypatch.setattr(monitor, "watch", lambda robots: seen.append(set(robots)))
+    again = MissionDesk(
+        provider.settings,
+        provider.store,
+        bookings=provider.bookings,
+        garage=provider.garage,
+        models=ModelShelf(provider.settings.models),
+        monitor=cast("FleetMonitor", monitor),
+    )
+    again.turn()
+    again.close()
+    assert seen == [{"two"}]
+
+
+def test_news_of_the_ground_do_not_hide_a_mission(provider: Provider) -> None:
+    """The monitor tells of all drones, those that it does not hold included."""
+    provider.garage.hand(["one"], LinkState.MISSION)
+    provider.garage.observe({"one": VehicleNews(), "two": VehicleNews()})
+    assert provider.garage.news("one").link is LinkState.MISSION
+    provider.garage.observe({})
+    assert provider.garage.news("one").link is LinkState.MISSION
+    assert provider.garage.news("two").reason == "the service looks for it again"
