@@ -28,6 +28,9 @@ _EARLY = 0.3
 """Metres beyond the least distance by which the drone gives way too early rather than too late."""
 _CLOSING = 0.3
 """Speed in m/s from which on a person and the drone close; below, it is noise."""
+_COMES = 0.75
+"""Speed in m/s towards the drone from which on who is followed comes back; the estimate of somebody
+who stops within a step swings that far."""
 _STILL_TURNING = 0.4
 """Fraction of their closing speed by which people are assumed to come faster than estimated, as
 the estimate lags behind a turn."""
@@ -44,8 +47,6 @@ _CLIMB = 1.5
 """Speed of climbing out of the way, m/s."""
 _HEAD = 1.9
 """Height of a tall person's head in metres; a drone above it may climb out of the way."""
-_BESIDE = 0.3
-"""Angle in radians within which somebody is in a direction."""
 _TIMES: NDArray[np.float64] = np.arange(0.0, 2.01, 0.05)
 """Times from now for which distances are predicted, seconds."""
 _STILL = Odometry(np.zeros(3), np.zeros(3), 0.0)
@@ -87,10 +88,15 @@ class ContactGuard:
         at_capture: Odometry | None,
         stamp: int,
         interval: float,
+        *,
+        target: RelativeTarget | None = None,
     ) -> None:
-        """Add the people in a frame captured at `stamp`, `interval` seconds after the last."""
+        """Add the people in a frame captured at `stamp`, `interval` seconds after the last.
+
+        `target` is that one of `people` who is followed.
+        """
         self._interval = interval
-        self._people.see(people, at_capture or _STILL, stamp, interval)
+        self._people.see(people, at_capture or _STILL, stamp, interval, target=target)
 
     def evade(self, now: Odometry | None, stamp: int) -> Vector | None:
         """Velocity (forward, left, up in m/s) by which to give way now; None if there is no need.
@@ -103,7 +109,7 @@ class ContactGuard:
         doubted, self._doubted = self._doubted, danger is not None and distance > _FAR
         if self._doubted and not (doubted or self.evading):
             danger = None
-        comes = any(away < -_CLOSING for _, away, _ in people)
+        comes = any(one.away < -_CLOSING for one in people)
         if danger is not None:
             self._velocity = self._choose(danger, walks, pose)
             self._danger_at = stamp
@@ -111,17 +117,13 @@ class ContactGuard:
             self._velocity = None
         return None if self._velocity is None else enu_to_body(self._velocity, pose.yaw)
 
-    def away(self, bearing: float, now: Odometry | None, stamp: int) -> float:
-        """Least speed in m/s at which anybody seen in a direction goes away; infinite without them.
+    def away(self, now: Odometry | None, stamp: int) -> float:
+        """Speed in m/s at which who is followed goes away; infinite while they are not seen.
 
-        Believed at once, so that the drone brakes before it is sure that somebody turns round.
+        Believed at once, so that the drone brakes before it is sure that they turn round.
         """
-        speeds = (
-            away
-            for seen, away, _ in self._people.relative_to(now or _STILL, stamp, in_sight=True)
-            if abs(math.remainder(seen.bearing - bearing, math.tau)) < _BESIDE
-        )
-        return min(speeds, default=math.inf)
+        people = self._people.relative_to(now or _STILL, stamp)
+        return min((one.away for one in people if one.followed and one.in_sight), default=math.inf)
 
     def headway(self, pace: float, delay: float) -> float:
         """Distance in metres from which a drone that follows somebody at `pace` m/s can back off.
@@ -142,15 +144,18 @@ class ContactGuard:
         """
         walks, danger, distance = [], None, math.inf
         flying = _velocity(pose)
-        for seen, away, left in people:
+        for one in people:
+            seen, away = one.place, one.away
             heading = pose.yaw + seen.bearing
             ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
             aside = np.array([-ahead[1], ahead[0], 0.0])
             closing = float(flying @ ahead) - away
-            come = (away - _STILL_TURNING * max(0.0, closing)) * ahead + left * aside
+            come = (away - _STILL_TURNING * max(0.0, closing)) * ahead + one.left * aside
             place = np.array([pose.position[0], pose.position[1], 0.0]) + seen.distance * ahead
             walks.append((place, come))
-            if danger is None and closing > _CLOSING:
+            # The approach keeps away from who is followed and only stops.
+            comes = away < -_COMES or not one.followed
+            if danger is None and comes and closing > _CLOSING:
                 left_over = self._room(-self.limits.backward * ahead, [walks[-1]], pose, late=True)
                 if left_over < self.limits.contact + _EARLY:
                     danger, distance = ahead, seen.distance

@@ -126,7 +126,7 @@ class FollowController:
         self._approach.see(seen.sighting, seen.others, seen.at_capture, dt)
         self._clearance.see(seen.surfaces, seen.at_capture, dt)
         dt = min(dt, _LONGEST_STEP)
-        self.guard.see(seen.people, seen.at_capture, seen.stamp, dt)
+        self.guard.see(seen.people, seen.at_capture, seen.stamp, dt, target=seen.sighting)
         self._delay = dt + min(seen.latency, _LONGEST_STEP)
         if seen.sighting is not None:
             self._take_in(seen.sighting, seen)
@@ -232,7 +232,7 @@ class FollowController:
         yaw_rate = float(self._yaw_pid(-target.bearing, dt=dt) or 0.0) + left / distance
         now = seen.pose
         error = target.distance - self._headway(away, dt)
-        away = min(away, self.guard.away(target.bearing, now, seen.pose_stamp) + _DOUBT)
+        away = min(away, self.guard.away(now, seen.pose_stamp) + _DOUBT)
         # Far away the integral would only wind up and cause an overshoot.
         reach = _INTEGRAL_REACH if now is None else _FED_REACH
         self._distance_pid.Ki = self.gains.distance[1] if abs(error) < reach else 0.0

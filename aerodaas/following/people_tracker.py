@@ -7,9 +7,9 @@ to believe it, so each person has a filter here that expects abrupt turns and st
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import NamedTuple
 
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.following.target_motion import TargetMotion
@@ -18,17 +18,19 @@ from aerodaas.types.data import Odometry
 
 __all__ = ["PeopleTracker", "Prediction"]
 
-Prediction: TypeAlias = tuple[RelativeTarget, float, float]
-"""Bearing and distance of a person, and their velocity away along the line of sight and to the left
-across it, m/s."""
-
 _SWERVE = 0.8
-"""Standard deviation of the change of a person's speed from one frame to the next, m/s; somebody
-who walks at 1 m/s and turns round within a step is believed after two frames."""
+"""Standard deviation of the change of the followed person's speed from one frame to the next, m/s;
+if they walk at 1 m/s and turn round within a step, they are believed after two frames."""
+_DRIFT = 0.3
+"""The same of everybody else: they come from farther away, where distances are less sure and there
+is more time."""
+_FASTEST = 2.5
+"""Speed of a run, m/s; whoever seems faster is believed to run, as boxes that change their size
+look like a sprint."""
 _SHORTEST = 0.1
 """Shortest interval between frames that is considered, seconds: at higher rates, noise would be
 taken for turns."""
-_STARTING = 1.0
+_STARTING = 1.5
 """Standard deviation of the speed of a person just detected, m/s."""
 _SAME = 1.2
 """Distance in metres between a person's predicted and detected position, at most."""
@@ -37,6 +39,19 @@ _MEMORY = 1.0
 _LOOKS = 3
 """Number of frames in a row that must show somebody new, as a detector's false and loose boxes of
 people last a frame or two."""
+
+
+class Prediction(NamedTuple):
+    """A person at a moment, seen from the drone."""
+
+    place: RelativeTarget
+    away: float
+    """Their speed along the line of sight, m/s."""
+    left: float
+    """Their speed across it, m/s."""
+    followed: bool
+    in_sight: bool
+    """Whether the newest frame showed them."""
 
 
 @dataclass(eq=False)
@@ -54,6 +69,17 @@ class _Person:
         """Whether enough frames showed them."""
         return self.looks >= _LOOKS
 
+    def add(self, sighting: RelativeTarget, pose: Odometry, stamp: int) -> None:
+        """Believe a sighting; a bound is no evidence against a prediction that is nearer."""
+        self.seen = stamp
+        self.looks += 1
+        predicted = self.motion.relative_to(pose, stamp)
+        nearer = predicted is not None and predicted[0].distance <= sighting.distance
+        recent = seconds(stamp - self.located) <= _MEMORY
+        if not (sighting.bound and nearer and recent):
+            self.motion.observe(sighting, pose, stamp)
+            self.located = stamp
+
 
 class PeopleTracker:
     """Estimates positions and velocities of people in the local ENU frame."""
@@ -61,20 +87,31 @@ class PeopleTracker:
     def __init__(self) -> None:
         """Start without people."""
         self._people: list[_Person] = []
+        self._followed: _Person | None = None
+        """Who is followed, as of the last frame that showed them."""
         self._newest = 0
         """Mission time of the newest frame, nanoseconds."""
 
     def reset(self) -> None:
         """Forget all people."""
         self._people.clear()
+        self._followed = None
 
     def see(
-        self, people: Iterable[RelativeTarget], pose: Odometry, stamp: int, interval: float
+        self,
+        people: Iterable[RelativeTarget],
+        pose: Odometry,
+        stamp: int,
+        interval: float,
+        *,
+        target: RelativeTarget | None = None,
     ) -> None:
         """Add the people in a frame captured from `pose` at `stamp`, `interval` s after the last.
 
-        The pairs of a person and a sighting that fit best are the same, the rest are new. An upper
-        bound of the distance is no evidence against somebody predicted nearer.
+        `target` is that one of `people` who is followed, known by other evidence than its place. It
+        claims its person first, whom no other sighting moves: a loose box around a body often looks
+        nearer than the body. Then each, nearest first, is the person predicted nearest to it, or a
+        new one.
         """
         last, self._newest = self._newest, stamp
         self._people = [
@@ -82,53 +119,52 @@ class PeopleTracker:
             for one in self._people
             if seconds(stamp - one.seen) <= _MEMORY and (one.sure or one.seen == last)
         ]
-        turning = _SWERVE / max(interval, _SHORTEST)
+        frame = max(interval, _SHORTEST)
         for person in self._people:
-            person.motion.acceleration = turning
-        for sighting, known in self._matched(list(people), pose, stamp):
-            if known is None and sighting.doubtful:
-                continue
-            person = known or _Person(TargetMotion(turning, _STARTING), stamp, stamp)
-            if known is None:
+            swerve = _SWERVE if person is self._followed else _DRIFT
+            person.motion.acceleration = swerve / frame
+        free = list(self._people)
+        for sighting in sorted(people, key=lambda one: (one is not target, one.distance)):
+            person = self._shown(sighting, free, pose, stamp, followed=sighting is target)
+            if person is None:
+                if sighting.doubtful:
+                    continue
+                person = _Person(TargetMotion(_DRIFT / frame, _STARTING), stamp, stamp)
                 self._people.append(person)
-            person.seen = stamp
-            person.looks += 1
+            else:
+                free.remove(person)
+            if sighting is target:
+                self._followed = person
+            person.add(sighting, pose, stamp)
+
+    def _shown(
+        self,
+        sighting: RelativeTarget,
+        free: Sequence[_Person],
+        pose: Odometry,
+        stamp: int,
+        *,
+        followed: bool,
+    ) -> _Person | None:
+        """Find whom of `free` a sighting shows; None for somebody new."""
+        offs = {one: _off(one, sighting, pose, stamp) for one in free}
+        own = offs.get(self._followed, math.inf)
+        if followed and own <= _SAME:
+            return self._followed
+        others = [one for one in free if one is not self._followed and offs[one] <= _SAME]
+        return min(others, key=offs.__getitem__, default=None)
+
+    def relative_to(self, pose: Odometry, stamp: int) -> list[Prediction]:
+        """Everybody surely there, predicted for `stamp` relative to `pose`, nearest first."""
+        found = []
+        for person in self._people:
             predicted = person.motion.relative_to(pose, stamp)
-            nearer = predicted is not None and predicted[0].distance <= sighting.distance
-            recent = seconds(stamp - person.located) <= _MEMORY
-            if not (sighting.bound and nearer and recent):
-                person.motion.observe(sighting, pose, stamp)
-                person.located = stamp
-
-    def _matched(
-        self, sightings: Sequence[RelativeTarget], pose: Odometry, stamp: int
-    ) -> Iterator[tuple[RelativeTarget, _Person | None]]:
-        """Each sighting with the person whom it shows, None for somebody new."""
-        fits = sorted(
-            (person.motion.surprise(sighting, pose, stamp), number, index)
-            for number, sighting in enumerate(sightings)
-            for index, person in enumerate(self._people)
-            if _off(person, sighting, pose, stamp) <= _SAME
-        )
-        found: dict[int, int] = {}
-        for _, number, index in fits:
-            if number not in found and index not in found.values():
-                found[number] = index
-        matched = {number: self._people[index] for number, index in found.items()}
-        for number, sighting in enumerate(sightings):
-            yield sighting, matched.get(number)
-
-    def relative_to(
-        self, pose: Odometry, stamp: int, *, in_sight: bool = False
-    ) -> list[Prediction]:
-        """Everybody surely there, predicted for `stamp` relative to `pose`, nearest first.
-
-        Or everybody `in_sight`, seen in the newest frame.
-        """
-        sure = (one for one in self._people if one.sure)
-        people = [one for one in sure if one.seen == self._newest or not in_sight]
-        found = (person.motion.relative_to(pose, stamp) for person in people)
-        return sorted(filter(None, found), key=lambda one: one[0].distance)
+            if person.sure and predicted is not None:
+                place, away, left = predicted
+                share = min(1.0, _FASTEST / max(math.hypot(away, left), _FASTEST))
+                in_sight, followed = person.seen == self._newest, person is self._followed
+                found.append(Prediction(place, share * away, share * left, followed, in_sight))
+        return sorted(found, key=lambda one: one.place.distance)
 
 
 def _off(person: _Person, sighting: RelativeTarget, pose: Odometry, stamp: int) -> float:

@@ -7,7 +7,6 @@ and compensates the latency from a frame's capture to the resulting command.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,25 +83,15 @@ class TargetMotion:
             return False
         return sighting.distance - predicted[0].distance > _LEAP * _RANGE_NOISE * sighting.distance
 
-    def surprise(self, sighting: RelativeTarget, odometry: Odometry, stamp: int) -> float:
-        """Squared Mahalanobis distance, 2 degrees of freedom, of a sighting from the prediction.
-
-        0 before the first observation. Of a bound, what is nearer is no surprise.
-        """
-        predicted = self.relative_to(odometry, stamp)
-        if self._state is None or predicted is None:
-            return 0.0
-        if sighting.bound:
-            distance = min(sighting.distance, predicted[0].distance)
-            sighting = replace(sighting, distance=distance)
-        state, covariance = self._predicted(self._state, seconds(stamp - self._stamp))
-        off = place_of(sighting, odometry) - state[:2]
-        return float(off @ np.linalg.solve(covariance[:2, :2] + _noise(sighting, odometry), off))
-
     def observe(self, sighting: RelativeTarget, odometry: Odometry, stamp: int) -> None:
         """Update the estimate by a sighting at `stamp` from a drone at `odometry`."""
+        heading = odometry.yaw + sighting.bearing
+        along = np.array([math.cos(heading), math.sin(heading)])
+        across = np.array([-along[1], along[0]])
         place = place_of(sighting, odometry)
-        noise = _noise(sighting, odometry)
+        range_sigma = max(_LEAST_NOISE, _RANGE_NOISE * sighting.distance)
+        side_sigma = max(_LEAST_NOISE, _SIDE_NOISE * sighting.distance)
+        noise = range_sigma**2 * np.outer(along, along) + side_sigma**2 * np.outer(across, across)
         if self._state is None:
             self._state = np.array([*place, 0.0, 0.0])
             self._covariance = np.zeros((4, 4))
@@ -149,14 +138,3 @@ class TargetMotion:
         push = np.vstack([np.eye(2) * dt**2 / 2, np.eye(2) * dt])
         covariance = step @ self._covariance @ step.T + self.acceleration**2 * push @ push.T
         return step @ state, covariance
-
-
-def _noise(sighting: RelativeTarget, odometry: Odometry) -> NDArray[np.float64]:
-    """Covariance (2, 2) of the position of a sighting, square metres."""
-    heading = odometry.yaw + sighting.bearing
-    along = np.array([math.cos(heading), math.sin(heading)])
-    across = np.array([-along[1], along[0]])
-    range_sigma = max(_LEAST_NOISE, _RANGE_NOISE * sighting.distance)
-    side_sigma = max(_LEAST_NOISE, _SIDE_NOISE * sighting.distance)
-    covariance = range_sigma**2 * np.outer(along, along)
-    return np.asarray(covariance + side_sigma**2 * np.outer(across, across))

@@ -141,7 +141,16 @@ def test_a_loose_box_before_half_of_the_target_is_neither_it_nor_a_stranger(side
         command = watched.show(target, *([loose] * (number % 4 != 3)))
         assert command is None or not command.evasive
     known = watched.follow.controller.guard._people.relative_to(POSE, round(1.9 * NANOSECONDS))
-    assert [one.distance for one, _, _ in known] == pytest.approx([2.0], abs=0.2)
+    assert [one.place.distance for one in known] == pytest.approx([2.0], abs=0.2)
+
+
+def test_somebody_who_walks_across_is_no_nearer_for_a_stride() -> None:
+    """Legs apart, a person seen from the side is wider than one seen from behind."""
+    watched = Watched(VipFollowAnalytics())
+    for _ in range(10):
+        watched.show(vest(2.0, -1.2), box("person", 9.0, 2.0, height=1.7, width=0.85))
+    known = watched.follow.controller.guard._people.relative_to(POSE, round(0.9 * NANOSECONDS))
+    assert known[-1].place.distance > 8.5
 
 
 @pytest.mark.parametrize(("frames", "believed"), [(2, False), (3, True)])

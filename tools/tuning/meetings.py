@@ -35,9 +35,9 @@ class NoGuard(ContactGuard):
         """Give way to nobody."""
         del now, stamp
 
-    def away(self, bearing: float, now: Odometry | None, stamp: int) -> float:
+    def away(self, now: Odometry | None, stamp: int) -> float:
         """Know of nobody who turns round."""
-        del bearing, now, stamp
+        del now, stamp
         return math.inf
 
     def headway(self, pace: float, delay: float) -> float:

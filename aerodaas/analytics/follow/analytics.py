@@ -40,7 +40,7 @@ from the ground, the chest of a person 3 m away is above the image, but that of 
 passer-by is not."""
 _BLOCKED = (3, 10)
 """Frames with an obstacle, of the last 10, that raise an alert."""
-_PERSON, _PERSON_SIZE = "person", TargetSize(1.7, 0.55)
+_PERSON, _PERSON_SIZE = "person", TargetSize(1.7, 0.55, widest=0.9)
 """Label and size of a bystander."""
 _WORN = 0.8
 """Share of a box, such as a vest's or a body's, within another person's box from which on both show
