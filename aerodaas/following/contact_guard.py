@@ -29,8 +29,9 @@ _EARLY = 0.3
 _CLOSING = 0.3
 """Speed in m/s from which on a person and the drone close; below, it is noise."""
 _COMES = 0.75
-"""Speed in m/s towards the drone from which on who is followed comes back; the estimate of somebody
-who stops within a step swings that far."""
+"""Speed in m/s towards the drone from which on the one who is followed comes back, which is told:
+the estimate of somebody who stops within a step swings that far, and the drone gives way, silently.
+"""
 _STILL_TURNING = 0.4
 """Fraction of their closing speed by which people are assumed to come faster than estimated, as
 the estimate lags behind a turn."""
@@ -70,17 +71,24 @@ class ContactGuard:
         """Mission time of the last sign of danger, nanoseconds."""
         self._doubted = False
         """Whether the last frame showed a danger beyond `_FAR`."""
+        self._comes = False
+        """Whether whom the drone gives way to comes at it."""
 
     @property
     def evading(self) -> bool:
         """Whether the drone gives way at present."""
         return self._velocity is not None
 
+    @property
+    def alarming(self) -> bool:
+        """Whether it gives way to somebody who comes, not to a target that only stops."""
+        return self.evading and self._comes
+
     def reset(self) -> None:
         """Forget all people."""
         self._people.reset()
         self._velocity = None
-        self._doubted = False
+        self._doubted = self._comes = False
 
     def see(
         self,
@@ -105,16 +113,17 @@ class ContactGuard:
         """
         pose = now or _STILL
         people = self._people.relative_to(pose, stamp)
-        walks, danger, distance = self._walks(people, pose)
-        doubted, self._doubted = self._doubted, danger is not None and distance > _FAR
+        walks, danger = self._walks(people, pose)
+        doubted, self._doubted = self._doubted, danger is not None and danger.place.distance > _FAR
         if self._doubted and not (doubted or self.evading):
             danger = None
         comes = any(one.away < -_CLOSING for one in people)
         if danger is not None:
-            self._velocity = self._choose(danger, walks, pose)
+            self._velocity = self._choose(_towards(danger, pose), walks, pose)
             self._danger_at = stamp
+            self._comes |= not danger.followed or danger.away < -_COMES
         elif not comes or seconds(stamp - self._danger_at) > _HOLD:
-            self._velocity = None
+            self._velocity, self._comes = None, False
         return None if self._velocity is None else enu_to_body(self._velocity, pose.yaw)
 
     def away(self, now: Odometry | None, stamp: int) -> float:
@@ -137,29 +146,24 @@ class ContactGuard:
 
     def _walks(
         self, people: Iterable[Prediction], pose: Odometry
-    ) -> tuple[list[_Walk], Vector | None, float]:
-        """How everybody walks, and where the nearest is whom backing off will not avoid.
-
-        The direction is a unit vector from the drone, None without danger; the distance in metres.
-        """
-        walks, danger, distance = [], None, math.inf
+    ) -> tuple[list[_Walk], Prediction | None]:
+        """How everybody walks, and the nearest person whom backing off will not avoid."""
+        walks, danger = [], None
         flying = _velocity(pose)
         for one in people:
-            seen, away = one.place, one.away
-            heading = pose.yaw + seen.bearing
-            ahead = np.array([math.cos(heading), math.sin(heading), 0.0])
+            ahead = _towards(one, pose)
             aside = np.array([-ahead[1], ahead[0], 0.0])
-            closing = float(flying @ ahead) - away
-            come = (away - _STILL_TURNING * max(0.0, closing)) * ahead + one.left * aside
-            place = np.array([pose.position[0], pose.position[1], 0.0]) + seen.distance * ahead
+            closing = float(flying @ ahead) - one.away
+            come = (one.away - _STILL_TURNING * max(0.0, closing)) * ahead + one.left * aside
+            place = np.array([*pose.position[:2], 0.0]) + one.place.distance * ahead
             walks.append((place, come))
-            # The approach keeps away from who is followed and only stops.
-            comes = away < -_COMES or not one.followed
+            # The approach keeps away from who is followed and stands.
+            comes = one.away < -_CLOSING or not one.followed
             if danger is None and comes and closing > _CLOSING:
                 left_over = self._room(-self.limits.backward * ahead, [walks[-1]], pose, late=True)
                 if left_over < self.limits.contact + _EARLY:
-                    danger, distance = ahead, seen.distance
-        return walks, danger, distance
+                    danger = one
+        return walks, danger
 
     def _choose(self, ahead: Vector, walks: Sequence[_Walk], pose: Odometry) -> Vector:
         """Velocity (ENU) by which to give way to somebody in the direction `ahead`."""
@@ -197,6 +201,12 @@ class ContactGuard:
             for place, walk in walks
         ]
         return float(min(rooms, default=math.inf))
+
+
+def _towards(person: Prediction, pose: Odometry) -> Vector:
+    """Direction (ENU) of a person from the drone, along the ground."""
+    heading = pose.yaw + person.place.bearing
+    return np.array([math.cos(heading), math.sin(heading), 0.0])
 
 
 def _velocity(pose: Odometry) -> Vector:

@@ -57,6 +57,7 @@ class Drone:
         self.visible: Callable[[float], bool] = lambda _: True
         self.commands: list[Vector | None] = []
         """Of each frame, ENU m/s."""
+        self.alarmed = False
         self.nearest = math.inf
         self.stamp = 0
 
@@ -73,6 +74,7 @@ class Drone:
                 target = seen[0] if seen and self.follows else None
                 self.guard.see(seen, pose, self.stamp, INTERVAL, target=target)
                 answer = self.guard.evade(pose, self.stamp)
+                self.alarmed |= self.guard.alarming
                 self.commands.append(None if answer is None else body_to_enu(answer, self.yaw))
             asked = self.commands[-1]
             wanted.append(self.cruise if asked is None else asked)
@@ -262,13 +264,25 @@ def test_how_fast_the_followed_person_goes_away_counts_while_in_sight() -> None:
         assert drone.guard.away(pose, drone.stamp + 1) == math.inf
 
 
-def test_who_is_followed_and_only_stops_is_not_given_way_to() -> None:
-    """The approach keeps that distance; somebody else there is given way to."""
-    for follows in (True, False):
-        drone = Drone([straight((1.5, 0.0), (0.0, 0.0))], follows=follows)
-        drone.cruise = drone.velocity = np.array([1.0, 0.0, 0.0])
-        drone.fly(0.5)
-        assert bool(drone.gave_way) is not follows
+@pytest.mark.parametrize(
+    ("speed", "follows", "gives_way", "alarms"),
+    [
+        (0.0, True, False, False),
+        (0.5, True, True, False),
+        (1.0, True, True, True),
+        (0.0, False, True, True),
+        (0.5, False, True, True),
+    ],
+)
+def test_who_is_followed_and_only_stops_is_no_alarm(
+    speed: float, *, follows: bool, gives_way: bool, alarms: bool
+) -> None:
+    """The estimate of somebody who stops swings; the approach keeps its distance from them."""
+    drone = Drone([straight((1.6, 0.0), (-speed, 0.0))], follows=follows)
+    drone.cruise = drone.velocity = np.array([1.0, 0.0, 0.0])
+    drone.fly(0.5)
+    assert bool(drone.gave_way) is gives_way
+    assert drone.alarmed is alarms
 
 
 @pytest.mark.parametrize(("speed", "waits"), [(1.2, 0), (3.5, 1)])
