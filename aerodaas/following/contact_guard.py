@@ -28,7 +28,7 @@ _EARLY = 0.3
 """Metres beyond the least distance by which the drone gives way too early rather than too late."""
 _CLOSING = 0.3
 """Speed in m/s from which on a person and the drone close; below, it is noise."""
-_COMES = 0.75
+_COMES = 0.9
 """Speed in m/s towards the drone from which on the one who is followed comes back, which is told:
 the estimate of somebody who stops within a step swings that far, and the drone gives way, silently.
 """
