@@ -187,16 +187,6 @@ def test_above_the_head_it_climbs() -> None:
         assert all(one[UP] >= 0.0 for one in drone.gave_way)
 
 
-def test_nobody_is_flown_over_from_below_their_head() -> None:
-    """Hemmed in, with somebody on each side, it backs off and stays low."""
-    walks = [straight((2.0, left), (-1.8, -0.3 * left)) for left in (0.0, 1.2, -1.2)]
-    drone = Drone(walks, height=1.85)
-    drone.velocity = np.array([1.3, 0.0, 0.0])
-    drone.fly(0.8)
-    assert drone.gave_way
-    assert all(one[UP] == pytest.approx(0.0) for one in drone.gave_way)
-
-
 def test_it_ends_once_nobody_comes_any_more() -> None:
     """Sooner than it is over for somebody who went out of sight."""
     drone = Drone([lambda time: (1.4 + 1.3 * abs(time - 2.0), 0.0)], follows=True)
