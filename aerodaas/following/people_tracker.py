@@ -125,11 +125,11 @@ class PeopleTracker:
             person.motion.acceleration = swerve / frame
         free = list(self._people)
         for sighting in sorted(people, key=lambda one: (one is not target, one.distance)):
-            person = self._shown(sighting, free, pose, stamp, followed=sighting is target)
-            if person is None:
-                if sighting.doubtful:
-                    continue
-                person = _Person(TargetMotion(_DRIFT / frame, _STARTING), stamp, stamp)
+            known = self._shown(sighting, free, pose, stamp, followed=sighting is target)
+            if known is None and sighting.doubtful:
+                continue
+            person = known or _Person(TargetMotion(_DRIFT / frame, _STARTING), stamp, stamp)
+            if known is None:
                 self._people.append(person)
             else:
                 free.remove(person)
@@ -147,12 +147,11 @@ class PeopleTracker:
         followed: bool,
     ) -> _Person | None:
         """Find whom of `free` a sighting shows; None for somebody new."""
-        offs = {one: _off(one, sighting, pose, stamp) for one in free}
-        own = offs.get(self._followed, math.inf)
-        if followed and own <= _SAME:
-            return self._followed
-        others = [one for one in free if one is not self._followed and offs[one] <= _SAME]
-        return min(others, key=offs.__getitem__, default=None)
+        mine = self._followed
+        offs = {one: off for one in free if (off := _off(one, sighting, pose, stamp)) <= _SAME}
+        if followed and mine is not None and mine in offs:
+            return mine
+        return min((one for one in offs if one is not mine), key=offs.__getitem__, default=None)
 
     def relative_to(self, pose: Odometry, stamp: int) -> list[Prediction]:
         """Everybody surely there, predicted for `stamp` relative to `pose`, nearest first."""

@@ -67,7 +67,7 @@ def test_another_target_is_another_person() -> None:
     other = RelativeTarget(-0.3, 6.0)
     for _ in range(10):
         watch.show(TARGET, other, target=TARGET)
-    watch.show(TARGET, other, target=other)
+    watch.show(TARGET, RelativeTarget(-0.3, 5.2), other, target=other)
     assert watch.followed.place.distance == pytest.approx(6.0, abs=0.1)
     assert abs(watch.followed.away) < 0.2
     assert [one.place.distance for one in watch.known] == pytest.approx([2.3, 6.0], abs=0.1)
