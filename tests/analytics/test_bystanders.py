@@ -180,6 +180,15 @@ def test_who_has_fallen_lies_within_a_bodys_length(*, fallen: bool) -> None:
     assert not _is_near(RelativeTarget(0.0, 1.0), expected)
 
 
+def test_a_body_where_the_vest_was_is_nobody_else() -> None:
+    """The detector misses the vest and puts the box of the body a little aside."""
+    watched = Watched(VipFollowAnalytics())
+    for number in range(15):
+        watched.show(vest(2.0, 0.0) if number < 10 else person(2.2, 0.6))
+    known = watched.follow.controller.guard._people.relative_to(POSE, round(1.4 * NANOSECONDS))
+    assert len(known) == 1
+
+
 def test_another_with_the_followed_label_counts_once() -> None:
     """By the vest; the box of the body around it adds nobody."""
     watched = Watched(VipFollowAnalytics())

@@ -102,3 +102,14 @@ def test_nobody_is_faster_than_a_run() -> None:
     found = watch.known[0]
     assert math.hypot(found.away, found.left) == pytest.approx(2.5)
     assert found.away < -2.4
+
+
+def test_a_cut_box_is_no_evidence_against_somebody_predicted_nearer() -> None:
+    """Who comes until their box is cut by the picture's edges goes on coming."""
+    watch = Watch()
+    for number in range(20):
+        watch.show(RelativeTarget(0.0, 3.0 - 0.1 * number))
+    for _ in range(3):
+        watch.show(RelativeTarget(0.0, 2.0, bound=True))
+    assert watch.known[0].place.distance == pytest.approx(0.8, abs=0.1)
+    assert watch.known[0].away == pytest.approx(-1.0, abs=0.1)
