@@ -81,7 +81,7 @@ def evaluate_model(
     from aerodaas.analytics.evaluation.errors import draw_mistakes  # noqa: PLC0415
     from aerodaas.analytics.evaluation.figures import LEAST_SCORE, evaluate  # noqa: PLC0415
     from aerodaas.analytics.evaluation.reading import read_dataset  # noqa: PLC0415
-    from aerodaas.cli.lab_study import show_progress  # noqa: PLC0415
+    from aerodaas.terminal.progress import show_progress  # noqa: PLC0415
 
     if not LEAST_SCORE <= min_score <= 1:
         raise ConfigError(f"--min-score lies between {LEAST_SCORE} and 1, not at {min_score}")
