@@ -101,7 +101,9 @@ class MavlinkVehicle:
         known = Capabilities("mavlink", max_speed=settings.max_speed, max_climb=settings.max_climb)
         if self._connection is None:
             return known
-        return replace(known, alone=self._connection.autopilot.alone)
+        connection = self._connection
+        autopilot, stranded = connection.autopilot, connection.fallback.obstacles
+        return replace(known, alone=autopilot.alone if stranded else autopilot.comes_home)
 
     def use_clock(self, clock: Clock) -> None:
         """Stamp states by `clock` from now on; the calling thread is the control loop."""
@@ -179,6 +181,7 @@ class MavlinkVehicle:
             return
         if self._connection is not None:
             self._part(self._connection)
+            self._put_back(self._connection)
         link.close()
         self._connection = None
         self._log()
@@ -197,6 +200,22 @@ class MavlinkVehicle:
             if phase.shown is FlightMode.LAND or not (departure.withdrawing or phase.armed):
                 return
             self._pause()
+
+    def _put_back(self, connection: Connection) -> None:
+        """Give the vehicle its own parameters back, if it stands: they may bring it home else."""
+        if self._settings.fallback != "set":
+            return
+        if not self._stands():
+            _log.warning(
+                "%s: still in flight, so that its fallback stays set; the next flight, or "
+                "`python -m aerodaas.drivers.mavlink URL --restore`, puts its own parameters back",
+                self._name,
+            )
+            return
+        try:
+            connection.fallback.restore()
+        except VehicleError as error:
+            _log.warning("%s: its own parameters are not back: %s", self._name, error)
 
     def _ours_in_the_air(self) -> bool:
         phase = self._phase
@@ -232,6 +251,7 @@ class MavlinkVehicle:
                 reasons.append("a take-off that was called off is not over yet")
             if not self._knows_place(now):
                 reasons.append("the autopilot does not know its position")
+            reasons += self._connection.fallback.objections
             said = self._connection.autopilot.objections(self._telemetry, now)
             if said and now - self._checked_at > CHECKS:
                 self._checked_at = now

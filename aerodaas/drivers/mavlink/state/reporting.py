@@ -76,9 +76,18 @@ class VehicleReport:
                 "impostor_packets": counts.impostors,
                 "refused_packets": counts.refused,
                 "silence": telemetry.silence(now),
+                **self._mission(),
             },
             ended=self._touchdown.ended,
         )
+
+    def _mission(self) -> dict[str, float]:
+        """Items of the vehicle's own mission, where it has told any."""
+        items = {
+            "mission_item": self._telemetry.mission_item,
+            "mission_reached": self._telemetry.mission_reached,
+        }
+        return {name: number for name, number in items.items() if math.isfinite(number)}
 
     def odometry(self, frame: LocalFrame | None, *, known: bool) -> Odometry:
         """Its position in our frame; NaN unless that is `known`."""
