@@ -17,6 +17,7 @@ from aerodaas.cli.export import export
 from aerodaas.cli.help_examples import ExampleGroup
 from aerodaas.cli.init import init
 from aerodaas.cli.new import new
+from aerodaas.cli.preflight import preflight
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
 from aerodaas.cli.serve import serve
@@ -242,6 +243,7 @@ def graph_command(
 
 
 app.command(context_settings=_WORDS)(check)
+app.command()(preflight)
 
 
 @app.command()

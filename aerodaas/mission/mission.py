@@ -95,6 +95,7 @@ class Mission:
         an invalid geofence.
         """
         self.limits = limits = robot.limits
+        self.preflight = robot.preflight
         self.fence = Geofence(limits.geofence)
         self.home = takeoff.astype(np.float64)
         self._options = robot.mission
@@ -299,6 +300,10 @@ class Mission:
         if self.state is MissionState.TAKING_OFF:
             self._to(MissionState.ABORTED, f"the vehicle refused to take off: {text}")
         self._log.alert(self._now, "refused", text)
+
+    def concern(self, text: str) -> None:
+        """Tell people of what does not keep the drone from taking off."""
+        self._log.alert(self._now, "preflight", text)
 
     def _observe(self, state: VehicleState, now: int) -> None:
         self._elapsed = seconds(now - self._turned_at) if self._last is not None else 0.0

@@ -56,7 +56,7 @@ class Application:
 
     def kill(self) -> list[psutil.Process]:
         """`kill -9`; the processes that it leaves."""
-        left = psutil.Process(self._process.pid).children(recursive=True)
+        left: list[psutil.Process] = psutil.Process(self._process.pid).children(recursive=True)
         self._process.kill()
         self._process.wait()
         return left

@@ -34,6 +34,7 @@ from aerodaas.drivers.setpoints import require_finite
 from aerodaas.types.clock import Clock, ScaledClock
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
 from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.health import HealthReadings
 from aerodaas.types.vehicle import (
     Capabilities,
     PositionSetpoint,
@@ -235,6 +236,13 @@ class MavlinkVehicle:
         with self._lock:
             link, now = self._connected().link, time.monotonic()
             return self._report.state(self._clock.now(), now, link.counts, link.reports(now))
+
+    def health(self) -> HealthReadings:
+        """What it tells about itself; raises VehicleError if not connected."""
+        with self._lock:
+            obstacles = self._connected().fallback.obstacles
+            stranded = None if self._settings.fallback == "ignore" else obstacles
+            return self._report.health(time.monotonic(), stranded)
 
     def preflight(self) -> list[str]:
         """Reasons against a take-off now; empty when ready."""
