@@ -16,6 +16,7 @@ from aerodaas.cli.examples import examples
 from aerodaas.cli.export import export
 from aerodaas.cli.help_examples import ExampleGroup
 from aerodaas.cli.init import init
+from aerodaas.cli.logs import logs
 from aerodaas.cli.new import new
 from aerodaas.cli.preflight import preflight
 from aerodaas.cli.replay import replay
@@ -244,6 +245,7 @@ def graph_command(
 
 app.command(context_settings=_WORDS)(check)
 app.command()(preflight)
+app.command()(logs)
 
 
 @app.command()

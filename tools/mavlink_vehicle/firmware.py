@@ -17,7 +17,7 @@ from tools.mavlink_vehicle.extras import Extras
 from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
 from tools.mavlink_vehicle.route import Route
-from tools.mavlink_vehicle.store import ParameterStore, PlanStore
+from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore
 
 __all__ = ["Firmware", "Result"]
 
@@ -69,6 +69,7 @@ class Firmware(ABC):
         self.parameters = parameters
         parameters.values.update(options.parameters)
         self.plans = PlanStore()
+        self.logs = LogStore()
         self.route = Route(
             flight,
             lambda: self.plans.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, []),

@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
 from aerodaas.drivers.mavlink.microservices.commander import Commander, CommandResult
+from aerodaas.drivers.mavlink.microservices.logs import fetch_log, list_logs
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Progress, download, upload
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
@@ -42,6 +44,7 @@ from aerodaas.types.vehicle import (
     VehicleMode,
     VehicleState,
 )
+from aerodaas.types.vehicle_log import LogEntry
 
 __all__ = ["MavlinkVehicle"]
 
@@ -394,6 +397,24 @@ class MavlinkVehicle:
     def download_mission(self, progress: Progress = lambda _, __: None) -> list[MissionItem]:
         """The mission on the vehicle; blocks, raises VehicleError."""
         return download(self._connected().link, mavlink.MAV_MISSION_TYPE_MISSION, progress)
+
+    def logs(self) -> list[LogEntry]:
+        """The autopilot's own logs, oldest first; blocks, raises VehicleError, also in flight."""
+        return list_logs(self._grounded_link("list logs"))
+
+    def fetch_log(
+        self, log: LogEntry, folder: Path, progress: Progress = lambda _, __: None
+    ) -> Path:
+        """Fetch one of them into `folder`; blocks, raises VehicleError, also in flight."""
+        return fetch_log(
+            self._grounded_link("fetch logs"), self.connection.autopilot, log, folder, progress
+        )
+
+    def _grounded_link(self, deed: str) -> MavlinkLink:
+        connection = self._connected()
+        if not self._stands():
+            raise VehicleError(f"{self._name} cannot {deed} in flight: its link is needed")
+        return connection.link
 
     @property
     def connection(self) -> Connection:

@@ -86,6 +86,8 @@ class ArduPilot(Autopilot):
     comes_home: ClassVar[str] = (
         "ArduPilot stops within 3 s, and comes home by its ground-station failsafe"
     )
+    log_suffix: ClassVar[str] = ".bin"
+    log_head: ClassVar[bytes] = b"\xa3\x95\x80"
     ways_home: ClassVar[frozenset[str]] = frozenset({"return", "retrace", "plan"})
     rates: ClassVar[dict[int, float]] = {
         **Autopilot.rates,

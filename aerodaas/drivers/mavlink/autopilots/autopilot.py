@@ -82,6 +82,9 @@ class Autopilot(ABC):
     """Its behaviour once our process is gone, with the parameters that it is delivered with."""
     comes_home: ClassVar[str]
     """The same with a fallback."""
+    log_suffix: ClassVar[str]
+    log_head: ClassVar[bytes]
+    """Of the files of its own logs, and their first bytes."""
     ways_home: ClassVar[frozenset[str]]
     """Those of `return`, `retrace` and `plan` that its own protection can fly."""
     rates: ClassVar[dict[int, float]] = {

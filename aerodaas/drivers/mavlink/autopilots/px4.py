@@ -82,6 +82,8 @@ class PX4(Autopilot):
         "without a radio, it sinks where it is"
     )
     comes_home: ClassVar[str] = "PX4 leaves offboard mode within a second or so, and comes home"
+    log_suffix: ClassVar[str] = ".ulg"
+    log_head: ClassVar[bytes] = b"ULog\x01\x12\x35"
     ways_home: ClassVar[frozenset[str]] = frozenset({"return"})
     failsafes: ClassVar[tuple[Failsafe, ...]] = (
         Failsafe(

@@ -53,6 +53,7 @@ _WANTED = frozenset(
         *(mavlink.MAVLINK_MSG_ID_ESTIMATOR_STATUS, mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT),
         *(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, mavlink.MAVLINK_MSG_ID_VIBRATION),
         *(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT, mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED),
+        *(mavlink.MAVLINK_MSG_ID_LOG_ENTRY, mavlink.MAVLINK_MSG_ID_LOG_DATA),
         mavlink.MAVLINK_MSG_ID_SMART_BATTERY_INFO,
         EventMessage.id,
     }
