@@ -19,17 +19,22 @@ from mavlink_flights import LOOPBACK, Pair, flight, free_port, robot_of, wait_fo
 from typing_extensions import Self
 
 from aerodaas.config.model import EnvironmentConfig
+from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.microservices import journal, parameters, plans
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
+from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import ConfigError, VehicleError
+from aerodaas.types.geometry import GeodeticOrigin
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 from tools.mavlink_vehicle.store import PlanStore
 
 TESTS = Path(__file__).parents[2]
-ARDUPILOT = AutopilotOptions(family="ardupilot")
-PX4 = AutopilotOptions(family="px4")
+ARDUPILOT = AutopilotOptions(family="ardupilot", ready_after=0.0)
+AS_PX4 = AutopilotOptions(family="px4", ready_after=0.0)
 WAY = [[6.0, 6.0, 4.0], [6.0, 0.0, 3.0]]
 SENDER = mavlink.MAVLink(None, 1, 1)
 OWN = {"FS_GCS_ENABLE": 0.0, "MAV_GCS_SYSID": 255.0, "FS_OPTIONS": 16.0}
@@ -105,7 +110,7 @@ def test_a_killed_process_leaves_a_vehicle_that_comes_home(state_folder: Path) -
     with ExitStack() as open_:
         flights = [
             open_.enter_context(Killed(options, *words))
-            for options, *words in ((ARDUPILOT,), (PX4,), (ARDUPILOT, plan))
+            for options, *words in ((ARDUPILOT,), (AS_PX4,), (ARDUPILOT, plan))
         ]
         for one in flights:
             one.kill_away_from_home()
@@ -179,7 +184,9 @@ def test_the_owner_gets_everything_back(state_folder: Path) -> None:
 
 def test_what_is_set_already_is_left_alone(state_folder: Path) -> None:
     """Nothing is written to a vehicle that comes home by its owner's own settings."""
-    options = AutopilotOptions(family="ardupilot", parameters={**OURS, "FS_GCS_ENABLE": 3.0})
+    options = AutopilotOptions(
+        family="ardupilot", ready_after=0.0, parameters={**OURS, "FS_GCS_ENABLE": 3.0}
+    )
     with flight(options, fallback="set") as pair:
         assert pair.vehicle.preflight() == []
     assert not pair.heard("PARAM_SET")
@@ -214,8 +221,8 @@ def test_after_a_kill_the_next_flight_puts_it_back(
         assert "FS_GCS_ENABLE 0" in caplog.text
         assert "--restore" in caplog.text
         assert values(pair) == OURS
-        with again(pair, fallback="set"):
-            assert values(pair) == OURS
+        with again(pair, fallback="set", way_home="retrace"):
+            assert values(pair) == {**OURS, "FS_GCS_ENABLE": 3.0}
         assert values(pair) == OWN
         assert not list(state_folder.rglob("*.json"))
 
@@ -231,7 +238,9 @@ def test_what_its_owner_sets_meanwhile_stays() -> None:
 def test_in_flight_it_stays_set() -> None:
     """What brings it home is not taken from it before it is home."""
     with flight(ARDUPILOT, fallback="set") as pair:
-        pair.take_off()
+        connection = pair.vehicle.connection
+        connection.commander.give(connection.autopilot.arm(), now=time.monotonic())
+        wait_for(lambda: pair.vehicle.read().armed)
         pair.vehicle.close()
         assert values(pair) == OURS
 
@@ -253,9 +262,8 @@ def test_older_firmware_has_other_names() -> None:
     assert (held["SYSID_MYGCS"], held["RTL_ALT"], held["RTL_ALT_FINAL"]) == (255.0, 1500.0, 200.0)
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "word"),
-    [
+KEEPING_AWAY = {
+    "ardupilot": [
         ("MAV_GCS_SYSID", 255.0, "does not notice our silence"),
         ("MAV_GCS_SYSID_HI", 255.0, "hide our silence"),
         ("FS_GCS_TIMEOUT", 30.0, "later than 5 s"),
@@ -264,32 +272,53 @@ def test_older_firmware_has_other_names() -> None:
         ("RTL_ALT_M", 130.0, "above the geofence's ceiling"),
         ("RTL_ALT_FINAL_M", 2.0, "hover over its home"),
     ],
-)
-def test_each_that_keeps_it_away_is_named(name: str, value: float, word: str) -> None:
-    """One at a time, with all others as they should be."""
-    options = AutopilotOptions(family="ardupilot", parameters={**OURS, name: value})
-    with flight(options, fallback="require") as pair:
-        (reason,) = pair.vehicle.preflight()
-    assert f"{name} is {value:g}" in reason
-    assert word in reason
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "word"),
-    [
+    "px4": [
         ("COM_OBL_RC_ACT", 5.0, "hovers"),
         ("COM_OF_LOSS_T", 30.0, "later than 5 s"),
         ("RTL_RETURN_ALT", 130.0, "above the geofence's ceiling"),
         ("RTL_LAND_DELAY", -1.0, "hover over its home"),
     ],
-)
-def test_px4_has_its_own(name: str, value: float, word: str) -> None:
-    """One at a time, as above."""
-    options = AutopilotOptions(parameters={"COM_OBL_RC_ACT": 3.0, name: value})
+}
+
+
+@pytest.mark.parametrize("family", ["ardupilot", "px4"])
+def test_each_that_keeps_it_away_is_named(family: str) -> None:
+    """One at a time, with all others as they should be."""
+    good = OURS if family == "ardupilot" else {"COM_OBL_RC_ACT": 3.0}
+    options = AutopilotOptions(family=family, ready_after=0.0, parameters=good)  # type: ignore[arg-type]
     with flight(options, fallback="require") as pair:
-        (reason,) = pair.vehicle.preflight()
-    assert f"{name} is {value:g}" in reason
-    assert word in reason
+        assert pair.vehicle.preflight() == []
+        fallback = pair.vehicle.connection.fallback
+        held = pair.autopilot.firmware.parameters.values
+        for name, value, word in KEEPING_AWAY[family]:
+            before, held[name] = held[name], value
+            (reason,) = fallback.examine(120.0, "")
+            assert f"{name} is {value:g}" in reason
+            assert word in reason
+            held[name] = before
+
+
+def test_what_is_judged_goes_with_role_version_and_way() -> None:
+    """PX4 before 1.14 asks another parameter; as its ground station it may hold first."""
+    names = {
+        (role, software): [
+            name
+            for one in PX4().fallback(MavlinkSettings(role=role), 120.0, software)
+            for name in one.names
+        ]
+        for role in ("companion", "ground_station")
+        for software in ("1.13.3", "1.14.0", "")
+    }
+    assert "COM_OBL_ACT" in names["companion", "1.13.3"]
+    assert "COM_OBL_ACT" not in names["companion", "1.14.0"] + names["companion", ""]
+    assert "NAV_DLL_ACT" in names["ground_station", "1.14.0"]
+    assert "NAV_DLL_ACT" not in names["companion", "1.14.0"]
+    for way, value in (("return", 1.0), ("retrace", 3.0), ([(1.0, 2.0, 3.0)], 6.0)):
+        settings = MavlinkSettings(way_home=way)
+        *_, acts = ArduPilot().fallback(settings, 120.0, "")
+        assert acts.value == value
+        fitting = [one for one in range(8) if acts.fits(float(one))]
+        assert fitting == ([1, 3, 6] if way == "return" else [value])
 
 
 def test_the_way_home_takes_the_owners_mission_for_a_flight() -> None:
@@ -343,7 +372,7 @@ class Faulty(PlanStore):
     [
         ("refuses", "does not know this command.*way_home.*return"),
         ("stalls", "stopped answering while taking the mission"),
-        ("moves", "holds another way home than was uploaded: item 2"),
+        ("moves", "holds another way home than ours: item 2"),
         ("shortens", "4 items instead of 5"),
         ("vanishes", "stopped answering while taking the mission.*is not put back yet"),
     ],
@@ -368,32 +397,31 @@ def test_a_way_home_that_is_not_there_is_no_fallback(
 @pytest.mark.parametrize(
     ("way", "word"),
     [
-        ([[0.0, 30.0, 3.0]], r"way_home.0: .* outside the geofence"),
-        ([[0.0, 5.0, 300.0]], r"way_home.0: .* above the ceiling"),
-        ([[8.0, 8.0, 3.0], [-8.0, 8.0, 3.0]], r"way_home.0: .*crosses a no-fly zone"),
+        ([(0.0, 30.0, 3.0)], r"way_home.0: .* outside the geofence"),
+        ([(0.0, 5.0, 300.0)], r"way_home.0: .* above the ceiling"),
+        ([(8.0, 8.0, 3.0), (-8.0, 8.0, 3.0)], r"way_home.0: .*crosses a no-fly zone"),
     ],
 )
-def test_a_way_home_keeps_to_the_geofence(way: list[list[float]], word: str) -> None:
-    """Its places and the legs between them; the vehicle gets nothing of it."""
-    limits = {
-        "geofence": {
-            "polygon": [[-10, -10], [10, -10], [10, 10], [-10, 10]],
-            "no_fly": [[[-2, 7], [2, 7], [2, 9], [-2, 9]]],
-            "ceiling": 50,
-        }
+def test_a_way_home_keeps_to_the_geofence(way: list[tuple[float, float, float]], word: str) -> None:
+    """Its places and the legs between them, before anything of it is uploaded."""
+    fence = {
+        "polygon": [[-10, -10], [10, -10], [10, 10], [-10, 10]],
+        "no_fly": [[[-2, 7], [2, 7], [2, 9], [-2, 9]]],
+        "ceiling": 50,
     }
-    with (
-        started(ARDUPILOT, fallback="set", way_home=way, limits=limits) as (autopilot, vehicle),
-        pytest.raises(VehicleError, match=word),
-    ):
-        vehicle.connect()
-    assert mission(autopilot) == []
+    robot = robot_of(1, limits={"geofence": fence}, start=(0.0, 0.0, 1.0))
+    origin = GeodeticOrigin(47.0, 8.0)
+    with pytest.raises(VehicleError, match=word):
+        way_home_items(robot, way, origin)
+    *_, place, landing = way_home_items(robot, [(5.0, 5.0, 4.0)], origin)
+    assert (place.z, landing.z) == (3.0, 0.0), "heights are above where it starts"
+    assert (landing.x, landing.y) == (470_000_000, 80_000_000)
 
 
 def test_px4_flies_no_way_home_of_ours() -> None:
-    """Its mission return goes by the mission's progress: said, nothing is uploaded."""
+    """Its mission return goes by the mission's progress: said, nothing is changed."""
     with (
-        started(PX4, fallback="set", way_home="retrace") as (_, vehicle),
+        started(AS_PX4, fallback="set", way_home="retrace") as (_, vehicle),
         pytest.raises(VehicleError, match=r'PX4 cannot fly this settings.way_home.*"return"'),
     ):
         vehicle.connect()

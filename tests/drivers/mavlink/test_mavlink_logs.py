@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import random
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from mavlink_flights import LOOPBACK, Pair, flight, free_port
+from mavlink_flights import LOOPBACK, Pair, flight, free_port, wait_for
 
 from aerodaas.cli.app import main
 from aerodaas.drivers.mavlink.microservices import logs as module
@@ -24,16 +25,25 @@ from tools.mavlink_vehicle.store import LogStore
 DATAFLASH = b"\xa3\x95\x80" + random.Random(1).randbytes(100_000)
 ULOG = b"ULog\x01\x12\x35" + random.Random(2).randbytes(5_000)
 BEGAN = 1_800_000_000.0
-ARDUPILOT = AutopilotOptions(family="ardupilot")
+ARDUPILOT = AutopilotOptions(family="ardupilot", ready_after=0.0)
+
+
+@pytest.fixture(scope="module")
+def connected() -> Iterator[Pair]:
+    """A vehicle on the ground; little patience with its silence."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_TIMEOUT", 0.2)
+        with flight(ARDUPILOT, fallback="ignore") as flown:
+            yield flown
 
 
 @pytest.fixture
-def pair(monkeypatch: pytest.MonkeyPatch) -> Iterator[Pair]:
-    """A vehicle on the ground with two logs; little patience with its silence."""
-    monkeypatch.setattr(module, "_TIMEOUT", 0.2)
-    with flight(ARDUPILOT, fallback="ignore") as flown:
-        flown.autopilot.firmware.logs.logs = {1: DATAFLASH[:90], 2: DATAFLASH}
-        yield flown
+def pair(connected: Pair) -> Pair:
+    """The same with two logs."""
+    connected.autopilot.spoil(up=Impairment(), down=Impairment())
+    connected.autopilot.firmware.logs = LogStore()
+    connected.autopilot.firmware.logs.logs = {1: DATAFLASH[:90], 2: DATAFLASH}
+    return connected
 
 
 def test_the_list(pair: Pair) -> None:
@@ -51,7 +61,7 @@ def test_a_log_is_fetched_whole(pair: Pair, tmp_path: Path) -> None:
     assert file.name == "log-2-20270115-080000.bin"
     assert file.read_bytes() == DATAFLASH
     assert told == [(36_000, 100_003), (72_000, 100_003), (100_003, 100_003)]
-    assert pair.heard("LOG_REQUEST_END")
+    wait_for(lambda: bool(pair.heard("LOG_REQUEST_END")))
 
 
 def test_px4_has_its_own_format(tmp_path: Path) -> None:
@@ -147,13 +157,17 @@ def test_a_folder_that_cannot_be_written_is_named(pair: Pair, tmp_path: Path) ->
 
 def test_not_in_flight(pair: Pair, tmp_path: Path) -> None:
     """Setpoints and telemetry need the link."""
-    pair.take_off()
+    connection = pair.vehicle.connection
+    connection.commander.give(connection.autopilot.arm(), now=time.monotonic())
+    wait_for(lambda: pair.vehicle.read().armed)
     for deed in (
         pair.vehicle.logs,
         lambda: pair.vehicle.fetch_log(LogEntry(1, 90, None), tmp_path),
     ):
         with pytest.raises(VehicleError, match="in flight"):
             deed()
+    connection.commander.give(connection.autopilot.disarm(), now=time.monotonic())
+    wait_for(lambda: not pair.vehicle.read().armed)
 
 
 def test_on_the_command_line(

@@ -17,7 +17,7 @@ from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, FallbackPar
 from aerodaas.drivers.mavlink.microservices.journal import Changes, Journal, ParameterChange
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, download, upload
-from aerodaas.drivers.mavlink.microservices.way_home import upload_way_home
+from aerodaas.drivers.mavlink.microservices.way_home import other_way_home, upload_way_home
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.types.errors import VehicleError
@@ -93,26 +93,28 @@ class Fallback:
         was changed before has been put back.
         """
         self._remind()
-        wanted = self._autopilot.fallback(self._settings, ceiling, software)
         if self._settings.fallback == "set":
-            self._require_way()
-            self._change(wanted, plan)
+            if unable := self._unable():
+                raise VehicleError(f"{self._name}: {unable}")
+            self._change(self._autopilot.fallback(self._settings, ceiling, software), plan)
+            plan = ()  # it was compared before anything was set that flies it
         self.obstacles = tuple(self.examine(ceiling, software, plan))
         if self.obstacles and self._settings.fallback == "set":
             raise VehicleError(f"{self._name}: {'; '.join(self.objections)}{self._undone()}")
-        for text in self.obstacles:
+        if self.obstacles:
             _log.warning(
                 '%s: %s would not come home if this process died: %s ("fallback": "set" does it '
                 "for a flight)",
                 self._name,
                 self._autopilot.name,
-                text,
+                "; ".join(self.obstacles),
             )
 
     def examine(self, ceiling: float, software: str, plan: Sequence[MissionItem] = ()) -> list[str]:
         """What keeps it from coming home, one sentence each; nothing is changed."""
         wanted = self._autopilot.fallback(self._settings, ceiling, software)
-        obstacles = [one.text for one in self._judge(wanted)]
+        obstacles = [unable] if (unable := self._unable()) else []
+        obstacles += [one.text for one in self._judge(wanted)]
         return obstacles + (self._compare(plan) if plan else [])
 
     def restore(self) -> None:
@@ -155,12 +157,12 @@ class Fallback:
             said or "its mission",
         )
 
-    def _require_way(self) -> None:
-        if self._settings.way_kind not in self._autopilot.ways_home:
-            raise VehicleError(
-                f"{self._name}: {self._autopilot.name} cannot fly this settings.way_home by "
-                'itself; take "return"'
-            )
+    def _unable(self) -> str:
+        """Why its firmware cannot fly the way home that is asked for; empty if it can."""
+        if self._settings.way_kind in self._autopilot.ways_home:
+            return ""
+        name = self._autopilot.name
+        return f'{name} cannot fly this settings.way_home by itself; take "return"'
 
     def _change(self, wanted: Sequence[FallbackParameter], plan: Sequence[MissionItem]) -> None:
         """Set what does not fit; the journal is always ahead of the vehicle."""
@@ -223,11 +225,10 @@ class Fallback:
 
     def _compare(self, plan: Sequence[MissionItem]) -> list[str]:
         try:
-            held = download(self._link)
+            text = other_way_home(self._link, plan)
         except VehicleError as error:
-            return [str(error)]
-        same = [one.command for one in held[1:]] == [one.command for one in plan[1:]]
-        return [] if same else ["the way home is not on it"]
+            text = str(error)
+        return [text] if text else []
 
 
 def _same(one: float, other: float) -> bool:

@@ -16,7 +16,7 @@ from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import GeodeticOrigin
 
-__all__ = ["upload_way_home", "way_home_items"]
+__all__ = ["other_way_home", "upload_way_home", "way_home_items"]
 
 _EARTH = 1e7
 _HEIGHT = 0.011
@@ -64,18 +64,23 @@ def upload_way_home(link: MavlinkLink, items: Sequence[MissionItem]) -> None:
             f'{error}; "way_home": "return" needs no plan (DO_RETURN_PATH_START does: ArduCopter '
             "4.6 or later)"
         ) from None
+    if text := other_way_home(link, items):
+        raise VehicleError(text)
+
+
+def other_way_home(link: MavlinkLink, items: Sequence[MissionItem]) -> str:
+    """In what the vehicle's plan differs from `items`; empty if in nothing. Raises VehicleError."""
     held = download(link)
     if len(held) != len(items):
-        raise VehicleError(
-            f"the autopilot holds another way home than was uploaded: {len(held)} items instead of "
-            f"{len(items)}"
-        )
+        return f"it holds another way home than ours: {len(held)} items instead of {len(items)}"
     for number, (sent, kept) in enumerate(zip(items, held, strict=True)):
         if number and not _same(sent, kept):
-            raise VehicleError(
-                f"the autopilot holds another way home than was uploaded: item {number} is command "
-                f"{kept.command} at {kept.x / _EARTH:.7f}, {kept.y / _EARTH:.7f}, {kept.z:g} m"
+            place = f"{kept.x / _EARTH:.7f}, {kept.y / _EARTH:.7f}, {kept.z:g} m"
+            return (
+                f"it holds another way home than ours: item {number} is command {kept.command} at "
+                f"{place}"
             )
+    return ""
 
 
 def _same(sent: MissionItem, kept: MissionItem) -> bool:
