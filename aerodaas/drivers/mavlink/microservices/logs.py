@@ -46,7 +46,7 @@ def list_logs(link: MavlinkLink) -> list[LogEntry]:
                 total = entry.num_logs
                 if total:
                     found[entry.id] = LogEntry(entry.id, entry.size, entry.time_utc or None)
-                if len(found) >= total:
+                if len(found) >= entry.num_logs:
                     return [found[number] for number in sorted(found)]
     if total is None:
         raise VehicleError("the autopilot does not answer when asked for its logs")
