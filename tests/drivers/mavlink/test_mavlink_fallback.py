@@ -314,7 +314,7 @@ def test_what_is_judged_goes_with_role_version_and_way() -> None:
     assert "NAV_DLL_ACT" in names["ground_station", "1.14.0"]
     assert "NAV_DLL_ACT" not in names["companion", "1.14.0"]
     for way, value in (("return", 1.0), ("retrace", 3.0), ([(1.0, 2.0, 3.0)], 6.0)):
-        settings = MavlinkSettings(way_home=way)
+        settings = MavlinkSettings.model_validate({"way_home": way})
         *_, acts = ArduPilot().fallback(settings, 120.0, "")
         assert acts.value == value
         fitting = [one for one in range(8) if acts.fits(float(one))]
