@@ -17,7 +17,9 @@ from aerodaas.cli.failure import failure_of, show_failure
 from aerodaas.cli.help_examples import ExampleGroup
 from aerodaas.cli.import_bag import import_bag
 from aerodaas.cli.init import init
+from aerodaas.cli.logs import logs
 from aerodaas.cli.new import new
+from aerodaas.cli.preflight import preflight
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
 from aerodaas.cli.serve import serve
@@ -270,6 +272,8 @@ def graph_command(
 
 
 app.command(context_settings=_WORDS)(check)
+app.command()(preflight)
+app.command()(logs)
 
 
 @app.command()

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.cli.application import build_application
+from aerodaas.cli.preflight import settled_items
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions, current_options
 from aerodaas.types.errors import (
@@ -202,17 +203,20 @@ def _vehicle(
     connected: ExitStack,
 ) -> str:
     from aerodaas.config.plugins import load_plugin  # noqa: PLC0415 - slow to load
+    from aerodaas.types.health import Verdict  # noqa: PLC0415 - as above
 
     vehicle: Vehicle = load_plugin("drivers", robot.driver)(robot, environment.config)
     connected.callback(vehicle.close)
     vehicle.connect(_CONNECTING)
     vehicles[robot.id] = vehicle
     state = vehicle.read()
-    refused = vehicle.preflight()
+    items = settled_items(vehicle, robot)
+    refused = [one.text for one in items if one.verdict is Verdict.REFUSED]
     if refused:
         raise VehicleError(f"{robot.driver} would not take off: {'; '.join(refused)}")
+    warned = "".join(f"; {one.text}" for one in items if one.verdict is Verdict.WARNING)
     charge = 100 * state.battery.fraction
-    return f"{robot.driver} answers: {state.mode.value}, battery {charge:.0f} %"
+    return f"{robot.driver} answers: {state.mode.value}, battery {charge:.0f} %{warned}"
 
 
 def _camera(environment: Environment, sensor: SensorConfig, vehicles: dict[str, Vehicle]) -> str:

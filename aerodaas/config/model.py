@@ -30,6 +30,7 @@ from typing_extensions import Self
 
 from aerodaas.config.checked import checked
 from aerodaas.config.json_text import check_plain, read_json
+from aerodaas.config.preflight import PreflightConfig
 from aerodaas.config.secrets import HIDDEN, SecretUrl, shown, shown_text
 from aerodaas.types.identifiers import Identifier, ScopedName
 
@@ -42,6 +43,7 @@ __all__ = [
     "HomeConfig",
     "LimitsConfig",
     "MissionConfig",
+    "PreflightConfig",
     "RecordingConfig",
     "RemoteConfig",
     "RobotConfig",
@@ -267,6 +269,7 @@ class RobotConfig(_Strict):
     """Settings of the driver, such as `url` for MAVLink."""
     sensors: list[SensorConfig] = Field(default_factory=list)
     limits: LimitsConfig = LimitsConfig()
+    preflight: PreflightConfig = PreflightConfig()
     mission: MissionConfig = MissionConfig()
     edge: Identifier | None = None
     """Compute resource, of the kind `edge`, that flies it; None: the edge beside all drones."""

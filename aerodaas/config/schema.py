@@ -7,7 +7,7 @@ import inspect
 import json
 from typing import Any
 
-from aerodaas.config import model
+from aerodaas.config import model, preflight
 from aerodaas.config.model import EnvironmentConfig
 
 __all__ = ["environment_schema"]
@@ -30,7 +30,8 @@ def _docstrings() -> dict[str, dict[str, str]]:
     of the time that its imports of the project take.
     """
     found: dict[str, dict[str, str]] = {}
-    for node in ast.parse(inspect.getsource(model)).body:
+    sources = map(inspect.getsource, (preflight, model))
+    for node in (node for source in sources for node in ast.parse(source).body):
         if isinstance(node, ast.ClassDef):
             inherited: dict[str, Any] = {}
             for base in node.bases:

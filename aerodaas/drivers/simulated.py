@@ -20,6 +20,7 @@ from aerodaas.simulation.wind import Wind
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import ClockError, InvalidWaypointError, VehicleError
 from aerodaas.types.geometry import GeodeticOrigin
+from aerodaas.types.health import HealthReadings
 from aerodaas.types.vehicle import (
     Capabilities,
     PositionSetpoint,
@@ -59,6 +60,7 @@ class SimulatedVehicle:
             min(limits.cruise_speed, limits.max_speed, airframe.max_speed),
         )
         self._max_yaw_rate = math.radians(limits.max_yaw_rate)
+        self._wind = math.hypot(*simulation.wind[:2])
         wind = Wind(simulation.wind, simulation.gust, f"{simulation.seed}/{robot.id}/wind", STEP)
         self._rotor = Multirotor(
             airframe,
@@ -137,6 +139,17 @@ class SimulatedVehicle:
         elif left < airframe.battery_minimum:
             faults.append(f"the battery is low: {left:.0%}")
         return faults
+
+    def health(self) -> HealthReadings:
+        """What the simulation has of it; raises VehicleError if not connected."""
+        self._require_connection()
+        cells = self._airframe.cells
+        return HealthReadings(
+            cells=(self._autopilot.battery.state.voltage / cells,) * cells,
+            gps_fix=None if self._origin is None else True,
+            wind=self._wind,
+            silence=0.0,
+        )
 
     def preflight(self) -> list[str]:
         """Reasons against a take-off now; empty when ready."""

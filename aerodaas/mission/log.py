@@ -12,7 +12,7 @@ from aerodaas.types.data import Alert, Header
 from aerodaas.types.geometry import Vector, length
 from aerodaas.types.status import RECENT
 
-__all__ = ["MissionLog", "words"]
+__all__ = ["MissionLog", "subject", "words"]
 
 _STRIDE = 0.5
 """Metres from the last counted position before a stride counts; far above the odometry's noise,
@@ -87,3 +87,8 @@ class MissionLog:
 def words(text: str) -> str:
     """The text with its numbers masked: alerts with equal results have the same subject."""
     return re.sub(r"\d+(\.\d+)?", "#", text)
+
+
+def subject(kind: str, text: str) -> tuple[str, str]:
+    """Key by which faults are the same: several of the vehicle share one kind."""
+    return kind, words(text) if kind == "vehicle" else ""

@@ -9,6 +9,7 @@ import numpy as np
 
 from aerodaas.mission.actions import Action, Fly, Hold, Land, Return, TakeOff, Wait
 from aerodaas.mission.mission import Mission
+from aerodaas.mission.safety.checklist import Checklist, concerns, refusals
 from aerodaas.mission.safety.setpoint_filter import Neighbour, SetpointFilter
 from aerodaas.types.clock import NANOSECONDS, seconds
 from aerodaas.types.errors import VehicleError
@@ -46,6 +47,7 @@ class SetpointLoop:
         """Fly `vehicle` by `mission`, within the mission's limits."""
         self.vehicle = vehicle
         self.mission = mission
+        self._checklist = Checklist(vehicle, mission.limits, mission.preflight)
         self.guard = SetpointFilter(
             mission.limits,
             mission.home,
@@ -65,8 +67,11 @@ class SetpointLoop:
         """
         state = self._read()
         checking = self.mission.state is MissionState.PREFLIGHT
-        objections = self.vehicle.preflight() if checking else ()
-        action = self.mission.update(state, now, objections)
+        items = self._checklist.examine(state) if checking else []
+        action = self.mission.update(state, now, refusals(items))
+        if isinstance(action, TakeOff):
+            for text in concerns(items):
+                self.mission.concern(text)
         try:
             return self._carry_out(action, state, now, neighbours)
         except VehicleError as error:

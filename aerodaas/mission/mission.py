@@ -35,7 +35,7 @@ from aerodaas.mission.commands import (
 )
 from aerodaas.mission.forecast import BatteryForecast
 from aerodaas.mission.leg import Leg, LegPhase, setpoint_towards
-from aerodaas.mission.log import MissionLog, words
+from aerodaas.mission.log import MissionLog, subject
 from aerodaas.mission.manual import ManualControl
 from aerodaas.mission.navigator import LiveCommand, Navigator
 from aerodaas.mission.planner import Planner
@@ -43,7 +43,7 @@ from aerodaas.mission.queue import QueuedWaypoint
 from aerodaas.mission.safety.detour import Detour
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.motors import Motors, MotorWatch
-from aerodaas.mission.safety.supervisor import CALM, FailsafeAction, Fault, Supervisor, has_position
+from aerodaas.mission.safety.supervisor import CALM, FailsafeAction, Supervisor, has_position
 from aerodaas.mission.state_machine import FLYING, TERMINAL, MissionStateMachine
 from aerodaas.schedulers.trajectory.base import PlanningContext
 from aerodaas.types.braking import stopping_point
@@ -95,6 +95,7 @@ class Mission:
         an invalid geofence.
         """
         self.limits = limits = robot.limits
+        self.preflight = robot.preflight
         self.fence = Geofence(limits.geofence)
         self.home = takeoff.astype(np.float64)
         self._options = robot.mission
@@ -301,6 +302,10 @@ class Mission:
             self._to(MissionState.ABORTED, f"the vehicle refused to take off: {text}")
         self._log.alert(self._now, "refused", text)
 
+    def concern(self, text: str) -> None:
+        """Tell people of what does not keep the drone from taking off."""
+        self._log.alert(self._now, "preflight", text)
+
     def _observe(self, state: VehicleState, now: int) -> None:
         self._elapsed = seconds(now - self._turned_at) if self._last is not None else 0.0
         self._now = self._turned_at = now
@@ -373,14 +378,14 @@ class Mission:
         return Wait()
 
     def _protect(self, state: VehicleState) -> None:
-        before = {_subject(finding) for finding in self._assessment.findings}
+        before = {subject(finding.kind, finding.text) for finding in self._assessment.findings}
         self._assessment = self._supervisor.assess(state, self._now)
         demand, reason = self._assessment.demand, self._assessment.gravest.text
         for finding in self._assessment.findings:
             # The reason for a takeover or a lost position already names the faults behind it.
             named = demand is not FailsafeAction.NOTHING and finding.text in reason
             told = named and finding.kind == "vehicle"
-            if _subject(finding) not in before and not told:
+            if subject(finding.kind, finding.text) not in before and not told:
                 self._log.alert(self._now, finding.kind, finding.text)
         if demand is FailsafeAction.RELEASE:
             self._to(MissionState.ABORTED, reason)
@@ -590,8 +595,3 @@ def _flown(command: VelocityCommand, state: VehicleState) -> VelocitySetpoint:
     """A velocity command in the local frame, by the drone's yaw."""
     velocity = body_to_enu(command.velocity, state.odometry.yaw)
     return VelocitySetpoint(velocity, command.yaw_rate, command.evasive)
-
-
-def _subject(finding: Fault) -> tuple[str, str]:
-    """Key by which findings are the same: several faults of the vehicle share one kind."""
-    return finding.kind, words(finding.text) if finding.kind == "vehicle" else ""

@@ -46,7 +46,7 @@ FAR = survey((0, 60))
 
 def robot_at(
     url: str,
-    settings: Mapping[str, str] | None = None,
+    settings: Mapping[str, Any] | None = None,
     **limits: Any,  # noqa: ANN401
 ) -> RobotConfig:
     """The robot that flies what is found at `url`; `settings` of its driver go on top."""
@@ -76,7 +76,7 @@ class SitlFlight:
         self,
         url: str,
         *commands: Command,
-        settings: Mapping[str, str] | None = None,
+        settings: Mapping[str, Any] | None = None,
         link: Impairment = PERFECT,
         **limits: Any,  # noqa: ANN401
     ) -> None:

@@ -14,10 +14,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pymavlink import DFReader
 
 from aerodaas.config.model import EnvironmentConfig, GeofenceConfig
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.drivers.mavlink.microservices.fence import upload_fence
+from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.mission.commands import End, OpenStream, Pause, Resume, StreamItem
@@ -31,6 +33,12 @@ from sitl.flights import FAR, FARM, SitlFlight, robot_at, survey
 pytestmark = [pytest.mark.sitl, pytest.mark.slow, pytest.mark.timeout(420), pytest.mark.wall_clock]
 
 HERE = Path(__file__).parent
+
+
+@pytest.fixture(autouse=True)
+def journals(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Keep what a flight changes on a vehicle in a folder of the test's own."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
 
 def finish(flight: SitlFlight) -> None:
@@ -145,8 +153,8 @@ def kill_in_flight(url: str, *settings: str) -> None:
 
 
 def test_killed_as_its_ground_station(autopilot: Autopilot) -> None:
-    """With its failsafes set by us, nobody needs to come: it goes home, or lands, by itself."""
-    kill_in_flight(autopilot.url, "role=ground_station", "failsafes=set")
+    """With a fallback, nobody needs to come: it goes home, or lands, by itself."""
+    kill_in_flight(autopilot.url, "role=ground_station", "fallback=set")
     robot = robot_at(autopilot.url)
     vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
     vehicle.connect(30.0)
@@ -166,6 +174,56 @@ def test_killed_as_its_ground_station(autopilot: Autopilot) -> None:
         assert float(np.linalg.norm(place[:2])) < 2.0
     finally:
         vehicle.close()
+
+
+def test_a_fallback_is_put_back(autopilot: Autopilot, tmp_path: Path) -> None:
+    """A whole flight with a way home by a plan: then its parameters and its mission are its own."""
+    if autopilot.family == "px4":
+        pytest.skip("PX4 flies no way home of ours")
+    names = ("FS_GCS_ENABLE", "MAV_GCS_SYSID", "FS_OPTIONS")
+    robot = robot_at(autopilot.url, {"fallback": "ignore"})
+    own = [
+        MissionItem(16, (0.0, 0.0, 0.0, 0.0), 1, 2, 0.0, mavlink.MAV_FRAME_GLOBAL),
+        MissionItem(mavlink.MAV_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, 0.0), 0, 0, 12.5),
+    ]
+    before: dict[str, float | None] = {}
+    for flown in (False, True):
+        if flown:
+            settings = {"fallback": "set", "way_home": [[3.0, 3.0, 3.0]]}
+            with SitlFlight(autopilot.url, survey((0, 5)), settings=settings) as flight:
+                assert flight.vehicle.parameters.get("FS_GCS_ENABLE") == 6.0
+                finish(flight)
+                assert "mission_item" in flight.vehicle.read().extra
+        vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
+        vehicle.connect(60.0)
+        try:
+            if not flown:
+                vehicle.upload_mission(own)
+            held = {name: vehicle.parameters.get(name) for name in names}
+            mission = vehicle.download_mission()
+        finally:
+            vehicle.close()
+        before = before or held
+        assert held == before
+        assert [item.command for item in mission] == [16, mavlink.MAV_CMD_NAV_TAKEOFF]
+        assert mission[1].z == 12.5
+    assert not list(tmp_path.rglob("*.json"))
+
+
+def test_its_own_log_is_fetched(autopilot: Autopilot, tmp_path: Path) -> None:
+    """After a flight: the newest one is whole, and its own reader finds the flight in it."""
+    with SitlFlight(autopilot.url, survey((0, 3))) as flight:
+        finish(flight)
+        logs = flight.vehicle.logs()
+        file = flight.vehicle.fetch_log(logs[-1], tmp_path)
+        print(f"\n{len(logs)} logs; {file.name}: {file.stat().st_size} bytes")  # noqa: T201
+        assert file.stat().st_size == logs[-1].size
+    if autopilot.family == "ardupilot":
+        reader = DFReader.DFReader_binary(str(file))
+        heights = []
+        while (message := reader.recv_match(type="CTUN")) is not None:
+            heights.append(message.Alt)
+        assert max(heights) > 2.0
 
 
 def test_process_killed(autopilot: Autopilot) -> None:

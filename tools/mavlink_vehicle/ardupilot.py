@@ -17,11 +17,16 @@ __all__ = ["EmulatedArduPilot"]
 
 _OK, _FAILED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_FAILED
 _STABILIZE, _GUIDED, _LOITER, _RETURN, _LAND, _BRAKE = 0, 4, 5, 6, 9, 17
-_MODES = {_STABILIZE, 2, 3, _GUIDED, _LOITER, _RETURN, 7, _LAND, 16, _BRAKE}
+_AUTO = 3
+_MODES = {_STABILIZE, 2, _AUTO, _GUIDED, _LOITER, _RETURN, 7, _LAND, 16, _BRAKE}
 _NEED_PLACE = {_GUIDED, _LOITER, _RETURN, _BRAKE}
 _TIMEOUT = 3.0
 """GUID_TIMEOUT: seconds without setpoints after which it stops."""
-_STATION_LOST = 5.0
+_SMART = {1.0, 3.0}
+"""FS_GCS_ENABLE: return, by the flown way or straight; both fly straight here."""
+_PLANNED = 6.0
+_LANDS_ON = 1 << 3
+"""Bit of FS_OPTIONS."""
 _CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 _GPS = mavlink.MAV_SYS_STATUS_SENSOR_GPS
 _POSITION = mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
@@ -55,11 +60,16 @@ class EmulatedArduPilot(Firmware):
             "BATT_FS_LOW_ACT": 0.0,
             "FS_EKF_ACTION": 1.0,
             "FS_GCS_ENABLE": 0.0,
+            "FS_GCS_TIMEOUT": 5.0,
+            "FS_OPTIONS": 16.0,
+            "RTL_ALT_M": 15.0,
+            "RTL_ALT_FINAL_M": 0.0,
             "FENCE_ENABLE": 0.0,
             "FENCE_ACTION": 1.0,
             "FENCE_TYPE": 7.0,
             "FENCE_ALT_MAX": 100.0,
-            "SYSID_MYGCS": 255.0,
+            "MAV_GCS_SYSID": 255.0,
+            "MAV_GCS_SYSID_HI": 0.0,
         }
         super().__init__(options, flight, say, ParameterStore(values, set(), bytewise=False))
         self._mode = _STABILIZE
@@ -81,7 +91,10 @@ class EmulatedArduPilot(Firmware):
 
     def hear_heartbeat(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
         """HEARTBEAT of another system."""
-        if message.get_srcSystem() == int(self.parameters.values["SYSID_MYGCS"]):
+        values = self.parameters.values
+        lowest = values.get("MAV_GCS_SYSID", values.get("SYSID_MYGCS", 255.0))
+        highest = values.get("MAV_GCS_SYSID_HI", 0.0)
+        if lowest <= message.get_srcSystem() <= max(lowest, highest):
             self._station_at = self.now
 
     @property
@@ -131,6 +144,7 @@ class EmulatedArduPilot(Firmware):
             return _OK
         self._mode = mode
         self.failsafe = False
+        self.route.leave()
         deeds = {
             _RETURN: ("return", self.flight.return_home),
             _LAND: ("land", self.flight.land),
@@ -146,6 +160,7 @@ class EmulatedArduPilot(Firmware):
     def take_over(self) -> None:
         """A pilot flips the switch: loiter."""
         self._mode = _LOITER
+        self.route.leave()
         self.flight.hold()
 
     def enter_return(self) -> None:
@@ -172,11 +187,22 @@ class EmulatedArduPilot(Firmware):
                 self.flight.hold()
             else:
                 self.flight.target = GuidedTarget(target.position, None, target.yaw, None)
-        lost = self._station_at is not None and self.now - self._station_at > _STATION_LOST
-        enabled = self.parameters.values["FS_GCS_ENABLE"] > 0.0
-        if lost and enabled and self._mode not in {_RETURN, _LAND}:
-            self.text("GCS Failsafe")
+        values = self.parameters.values
+        silence = math.inf if self._station_at is None else self.now - self._station_at
+        lost = values["FS_GCS_TIMEOUT"] < silence < math.inf
+        if not lost or values["FS_GCS_ENABLE"] == 0.0 or self.failsafe:
+            return
+        if self._mode == _LAND and int(values["FS_OPTIONS"]) & _LANDS_ON:
+            return
+        self.text("GCS Failsafe")
+        if values["FS_GCS_ENABLE"] == _PLANNED and self.route.join():
+            self.text("Return path started", mavlink.MAV_SEVERITY_INFO)
+            self._mode, self.failsafe = _AUTO, True
+        elif values["FS_GCS_ENABLE"] in {*_SMART, _PLANNED}:
             self.enter_return()
+        else:
+            self._set_mode(_LAND)
+            self.failsafe = True
 
     def refuse_arming(self) -> None:
         """PreArm texts."""

@@ -6,6 +6,7 @@ import contextlib
 import selectors
 import socket
 import time
+from collections.abc import Callable
 from typing import Any
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -19,6 +20,7 @@ from tools.mavlink_vehicle.firmware import Firmware
 from tools.mavlink_vehicle.flight import MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
 from tools.mavlink_vehicle.px4 import EmulatedPX4
+from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore
 
 __all__ = ["EmulatedAutopilot"]
 
@@ -26,14 +28,24 @@ _TURN = 0.01
 _LARGEST = 65535
 _HEARTBEAT = 1.0
 _ROUNDING = 1e-6
-_PARAMETERS = {"PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"}
-_PLANS = {
-    "MISSION_CLEAR_ALL",
-    "MISSION_COUNT",
-    "MISSION_ITEM_INT",
-    "MISSION_REQUEST_INT",
-    "MISSION_REQUEST_LIST",
+_STORED: dict[str, Callable[[Firmware], ParameterStore | PlanStore | LogStore]] = {
+    **dict.fromkeys(
+        ("PARAM_REQUEST_LIST", "PARAM_REQUEST_READ", "PARAM_SET"),
+        lambda firmware: firmware.parameters,
+    ),
+    **dict.fromkeys(
+        (
+            "MISSION_CLEAR_ALL",
+            "MISSION_COUNT",
+            "MISSION_ITEM_INT",
+            "MISSION_REQUEST_INT",
+            "MISSION_REQUEST_LIST",
+        ),
+        lambda firmware: firmware.plans,
+    ),
+    **dict.fromkeys(("LOG_REQUEST_DATA", "LOG_REQUEST_LIST"), lambda firmware: firmware.logs),
 }
+"""What answers to a message."""
 
 
 class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
@@ -184,11 +196,8 @@ class EmulatedAutopilot(EmulatedVehicle[MavFlight]):
             self._acknowledge(message, firmware.obey(message.command, values, message.frame))
         elif kind == "SET_POSITION_TARGET_LOCAL_NED":
             firmware.setpoint(message)
-        elif kind in _PARAMETERS:
-            for answer in firmware.parameters.handle(message):
-                self._say(answer)
-        elif kind in _PLANS:
-            for answer in firmware.plans.handle(message):
+        elif kind in _STORED:
+            for answer in _STORED[kind](firmware).handle(message):
                 self._say(answer)
         elif kind == "HEARTBEAT" and isinstance(firmware, EmulatedArduPilot):
             firmware.hear_heartbeat(message)

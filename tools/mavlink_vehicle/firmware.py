@@ -16,7 +16,8 @@ from aerodaas.types.vehicle import VehicleMode
 from tools.mavlink_vehicle.extras import Extras
 from tools.mavlink_vehicle.flight import GuidedTarget, MavFlight
 from tools.mavlink_vehicle.options import AutopilotOptions
-from tools.mavlink_vehicle.store import ParameterStore, PlanStore
+from tools.mavlink_vehicle.route import Route
+from tools.mavlink_vehicle.store import LogStore, ParameterStore, PlanStore
 
 __all__ = ["Firmware", "Result"]
 
@@ -68,6 +69,13 @@ class Firmware(ABC):
         self.parameters = parameters
         parameters.values.update(options.parameters)
         self.plans = PlanStore()
+        self.logs = LogStore()
+        self.route = Route(
+            flight,
+            lambda: self.plans.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, []),
+            lambda: self.home,
+            say,
+        )
         self.rates = dict(self.default_rates)
         self.armed = False
         self.failsafe = False
@@ -300,6 +308,7 @@ class Firmware(ABC):
     def advance(self, duration: float) -> None:
         """Let time pass."""
         self.now += duration
+        self.route.advance()
         self.flight.advance(duration)
         if self._lifted and not self.flight.flying:
             self._lifted = self.armed = self.failsafe = False
@@ -358,6 +367,7 @@ class Firmware(ABC):
             mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE: self._landed,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: self._home,
             mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: self._time,
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: self.route.current,
         }
         needs_place = {
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED,

@@ -92,6 +92,8 @@ class EmulatedPX4(Firmware):
             "GF_MAX_VER_DIST": 0.0,
             "MIS_TAKEOFF_ALT": 2.5,
             "RTL_RETURN_ALT": 30.0,
+            "RTL_LAND_DELAY": 0.0,
+            "COM_OF_LOSS_T": 1.0,
         }
         integers = {"COM_LOW_BAT_ACT", "COM_OBL_RC_ACT", "NAV_DLL_ACT", "GF_ACTION"}
         super().__init__(options, flight, say, ParameterStore(values, integers, bytewise=True))

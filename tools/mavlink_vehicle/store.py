@@ -7,8 +7,12 @@ from typing import Any
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
-__all__ = ["ParameterStore", "PlanStore"]
+__all__ = ["LogStore", "ParameterStore", "PlanStore"]
 
+_PACKET = 90
+"""Bytes of a LOG_DATA."""
+_BEGAN = 1_800_000_000
+"""Seconds since the Unix epoch at which every log began."""
 _INT, _REAL = mavlink.MAV_PARAM_TYPE_INT32, mavlink.MAV_PARAM_TYPE_REAL32
 
 
@@ -57,6 +61,35 @@ class ParameterStore:
         return mavlink.MAVLink_param_value_message(
             name.encode(), value, kind, len(self.values), index
         )
+
+
+class LogStore:
+    """Logs by number, told in packets of 90 bytes."""
+
+    def __init__(self) -> None:
+        self.logs: dict[int, bytes] = {}
+
+    def handle(self, message: Any) -> list[Any]:  # noqa: ANN401
+        """The answers to LOG_REQUEST_LIST or LOG_REQUEST_DATA."""
+        if message.get_type() == "LOG_REQUEST_LIST":
+            count, last = len(self.logs), max(self.logs, default=0)
+            told = [
+                mavlink.MAVLink_log_entry_message(number, count, last, _BEGAN, len(content))
+                for number, content in self.logs.items()
+            ]
+            return told or [mavlink.MAVLink_log_entry_message(0, 0, 0, 0, 0)]
+        if message.get_type() != "LOG_REQUEST_DATA" or message.id not in self.logs:
+            return []
+        wanted = self.logs[message.id][message.ofs : message.ofs + message.count]
+        return [
+            mavlink.MAVLink_log_data_message(
+                message.id,
+                message.ofs + begin,
+                len(wanted[begin : begin + _PACKET]),
+                wanted[begin : begin + _PACKET].ljust(_PACKET, b"\0"),
+            )
+            for begin in range(0, len(wanted), _PACKET)
+        ]
 
 
 class PlanStore:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from aerodaas.config.model import EnvironmentConfig, RobotConfig
+from aerodaas.config.model import EnvironmentConfig, GeofenceConfig, RobotConfig
 from aerodaas.drivers.mavlink.connecting import Connection
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
@@ -32,18 +32,25 @@ def main(
     set_failsafes: Annotated[
         bool, typer.Option("--set-failsafes", help="Set the failsafes that are found unsafe.")
     ] = False,
+    restore: Annotated[
+        bool,
+        typer.Option("--restore", help="Put back what an earlier flight set for its fallback."),
+    ] = False,
 ) -> None:
     """Connect, and print the vehicle's identity, its objections and its missing protections."""
-    settings = {"url": url, "system": system, "failsafes": "ignore"}
+    settings = {"url": url, "system": system, "failsafes": "ignore", "fallback": "ignore"}
     robot = RobotConfig(id="vehicle", driver="mavlink", settings=settings)
     vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
     try:
         vehicle.connect(timeout)
         time.sleep(_SETTLING)
         _tell(vehicle)
+        if restore:
+            vehicle.connection.fallback.restore()
         # Judged by this role, but never in it: its end would then be a loss of the ground station.
         role = MavlinkSettings(role="ground_station" if as_station else "companion")
-        _judge(vehicle.connection, role, fix=set_failsafes)
+        _judge(vehicle.connection, fix=set_failsafes)
+        _judge_fallback(vehicle, role)
     except AeroDaaSError as error:
         typer.echo(error, err=True)
         raise typer.Exit(error.exit_code) from None
@@ -65,19 +72,29 @@ def _tell(vehicle: MavlinkVehicle) -> None:
         typer.echo(f"would not take off: {reason}")
 
 
-def _judge(connection: Connection, settings: MavlinkSettings, *, fix: bool) -> None:
+def _judge(connection: Connection, *, fix: bool) -> None:
     parameters = Parameters(connection.link, connection.autopilot)
-    found = unsafe_parameters(parameters, connection.autopilot, settings)
+    found = unsafe_parameters(parameters, connection.autopilot)
     for unsafe in found:
         if fix:
             parameters.set(unsafe.failsafe.name, unsafe.failsafe.safe)
         typer.echo(f"{unsafe.text}{': set' if fix else ''}")
-    if settings.role == "companion" and connection.autopilot.orphaned:
-        typer.echo(connection.autopilot.orphaned)
     if not found:
         typer.echo("failsafes: no parameter is unsafe")
     elif not fix:
         typer.echo("--set-failsafes sets them")
+
+
+def _judge_fallback(vehicle: MavlinkVehicle, role: MavlinkSettings) -> None:
+    connection = vehicle.connection
+    ceiling = GeofenceConfig().ceiling
+    obstacles = connection.fallback.under(role).examine(ceiling, vehicle.telemetry.software)
+    for text in obstacles:
+        typer.echo(f"would not come home without us: {text}")
+    if obstacles:
+        typer.echo('"fallback": "set" in the robot\'s settings does it for a flight')
+    else:
+        typer.echo(f"without us: {connection.autopilot.comes_home}")
 
 
 if __name__ == "__main__":

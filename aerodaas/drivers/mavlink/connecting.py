@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
+import re
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,8 +15,11 @@ from aerodaas.config.model import RobotConfig
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
 from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.microservices.commander import Commander
+from aerodaas.drivers.mavlink.microservices.fallback import Fallback
 from aerodaas.drivers.mavlink.microservices.fence import upload_fence
+from aerodaas.drivers.mavlink.microservices.journal import Journal
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
+from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.state.alignment import Alignment, global_origin
 from aerodaas.drivers.mavlink.state.frames import LocalFrame
@@ -32,6 +36,8 @@ CHECKS = 4.0
 """Seconds between requests to run and report the arming checks."""
 _WORDS = 40.0
 """Greatest age in seconds of an autopilot's text that explains why it is not ready."""
+_VERSION = 3.0
+"""Seconds to wait for the autopilot's version."""
 _FAR = 20.0
 """Allowed metres between its position and the environment's home."""
 
@@ -45,6 +51,7 @@ class Connection:
     commander: Commander
     departure: Departure
     alignment: Alignment
+    fallback: Fallback
     target: tuple[int, int]
     """System and component."""
 
@@ -61,19 +68,40 @@ def establish(
     home: GeodeticOrigin | None,
     pause: Callable[[], None],
 ) -> Connection:
-    """Wait until it is ready, check its failsafes and upload its fence; raises VehicleError."""
+    """Wait until it is ready, see to its protections and its fence; raises VehicleError."""
     assert link.target is not None  # noqa: S101 - it was just adopted
     commander.give(autopilot.version(), now=time.monotonic())
     _await_ready(autopilot, commander, telemetry, robot.id, settings, pause)
     frame = _frame(telemetry, robot, settings, home, pause)
+    journal = Journal(_own_name(autopilot, telemetry, settings, link.target[0], pause))
+    fallback = Fallback(link, autopilot, settings, name=robot.id, journal=journal)
     if not telemetry.armed:
         _see_to_failsafes(link, autopilot, settings, robot.id)
+        origin = global_origin(telemetry, frame)
         if settings.fence != "off":
-            origin = global_origin(telemetry, frame)
             upload_fence(link, autopilot, robot.limits.geofence, origin, settings.fence)
+        if settings.fallback != "ignore":
+            ways = settings.way_home
+            plan = [] if isinstance(ways, str) else way_home_items(robot, ways, origin)
+            fallback.establish(robot.limits.geofence.ceiling, telemetry.software, plan)
     _log.info("%s: %s %s, system %d", robot.id, autopilot.name, telemetry.software, link.target[0])
     alignment = Alignment(frame, telemetry)
-    return Connection(link, autopilot, commander, departure, alignment, link.target)
+    return Connection(link, autopilot, commander, departure, alignment, fallback, link.target)
+
+
+def _own_name(
+    autopilot: Autopilot,
+    telemetry: Telemetry,
+    settings: MavlinkSettings,
+    system: int,
+    pause: Callable[[], None],
+) -> str:
+    """A name that no other vehicle has: its board's number, or else where it is met."""
+    deadline = time.monotonic() + _VERSION
+    while not telemetry.software and time.monotonic() < deadline:
+        pause()
+    where = telemetry.hardware or re.sub(r"[^A-Za-z0-9.]+", "-", settings.url)
+    return f"{autopilot.name}-{system}-{where}".lower()
 
 
 def _await_ready(
@@ -156,10 +184,8 @@ def _see_to_failsafes(
 ) -> None:
     if settings.failsafes == "ignore":
         return
-    if autopilot.orphaned and settings.role == "companion":
-        _log.warning("%s: %s: %s", name, autopilot.name, autopilot.orphaned)
     parameters = Parameters(link, autopilot)
-    for unsafe in unsafe_parameters(parameters, autopilot, settings):
+    for unsafe in unsafe_parameters(parameters, autopilot):
         if settings.failsafes == "set":
             parameters.set(unsafe.failsafe.name, unsafe.failsafe.safe)
             _log.warning("%s: %s: set", name, unsafe.text)

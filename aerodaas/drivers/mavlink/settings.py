@@ -18,6 +18,8 @@ _STATION = 255
 """System id of an autopilot's ground station, by default."""
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Place = tuple[Finite, Finite, Finite]
 Identity = Annotated[int, Field(ge=1, le=255)]
 
 
@@ -45,6 +47,15 @@ class MavlinkSettings(BaseModel):
     """Seconds given to the autopilot to know its position, once it is heard."""
     failsafes: Literal["report", "set", "ignore"] = "report"
     """Parameters that leave it unprotected: say so, set them, or do not ask."""
+    fallback: Literal["report", "require", "set", "ignore"] = "report"
+    """Whether it comes home by itself once this process is gone: say what keeps it from that;
+    refuse to take off until it would; have it come home for as long as we are connected, by
+    parameters (and a plan) that are put back afterwards; or do not ask."""
+    way_home: Literal["return", "retrace"] | Annotated[list[Place], Field(min_length=1)] = "return"
+    """How: straight; back along the way that was flown; or through these places (ENU metres) by a
+    plan that is uploaded before take-off. The latter two are ArduPilot's alone."""
+    fallback_after: Annotated[float, Field(ge=2, le=120)] = 5.0
+    """Seconds of our silence after which it must be on its way home."""
     fence: Literal["off", "warn", "hold", "return", "land"] = "off"
     """Upload the robot's geofence, with this action when it is crossed; `off` leaves the vehicle's
     own fence as it is."""
@@ -58,6 +69,11 @@ class MavlinkSettings(BaseModel):
     """m/s that the vehicle itself can do horizontally."""
     max_climb: Positive = 3.0
     """m/s that the vehicle itself can do vertically."""
+
+    @property
+    def way_kind(self) -> Literal["return", "retrace", "plan"]:
+        """The kind of the way home."""
+        return self.way_home if isinstance(self.way_home, str) else "plan"
 
     @model_validator(mode="before")
     @classmethod

@@ -9,6 +9,7 @@ import time
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
 from aerodaas.drivers.mavlink.microservices.commander import Commander, CommandResult
+from aerodaas.drivers.mavlink.microservices.logs import fetch_log, list_logs
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem, Progress, download, upload
 from aerodaas.drivers.mavlink.settings import MavlinkSettings, mavlink_settings
@@ -34,6 +36,7 @@ from aerodaas.drivers.setpoints import require_finite
 from aerodaas.types.clock import Clock, ScaledClock
 from aerodaas.types.errors import ConfigError, InvalidWaypointError, VehicleError
 from aerodaas.types.geometry import GeodeticOrigin, Vector
+from aerodaas.types.health import HealthReadings
 from aerodaas.types.vehicle import (
     Capabilities,
     PositionSetpoint,
@@ -41,6 +44,7 @@ from aerodaas.types.vehicle import (
     VehicleMode,
     VehicleState,
 )
+from aerodaas.types.vehicle_log import LogEntry
 
 __all__ = ["MavlinkVehicle"]
 
@@ -101,7 +105,9 @@ class MavlinkVehicle:
         known = Capabilities("mavlink", max_speed=settings.max_speed, max_climb=settings.max_climb)
         if self._connection is None:
             return known
-        return replace(known, alone=self._connection.autopilot.alone)
+        connection = self._connection
+        autopilot, stranded = connection.autopilot, connection.fallback.obstacles
+        return replace(known, alone=autopilot.alone if stranded else autopilot.comes_home)
 
     def use_clock(self, clock: Clock) -> None:
         """Stamp states by `clock` from now on; the calling thread is the control loop."""
@@ -179,6 +185,7 @@ class MavlinkVehicle:
             return
         if self._connection is not None:
             self._part(self._connection)
+            self._put_back(self._connection)
         link.close()
         self._connection = None
         self._log()
@@ -197,6 +204,22 @@ class MavlinkVehicle:
             if phase.shown is FlightMode.LAND or not (departure.withdrawing or phase.armed):
                 return
             self._pause()
+
+    def _put_back(self, connection: Connection) -> None:
+        """Give the vehicle its own parameters back, if it stands: they may bring it home else."""
+        if self._settings.fallback != "set":
+            return
+        if not self._stands():
+            _log.warning(
+                "%s: still in flight, so that its fallback stays set; the next flight, or "
+                "`python -m aerodaas.drivers.mavlink URL --restore`, puts its own parameters back",
+                self._name,
+            )
+            return
+        try:
+            connection.fallback.restore()
+        except VehicleError as error:
+            _log.warning("%s: its own parameters are not back: %s", self._name, error)
 
     def _ours_in_the_air(self) -> bool:
         phase = self._phase
@@ -217,6 +240,13 @@ class MavlinkVehicle:
             link, now = self._connected().link, time.monotonic()
             return self._report.state(self._clock.now(), now, link.counts, link.reports(now))
 
+    def health(self) -> HealthReadings:
+        """What it tells about itself; raises VehicleError if not connected."""
+        with self._lock:
+            obstacles = self._connected().fallback.obstacles
+            stranded = None if self._settings.fallback == "ignore" else obstacles
+            return self._report.health(time.monotonic(), stranded)
+
     def preflight(self) -> list[str]:
         """Reasons against a take-off now; empty when ready."""
         with self._lock:
@@ -232,6 +262,7 @@ class MavlinkVehicle:
                 reasons.append("a take-off that was called off is not over yet")
             if not self._knows_place(now):
                 reasons.append("the autopilot does not know its position")
+            reasons += self._connection.fallback.objections
             said = self._connection.autopilot.objections(self._telemetry, now)
             if said and now - self._checked_at > CHECKS:
                 self._checked_at = now
@@ -366,6 +397,24 @@ class MavlinkVehicle:
     def download_mission(self, progress: Progress = lambda _, __: None) -> list[MissionItem]:
         """The mission on the vehicle; blocks, raises VehicleError."""
         return download(self._connected().link, mavlink.MAV_MISSION_TYPE_MISSION, progress)
+
+    def logs(self) -> list[LogEntry]:
+        """The autopilot's own logs, oldest first; blocks, raises VehicleError, also in flight."""
+        return list_logs(self._grounded_link("list logs"))
+
+    def fetch_log(
+        self, log: LogEntry, folder: Path, progress: Progress = lambda _, __: None
+    ) -> Path:
+        """Fetch one of them into `folder`; blocks, raises VehicleError, also in flight."""
+        return fetch_log(
+            self._grounded_link("fetch logs"), self.connection.autopilot, log, folder, progress
+        )
+
+    def _grounded_link(self, deed: str) -> MavlinkLink:
+        connection = self._connected()
+        if not self._stands():
+            raise VehicleError(f"{self._name} cannot {deed} in flight: its link is needed")
+        return connection.link
 
     @property
     def connection(self) -> Connection:

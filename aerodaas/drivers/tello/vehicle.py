@@ -30,6 +30,7 @@ from aerodaas.types.braking import limit_length, velocity_towards
 from aerodaas.types.clock import NANOSECONDS, Clock, ScaledClock
 from aerodaas.types.errors import InvalidWaypointError, VehicleError
 from aerodaas.types.geometry import Vector, enu_to_body, wrap_angle
+from aerodaas.types.health import HealthReadings
 from aerodaas.types.vehicle import (
     Capabilities,
     PositionSetpoint,
@@ -192,6 +193,15 @@ class TelloVehicle:
                     "unanswered_commands": counts.timeouts,
                 },
                 ended=self._phase.ended,
+            )
+
+    def health(self) -> HealthReadings:
+        """The little that a Tello tells beyond its state; raises VehicleError if not connected."""
+        self._connected()
+        with self._lock:
+            return HealthReadings(
+                silence=time.monotonic() - self._heard_at,
+                stranded=("it lands where it is, 15 s after our last word",),
             )
 
     def preflight(self) -> list[str]:

@@ -13,7 +13,16 @@ from aerodaas.types.energy import EnergyMeter
 from aerodaas.types.geometry import Vector, is_finite
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 
-__all__ = ["CALM", "Assessment", "FailsafeAction", "Fault", "Supervisor", "has_position"]
+__all__ = [
+    "CALM",
+    "Assessment",
+    "FailsafeAction",
+    "Fault",
+    "Supervisor",
+    "charge_objection",
+    "has_position",
+    "place_objections",
+]
 
 
 class FailsafeAction(enum.IntEnum):
@@ -97,28 +106,12 @@ class Supervisor:
 
     def objections(self, state: VehicleState) -> list[str]:
         """Reasons against taking off now that waiting will not remove."""
-        limits, fence = self._limits, self._fence
         reasons: list[str] = []
         if state.mode is not VehicleMode.GROUNDED:
             reasons.append(f"the vehicle is {state.mode.value}, not on the ground")
-        charge = state.battery.fraction
-        if math.isfinite(charge) and charge <= limits.battery_return:
-            reasons.append(
-                f"the battery is at {charge:.0%}, and the drone returns at "
-                f"{limits.battery_return:.0%}: charge it"
-            )
-        if not has_position(state):
-            return [*reasons, "the vehicle does not know its position"]
-        position = state.odometry.position
-        if not fence.inside(position):
-            reasons.append(f"the drone stands outside its geofence, at {_place(position)}")
-        height = float(position[2]) + limits.takeoff_height
-        if not fence.floor <= height <= fence.ceiling:
-            reasons.append(
-                f"taking off to {height:g} m leaves the geofence's heights of "
-                f"{fence.floor:g} to {fence.ceiling:g} m"
-            )
-        return reasons
+        if objection := charge_objection(state, self._limits):
+            reasons.append(objection)
+        return reasons + place_objections(state, self._limits, self._fence)
 
     def _mode(self, state: VehicleState) -> Fault | None:
         if state.mode is VehicleMode.MANUAL:
@@ -187,6 +180,33 @@ class Supervisor:
             text = f"the drone is outside its geofence, at {_place(position)}"
             return Fault(FailsafeAction.NOTHING, "geofence", text)
         return None
+
+
+def charge_objection(state: VehicleState, limits: LimitsConfig) -> str:
+    """Why the battery's charge allows no take-off; empty if it does, or is not known."""
+    charge = state.battery.fraction
+    if not math.isfinite(charge) or charge > limits.battery_return:
+        return ""
+    return (
+        f"the battery is at {charge:.0%}, and the drone returns at "
+        f"{limits.battery_return:.0%}: charge it"
+    )
+
+
+def place_objections(state: VehicleState, limits: LimitsConfig, fence: Geofence) -> list[str]:
+    """Why nothing may take off where the drone stands; empty if it may."""
+    if not has_position(state):
+        return ["the vehicle does not know its position"]
+    reasons, position = list[str](), state.odometry.position
+    if not fence.inside(position):
+        reasons.append(f"the drone stands outside its geofence, at {_place(position)}")
+    height = float(position[2]) + limits.takeoff_height
+    if not fence.floor <= height <= fence.ceiling:
+        reasons.append(
+            f"taking off to {height:g} m leaves the geofence's heights of "
+            f"{fence.floor:g} to {fence.ceiling:g} m"
+        )
+    return reasons
 
 
 def has_position(state: VehicleState) -> bool:

@@ -60,7 +60,7 @@ class Handmade:
 
         monkeypatch.setattr(MavlinkLink, "_start", begin)
         monkeypatch.setattr(link, "open_transport", lambda *_: self)
-        self.robot = robot_of(1, failsafes="ignore", **settings)
+        self.robot = robot_of(1, failsafes="ignore", fallback="ignore", **settings)
         self.vehicle = MavlinkVehicle(self.robot, EnvironmentConfig(robots=[self.robot]))
 
     def receive(self) -> list[tuple[bytes, tuple[str, int]]]:

@@ -51,7 +51,7 @@ class Stepped:
         port = free_port()
         options = replace(options or AutopilotOptions(), peer=(LOOPBACK, port))
         self.autopilot = EmulatedAutopilot(options)
-        self.robot = robot = robot_of(port, failsafes="ignore", **settings)
+        self.robot = robot = robot_of(port, failsafes="ignore", fallback="ignore", **settings)
         self.vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
 
     def __enter__(self) -> Self:

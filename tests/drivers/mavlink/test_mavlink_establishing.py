@@ -35,9 +35,10 @@ class Meeting:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> None:  # noqa: ANN401
         self.now = 100.0
-        self.settings = MavlinkSettings(**settings)
+        self.settings = MavlinkSettings(**{"fallback": "ignore", **settings})
         self.telemetry = Telemetry()
         self.telemetry.beat_at = 99.0
+        self.telemetry.software = "4.7.0"
         self.telemetry.place, self.telemetry.altitude = (47.001, 8.0), 488.0
         self.telemetry.position = np.array([10.0, 20.0, -3.0])
         self.telemetry.sensors = Sensors(CHECK, CHECK, CHECK)
@@ -270,16 +271,12 @@ def test_who_knows_its_place_and_would_not_arm_is_met_in_the_end(
     assert meeting.now == 113.0
 
 
-@pytest.mark.parametrize("role", ["companion", "ground_station"])
 @pytest.mark.parametrize("failsafes", ["report", "set", "ignore"])
 def test_what_leaves_it_unprotected_is_said_or_set(
-    monkeypatch: pytest.MonkeyPatch,
-    caplog: pytest.LogCaptureFixture,
-    failsafes: str,
-    role: str,
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, failsafes: str
 ) -> None:
-    """As the settings say; ArduPilot's companion is told that nothing makes its end safe."""
-    meeting = Meeting(monkeypatch, failsafes=failsafes, role=role)
+    """As the settings say."""
+    meeting = Meeting(monkeypatch, failsafes=failsafes)
     failsafe = SimpleNamespace(name="FS_EKF_ACTION", safe=1.0)
     meeting.unsafe = [SimpleNamespace(failsafe=failsafe, text="it is 0")]
     meeting.establish()
@@ -289,11 +286,9 @@ def test_what_leaves_it_unprotected_is_said_or_set(
         "set": ["d: it is 0: set"],
         "ignore": [],
     }[failsafes]
-    if role == "companion" and failsafes != "ignore":
-        expected = [f"d: ArduPilot: {ArduPilot.orphaned}", *expected]
     assert caplog.messages == expected
     if failsafes != "ignore":
-        assert meeting.asked[0][1:] == (meeting.autopilot, meeting.settings)
+        assert meeting.asked[0][1:] == (meeting.autopilot,)
 
 
 def test_its_fence_is_uploaded_where_zero_lies(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -328,7 +323,7 @@ def test_a_start_far_from_where_it_stands_is_warned_of(
     warned: bool,
 ) -> None:
     """20 m along the ground by the globe; not one in the air, which has flown away from there."""
-    meeting.settings = MavlinkSettings(failsafes="ignore")
+    meeting.settings = MavlinkSettings(failsafes="ignore", fallback="ignore")
     meeting.establish(HOME, start=start)
     assert any("d stands 20 m from where" in text for text in caplog.messages) is warned
     caplog.clear()

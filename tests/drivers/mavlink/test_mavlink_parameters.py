@@ -15,7 +15,6 @@ from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.microservices import parameters as module
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters, unsafe_parameters
-from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import VehicleError
 
@@ -227,16 +226,24 @@ def test_a_name_with_letters_that_no_autopilot_has_is_not_known(
 
 
 def test_what_leaves_a_vehicle_unprotected(monkeypatch: pytest.MonkeyPatch) -> None:
-    """By its value, and by whether the ground station is ours; what is not known is not told."""
-    held = {"BATT_FS_LOW_ACT": 0.0, "FS_EKF_ACTION": 1.0, "FS_GCS_ENABLE": 0.0}
-    parameters = Autopilot(monkeypatch, held).parameters
-    companion = unsafe_parameters(parameters, ArduPilot(), MavlinkSettings())
-    assert [(one.failsafe.name, one.value) for one in companion] == [("BATT_FS_LOW_ACT", 0.0)]
+    """By its value; what is not known is not told."""
+    parameters = Autopilot(monkeypatch, {"BATT_FS_LOW_ACT": 0.0, "FS_EKF_ACTION": 1.0}).parameters
+    (one,) = unsafe_parameters(parameters, ArduPilot())
+    assert (one.failsafe.name, one.failsafe.safe, one.value) == ("BATT_FS_LOW_ACT", 2.0, 0.0)
     words = "BATT_FS_LOW_ACT is 0, so that a low battery only leads to a warning; 2 is safer"
-    assert companion[0].text == words
-    station = MavlinkSettings(role="ground_station")
-    both = unsafe_parameters(parameters, ArduPilot(), station)
-    assert [one.failsafe.name for one in both] == ["BATT_FS_LOW_ACT", "FS_GCS_ENABLE"]
-    silent = Autopilot(monkeypatch, {"FS_GCS_ENABLE": 0.0}).parameters
-    (one,) = unsafe_parameters(silent, ArduPilot(), station)
-    assert (one.failsafe.name, one.failsafe.safe) == ("FS_GCS_ENABLE", 1.0)
+    assert one.text == words
+    silent = Autopilot(monkeypatch, {"FS_EKF_ACTION": 0.0}).parameters
+    (one,) = unsafe_parameters(silent, ArduPilot())
+    assert one.failsafe.name == "FS_EKF_ACTION"
+
+
+def test_several_values_are_asked_for_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of each pair of names one is enough; what is not told costs as much time as one value."""
+    autopilot = Autopilot(monkeypatch, {"OLD": 4.0, "OTHER": 2.0})
+    found = autopilot.parameters.known([("NEW", "OLD"), ("OTHER",)])
+    assert found == {"OLD": 4.0, "OTHER": 2.0}
+    assert autopilot.now < 100.1
+    assert autopilot.parameters.known([("OTHER",), ("MISSING",)], tries=2) == {"OTHER": 2.0}
+    assert autopilot.now == pytest.approx(101.4, abs=0.1)
+    assert [one.param_id for one in autopilot.sent].count("MISSING") == 2
+    assert [one.param_id for one in autopilot.sent].count("OTHER") == 2

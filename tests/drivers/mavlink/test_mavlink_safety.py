@@ -164,20 +164,6 @@ def test_closing_in_the_air_lands(pair: Pair) -> None:
     wait_for(lambda: pair.autopilot.mode is VehicleMode.LANDING)
 
 
-def test_a_ground_station_that_falls_silent_brings_it_home() -> None:
-    """As the ground station itself, our silence triggers the autopilot's own failsafe."""
-    with flight(
-        AutopilotOptions(family="ardupilot"),
-        role="ground_station",
-        failsafes="set",
-    ) as pair:
-        pair.guide()
-        assert pair.vehicle._link is not None
-        pair.vehicle._link.close()
-        pair.vehicle._link = None
-        wait_for(lambda: "return" in pair.autopilot.firmware.motions, timeout=15.0)
-
-
 def test_a_target_left_alone_is_near() -> None:
     """Killed on the way to a far place, the vehicle stops within metres, not at the place."""
     with flight(AutopilotOptions(family="ardupilot")) as pair:

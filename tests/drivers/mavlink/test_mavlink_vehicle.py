@@ -298,7 +298,7 @@ def test_unsafe_failsafes_are_reported_or_set(
     with flight(options) as pair:
         assert f"{name} is 0" in caplog.text
         assert pair.autopilot.firmware.parameters.values[name] == 0.0
-        assert ("if this process dies it hovers" in caplog.text) == (family == "ardupilot")
+        assert "would not come home if this process died" in caplog.text
     with flight(options, failsafes="set") as pair:
         assert pair.autopilot.firmware.parameters.values[name] == safe
         assert pair.vehicle.parameters.get("NO_SUCH_THING") is None
@@ -308,10 +308,12 @@ def test_unsafe_failsafes_are_reported_or_set(
 
 @pytest.mark.parametrize("role", ["companion", "ground_station"])
 def test_a_ground_station_has_px4_come_home_when_setpoints_stop(role: str) -> None:
-    """Else it would have sunk where it was before its ground station counts as lost."""
-    with flight(AutopilotOptions(family="px4"), failsafes="set", role=role) as pair:
-        set_to = pair.autopilot.firmware.parameters.values["COM_OBL_RC_ACT"]
-        assert set_to == (5.0 if role == "ground_station" else 0.0)
+    """It holds first as a ground station's, and returns as a companion's; afterwards as before."""
+    with flight(AutopilotOptions(family="px4"), fallback="set", role=role) as pair:
+        values = pair.autopilot.firmware.parameters.values
+        assert values["COM_OBL_RC_ACT"] == (5.0 if role == "ground_station" else 3.0)
+        assert values["NAV_DLL_ACT"] == (2.0 if role == "ground_station" else 0.0)
+    assert (values["COM_OBL_RC_ACT"], values["NAV_DLL_ACT"]) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize(

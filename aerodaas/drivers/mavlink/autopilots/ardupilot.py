@@ -4,8 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, Failsafe, FenceAction
+from aerodaas.drivers.mavlink.autopilots.autopilot import (
+    Autopilot,
+    Failsafe,
+    FallbackParameter,
+    FenceAction,
+)
 from aerodaas.drivers.mavlink.microservices.commander import PendingCommand
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -49,6 +55,19 @@ _KNOWN = {
     21: FlightMode.RETURN,
     _LAND: FlightMode.LAND,
 }
+_LOST = {"return": 1.0, "retrace": 3.0, "plan": 6.0}
+"""FS_GCS_ENABLE: return to launch; the flown way back (SmartRTL), or a return where that is too
+long to remember; the mission from DO_RETURN_PATH_START, or a return without one."""
+_WAYS = {
+    "return": "come home",
+    "retrace": "fly the flown way back",
+    "plan": "fly the way home that was uploaded",
+}
+_LANDS_ON = 1 << 3
+"""Bit of FS_OPTIONS: a landing goes on."""
+_LOWEST_RETURN, _BELOW_CEILING = 2.0, 2.0
+"""Metres: its lowest height of a return (RTL_ALT_MIN), and how far below the geofence's ceiling
+we set it."""
 _TALK = 35.0
 """Seconds: longer than the 30 s between its repeated objections."""
 
@@ -62,12 +81,14 @@ class ArduPilot(Autopilot):
     stops_short: ClassVar[bool] = False
     alone: ClassVar[str] = (
         "ArduPilot stops within 3 s and hovers until a pilot lands it; it comes home only with "
-        'FS_GCS_ENABLE at 1 and "role": "ground_station"'
+        'a "fallback" (docs/mavlink.md)'
     )
-    orphaned: ClassVar[str] = (
-        "if this process dies it hovers where it is; with FS_GCS_ENABLE at 1 and "
-        '"role": "ground_station" it comes home'
+    comes_home: ClassVar[str] = (
+        "ArduPilot stops within 3 s, and comes home by its ground-station failsafe"
     )
+    log_suffix: ClassVar[str] = ".bin"
+    log_head: ClassVar[bytes] = b"\xa3\x95\x80"
+    ways_home: ClassVar[frozenset[str]] = frozenset({"return", "retrace", "plan"})
     rates: ClassVar[dict[int, float]] = {
         **Autopilot.rates,
         mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: 2.0,
@@ -84,13 +105,6 @@ class ArduPilot(Autopilot):
             frozenset({0.0}),
             1.0,
             "the loss of its position is only reported",
-        ),
-        Failsafe(
-            "FS_GCS_ENABLE",
-            frozenset({0.0}),
-            1.0,
-            "the loss of the ground station is ignored",
-            role="ground_station",
         ),
     )
 
@@ -145,6 +159,67 @@ class ArduPilot(Autopilot):
         """Every parameter travels as a float."""
         del kind
         return value
+
+    def fallback(
+        self, settings: MavlinkSettings, ceiling: float, software: str
+    ) -> tuple[FallbackParameter, ...]:
+        """Its ground-station failsafe, which must listen to our system id alone.
+
+        Names and meanings as in ArduCopter 4.3 to 4.7 (ArduCopter/Parameters.cpp and events.cpp,
+        libraries/GCS_MAVLink/GCS.cpp): 4.7 renamed SYSID_MYGCS and made a range of it, and gives
+        heights in metres instead of centimetres.
+        """
+        del software
+        ours, after = float(settings.own_system), settings.fallback_after
+        action = _LOST[settings.way_kind]
+        fits = {action, *_LOST.values()} if settings.way_kind == "return" else {action}
+        return (
+            FallbackParameter(
+                ("MAV_GCS_SYSID", "SYSID_MYGCS"),
+                lambda value: value == ours,
+                ours,
+                f"it does not notice our silence, who are system {ours:g}",
+            ),
+            FallbackParameter(
+                ("MAV_GCS_SYSID_HI",),
+                lambda value: value <= ours,
+                0.0,
+                "other systems' heartbeats hide our silence",
+                beside="MAV_GCS_SYSID",
+            ),
+            FallbackParameter(
+                ("FS_GCS_TIMEOUT",),
+                lambda value: value <= after,
+                after,
+                f"it acts later than {after:g} s after our last word",
+            ),
+            FallbackParameter(
+                ("RTL_ALT_M", "RTL_ALT"),
+                lambda metres: metres <= ceiling,
+                max(_LOWEST_RETURN, ceiling - _BELOW_CEILING),
+                f"it would return above the geofence's ceiling of {ceiling:g} m",
+                scales=(1.0, 100.0),
+            ),
+            FallbackParameter(
+                ("RTL_ALT_FINAL_M", "RTL_ALT_FINAL"),
+                lambda metres: metres <= 0.0,
+                0.0,
+                "it would hover over its home instead of landing",
+            ),
+            FallbackParameter(
+                ("FS_OPTIONS",),
+                lambda value: bool(int(value) & _LANDS_ON),
+                float(_LANDS_ON),
+                "a landing that we have commanded would end in a return when we are silent",
+                bits=True,
+            ),
+            FallbackParameter(
+                ("FS_GCS_ENABLE",),
+                lambda value: value in fits,
+                action,
+                f"it does not {_WAYS[settings.way_kind]} when we are silent",
+            ),
+        )
 
     def fence(self, action: FenceAction, ceiling: float) -> dict[str, float]:
         """FENCE_ACTION: 0 report, 1 return or land, 2 land, 4 brake or land; all fence types."""

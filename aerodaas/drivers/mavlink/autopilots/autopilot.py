@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from aerodaas.drivers.mavlink.microservices.commander import PendingCommand
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 
-__all__ = ["ANYWHERE", "NOT_GIVEN", "Autopilot", "Failsafe", "FenceAction"]
+__all__ = [
+    "ANYWHERE",
+    "NOT_GIVEN",
+    "Autopilot",
+    "Failsafe",
+    "FallbackParameter",
+    "FenceAction",
+    "older_than",
+]
 
 FenceAction = Literal["warn", "hold", "return", "land"]
 NOT_GIVEN = float("nan")
@@ -29,8 +40,31 @@ class Failsafe:
     safe: float
     """The value to be set."""
     why: str
-    role: Literal["any", "ground_station"] = "any"
-    """True if it matters in the role of the ground station only."""
+
+
+@dataclass(frozen=True)
+class FallbackParameter:
+    """A parameter on which it depends whether the vehicle comes home once we are silent."""
+
+    names: tuple[str, ...]
+    """Its names in different versions of the firmware; the vehicle knows one of them."""
+    fits: Callable[[float], bool]
+    value: float
+    """The value to be set where its own does not fit."""
+    why: str
+    """What follows from a value that does not fit."""
+    scales: tuple[float, ...] = (1.0, 1.0)
+    """For each name, how many of its units `fits` and `value` count as one."""
+    bits: bool = False
+    """Whether `value` is bits that are added to what is set."""
+    beside: str = ""
+    """Some versions have it beside this one, and others do not: then nothing depends on it."""
+
+
+def older_than(software: str, *version: int) -> bool:
+    """Whether a version such as `1.13.3` is known to be older than `version`."""
+    numbers = tuple(int(number) for number in re.findall(r"\d+", software))
+    return bool(numbers) and numbers[: len(version)] < version
 
 
 class Autopilot(ABC):
@@ -45,9 +79,14 @@ class Autopilot(ABC):
     """Whether it holds before it has reached the height of a take-off."""
     failsafes: ClassVar[tuple[Failsafe, ...]]
     alone: ClassVar[str]
-    """Its behaviour once our process is gone."""
-    orphaned: ClassVar[str] = ""
-    """Its behaviour if a companion's process dies, where no parameter makes that safe."""
+    """Its behaviour once our process is gone, with the parameters that it is delivered with."""
+    comes_home: ClassVar[str]
+    """The same with a fallback."""
+    log_suffix: ClassVar[str]
+    log_head: ClassVar[bytes]
+    """Of the files of its own logs, and their first bytes."""
+    ways_home: ClassVar[frozenset[str]]
+    """Those of `return`, `retrace` and `plan` that its own protection can fly."""
     rates: ClassVar[dict[int, float]] = {
         mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: 20.0,
         mavlink.MAVLINK_MSG_ID_ATTITUDE: 20.0,
@@ -59,6 +98,7 @@ class Autopilot(ABC):
         mavlink.MAVLINK_MSG_ID_SYSTEM_TIME: 1.0,
         mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: 1.0,
         mavlink.MAVLINK_MSG_ID_VIBRATION: 1.0,
+        mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: 1.0,
     }
     """Required messages, and their rates in Hz."""
 
@@ -93,6 +133,15 @@ class Autopilot(ABC):
     @abstractmethod
     def decode(self, value: float, kind: int) -> float:
         """A parameter's value from PARAM_VALUE."""
+
+    @abstractmethod
+    def fallback(
+        self, settings: MavlinkSettings, ceiling: float, software: str
+    ) -> tuple[FallbackParameter, ...]:
+        """Parameters with which it comes home once we are silent, in the order of setting them.
+
+        `ceiling` is the geofence's, in metres above home; `software` its version, as far as known.
+        """
 
     @abstractmethod
     def fence(self, action: FenceAction, ceiling: float) -> dict[str, float]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from typing import ClassVar
 
 from aerodaas.drivers.mavlink.autopilots.autopilot import (
@@ -10,9 +11,12 @@ from aerodaas.drivers.mavlink.autopilots.autopilot import (
     NOT_GIVEN,
     Autopilot,
     Failsafe,
+    FallbackParameter,
     FenceAction,
+    older_than,
 )
 from aerodaas.drivers.mavlink.microservices.commander import PendingCommand
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.state.phase import FlightMode
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -46,6 +50,12 @@ _MODES = {
     FlightMode.LAND: (_AUTO, 6),
 }
 _KNOWN = {mode: ours for ours, mode in _MODES.items()}
+_RETURN, _HOLD = 3.0, 5.0
+"""Values of COM_OBL_RC_ACT."""
+_RETURN_ALONE = 2.0
+"""Value of NAV_DLL_ACT, and of COM_OBL_ACT, which versions before 1.14 heed without a radio."""
+_LOWEST_RETURN, _BELOW_CEILING = 2.0, 2.0
+"""Metres of height of a return, and how far below the geofence's ceiling we set it."""
 _INTEGER = {
     mavlink.MAV_PARAM_TYPE_UINT8,
     mavlink.MAV_PARAM_TYPE_INT8,
@@ -71,32 +81,16 @@ class PX4(Autopilot):
         "PX4 leaves offboard mode within 1.3 s and does what COM_OBL_RC_ACT says: by default, and "
         "without a radio, it sinks where it is"
     )
+    comes_home: ClassVar[str] = "PX4 leaves offboard mode within a second or so, and comes home"
+    log_suffix: ClassVar[str] = ".ulg"
+    log_head: ClassVar[bytes] = b"ULog\x01\x12\x35"
+    ways_home: ClassVar[frozenset[str]] = frozenset({"return"})
     failsafes: ClassVar[tuple[Failsafe, ...]] = (
         Failsafe(
             "COM_LOW_BAT_ACT",
             frozenset({0.0, 1.0}),
             3.0,
             "a low battery only leads to a warning",
-        ),
-        Failsafe(
-            "COM_OBL_RC_ACT",
-            frozenset({1.0, 2.0, 6.0, 7.0}),
-            5.0,
-            "when our setpoints stop it expects a pilot's sticks, or cuts the motors",
-        ),
-        Failsafe(
-            "COM_OBL_RC_ACT",
-            frozenset({0.0}),
-            5.0,
-            "when our setpoints stop it sinks where it is, unless a pilot has a radio",
-            role="ground_station",
-        ),
-        Failsafe(
-            "NAV_DLL_ACT",
-            frozenset({0.0}),
-            2.0,
-            "the loss of the ground station is ignored",
-            role="ground_station",
         ),
     )
 
@@ -162,6 +156,52 @@ class PX4(Autopilot):
             return value
         (decoded,) = struct.unpack("<i", struct.pack("<f", value))
         return float(decoded)
+
+    def fallback(
+        self, settings: MavlinkSettings, ceiling: float, software: str
+    ) -> tuple[FallbackParameter, ...]:
+        """What it does when setpoints stop, and without its ground station where that is us.
+
+        A ground station's vehicle holds first and returns after the 10 s by which PX4 calls the
+        ground station lost, so that a moment without a link sends it nowhere; a companion's
+        returns at once, and follows setpoints again when they come (failsafe.cpp). Before 1.14 it
+        asks another parameter while it has no radio.
+        """
+        after = settings.fallback_after
+        sinks = "when our setpoints stop it sinks where it is, waits for a pilot, or hovers"
+        acts = FallbackParameter(("COM_OBL_RC_ACT",), lambda v: v == _RETURN, _RETURN, sinks)
+        if settings.role == "ground_station":
+            acts = FallbackParameter(
+                ("COM_OBL_RC_ACT",), lambda v: v in {_RETURN, _HOLD}, _HOLD, sinks
+            )
+        wanted = [
+            FallbackParameter(
+                ("COM_OF_LOSS_T",),
+                lambda value: value <= after,
+                1.0,
+                f"it acts later than {after:g} s after our last setpoint",
+            ),
+            FallbackParameter(
+                ("RTL_RETURN_ALT",),
+                lambda value: value <= ceiling,
+                max(_LOWEST_RETURN, ceiling - _BELOW_CEILING),
+                f"it would return above the geofence's ceiling of {ceiling:g} m",
+            ),
+            FallbackParameter(
+                ("RTL_LAND_DELAY",),
+                lambda value: value >= 0.0,
+                0.0,
+                "it would hover over its home instead of landing",
+            ),
+            acts,
+        ]
+        returns = FallbackParameter((), lambda value: value == _RETURN_ALONE, _RETURN_ALONE, sinks)
+        if older_than(software, 1, 14):
+            wanted.append(replace(returns, names=("COM_OBL_ACT",)))
+        if settings.role == "ground_station":
+            lost = "the loss of the ground station is ignored"
+            wanted.append(replace(returns, names=("NAV_DLL_ACT",), why=lost))
+        return tuple(wanted)
 
     def fence(self, action: FenceAction, ceiling: float) -> dict[str, float]:
         """GF_ACTION: 1 warn, 2 hold, 3 return, 5 land."""

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import queue
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, Failsafe
-from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.types.errors import VehicleError
@@ -39,6 +38,28 @@ class Parameters:
         found = self._read(name)
         return None if found is None else found.value
 
+    def known(self, wanted: Iterable[tuple[str, ...]], tries: int = _TRIES) -> dict[str, float]:
+        """Values by name, asked for together: of each tuple's names the vehicle knows one.
+
+        What it does not know, or does not tell, is missing. As many tries are made as for one.
+        """
+        missing, found = set(wanted), dict[str, float]()
+        with self._link.listen("PARAM_VALUE") as inbox:
+            for _ in range(tries):
+                for name in sorted(name for names in missing for name in names):
+                    self._link.send(self._request(name))
+                deadline = time.monotonic() + _TIMEOUT
+                while missing and (left := deadline - time.monotonic()) > 0.0:
+                    try:
+                        message = inbox.get(timeout=left)
+                    except queue.Empty:
+                        break
+                    kind, value = message.param_type, message.param_value
+                    for names in [one for one in missing if message.param_id in one]:
+                        found[message.param_id] = self._autopilot.decode(value, kind)
+                        missing.discard(names)
+        return found
+
     def set(self, name: str, value: float) -> None:
         """Set `name` and verify it; raises VehicleError if it was not set."""
         before = self._read(name)
@@ -59,8 +80,10 @@ class Parameters:
             raise VehicleError(f"the autopilot did not set {name} to {value:g}: {held}")
 
     def _read(self, name: str) -> _Value | None:
-        request = mavlink.MAVLink_param_request_read_message(*self._target(), _bytes(name), -1)
-        return next(self._answers(name, request), None)
+        return next(self._answers(name, self._request(name)), None)
+
+    def _request(self, name: str) -> object:
+        return mavlink.MAVLink_param_request_read_message(*self._target(), _bytes(name), -1)
 
     def _answers(self, name: str, request: object) -> Iterator[_Value]:
         """Values of `name` received after `request`, which is repeated until one arrives."""
@@ -110,14 +133,10 @@ class UnsafeParameter:
         )
 
 
-def unsafe_parameters(
-    parameters: Parameters, autopilot: Autopilot, settings: MavlinkSettings
-) -> list[UnsafeParameter]:
+def unsafe_parameters(parameters: Parameters, autopilot: Autopilot) -> list[UnsafeParameter]:
     """Failsafes that are off by the vehicle's parameters; each is read from the vehicle."""
     found = []
     for failsafe in autopilot.failsafes:
-        if failsafe.role not in {"any", settings.role}:
-            continue
         value = parameters.get(failsafe.name)
         if value is not None and value in failsafe.unsafe:
             found.append(UnsafeParameter(failsafe, value))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -23,6 +24,9 @@ _DOES_NOT_FIT = 0.8
 """Variance, of 1, from which ArduPilot rejects a sensor (its FS_EKF_THRESH)."""
 _SHAKES = (60, 30)
 """Excessive vibration in m/s², and the level worth a report."""
+_UNKNOWN = 65535
+_HIGHEST_CELL = 4600
+"""Millivolts that no cell has, at 4.35 V when it is full."""
 _CLIPS = 10
 """Samples beyond an accelerometer's range from one message to the next."""
 
@@ -82,6 +86,17 @@ class Health:
         self._heard_at: float | None = None
         self._gps_silence = 0.0
         self._clipped: int | None = None
+        self.cells: tuple[float, ...] | None = None
+        """Volts of each cell of the first battery; None while they are not told."""
+        self.cycles: int | None = None
+        """Its charging cycles, likewise."""
+        self.vibration: float | None = None
+        """m/s² of the axis that shakes most."""
+        self.compass: float | None = None
+        self.estimator: float | None = None
+        """Misfits of the compass and of all sensors, as shares of what the estimator rejects."""
+        self.gps_fix: bool | None = None
+        """Whether the GPS has a position in space."""
         self._charges_told = False
         """Batteries are reported by their own messages."""
         self._takers = {
@@ -89,6 +104,7 @@ class Health:
             "ESTIMATOR_STATUS": self._estimator,
             "EKF_STATUS_REPORT": self._filter,
             "BATTERY_STATUS": self._battery,
+            "SMART_BATTERY_INFO": self._age,
             "VIBRATION": self._vibration,
             "SYS_STATUS": self._sensors,
         }
@@ -129,6 +145,7 @@ class Health:
 
     def _gps(self, message: Any, now: float) -> None:  # noqa: ANN401
         self._gps_silence = 0.0
+        self.gps_fix = bool(message.fix_type >= _FIX)
         if message.fix_type >= _FIX:
             self._fixed_at = now
         # A vehicle that never had a fix flies without GPS, or reports the reason itself.
@@ -144,8 +161,9 @@ class Health:
         self._note("unsure", unsure and f"estimator: position unsure by more than {unsure} m", now)
         unsure = _step(message.pos_vert_accuracy, _UNSURE)
         self._note("height", unsure and f"estimator: height unsure by more than {unsure} m", now)
-        misfits = {"compass": message.mag_ratio}
-        self._fit(misfits, 1.0, now)
+        self._fit({"compass": message.mag_ratio}, 1.0, now)
+        places = (message.vel_ratio, message.pos_horiz_ratio, message.pos_vert_ratio)
+        self.compass, self.estimator = _largest(message.mag_ratio), _largest(*places)
 
     def _filter(self, message: Any, now: float) -> None:  # noqa: ANN401
         self._flags(message.flags, now, glitch=mavlink.EKF_GPS_GLITCHING)
@@ -156,6 +174,10 @@ class Health:
             "compass": message.compass_variance,
         }
         self._fit(misfits, _DOES_NOT_FIT, now)
+        self.compass, self.estimator = (
+            _largest(message.compass_variance),
+            _largest(*misfits.values()),
+        )
 
     def _flags(self, flags: int, now: float, *, glitch: int) -> None:
         """Process the bits that both kinds of status have in common."""
@@ -171,15 +193,22 @@ class Health:
             text = f"estimator: what is measured of its {name} does not fit"
             self._note(f"misfit {name}", text if value > limit else "", now)
 
+    def _age(self, message: Any, _: float) -> None:  # noqa: ANN401
+        if message.id == 0 and message.cycle_count != _UNKNOWN:
+            self.cycles = message.cycle_count
+
     def _battery(self, message: Any, now: float) -> None:  # noqa: ANN401
         name = f"battery {message.id + 1}" if message.id else "battery"
         self._charges_told |= message.charge_state != mavlink.MAV_BATTERY_CHARGE_STATE_UNDEFINED
+        if message.id == 0:
+            self.cells = _cells([*message.voltages, *message.voltages_ext])
         said = [_CHARGES[message.charge_state]] if message.charge_state in _CHARGES else []
         said += [text for bit, text in _BATTERY_FAULTS.items() if message.fault_bitmask & bit]
         self._note(name, f"{name}: {', '.join(said)}" if said else "", now)
 
     def _vibration(self, message: Any, now: float) -> None:  # noqa: ANN401
         shakes = _step(max(message.vibration_x, message.vibration_y, message.vibration_z), _SHAKES)
+        self.vibration = _largest(message.vibration_x, message.vibration_y, message.vibration_z)
         text = shakes and f"vibration: more than {shakes} m/s²"
         self._note("vibration", text, now)
         clipped = message.clipping_0 + message.clipping_1 + message.clipping_2
@@ -198,6 +227,22 @@ class Health:
             bad &= ~mavlink.MAV_SYS_STATUS_SENSOR_BATTERY
         for bit, name in _SENSORS.items():
             self._note(f"sensor {name}", f"{name}: unhealthy" if bad & bit else "", now)
+
+
+def _largest(*values: float) -> float | None:
+    """The largest of those that are numbers; None without any."""
+    return max((one for one in values if math.isfinite(one)), default=None)
+
+
+def _cells(millivolts: Sequence[int]) -> tuple[float, ...] | None:
+    """Volts of each cell; None if they are not told.
+
+    An autopilot that does not measure cells tells the whole battery's voltage as the first one.
+    """
+    told = [one for one in millivolts if 0 < one < _UNKNOWN]
+    if not told or max(told) > _HIGHEST_CELL:
+        return None
+    return tuple(one / 1e3 for one in told)
 
 
 def _step(value: float, steps: tuple[int, ...]) -> str:

@@ -13,10 +13,12 @@ from aerodaas.drivers.mavlink.state.frames import LocalFrame
 from aerodaas.drivers.mavlink.state.phase import FlightPhase
 from aerodaas.drivers.mavlink.state.telemetry import Telemetry
 from aerodaas.drivers.mavlink.state.touchdown import Touchdown
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import LinkCounts
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry
 from aerodaas.types.geometry import Vector
+from aerodaas.types.health import HealthReadings
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 __all__ = ["REASONS", "VehicleReport"]
@@ -27,6 +29,8 @@ _LOST_AFTER = 1.5
 """Seconds of silence of a vehicle that sends 40 messages a second, after which it is lost."""
 _FINDING = 1.0
 """Seconds for a first position after the link is back."""
+_DATED = 1e9
+"""Seconds since the Unix epoch that its clock shows at least once it knows the date."""
 _GRAVE = 3
 """Severity of an error; smaller is more severe."""
 
@@ -76,9 +80,18 @@ class VehicleReport:
                 "impostor_packets": counts.impostors,
                 "refused_packets": counts.refused,
                 "silence": telemetry.silence(now),
+                **self._mission(),
             },
             ended=self._touchdown.ended,
         )
+
+    def _mission(self) -> dict[str, float]:
+        """Items of the vehicle's own mission, where it has told any."""
+        items = {
+            "mission_item": self._telemetry.mission_item,
+            "mission_reached": self._telemetry.mission_reached,
+        }
+        return {name: number for name, number in items.items() if math.isfinite(number)}
 
     def odometry(self, frame: LocalFrame | None, *, known: bool) -> Odometry:
         """Its position in our frame; NaN unless that is `known`."""
@@ -93,6 +106,25 @@ class VehicleReport:
             attitude.roll,
             attitude.pitch,
             attitude.yaw_rate,
+        )
+
+    def health(self, now: float, stranded: tuple[str, ...] | None) -> HealthReadings:
+        """Its health at `now`; `stranded` is why it would not come home without us, if known."""
+        telemetry, health = self._telemetry, self._telemetry.health
+        logs = mavlink.MAV_SYS_STATUS_LOGGING
+        sensors = telemetry.sensors
+        has_log = sensors is not None and sensors.present & sensors.enabled & logs
+        return HealthReadings(
+            cells=health.cells,
+            cycles=health.cycles,
+            vibration=health.vibration,
+            compass=health.compass,
+            estimator=health.estimator,
+            gps_fix=health.gps_fix,
+            logs=bool(sensors.health & logs) if sensors is not None and has_log else None,
+            silence=telemetry.silence(now),
+            clock=telemetry.clock if telemetry.clock > _DATED else None,
+            stranded=stranded,
         )
 
     @property

@@ -77,9 +77,15 @@ class Telemetry:
         """Seconds of the autopilot's own clock since it started."""
         self.clock = math.nan
         """The same clock in seconds since the Unix epoch."""
+        self.mission_item = self.mission_reached = math.nan
+        """Numbers of the items of its own mission: that it flies or would fly, and the last that it
+        has reached."""
         self.reboots = 0
         self._booting: bool | None = None
         self.software = ""
+        """Its version; empty before AUTOPILOT_VERSION has come."""
+        self.hardware = ""
+        """Its board's own number, in hexadecimal digits; empty if it has none."""
         self._stamps: dict[str, int] = {}
         self.seen: dict[str, float] = {}
         """Arrival time of each kind of message."""
@@ -96,6 +102,8 @@ class Telemetry:
             "HOME_POSITION": self._home,
             "SYSTEM_TIME": self._time,
             "AUTOPILOT_VERSION": self._version,
+            "MISSION_CURRENT": self._mission,
+            "MISSION_ITEM_REACHED": self._reached,
             "STATUSTEXT": self._text,
             "EVENT": self._event,
         }
@@ -225,12 +233,21 @@ class Telemetry:
         self._stamps.clear()
         self.position_at = self.attitude_at = -math.inf
         self.home = self.place = self.altitude = self.gps = None
+        self.mission_item = self.mission_reached = math.nan
         self.sensors = self.on_ground = None
         self.health, self.events = Health(), EventReader()
 
     def _version(self, message: Any, _: float) -> None:  # noqa: ANN401
         version = message.flight_sw_version
         self.software = ".".join(str(version >> shift & 0xFF) for shift in (24, 16, 8))
+        number = bytes(message.uid2)
+        self.hardware = number.rstrip(b"\0").hex() or (f"{message.uid:x}" if message.uid else "")
+
+    def _mission(self, message: Any, _: float) -> None:  # noqa: ANN401
+        self.mission_item = float(message.seq)
+
+    def _reached(self, message: Any, _: float) -> None:  # noqa: ANN401
+        self.mission_reached = float(message.seq)
 
     def _text(self, message: Any, now: float) -> None:  # noqa: ANN401
         self.texts.take(message.text, message.severity, now, message.id, message.chunk_seq)

@@ -1,0 +1,104 @@
+"""`aerodaas logs`: the logs that a vehicle keeps itself."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from aerodaas.cli.robot import connected_robot
+from aerodaas.types.errors import VehicleError
+
+if TYPE_CHECKING:
+    from aerodaas.types.vehicle_log import LogEntry, LoggingVehicle
+
+__all__ = ["logs"]
+
+
+def logs(
+    robot: Annotated[str, typer.Argument(help="Id of the robot.")],
+    numbers: Annotated[
+        list[int] | None, typer.Argument(help="Logs to fetch; none lists them.")
+    ] = None,
+    latest: Annotated[  # noqa: FBT002
+        bool, typer.Option("--latest", help="Fetch the newest one.")
+    ] = False,
+    to: Annotated[Path, typer.Option(help="The folder for what is fetched.")] = Path(),
+    env: Annotated[Path, typer.Option(help="The environment file.")] = Path("environment.json"),
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
+    ] = None,
+    as_json: Annotated[  # noqa: FBT002
+        bool, typer.Option("--json", help="Print the list, or the files, as JSON.")
+    ] = False,
+) -> None:
+    """List the logs on a robot's autopilot, or fetch some of them; on the ground only.
+
+    aerodaas logs drone
+    aerodaas logs drone --latest --to runs/logs
+    aerodaas logs drone 3 4 --env campus.json
+    """
+    from aerodaas.types.vehicle_log import LoggingVehicle  # noqa: PLC0415 - slow to load
+
+    with connected_robot(robot, env, setting or ()) as (vehicle, _):
+        if not isinstance(vehicle, LoggingVehicle):
+            driver = vehicle.capabilities.driver
+            raise VehicleError(f"{robot}: no logs can be fetched by the driver {driver}")
+        found = vehicle.logs()
+        if not (numbers or latest):
+            _show(robot, found, as_json=as_json)
+            return
+        chosen = _chosen(found, numbers or [max((one.number for one in found), default=0)])
+        files = [_fetch(vehicle, one, to, quiet=as_json) for one in chosen]
+        if as_json:
+            typer.echo(json.dumps([str(file) for file in files]))
+
+
+def _chosen(found: Sequence[LogEntry], numbers: Sequence[int]) -> list[LogEntry]:
+    known = {one.number: one for one in found}
+    missing = [number for number in numbers if number not in known]
+    if missing:
+        there = ", ".join(map(str, known)) or "none"
+        raise VehicleError(f"the vehicle has no log {missing[0]}; it has {there}")
+    return [known[number] for number in numbers]
+
+
+def _fetch(vehicle: LoggingVehicle, log: LogEntry, folder: Path, *, quiet: bool) -> Path:
+    from rich.progress import Progress  # noqa: PLC0415 - slow to load
+
+    with Progress(disable=quiet, transient=True) as bar:
+        task = bar.add_task(f"log {log.number}", total=log.size)
+        file = vehicle.fetch_log(log, folder, lambda done, _: bar.update(task, completed=done))
+    if not quiet:
+        typer.echo(file)
+    return file
+
+
+def _show(name: str, found: Sequence[LogEntry], *, as_json: bool) -> None:
+    from rich.console import Console  # noqa: PLC0415 - slow to load
+    from rich.table import Table  # noqa: PLC0415 - as above
+
+    if as_json:
+        rows = [{"number": one.number, "size": one.size, "began": one.began} for one in found]
+        typer.echo(json.dumps(rows))
+        return
+    if not found:
+        typer.echo(f"{name} has no logs")
+        return
+    table = Table(box=None, pad_edge=False)
+    for column in ("log", "began", "MB"):
+        table.add_column(column)
+    for one in found:
+        table.add_row(str(one.number), _when(one.began), f"{one.size / 1e6:.2f}")
+    Console().print(table)
+
+
+def _when(began: float | None) -> str:
+    if began is None:
+        return "not known"
+    return f"{datetime.fromtimestamp(began, timezone.utc):%Y-%m-%d %H:%M:%S} UTC"

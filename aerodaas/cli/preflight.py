@@ -1,0 +1,98 @@
+"""`aerodaas preflight`: a robot's health before take-off, as one list."""
+
+from __future__ import annotations
+
+import json
+import time
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from aerodaas.cli.robot import connected_robot
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from aerodaas.config.model import RobotConfig
+    from aerodaas.types.health import HealthItem
+    from aerodaas.types.vehicle import Vehicle
+
+__all__ = ["preflight", "settled_items"]
+
+_SETTLING = 2.0
+"""Seconds within which a vehicle's slowest messages arrive."""
+_MARKS = {
+    "good": "[green]good[/]",
+    "warning": "[yellow]warning[/]",
+    "refused": "[red]refused[/]",
+    "unknown": "[dim]unknown[/]",
+}
+
+
+def preflight(
+    robot: Annotated[str, typer.Argument(help="Id of the robot.")],
+    env: Annotated[Path, typer.Option(help="The environment file.")] = Path("environment.json"),
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
+    ] = None,
+    as_json: Annotated[  # noqa: FBT002
+        bool, typer.Option("--json", help="Print the list as JSON.")
+    ] = False,
+) -> None:
+    """Print a robot's health before take-off as one list; nothing moves.
+
+    Each item has its value, what it should be, what that means, and a remedy. The section
+    `preflight` of the robot in the environment file says what refuses a take-off and what only
+    warns. What the vehicle does not tell is unknown, never good. The exit code is 1 if a take-off
+    would be refused.
+
+        aerodaas preflight drone
+        aerodaas preflight drone --env campus.json --json
+        aerodaas preflight drone --set drone.preflight.wind=require
+    """
+    with connected_robot(robot, env, setting or ()) as (vehicle, config):
+        items = settled_items(vehicle, config)
+    refused = any(one.verdict.value == "refused" for one in items)
+    if as_json:
+        typer.echo(json.dumps({"robot": robot, "ready": not refused, "items": _rows(items)}))
+    else:
+        _show(robot, items)
+    raise typer.Exit(1 if refused else 0)
+
+
+def settled_items(vehicle: Vehicle, robot: RobotConfig) -> list[HealthItem]:
+    """The list of a connected vehicle, once nothing more is told."""
+    from aerodaas.mission.safety.checklist import Checklist  # noqa: PLC0415 - slow to load
+    from aerodaas.types.health import Verdict  # noqa: PLC0415 - as above
+    from aerodaas.types.vehicle import SteppedVehicle  # noqa: PLC0415 - as above
+
+    checklist = Checklist.of(vehicle, robot)
+    patience = 0.0 if isinstance(vehicle, SteppedVehicle) else _SETTLING
+    until = time.monotonic() + patience
+    while True:
+        items = checklist.examine(vehicle.read())
+        known = all(one.verdict is Verdict.GOOD for one in items)
+        if known or time.monotonic() >= until:
+            return items
+        time.sleep(0.1)
+
+
+def _rows(items: Sequence[HealthItem]) -> list[dict[str, str]]:
+    return [{**asdict(one), "verdict": one.verdict.value} for one in items]
+
+
+def _show(name: str, items: Sequence[HealthItem]) -> None:
+    from rich.console import Console  # noqa: PLC0415 - slow to load
+    from rich.table import Table  # noqa: PLC0415 - as above
+
+    table = Table(
+        title=f"aerodaas preflight {name}", title_justify="left", box=None, pad_edge=False
+    )
+    for column in ("item", "value", "should be", "", "remedy"):
+        table.add_column(column, overflow="fold")
+    for one in items:
+        table.add_row(one.name, one.value, one.bound, _MARKS[one.verdict.value], one.remedy)
+    Console().print(table)

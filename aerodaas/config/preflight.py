@@ -1,0 +1,71 @@
+"""What is looked at before take-off, and what a finding means."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeAlias
+
+from pydantic import BaseModel, ConfigDict, Field
+
+__all__ = ["PreflightConfig", "PreflightLevel"]
+
+PreflightLevel: TypeAlias = Literal["ignore", "warn", "refuse", "require"]
+"""What a finding means: nothing, a warning, no take-off, or none unless it is known to be good."""
+
+_Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+_Finite = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class PreflightConfig(BaseModel):
+    """The health of the vehicle and its surroundings before take-off.
+
+    Each item is at one of the levels `ignore`, `warn`, `refuse` (no take-off) and `require` (nor if
+    it is not known). Whether the battery, the geofence and the vehicle's own checks allow a
+    take-off is no matter of policy.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    cells: PreflightLevel = "warn"
+    """Voltage of each cell of the battery."""
+    battery_age: PreflightLevel = "warn"
+    """Charging cycles of the battery."""
+    vibration: PreflightLevel = "warn"
+    """Vibration while it stands."""
+    compass: PreflightLevel = "warn"
+    """How well the compass fits what the estimator expects."""
+    gps: PreflightLevel = "warn"
+    """Satellites and accuracy of the GPS."""
+    estimator: PreflightLevel = "warn"
+    """How well all sensors fit what the estimator expects."""
+    storage: PreflightLevel = "warn"
+    """Whether the vehicle can write its own log."""
+    wind: PreflightLevel = "warn"
+    """Speed of the wind."""
+    daylight: PreflightLevel = "warn"
+    """Height of the sun where it stands."""
+    link: PreflightLevel = "warn"
+    """Age of the vehicle's last word."""
+    fallback: PreflightLevel = "warn"
+    """Whether it comes home by itself once this process is gone."""
+    remote_id: PreflightLevel = "ignore"
+    """Whether a Remote ID transmitter says that it is ready."""
+    cell_voltage: _Positive = 3.5
+    """Volts of a cell at least."""
+    cell_spread: _Positive = 0.15
+    """Volts between the best and the worst cell at most."""
+    battery_cycles: Annotated[int, Field(ge=1)] = 300
+    """Charging cycles at most."""
+    most_vibration: _Positive = 15.0
+    """m/s² at most."""
+    misfit: _Positive = 0.8
+    """Share at most, of 1, from which the estimator rejects a sensor."""
+    satellites: Annotated[int, Field(ge=4)] = 6
+    """Satellites at least."""
+    gps_accuracy: _Positive = 5.0
+    """Metres of the GPS' standard deviation along the ground at most."""
+    wind_speed: _Positive = 10.0
+    """m/s at most."""
+    sun_elevation: _Finite = -6.0
+    """Degrees of the sun above the horizon at least; -6 is the end of civil twilight."""
+    silence: _Positive = 1.5
+    """Seconds since the vehicle's last word at most."""

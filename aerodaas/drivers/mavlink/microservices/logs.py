@@ -1,0 +1,152 @@
+"""List and download of the autopilot's own logs (LOG_REQUEST_LIST, LOG_REQUEST_DATA)."""
+
+from __future__ import annotations
+
+import contextlib
+import queue
+import time
+from collections.abc import Callable, Iterator
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.vehicle_log import LogEntry
+
+__all__ = ["fetch_log", "list_logs"]
+
+_TIMEOUT = 1.0
+"""Seconds of silence after which is asked again."""
+_TRIES = 6
+"""Times that is asked without anything new."""
+_PACKET = 90
+"""Bytes of a LOG_DATA."""
+_WINDOW = 400 * _PACKET
+"""Bytes asked for at once: half a second of a fast link, and few to ask for again."""
+_LARGEST = 4 << 30
+"""Bytes of a log that no card of an autopilot exceeds."""
+_LAST = 0xFFFF
+_FORM = "%Y%m%d-%H%M%S"
+
+Progress = Callable[[int, int], None]
+
+
+def list_logs(link: MavlinkLink) -> list[LogEntry]:
+    """The vehicle's logs, oldest first; raises VehicleError. Not for use in the link's thread."""
+    target = _target(link)
+    found: dict[int, LogEntry] = {}
+    total: int | None = None
+    with link.listen("LOG_ENTRY") as inbox:
+        for _ in range(_TRIES):
+            link.send(mavlink.MAVLink_log_request_list_message(*target, 0, _LAST))
+            for entry in _heard(inbox, _TIMEOUT):
+                total = entry.num_logs
+                if total:
+                    found[entry.id] = LogEntry(entry.id, entry.size, entry.time_utc or None)
+                if len(found) >= entry.num_logs:
+                    return [found[number] for number in sorted(found)]
+    if total is None:
+        raise VehicleError("the autopilot does not answer when asked for its logs")
+    raise VehicleError(f"the autopilot told {len(found)} of its {total} logs only; try again")
+
+
+def fetch_log(
+    link: MavlinkLink,
+    autopilot: Autopilot,
+    log: LogEntry,
+    folder: Path,
+    progress: Progress = lambda _, __: None,
+) -> Path:
+    """Fetch a log into a file of `folder`, whole or not at all; raises VehicleError.
+
+    Packets that are lost are asked for again. Not for use in the link's thread.
+    """
+    file = folder / f"log-{log.number}{_when(log.began)}{autopilot.log_suffix}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        _write(link, log, file, progress)
+        with file.open("rb") as written:
+            head = written.read(len(autopilot.log_head))
+    except OSError as error:
+        raise VehicleError(f"cannot write {file}: {error}") from None
+    if head != autopilot.log_head:
+        raise VehicleError(
+            f"{file} is on the vehicle as it was fetched, and is no log of {autopilot.name}: "
+            "its card may be damaged"
+        )
+    return file
+
+
+def _write(link: MavlinkLink, log: LogEntry, file: Path, progress: Progress) -> None:
+    if not 0 < log.size <= _LARGEST:
+        raise VehicleError(f"log {log.number} has {log.size} bytes, which is none to be fetched")
+    part = file.with_name(f"{file.name}.part")
+    try:
+        with part.open("wb") as output, link.listen("LOG_DATA") as inbox:
+            for begin in range(0, log.size, _WINDOW):
+                end = min(log.size, begin + _WINDOW)
+                output.write(_fetch(link, inbox, log, begin, end))
+                progress(end, log.size)
+        part.replace(file)
+    finally:
+        part.unlink(missing_ok=True)
+        # Some autopilots write no log, and send nothing else, before they are told.
+        link.send(mavlink.MAVLink_log_request_end_message(*_target(link)))
+
+
+def _fetch(
+    link: MavlinkLink, inbox: queue.SimpleQueue[Any], log: LogEntry, begin: int, end: int
+) -> bytes:
+    """Bytes `begin` to `end` of a log."""
+    content = bytearray(end - begin)
+    missing = set(range(begin, end, _PACKET))
+    tries = 0
+    while missing:
+        if tries == _TRIES:
+            raise VehicleError(
+                f"the autopilot stopped sending log {log.number} at byte {min(missing)} of "
+                f"{log.size}; try again nearer to it, or by another link"
+            )
+        tries += 1
+        first, last = min(missing), min(end, max(missing) + _PACKET)
+        link.send(
+            mavlink.MAVLink_log_request_data_message(
+                *_target(link), log.number, first, last - first
+            )
+        )
+        for packet in _heard(inbox, _TIMEOUT):
+            if packet.id != log.number or packet.ofs not in missing:
+                continue
+            wanted = min(_PACKET, end - packet.ofs)
+            if packet.count < wanted:
+                raise VehicleError(
+                    f"log {log.number} ends at byte {packet.ofs + packet.count}, and was said to "
+                    f"have {log.size}: list the logs again"
+                )
+            at = packet.ofs - begin
+            content[at : at + wanted] = bytes(packet.data[:wanted])
+            missing.discard(packet.ofs)
+            tries = 0
+            if not missing:
+                break
+    return bytes(content)
+
+
+def _heard(inbox: queue.SimpleQueue[Any], timeout: float) -> Iterator[Any]:
+    """Messages until none has come for `timeout` seconds, and for ten times that at most."""
+    until = time.monotonic() + 10.0 * timeout
+    with contextlib.suppress(queue.Empty):
+        while time.monotonic() < until:
+            yield inbox.get(timeout=timeout)
+
+
+def _when(began: float | None) -> str:
+    return "" if began is None else f"-{datetime.fromtimestamp(began, timezone.utc):{_FORM}}"
+
+
+def _target(link: MavlinkLink) -> tuple[int, int]:
+    assert link.target is not None  # noqa: S101 - only a known vehicle has logs
+    return link.target

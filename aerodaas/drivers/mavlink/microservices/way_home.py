@@ -1,0 +1,113 @@
+"""A way home as a plan on the vehicle, for ArduPilot's ground-station failsafe to fly."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from aerodaas.config.model import RobotConfig
+from aerodaas.drivers.mavlink.microservices.plans import MissionItem, download, upload
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.geometry import GeodeticOrigin
+
+__all__ = ["other_way_home", "upload_way_home", "way_home_items"]
+
+_EARTH = 1e7
+_HEIGHT = 0.011
+"""Metres by which a height may differ once it was kept: ArduPilot keeps centimetres."""
+
+
+def way_home_items(
+    robot: RobotConfig, places: Sequence[tuple[float, float, float]], origin: GeodeticOrigin
+) -> list[MissionItem]:
+    """The plan that leads through `places` to the robot's start, and lands there.
+
+    The vehicle joins it at the leg nearest to it (DO_RETURN_PATH_START). Heights are above the
+    start, as those of the places are. `origin` is that of the local frame. Raises VehicleError if
+    the fence does not allow the way.
+    """
+    start = np.array(robot.start, dtype=np.float64)
+    _require_allowed(robot, places)
+    here = _place(origin, (start[0], start[1]))
+    frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+    stand = (0.0, 0.0, 0.0, 0.0)
+    return [
+        # ArduPilot keeps its home as the first item, whatever is sent.
+        MissionItem(mavlink.MAV_CMD_NAV_WAYPOINT, stand, *here, 0.0, mavlink.MAV_FRAME_GLOBAL),
+        MissionItem(mavlink.MAV_CMD_DO_RETURN_PATH_START, stand, 0, 0, 0.0, frame),
+        *(
+            MissionItem(
+                mavlink.MAV_CMD_NAV_WAYPOINT,
+                stand,
+                *_place(origin, (east, north)),
+                round(up - float(start[2]), 2),
+                frame,
+            )
+            for east, north, up in places
+        ),
+        MissionItem(mavlink.MAV_CMD_NAV_LAND, stand, *here, 0.0, frame),
+    ]
+
+
+def upload_way_home(link: MavlinkLink, items: Sequence[MissionItem]) -> None:
+    """Upload the plan and read it back; raises VehicleError if the vehicle holds another one."""
+    try:
+        upload(link, items)
+    except VehicleError as error:
+        raise VehicleError(
+            f'{error}; "way_home": "return" needs no plan (DO_RETURN_PATH_START does: ArduCopter '
+            "4.6 or later)"
+        ) from None
+    if text := other_way_home(link, items):
+        raise VehicleError(text)
+
+
+def other_way_home(link: MavlinkLink, items: Sequence[MissionItem]) -> str:
+    """In what the vehicle's plan differs from `items`; empty if in nothing. Raises VehicleError."""
+    held = download(link)
+    if len(held) != len(items):
+        return f"it holds another way home than ours: {len(held)} items instead of {len(items)}"
+    for number, (sent, kept) in enumerate(zip(items, held, strict=True)):
+        if number and not _same(sent, kept):
+            place = f"{kept.x / _EARTH:.7f}, {kept.y / _EARTH:.7f}, {kept.z:g} m"
+            return (
+                f"it holds another way home than ours: item {number} is command {kept.command} at "
+                f"{place}"
+            )
+    return ""
+
+
+def _same(sent: MissionItem, kept: MissionItem) -> bool:
+    if sent.command != kept.command:
+        return False
+    if sent.command == mavlink.MAV_CMD_DO_RETURN_PATH_START:
+        return True
+    there = abs(sent.x - kept.x) <= 1 and abs(sent.y - kept.y) <= 1
+    return there and sent.frame == kept.frame and abs(sent.z - kept.z) <= _HEIGHT
+
+
+def _require_allowed(robot: RobotConfig, places: Sequence[tuple[float, float, float]]) -> None:
+    fence = Geofence(robot.limits.geofence)
+    for number, place in enumerate(places):
+        if objection := fence.objection(np.array(place)):
+            raise VehicleError(f"{robot.id}: settings.way_home.{number}: {objection}")
+    way = [(place[0], place[1]) for place in (*places, robot.start)]
+    if fence.area is None:
+        return
+    for number, leg in enumerate(itertools.pairwise(way)):
+        if not shapely.covers(fence.area, shapely.LineString(leg)):
+            raise VehicleError(
+                f"{robot.id}: settings.way_home.{number}: the way from there to the next place "
+                "leaves the geofence or crosses a no-fly zone"
+            )
+
+
+def _place(origin: GeodeticOrigin, place: tuple[float, float]) -> tuple[int, int]:
+    latitude, longitude, _ = origin.to_geodetic(np.array([*place, 0.0]))
+    return round(latitude * _EARTH), round(longitude * _EARTH)

@@ -1,0 +1,240 @@
+"""The list before take-off: everything that is known of the vehicle's health, judged by policy."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from aerodaas.config.model import LimitsConfig, RobotConfig
+from aerodaas.config.preflight import PreflightConfig, PreflightLevel
+from aerodaas.mission.safety.geofence import Geofence
+from aerodaas.mission.safety.supervisor import charge_objection, place_objections
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.health import OWN_CHECKS, HealthItem, HealthReadings, MeasuredVehicle, Verdict
+from aerodaas.types.sun import sun_elevation
+from aerodaas.types.vehicle import Vehicle, VehicleState
+
+__all__ = ["Checklist", "concerns", "refusals"]
+
+_NOT_KNOWN = "not known"
+_SUBJECTS = {
+    "GPS": "gps",
+    "battery": "cells",
+    "compass": "compass",
+    "compasses": "compass",
+    "second compass": "compass",
+    "estimator": "estimator",
+    "log": "storage",
+    "vibration": "vibration",
+    "wind": "wind",
+}
+"""The item to which a fault of the vehicle belongs, by the fault's first word."""
+_REMEDIES = {
+    "battery": "charge the battery",
+    "cells": "charge and balance the battery; retire one whose cells differ",
+    "battery_age": "take a newer battery",
+    "vibration": "look at propellers, motors and the autopilot's mounting",
+    "compass": "move away from metal and wires, or calibrate the compass",
+    "gps": "wait, or move away from walls and trees",
+    "estimator": "let it stand still for a minute; calibrate what does not fit",
+    "storage": "put a working card into the autopilot, or free space on it",
+    "wind": "wait for less wind",
+    "daylight": "wait for daylight; preflight.sun_elevation where a flight at night is legal",
+    "fence": "move the drone, or mend limits.geofence",
+    "fallback": '"fallback": "set" in the settings of the robot (docs/mavlink.md)',
+    "link": "look at antennas, cables and the address",
+    "remote_id": "switch the transmitter on, and wait for its GPS",
+    OWN_CHECKS: "do what it says",
+}
+
+
+class Checklist:
+    """The list of one robot, read from one vehicle."""
+
+    def __init__(self, vehicle: Vehicle, limits: LimitsConfig, policy: PreflightConfig) -> None:
+        """Judge by `limits` and `policy`; raises ConfigError for an invalid geofence."""
+        self._vehicle = vehicle
+        # Once: to ask a protocol about an instance looks up all its members.
+        self._measured = vehicle if isinstance(vehicle, MeasuredVehicle) else None
+        self._limits = limits
+        self._policy = policy
+        self._fence = Geofence(limits.geofence)
+
+    @classmethod
+    def of(cls, vehicle: Vehicle, robot: RobotConfig) -> Checklist:
+        """The list of `robot`."""
+        return cls(vehicle, robot.limits, robot.preflight)
+
+    def examine(self, state: VehicleState) -> list[HealthItem]:
+        """Every item that the policy does not ignore; `state` is the newest."""
+        told, objections = self._told(), self._vehicle.preflight()
+        own = HealthItem(OWN_CHECKS, "; ".join(objections) or "ready", "", Verdict.GOOD)
+        items = [
+            _by(objections, own),
+            self._battery(state),
+            self._place(state),
+        ]
+        faults = _faults(state.faults)
+        for item in self._health(state, told):
+            level: PreflightLevel = getattr(self._policy, item.name)
+            if level != "ignore":
+                items.append(_judged(item, level, faults.get(item.name, [])))
+        others = [text for text in faults.get("", []) if text not in objections]
+        if others:
+            items.append(HealthItem("faults", "; ".join(others), "", Verdict.WARNING))
+        return [
+            one
+            if one.verdict in {Verdict.GOOD, Verdict.UNKNOWN}
+            else replace(one, remedy=_REMEDIES.get(one.name, ""))
+            for one in items
+        ]
+
+    def _told(self) -> HealthReadings:
+        if self._measured is not None:
+            with contextlib.suppress(VehicleError):  # its own objections say what is missing
+                return self._measured.health()
+        return HealthReadings()
+
+    def _battery(self, state: VehicleState) -> HealthItem:
+        limits, charge = self._limits, state.battery.fraction
+        known = math.isfinite(charge)
+        volts = f", {state.battery.voltage:.1f} V" if state.battery.voltage else ""
+        item = HealthItem(
+            "battery",
+            f"{charge:.0%}{volts}" if known else _NOT_KNOWN,
+            f"more than {limits.battery_return:.0%}",
+            Verdict.GOOD if known else Verdict.UNKNOWN,
+        )
+        return _by([one for one in [charge_objection(state, limits)] if one], item)
+
+    def _place(self, state: VehicleState) -> HealthItem:
+        objections = place_objections(state, self._limits, self._fence)
+        value = "; ".join(objections) or "inside, and so is the take-off"
+        return _by(objections, HealthItem("fence", value, "inside", Verdict.GOOD))
+
+    def _health(self, state: VehicleState, told: HealthReadings) -> Iterator[HealthItem]:
+        policy = self._policy
+        yield self._cells(told.cells)
+        yield _most("battery_age", told.cycles, policy.battery_cycles, "{:g} cycles")
+        yield _most("vibration", told.vibration, policy.most_vibration, "{:.1f} m/s²")
+        yield _most("compass", told.compass, policy.misfit, "misfit {:.2f}")
+        yield self._gps(state, told)
+        yield _most("estimator", told.estimator, policy.misfit, "misfit {:.2f}")
+        yield _yes("storage", told.logs, "it writes its log", "it does not write its log")
+        yield _most("wind", told.wind, policy.wind_speed, "{:.1f} m/s")
+        yield self._daylight(state, told.clock)
+        yield _most("link", told.silence, policy.silence, "last word {:.1f} s ago")
+        yield _texts("fallback", told.stranded, "comes home without us")
+        yield _texts("remote_id", None if told.remote_id is None else [told.remote_id], "ready")
+
+    def _cells(self, cells: tuple[float, ...] | None) -> HealthItem:
+        least, spread = self._policy.cell_voltage, self._policy.cell_spread
+        bound = f"at least {least:.2f} V, at most {spread:.2f} V apart"
+        if not cells:
+            return _unknown("cells", bound)
+        apart = max(cells) - min(cells)
+        good = min(cells) >= least and apart <= spread
+        value = f"{len(cells)} cells from {min(cells):.2f} V, {apart:.2f} V apart"
+        return HealthItem("cells", value, bound, _verdict(good=good))
+
+    def _gps(self, state: VehicleState, told: HealthReadings) -> HealthItem:
+        policy, gps = self._policy, state.gps
+        bound = f"{policy.satellites} satellites, within {policy.gps_accuracy:g} m"
+        if told.gps_fix is None and gps is None:
+            return _unknown("gps", bound)
+        if gps is None or told.gps_fix is False:
+            return HealthItem("gps", "no fix", bound, Verdict.REFUSED)
+        # Zero is a driver's word for what it is not told.
+        few = 0 < gps.satellites < policy.satellites
+        good = not few and gps.horizontal_sigma <= policy.gps_accuracy
+        known = f"{gps.satellites} satellites" if gps.satellites else "a fix"
+        value = f"{known}, within {gps.horizontal_sigma:.1f} m"
+        return HealthItem("gps", value, bound, _verdict(good=good))
+
+    def _daylight(self, state: VehicleState, clock: float | None) -> HealthItem:
+        least = self._policy.sun_elevation
+        bound = f"at least {least:g}°"
+        if clock is None or state.gps is None:
+            return _unknown("daylight", bound)
+        height = sun_elevation(state.gps.latitude, state.gps.longitude, clock)
+        return HealthItem(
+            "daylight", f"sun at {height:.0f}°", bound, _verdict(good=height >= least)
+        )
+
+
+def refusals(items: Sequence[HealthItem]) -> list[str]:
+    """What keeps the drone on the ground by the items, one sentence each.
+
+    Without battery and fence, which the mission's supervisor refuses itself.
+    """
+    refused = [one for one in items if one.verdict is Verdict.REFUSED]
+    return [one.text for one in refused if one.name not in {"battery", "fence"}]
+
+
+def concerns(items: Sequence[HealthItem]) -> list[str]:
+    """What people are told, and what keeps the drone from nothing; one sentence each.
+
+    Without faults, which the mission tells itself in flight, and the fallback, which a driver tells
+    when it connects.
+    """
+    return [
+        one.text
+        for one in items
+        if one.verdict is Verdict.WARNING and one.name not in {"faults", "fallback"}
+    ]
+
+
+def _verdict(*, good: bool) -> Verdict:
+    return Verdict.GOOD if good else Verdict.REFUSED
+
+
+def _unknown(name: str, bound: str) -> HealthItem:
+    return HealthItem(name, _NOT_KNOWN, bound, Verdict.UNKNOWN)
+
+
+def _most(name: str, value: float | None, most: float, form: str) -> HealthItem:
+    bound = f"at most {most:g}"
+    if value is None or not math.isfinite(value):
+        return _unknown(name, bound)
+    return HealthItem(name, form.format(value), bound, _verdict(good=value <= most))
+
+
+def _yes(name: str, value: bool | None, yes: str, no: str) -> HealthItem:  # noqa: FBT001 - a reading
+    if value is None:
+        return _unknown(name, yes)
+    return HealthItem(name, yes if value else no, yes, _verdict(good=value))
+
+
+def _texts(name: str, objections: Sequence[str] | None, good: str) -> HealthItem:
+    if objections is None:
+        return _unknown(name, good)
+    said = "; ".join(one for one in objections if one)
+    return HealthItem(name, said or good, good, _verdict(good=not said))
+
+
+def _by(objections: Sequence[str], item: HealthItem) -> HealthItem:
+    """An item that is no matter of policy."""
+    return replace(item, verdict=Verdict.REFUSED) if objections else item
+
+
+def _judged(item: HealthItem, level: PreflightLevel, faults: Sequence[str]) -> HealthItem:
+    """The item by its level; what the vehicle itself says of it counts most."""
+    if faults:
+        item = replace(item, value="; ".join(faults), verdict=Verdict.REFUSED)
+    if item.verdict is Verdict.UNKNOWN and level == "require":
+        return replace(item, verdict=Verdict.REFUSED)
+    if item.verdict is Verdict.REFUSED and level == "warn":
+        return replace(item, verdict=Verdict.WARNING)
+    return item
+
+
+def _faults(texts: Sequence[str]) -> dict[str, list[str]]:
+    """The vehicle's faults by item; those of none under an empty name."""
+    found: dict[str, list[str]] = {}
+    for text in texts:
+        subject, colon, rest = text.partition(": ")
+        name = _SUBJECTS.get(subject, "") if colon else ""
+        found.setdefault(name, []).append(rest if name else text)
+    return found

@@ -1,0 +1,85 @@
+"""Health before flight: what a vehicle tells about itself, and how that is judged."""
+
+from __future__ import annotations
+
+import enum
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from aerodaas.types.vehicle import Vehicle
+
+__all__ = ["OWN_CHECKS", "HealthItem", "HealthReadings", "MeasuredVehicle", "Verdict"]
+
+OWN_CHECKS = "vehicle"
+"""Name of the item of the vehicle's own objections (`Vehicle.preflight`)."""
+
+
+@dataclass(frozen=True, slots=True)
+class HealthReadings:
+    """What a driver knows beyond the vehicle's state; None is not known, which is not good."""
+
+    cells: tuple[float, ...] | None = None
+    """Volts of each cell of the battery."""
+    cycles: int | None = None
+    """Charging cycles of the battery."""
+    vibration: float | None = None
+    """m/s², of the axis that shakes most."""
+    compass: float | None = None
+    """Misfit as a share of what the estimator rejects, from 0."""
+    estimator: float | None = None
+    """The largest misfit of all sensors, likewise."""
+    gps_fix: bool | None = None
+    """Whether the GPS has a position in space."""
+    logs: bool | None = None
+    """Whether the vehicle can write its own log."""
+    wind: float | None = None
+    """m/s along the ground."""
+    silence: float | None = None
+    """Seconds since the vehicle's last word."""
+    clock: float | None = None
+    """Seconds since the Unix epoch where the vehicle is; a simulation has no date."""
+    stranded: tuple[str, ...] | None = None
+    """Why it would not come home by itself once this process is gone; empty if it would."""
+    remote_id: str | None = None
+    """What a Remote ID transmitter objects to; empty if it is ready."""
+
+
+@runtime_checkable
+class MeasuredVehicle(Vehicle, Protocol):
+    """A vehicle that tells of its health."""
+
+    def health(self) -> HealthReadings:
+        """The newest readings; raises VehicleError if not connected."""
+        ...
+
+
+class Verdict(str, enum.Enum):
+    """What an item means for a take-off."""
+
+    GOOD = "good"
+    WARNING = "warning"
+    REFUSED = "refused"
+    UNKNOWN = "unknown"
+    """Not told by the vehicle, and not required."""
+
+
+@dataclass(frozen=True, slots=True)
+class HealthItem:
+    """One item of the list before take-off."""
+
+    name: str
+    value: str
+    """What was found; `not known` without a reading."""
+    bound: str
+    """What it should be."""
+    verdict: Verdict
+    remedy: str = ""
+    """What to do about a warning or a refusal."""
+
+    @property
+    def text(self) -> str:
+        """One sentence; what the vehicle itself says in its own words."""
+        if self.name == OWN_CHECKS:
+            return self.value
+        should = f", should be {self.bound}" if self.bound else ""
+        return f"{self.name}: {self.value}{should}"

@@ -1,0 +1,476 @@
+"""The vehicle comes home once our process is gone, and its owner's settings come back to it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mavlink_flights import LOOPBACK, Pair, flight, free_port, robot_of, wait_for
+from typing_extensions import Self
+
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
+from aerodaas.drivers.mavlink.microservices import journal, parameters, plans
+from aerodaas.drivers.mavlink.microservices.plans import MissionItem
+from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
+from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.types.errors import ConfigError, VehicleError
+from aerodaas.types.geometry import GeodeticOrigin
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
+from tools.mavlink_vehicle.store import PlanStore
+
+TESTS = Path(__file__).parents[2]
+ARDUPILOT = AutopilotOptions(family="ardupilot", ready_after=0.0)
+AS_PX4 = AutopilotOptions(family="px4", ready_after=0.0)
+WAY = [[6.0, 6.0, 4.0], [6.0, 0.0, 3.0]]
+SENDER = mavlink.MAVLink(None, 1, 1)
+OWN = {"FS_GCS_ENABLE": 0.0, "MAV_GCS_SYSID": 255.0, "FS_OPTIONS": 16.0}
+"""What its owner has set, and what is set for a flight."""
+OURS = {"FS_GCS_ENABLE": 1.0, "MAV_GCS_SYSID": 245.0, "FS_OPTIONS": 24.0}
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Wait less for an autopilot that says nothing."""
+    for module, name, seconds in (
+        (parameters, "_TIMEOUT", 0.1),
+        (plans, "_TIMEOUT", 0.1),
+        (plans, "_ITEM_TIMEOUT", 0.02),
+    ):
+        monkeypatch.setattr(module, name, seconds)
+
+
+def values(pair: Pair) -> dict[str, float]:
+    """What is set on the vehicle, of what matters here."""
+    held = pair.autopilot.firmware.parameters.values
+    return {name: held[name] for name in OWN}
+
+
+def mission(autopilot: EmulatedAutopilot) -> list[int]:
+    """Commands of the mission that it holds."""
+    held = autopilot.firmware.plans.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, [])
+    return [item.command for item in held]
+
+
+@contextmanager
+def started(
+    options: AutopilotOptions,
+    **settings: Any,  # noqa: ANN401
+) -> Iterator[tuple[EmulatedAutopilot, MavlinkVehicle]]:
+    """Both ends, not connected yet."""
+    port = free_port()
+    robot = robot_of(port, **settings)
+    vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
+    with EmulatedAutopilot(replace(options, peer=(LOOPBACK, port))) as autopilot:
+        yield autopilot, vehicle
+        vehicle.close()
+
+
+@contextmanager
+def again(pair: Pair, **settings: Any) -> Iterator[MavlinkVehicle]:  # noqa: ANN401
+    """Another process' driver of the same vehicle."""
+    robot = robot_of(int(pair.robot.settings["url"].rpartition(":")[2]), **settings)
+    vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
+    vehicle.connect()
+    try:
+        yield vehicle
+    finally:
+        vehicle.close()
+
+
+def die(pair: Pair) -> None:
+    """As when our process is killed: the wire is cut, nobody says goodbye."""
+    assert pair.vehicle._link is not None
+    pair.vehicle._link.close()
+    pair.vehicle._link = None
+
+
+@pytest.mark.slow
+@pytest.mark.wall_clock
+def test_a_killed_process_leaves_a_vehicle_that_comes_home(state_folder: Path) -> None:
+    """`kill -9` on the way out: it flies back and lands, by the emulator's truth.
+
+    Three vehicles at once: ArduPilot and PX4 straight, and an ArduPilot by a plan, which leads
+    through the place that it has not passed yet.
+    """
+    plan = f"way_home={json.dumps(WAY)}"
+    with ExitStack() as open_:
+        flights = [
+            open_.enter_context(Killed(options, *words))
+            for options, *words in ((ARDUPILOT,), (AS_PX4,), (ARDUPILOT, plan))
+        ]
+        for one in flights:
+            one.kill_away_from_home()
+        for one in flights:
+            wait_for(lambda: not one.autopilot.armed, 60.0)  # noqa: B023 - called at once
+            assert away(one.autopilot) < 1.5
+        straight, px4, planned = (one.furthest_east for one in flights)
+        assert max(straight, px4) < 1.0
+        assert planned > 5.0
+    assert list(state_folder.rglob("*.json")), "what is to be put back is not known any more"
+
+
+class Killed:
+    """A vehicle, and a process that flies it with a fallback."""
+
+    def __init__(self, options: AutopilotOptions, *words: str) -> None:
+        self.autopilot = EmulatedAutopilot(replace(options, peer=(LOOPBACK, free_port())))
+        self.furthest_east = 0.0
+        host, port = self.autopilot.options.peer
+        command = [sys.executable, "-m", "sitl.victim", f"udpin:{host}:{port}"]
+        command += ["fallback=set", "fallback_after=2", *words]
+        self._process = subprocess.Popen(command, cwd=TESTS)
+
+    def __enter__(self) -> Self:
+        self.autopilot.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._process.kill()
+        self._process.wait()
+        self.autopilot.stop()
+
+    def kill_away_from_home(self) -> None:
+        """`kill -9`, as soon as it is 4 m away."""
+        wait_for(lambda: away(self.autopilot) > 4.0, 60.0)
+        self._process.kill()
+        self._process.wait()
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def _watch(self) -> None:
+        while self.autopilot.armed:
+            self.furthest_east = max(self.furthest_east, float(self.autopilot.truth.position[0]))
+            time.sleep(0.1)
+
+
+def away(autopilot: EmulatedAutopilot) -> float:
+    """Metres over ground from where it stood."""
+    return float(np.linalg.norm(autopilot.truth.position[:2]))
+
+
+def test_its_place_in_its_own_mission_is_told() -> None:
+    """As far as it tells it."""
+    with flight(ARDUPILOT, fallback="set", way_home=WAY) as pair:
+        wait_for(lambda: "mission_item" in pair.vehicle.read().extra)
+        assert pair.vehicle.read().extra["mission_item"] == 0.0
+        assert "mission_reached" not in pair.vehicle.read().extra
+        pair.autopilot.inject(mavlink.MAVLink_mission_item_reached_message(3).pack(SENDER))
+        wait_for(lambda: pair.vehicle.read().extra.get("mission_reached") == 3.0)
+
+
+def test_the_owner_gets_everything_back(state_folder: Path) -> None:
+    """While we are connected it would come home; afterwards it is as it was."""
+    with flight(ARDUPILOT, fallback="set") as pair:
+        assert values(pair) == OURS
+        assert pair.vehicle.preflight() == []
+        assert "comes home" in pair.vehicle.capabilities.alone
+        assert list(state_folder.rglob("*.json"))
+    assert values(pair) == OWN
+    assert not list(state_folder.rglob("*.json"))
+
+
+def test_what_is_set_already_is_left_alone(state_folder: Path) -> None:
+    """Nothing is written to a vehicle that comes home by its owner's own settings."""
+    options = AutopilotOptions(
+        family="ardupilot", ready_after=0.0, parameters={**OURS, "FS_GCS_ENABLE": 3.0}
+    )
+    with flight(options, fallback="set") as pair:
+        assert pair.vehicle.preflight() == []
+    assert not pair.heard("PARAM_SET")
+    assert not state_folder.exists()
+
+
+@pytest.mark.parametrize("policy", ["report", "require", "ignore"])
+def test_nothing_is_changed_unasked(policy: str, caplog: pytest.LogCaptureFixture) -> None:
+    """It is told, and with "require" it does not take off; only "set" sets."""
+    with flight(ARDUPILOT, fallback=policy) as pair:
+        reasons = pair.vehicle.preflight()
+        assert any("FS_GCS_ENABLE is 0" in one for one in reasons) is (policy == "require")
+        if policy == "require":
+            with pytest.raises(VehicleError, match="would not come home without us"):
+                pair.vehicle.take_off(2.0)
+            assert not pair.autopilot.armed
+        assert ("would not come home if this process died" in caplog.text) is (policy != "ignore")
+        assert "hovers until a pilot lands it" in pair.vehicle.capabilities.alone
+        pair.vehicle.close()
+        assert not pair.heard("PARAM_SET")
+
+
+def test_after_a_kill_the_next_flight_puts_it_back(
+    state_folder: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """With the values of before the first flight; a flight that sets nothing says what is due."""
+    with flight(ARDUPILOT, fallback="set") as pair:
+        die(pair)
+        caplog.clear()
+        with again(pair, fallback="report") as vehicle:
+            assert vehicle.preflight() == []
+        assert "FS_GCS_ENABLE 0" in caplog.text
+        assert "--restore" in caplog.text
+        assert values(pair) == OURS
+        with again(pair, fallback="set", way_home="retrace"):
+            assert values(pair) == {**OURS, "FS_GCS_ENABLE": 3.0}
+        assert values(pair) == OWN
+        assert not list(state_folder.rglob("*.json"))
+
+
+def test_what_its_owner_sets_meanwhile_stays() -> None:
+    """By a ground station beside us: not our value any more, so not ours to put back."""
+    with flight(ARDUPILOT, fallback="set") as pair:
+        held = pair.autopilot.firmware.parameters.values
+        held["FS_OPTIONS"] = 25.0
+    assert values(pair) == {**OWN, "FS_OPTIONS": 25.0}
+
+
+def test_in_flight_it_stays_set() -> None:
+    """What brings it home is not taken from it before it is home."""
+    with flight(ARDUPILOT, fallback="set") as pair:
+        connection = pair.vehicle.connection
+        connection.commander.give(connection.autopilot.arm(), now=time.monotonic())
+        wait_for(lambda: pair.vehicle.read().armed)
+        pair.vehicle.close()
+        assert values(pair) == OURS
+
+
+def test_older_firmware_has_other_names() -> None:
+    """ArduCopter before 4.7: SYSID_MYGCS, and heights in centimetres."""
+    options = AutopilotOptions(
+        family="ardupilot",
+        parameters={"SYSID_MYGCS": 255.0, "RTL_ALT": 1500.0, "RTL_ALT_FINAL": 200.0},
+    )
+    limits = {"geofence": {"ceiling": 10.0}}
+    with started(options, fallback="set", limits=limits) as (autopilot, vehicle):
+        held = autopilot.firmware.parameters.values
+        for name in ("MAV_GCS_SYSID", "MAV_GCS_SYSID_HI", "RTL_ALT_M", "RTL_ALT_FINAL_M"):
+            held.pop(name)
+        vehicle.connect()
+        changed = held["SYSID_MYGCS"], held["RTL_ALT"], held["RTL_ALT_FINAL"]
+        assert changed == (245.0, 800.0, 0.0)
+    assert (held["SYSID_MYGCS"], held["RTL_ALT"], held["RTL_ALT_FINAL"]) == (255.0, 1500.0, 200.0)
+
+
+KEEPING_AWAY = {
+    "ardupilot": [
+        ("MAV_GCS_SYSID", 255.0, "does not notice our silence"),
+        ("MAV_GCS_SYSID_HI", 255.0, "hide our silence"),
+        ("FS_GCS_TIMEOUT", 30.0, "later than 5 s"),
+        ("FS_GCS_ENABLE", 5.0, "does not come home"),
+        ("FS_OPTIONS", 16.0, "a landing"),
+        ("RTL_ALT_M", 130.0, "above the geofence's ceiling"),
+        ("RTL_ALT_FINAL_M", 2.0, "hover over its home"),
+    ],
+    "px4": [
+        ("COM_OBL_RC_ACT", 5.0, "hovers"),
+        ("COM_OF_LOSS_T", 30.0, "later than 5 s"),
+        ("RTL_RETURN_ALT", 130.0, "above the geofence's ceiling"),
+        ("RTL_LAND_DELAY", -1.0, "hover over its home"),
+    ],
+}
+
+
+@pytest.mark.parametrize("family", ["ardupilot", "px4"])
+def test_each_that_keeps_it_away_is_named(family: str) -> None:
+    """One at a time, with all others as they should be."""
+    good = OURS if family == "ardupilot" else {"COM_OBL_RC_ACT": 3.0}
+    options = AutopilotOptions(family=family, ready_after=0.0, parameters=good)  # type: ignore[arg-type]
+    with flight(options, fallback="require") as pair:
+        assert pair.vehicle.preflight() == []
+        fallback = pair.vehicle.connection.fallback
+        held = pair.autopilot.firmware.parameters.values
+        for name, value, word in KEEPING_AWAY[family]:
+            before, held[name] = held[name], value
+            (reason,) = fallback.examine(120.0, "")
+            assert f"{name} is {value:g}" in reason
+            assert word in reason
+            held[name] = before
+
+
+def test_what_is_judged_goes_with_role_version_and_way() -> None:
+    """PX4 before 1.14 asks another parameter; as its ground station it may hold first."""
+    names = {
+        (role, software): [
+            name
+            for one in PX4().fallback(MavlinkSettings(role=role), 120.0, software)
+            for name in one.names
+        ]
+        for role in ("companion", "ground_station")
+        for software in ("1.13.3", "1.14.0", "")
+    }
+    assert "COM_OBL_ACT" in names["companion", "1.13.3"]
+    assert "COM_OBL_ACT" not in names["companion", "1.14.0"] + names["companion", ""]
+    assert "NAV_DLL_ACT" in names["ground_station", "1.14.0"]
+    assert "NAV_DLL_ACT" not in names["companion", "1.14.0"]
+    for way, value in (("return", 1.0), ("retrace", 3.0), ([(1.0, 2.0, 3.0)], 6.0)):
+        settings = MavlinkSettings.model_validate({"way_home": way})
+        *_, acts = ArduPilot().fallback(settings, 120.0, "")
+        assert acts.value == value
+        fitting = [one for one in range(8) if acts.fits(float(one))]
+        assert fitting == ([1, 3, 6] if way == "return" else [value])
+
+
+def test_the_way_home_takes_the_owners_mission_for_a_flight() -> None:
+    """Their own comes back, item by item."""
+    own = [
+        MissionItem(16, (0.0, 0.0, 0.0, 0.0), 1, 2, 0.0, mavlink.MAV_FRAME_GLOBAL),
+        MissionItem(mavlink.MAV_CMD_NAV_TAKEOFF, (1.5, 0.0, 0.0, 0.0), 3, 4, 12.5),
+    ]
+    with flight(ARDUPILOT, fallback="ignore") as pair:
+        pair.vehicle.upload_mission(own)
+        pair.vehicle.close()
+        with again(pair, fallback="set", way_home=WAY):
+            assert mission(pair.autopilot) == [16, 188, 16, 16, 21]
+        with again(pair, fallback="ignore") as vehicle:
+            assert vehicle.download_mission() == own
+
+
+class Faulty(PlanStore):
+    """Takes plans in the wrong way."""
+
+    def __init__(self, fault: str, autopilot: EmulatedAutopilot) -> None:
+        super().__init__()
+        self._fault = fault
+        self._autopilot = autopilot
+
+    def handle(self, message: Any) -> list[Any]:  # noqa: ANN401 - pymavlink has no types
+        """The answers, one of them false."""
+        kind = message.get_type()
+        uploads = kind == "MISSION_ITEM_INT"
+        if self._fault == "stalls" and uploads and message.seq == 2:
+            return []
+        if self._fault == "vanishes" and uploads and message.seq == 2:
+            self._autopilot.cut()
+            return []
+        if self._fault == "refuses" and uploads and message.command == 188:
+            peer = (message.get_srcSystem(), message.get_srcComponent())
+            unsupported = mavlink.MAV_MISSION_UNSUPPORTED
+            return [mavlink.MAVLink_mission_ack_message(*peer, unsupported, message.mission_type)]
+        if self._fault == "moves" and uploads and message.seq == 2:
+            message.x += 100
+        if self._fault == "shortens" and kind == "MISSION_ITEM_INT" and message.seq == 4:
+            answers = super().handle(message)
+            self.plans[message.mission_type].pop()
+            return answers
+        return super().handle(message)
+
+
+@pytest.mark.usefixtures("impatient")
+@pytest.mark.parametrize(
+    ("fault", "word"),
+    [
+        ("refuses", "does not know this command.*way_home.*return"),
+        ("stalls", "stopped answering while taking the mission"),
+        ("moves", "holds another way home than ours: item 2"),
+        ("shortens", "4 items instead of 5"),
+        ("vanishes", "stopped answering while taking the mission.*is not put back yet"),
+    ],
+)
+def test_a_way_home_that_is_not_there_is_no_fallback(
+    fault: str, word: str, state_folder: Path
+) -> None:
+    """The connection fails, so that nothing takes off, and the vehicle is as it was."""
+    with started(ARDUPILOT, fallback="set", way_home=WAY) as (autopilot, vehicle):
+        autopilot.firmware.plans = store = Faulty(fault, autopilot)
+        with pytest.raises(VehicleError, match=f"(?s){word}"):
+            vehicle.connect()
+        assert not vehicle.connected
+        assert autopilot.firmware.motions == []
+        held = autopilot.firmware.parameters.values
+        assert {name: held[name] for name in OWN} == OWN
+        assert bool(list(state_folder.rglob("*.json"))) is (fault == "vanishes")
+        if fault != "vanishes":
+            assert store.plans.get(mavlink.MAV_MISSION_TYPE_MISSION, []) == []
+
+
+@pytest.mark.parametrize(
+    ("way", "word"),
+    [
+        ([(0.0, 30.0, 3.0)], r"way_home.0: .* outside the geofence"),
+        ([(0.0, 5.0, 300.0)], r"way_home.0: .* above the ceiling"),
+        ([(8.0, 8.0, 3.0), (-8.0, 8.0, 3.0)], r"way_home.0: .*crosses a no-fly zone"),
+    ],
+)
+def test_a_way_home_keeps_to_the_geofence(way: list[tuple[float, float, float]], word: str) -> None:
+    """Its places and the legs between them, before anything of it is uploaded."""
+    fence = {
+        "polygon": [[-10, -10], [10, -10], [10, 10], [-10, 10]],
+        "no_fly": [[[-2, 7], [2, 7], [2, 9], [-2, 9]]],
+        "ceiling": 50,
+    }
+    robot = robot_of(1, limits={"geofence": fence}, start=(0.0, 0.0, 1.0))
+    origin = GeodeticOrigin(47.0, 8.0)
+    with pytest.raises(VehicleError, match=word):
+        way_home_items(robot, way, origin)
+    *_, place, landing = way_home_items(robot, [(5.0, 5.0, 4.0)], origin)
+    assert (place.z, landing.z) == (3.0, 0.0), "heights are above where it starts"
+    assert (landing.x, landing.y) == (470_000_000, 80_000_000)
+
+
+def test_px4_flies_no_way_home_of_ours() -> None:
+    """Its mission return goes by the mission's progress: said, nothing is changed."""
+    with (
+        started(AS_PX4, fallback="set", way_home="retrace") as (_, vehicle),
+        pytest.raises(VehicleError, match=r'PX4 cannot fly this settings.way_home.*"return"'),
+    ):
+        vehicle.connect()
+
+
+@pytest.mark.usefixtures("impatient")
+def test_a_parameter_that_is_not_told_is_no_fallback() -> None:
+    """Unknown is not good, and nothing is set half."""
+    with started(ARDUPILOT, fallback="set") as (autopilot, vehicle):
+        autopilot.firmware.parameters.values.pop("FS_GCS_ENABLE")
+        with pytest.raises(VehicleError, match="does not tell FS_GCS_ENABLE"):
+            vehicle.connect()
+        held = autopilot.firmware.parameters.values
+        assert held["MAV_GCS_SYSID"] == 255.0
+
+
+def test_a_journal_that_cannot_be_read_stops_it(state_folder: Path) -> None:
+    """Rather than to forget what the vehicle was like."""
+    with flight(ARDUPILOT, fallback="set") as pair:
+        die(pair)
+        (file,) = state_folder.rglob("*.json")
+        file.write_text('{"parameters": {"FS_')
+        port = int(pair.robot.settings["url"].rpartition(":")[2])
+        robot = robot_of(port, fallback="set")
+        vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
+        with pytest.raises(VehicleError, match="cannot be read: compare its parameters"):
+            vehicle.connect()
+
+
+def test_a_journal_that_cannot_be_written_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """First it is kept, then it is changed."""
+
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(journal, "write_private", full)
+    with started(ARDUPILOT, fallback="set") as (autopilot, vehicle):
+        with pytest.raises(VehicleError, match=r"so nothing is.*XDG_STATE_HOME"):
+            vehicle.connect()
+        held = autopilot.firmware.parameters.values
+        assert {name: held[name] for name in OWN} == OWN
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [{"way_home": []}, {"way_home": "loiter"}, {"fallback_after": 1}, {"fallback": "on"}],
+)
+def test_settings_of_a_fallback_are_checked(settings: dict[str, object]) -> None:
+    """By name, before anything is connected."""
+    robot = robot_of(1, **settings)
+    with pytest.raises(ConfigError, match=next(iter(settings))):
+        MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))

@@ -1,0 +1,205 @@
+"""The autopilot's own logs: listed, fetched whole or not at all, on the ground."""
+
+from __future__ import annotations
+
+import json
+import random
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mavlink_flights import LOOPBACK, Pair, flight, free_port, wait_for
+
+from aerodaas.cli.app import main
+from aerodaas.drivers.mavlink.microservices import logs as module
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.testing.channel import Impairment
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.vehicle_log import LogEntry
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
+from tools.mavlink_vehicle.store import LogStore
+
+DATAFLASH = b"\xa3\x95\x80" + random.Random(1).randbytes(100_000)
+ULOG = b"ULog\x01\x12\x35" + random.Random(2).randbytes(5_000)
+BEGAN = 1_800_000_000.0
+ARDUPILOT = AutopilotOptions(family="ardupilot", ready_after=0.0)
+
+
+@pytest.fixture(scope="module")
+def connected() -> Iterator[Pair]:
+    """A vehicle on the ground; little patience with its silence."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "_TIMEOUT", 0.2)
+        with flight(ARDUPILOT, fallback="ignore") as flown:
+            yield flown
+
+
+@pytest.fixture
+def pair(connected: Pair) -> Pair:
+    """The same with two logs."""
+    connected.autopilot.spoil(up=Impairment(), down=Impairment())
+    connected.autopilot.firmware.logs = LogStore()
+    connected.autopilot.firmware.logs.logs = {1: DATAFLASH[:90], 2: DATAFLASH}
+    return connected
+
+
+def test_the_list(pair: Pair) -> None:
+    """Numbers, sizes and times; of none it is empty."""
+    assert pair.vehicle.logs() == [LogEntry(1, 90, BEGAN), LogEntry(2, 100_003, BEGAN)]
+    pair.autopilot.firmware.logs.logs = {}
+    assert pair.vehicle.logs() == []
+
+
+def test_a_log_is_fetched_whole(pair: Pair, tmp_path: Path) -> None:
+    """Byte by byte, in a file named after its number and time; progress is told."""
+    told: list[tuple[int, int]] = []
+    log = pair.vehicle.logs()[1]
+    file = pair.vehicle.fetch_log(log, tmp_path / "new", lambda *done: told.append(done))
+    assert file.name == "log-2-20270115-080000.bin"
+    assert file.read_bytes() == DATAFLASH
+    assert told == [(36_000, 100_003), (72_000, 100_003), (100_003, 100_003)]
+    wait_for(lambda: bool(pair.heard("LOG_REQUEST_END")))
+
+
+def test_px4_has_its_own_format(tmp_path: Path) -> None:
+    """ULog, numbered from zero."""
+    with flight(fallback="ignore") as pair:
+        pair.autopilot.firmware.logs.logs = {0: ULOG}
+        (log,) = pair.vehicle.logs()
+        file = pair.vehicle.fetch_log(log, tmp_path)
+    assert file.suffix == ".ulg"
+    assert file.read_bytes() == ULOG
+
+
+def test_lost_packets_are_asked_for_again(pair: Pair, tmp_path: Path) -> None:
+    """A tenth of them, both ways."""
+    bad = Impairment(loss=0.1)
+    pair.autopilot.spoil(up=bad, down=bad)
+    log = LogEntry(2, len(DATAFLASH), BEGAN)
+    assert pair.vehicle.fetch_log(log, tmp_path).read_bytes() == DATAFLASH
+
+
+class Faulty(LogStore):
+    """Answers through `spoil`."""
+
+    def __init__(self, logs: dict[int, bytes], spoil: Callable[[Any], Any]) -> None:
+        super().__init__()
+        self.logs = logs
+        self._spoil = spoil
+
+    def handle(self, message: Any) -> list[Any]:  # noqa: ANN401 - pymavlink has no types
+        """The answers that are left."""
+        answers = [self._spoil(answer) for answer in super().handle(message)]
+        return [answer for answer in answers if answer is not None]
+
+
+def stalls(message: Any) -> Any:  # noqa: ANN401
+    """Nothing after a while."""
+    return message if getattr(message, "ofs", 0) < 40_000 else None
+
+
+def ends(message: Any) -> Any:  # noqa: ANN401
+    """Shorter than it was said to be."""
+    if message.get_type() != "LOG_DATA" or message.ofs != 900:
+        return message
+    return mavlink.MAVLink_log_data_message(message.id, 900, 10, message.data)
+
+
+def forgets(message: Any) -> Any:  # noqa: ANN401
+    """The second one of the list."""
+    return None if message.get_type() == "LOG_ENTRY" and message.id == 2 else message
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (stalls, "stopped sending log 2 at byte 40050 of 100003"),
+        (ends, "ends at byte 910, and was said to have 100003"),
+        (forgets, "told 1 of its 2 logs only"),
+        (lambda _: None, "does not answer when asked for its logs"),
+    ],
+)
+def test_what_goes_wrong_is_said_and_leaves_no_file(
+    pair: Pair, tmp_path: Path, spoil: Callable[[Any], Any], said: str
+) -> None:
+    """Neither half a log, nor an endless wait."""
+    pair.autopilot.firmware.logs = Faulty({1: DATAFLASH[:90], 2: DATAFLASH}, spoil)
+    with pytest.raises(VehicleError, match=said):
+        pair.vehicle.fetch_log(pair.vehicle.logs()[1], tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_damaged_log_is_told_and_kept(pair: Pair, tmp_path: Path) -> None:
+    """Somebody may mend it."""
+    pair.autopilot.firmware.logs.logs = {1: b"\xff" * 500}
+    with pytest.raises(VehicleError, match="is no log of ArduPilot"):
+        pair.vehicle.fetch_log(pair.vehicle.logs()[0], tmp_path)
+    (file,) = tmp_path.iterdir()
+    assert file.read_bytes() == b"\xff" * 500
+
+
+@pytest.mark.parametrize("size", [0, 5 << 30])
+def test_a_size_that_cannot_be_is_refused(pair: Pair, tmp_path: Path, size: int) -> None:
+    """Before the disk is full."""
+    with pytest.raises(VehicleError, match="none to be fetched"):
+        pair.vehicle.fetch_log(LogEntry(1, size, None), tmp_path)
+
+
+def test_a_folder_that_cannot_be_written_is_named(pair: Pair, tmp_path: Path) -> None:
+    """With the system's own reason."""
+    (tmp_path / "file").touch()
+    with pytest.raises(VehicleError, match=r"cannot write .*file"):
+        pair.vehicle.fetch_log(LogEntry(1, 90, None), tmp_path / "file")
+
+
+def test_not_in_flight(pair: Pair, tmp_path: Path) -> None:
+    """Setpoints and telemetry need the link."""
+    connection = pair.vehicle.connection
+    connection.commander.give(connection.autopilot.arm(), now=time.monotonic())
+    wait_for(lambda: pair.vehicle.read().armed)
+    for deed in (
+        pair.vehicle.logs,
+        lambda: pair.vehicle.fetch_log(LogEntry(1, 90, None), tmp_path),
+    ):
+        with pytest.raises(VehicleError, match="in flight"):
+            deed()
+    connection.commander.give(connection.autopilot.disarm(), now=time.monotonic())
+    wait_for(lambda: not pair.vehicle.read().armed)
+
+
+def test_on_the_command_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A list, the newest one, and a number that there is not."""
+    port = free_port()
+    settings = {"url": f"udpin:{LOOPBACK}:{port}", "fallback": "ignore", "failsafes": "ignore"}
+    drone = {"id": "drone", "driver": "mavlink", "settings": settings}
+    robots = [drone, {"id": "other"}]
+    (tmp_path / "environment.json").write_text(json.dumps({"robots": robots}))
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["aerodaas", "logs", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        told = capsys.readouterr()
+        return int(ended.value.code or 0), told.out + told.err
+
+    options = AutopilotOptions(family="ardupilot", peer=(LOOPBACK, port))
+    with EmulatedAutopilot(options) as autopilot:
+        autopilot.firmware.logs.logs = {1: DATAFLASH[:90], 2: DATAFLASH}
+        code, told = run("drone")
+        assert code == 0, told
+        assert "2027-01-15 08:00:00 UTC" in told
+        code, told = run("drone", "--latest", "--to", "got", "--json")
+        (file,) = json.loads(told)
+        assert (code, Path(file).read_bytes()) == (0, DATAFLASH)
+        code, told = run("drone", "7")
+        assert code != 0
+        assert "has no log 7; it has 1, 2" in told
+    code, told = run("other")
+    assert code != 0
+    assert "no logs can be fetched by the driver simulated" in told
