@@ -7,9 +7,10 @@ import math
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 
@@ -65,6 +66,10 @@ class MavlinkVehicle:
     """
 
     settings_model = MavlinkSettings
+    observing: ClassVar[Mapping[str, str]] = {
+        "failsafes": "ignore", "fallback": "ignore", "fence": "off",
+    }  # fmt: skip
+    """Settings with which a connection changes nothing at the vehicle, for who only watches it."""
 
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
         """Prepare for `robot`; nothing is sent or opened."""

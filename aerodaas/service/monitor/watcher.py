@@ -27,9 +27,10 @@ _PAUSE, _LONGEST_PAUSE = 1.0, 10.0
 class VehicleWatcher:
     """Holds one vehicle while it is wanted, in a thread of its own.
 
-    It calls `connect`, `read`, `preflight` and `close` of the driver and nothing else. A driver
-    lands what it has flown when it is closed, and some land what is in the air, whoever flies it:
-    so a vehicle that is armed is not closed before it has been disarmed.
+    It calls `connect`, `read`, `preflight` and `close` of the driver and nothing else, with the
+    settings by which the driver changes nothing at the vehicle (`observing`, if it has any). A
+    driver lands what it has flown when it is closed, and some land what is in the air, whoever
+    flies it: so a vehicle that is armed is not closed before it has been disarmed.
     """
 
     def __init__(
@@ -79,9 +80,8 @@ class VehicleWatcher:
             fresh = VehicleNews(held=True, link=LinkState.CONNECTING, since=time.time())
             self._tell(**dict(fresh))
         try:
-            vehicle: Vehicle = load_plugin("drivers", self._robot.driver)(
-                self._robot, self._environment
-            )
+            driver = load_plugin("drivers", self._robot.driver)
+            vehicle: Vehicle = driver(self._observed(driver), self._environment)
             vehicle.connect(_CONNECT_SECONDS)
             try:
                 reached = True
@@ -99,6 +99,11 @@ class VehicleWatcher:
         else:
             self._tell(link=LinkState.UNWATCHED, since=time.time(), held=False, reason="")
         return reached
+
+    def _observed(self, driver: object) -> RobotConfig:
+        """The robot, by settings with which its driver changes nothing at the vehicle."""
+        settings = {**self._robot.settings, **getattr(driver, "observing", {})}
+        return self._robot.model_copy(update={"settings": settings})
 
     def _watch(self, vehicle: Vehicle) -> str:
         """Read until it is wanted no more, or silent; returns why it is lost."""

@@ -209,6 +209,20 @@ def test_nothing_is_changed_unasked(policy: str, caplog: pytest.LogCaptureFixtur
         assert not pair.heard("PARAM_SET")
 
 
+def test_who_only_watches_changes_nothing(state_folder: Path) -> None:
+    """By the driver's own settings for that, over those of a flight that sets all there is."""
+    wanted = {"fallback": "set", "failsafes": "set", "fence": "land", "way_home": WAY}
+    with started(ARDUPILOT, **{**wanted, **MavlinkVehicle.observing}) as (autopilot, vehicle):
+        held = autopilot.firmware.parameters.values
+        before = dict(held)
+        vehicle.connect()
+        assert held == before
+        assert not any(autopilot.firmware.plans.plans.values())
+        vehicle.close()
+        assert held == before
+    assert not any(state_folder.rglob("*.json"))
+
+
 def test_after_a_kill_the_next_flight_puts_it_back(
     state_folder: Path, caplog: pytest.LogCaptureFixture
 ) -> None:

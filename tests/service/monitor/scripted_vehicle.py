@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,6 +26,7 @@ class Script:
     objections: list[str] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
     sensors: list[Any] = field(default_factory=list)
+    settings: dict[str, Any] = field(default_factory=dict)
 
 
 SCRIPT = Script()
@@ -35,8 +36,11 @@ SCRIPT = Script()
 class ScriptedVehicle:
     """Implements `Vehicle`, or as much as a monitor may call; anything else fails."""
 
+    observing: ClassVar[dict[str, str]] = {"fence": "off"}
+
     def __init__(self, robot: Any, environment: Any) -> None:  # noqa: ANN401, ARG002
         SCRIPT.sensors = list(robot.sensors)
+        SCRIPT.settings = dict(robot.settings)
 
     def __getattribute__(self, name: str) -> Any:  # noqa: ANN401
         if not name.startswith("_"):

@@ -65,6 +65,20 @@ def test_it_reads_and_commands_nothing(watcher: VehicleWatcher, script: Script) 
     assert script.sensors == []
 
 
+def test_connecting_changes_nothing_at_the_vehicle(script: Script) -> None:
+    """Whatever a flight would set there: the driver says by which settings it leaves all as it is."""
+    fleet = fleet_of("one", driver="scripted_vehicle:ScriptedVehicle")
+    fleet["robots"][0]["settings"] = {"fence": "land", "url": "somewhere"}
+    config = EnvironmentConfig.model_validate(fleet)
+    watcher = VehicleWatcher(config.robots[0], config, lambda: None)
+    watcher.start()
+    watcher.want(wanted=True)
+    until(lambda: watcher.news.link is LinkState.CONNECTED)
+    watcher.want(wanted=False)
+    until(lambda: not watcher.news.held)
+    assert script.settings == {"fence": "off", "url": "somewhere"}
+
+
 def test_one_that_is_unplugged_is_lost_and_found_again(
     watcher: VehicleWatcher, script: Script
 ) -> None:
