@@ -117,8 +117,12 @@ def test_geodetic_coordinates_are_those_of_a_library(
 ) -> None:
     """At any place of the earth, poles included, to a hundredth of a millimetre."""
     latitude, longitude, altitude = origin.to_geodetic(position)
-    expected = pymap3d.enu2geodetic(*position, origin.latitude, origin.longitude, origin.altitude)
-    apart = pymap3d.geodetic2enu(latitude, longitude, altitude, *map(float, expected))
+    east, north, up = map(float, position)
+    lat, lon, alt = map(
+        float,
+        pymap3d.enu2geodetic(east, north, up, origin.latitude, origin.longitude, origin.altitude),
+    )
+    apart = pymap3d.geodetic2enu(latitude, longitude, altitude, lat, lon, alt)
     assert math.hypot(*apart) < 1e-5
 
 

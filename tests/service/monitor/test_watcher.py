@@ -30,14 +30,16 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Script:
 
 
 @pytest.fixture
-def watcher(script: Script) -> Iterator[VehicleWatcher]:  # noqa: ARG001 - the vehicle's
+def watcher(script: Script) -> Iterator[VehicleWatcher]:
     """A watcher of a robot with a camera."""
     fleet = fleet_of("one", driver="scripted_vehicle:ScriptedVehicle")
     config = EnvironmentConfig.model_validate(fleet)
     made = VehicleWatcher(config.robots[0], config, lambda: None)
     made.start()
     yield made
+    script.armed, script.breaks = False, None
     made.want(wanted=False)
+    until(lambda: not made.news.held)
 
 
 def until(condition: Callable[[], bool], seconds: float = 10.0) -> None:
@@ -66,7 +68,7 @@ def test_it_reads_and_commands_nothing(watcher: VehicleWatcher, script: Script) 
 
 
 def test_connecting_changes_nothing_at_the_vehicle(script: Script) -> None:
-    """Whatever a flight would set there: the driver says by which settings it leaves all as it is."""
+    """Whatever a flight would set there: the driver says by which settings it sets nothing."""
     fleet = fleet_of("one", driver="scripted_vehicle:ScriptedVehicle")
     fleet["robots"][0]["settings"] = {"fence": "land", "url": "somewhere"}
     config = EnvironmentConfig.model_validate(fleet)
