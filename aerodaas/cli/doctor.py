@@ -25,7 +25,6 @@ __all__ = ["examine", "show_findings"]
 
 _PACKAGES = {
     "ray": "ray",
-    "iceoryx2": "iceoryx2",
     "panda3d": "panda3d.core",
     "onnxruntime": "onnxruntime",
     "opencv-python-headless": "cv2",
@@ -36,7 +35,6 @@ _PACKAGES = {
     "pyvrp": "pyvrp",
 }
 _REMEDIES = {
-    "iceoryx2": "pip install 'iceoryx2==0.10.*', which builds it with Rust where it has no wheel",
     "pyvrp": "for the optimal scheduler and fleets, use Python 3.11 or newer",
 }
 _MEMORY_NEEDED = 1.0

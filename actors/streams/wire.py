@@ -1,0 +1,79 @@
+"""What publishers and subscribers of one node say to each other.
+
+A connection has two sockets, both of whole packets (`SOCK_SEQPACKET`), in order and reliable:
+
+- the queue, on which messages go to the reader. The publisher keeps both its ends: from the far one
+  it takes the oldest message back, if the reader has not, when the queue is full. The kernel gives
+  each packet to one of them.
+- the control connection, which ends when either process does. The publisher first sends the name
+  of the stream with the far end of the queue, and the file of its slots before it first uses one;
+  the reader gives slots back.
+
+A packet of the queue is a message with `INLINE` at its end, or a slot and `IN_SLOT`.
+"""
+
+from __future__ import annotations
+
+import array
+import socket
+import struct
+
+__all__ = [
+    "INLINE",
+    "IN_SLOT",
+    "LEAVING",
+    "LONGEST",
+    "LONGEST_INLINE",
+    "RELEASE",
+    "SLOT",
+    "packet",
+    "receive_descriptor",
+    "send_descriptor",
+]
+
+LONGEST_INLINE = 3072
+"""Bytes up to which a message travels in its packet: the kernel takes 4 KiB for it, and 32 of them
+fit into a socket's buffer of the usual 208 KiB."""
+INLINE = b"\0"
+IN_SLOT = b"\1"
+SLOT = struct.Struct("<QQQ")
+"""Offset and capacity of a slot, size of the message in it."""
+LONGEST = LONGEST_INLINE + 64
+RELEASE = struct.Struct("<Q")
+"""Offset of a slot that the reader no longer holds."""
+LEAVING = 2**64 - 1
+"""In place of an offset: the reader reads no more, and gives back later what it holds."""
+_LONGEST_NAME = 1024
+
+
+def packet(connection: socket.socket, longest: int) -> bytes | None:
+    """Return the next packet, empty at the connection's end; None if there is none yet."""
+    try:
+        return connection.recv(longest)
+    except BlockingIOError:
+        return None
+    except OSError:  # reset by the other end
+        return b""
+
+
+def send_descriptor(connection: socket.socket, name: str, descriptor: int) -> None:
+    """Send an open file or socket. Raises OSError if the other end is gone or takes no more."""
+    rights = array.array("i", [descriptor])
+    connection.sendmsg(
+        [name.encode()], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, rights)], socket.MSG_NOSIGNAL
+    )
+
+
+def receive_descriptor(connection: socket.socket) -> tuple[str, int] | None:
+    """Return what `send_descriptor` sent, as an open descriptor; None if nothing of the kind."""
+    try:
+        name, descriptors, _, _ = socket.recv_fds(
+            connection, _LONGEST_NAME, 2, socket.MSG_CMSG_CLOEXEC
+        )
+    except OSError:
+        return None
+    if len(descriptors) != 1:
+        for one in descriptors:
+            socket.close(one)
+        return None
+    return name.decode(errors="replace"), descriptors[0]
