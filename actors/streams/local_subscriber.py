@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import select
 import socket
 import struct
@@ -230,7 +231,12 @@ class LocalSubscriber:
             control.close()
             return
         stream, descriptor = sent
-        queue = socket.socket(fileno=descriptor)
+        try:
+            queue = socket.socket(fileno=descriptor)
+        except OSError:  # not a socket
+            os.close(descriptor)
+            control.close()
+            return
         if stream not in self._depths:
             queue.close()
             control.close()

@@ -129,7 +129,7 @@ class Arrivals:
         """Connect to the subscribers that have come since the last call."""
         self.waiting = False
         try:
-            names = {path.name for path in self._folder.iterdir() if path.suffix != _BELL}
+            names = {path.name for path in self._folder.iterdir() if path.suffix[1:].isdigit()}
         except OSError:  # no descriptor left
             self.waiting = True
             return
@@ -137,7 +137,7 @@ class Arrivals:
         for name in sorted(names - self._known):
             connection = self._connect(self._folder / name)
             if connection is not None:
-                yield Arrival(connection, int(name.rpartition(".")[2]), name)
+                yield Arrival(connection, int(Path(name).suffix[1:]), name)
 
     def close(self) -> None:
         """Look no more."""

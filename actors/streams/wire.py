@@ -49,7 +49,7 @@ _LONGEST_NAME = 1024
 def packet(connection: socket.socket, longest: int) -> bytes | None:
     """Return the next packet, empty at the connection's end; None if there is none yet."""
     try:
-        return connection.recv(longest)
+        return connection.recv(longest, socket.MSG_DONTWAIT)
     except BlockingIOError:
         return None
     except OSError:  # reset by the other end
