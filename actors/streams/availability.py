@@ -7,6 +7,7 @@ import sys
 
 from aerodaas.actors.streams.rendezvous import streams_folder
 from aerodaas.actors.streams.slots import SlotPool
+from aerodaas.actors.streams.wire import queue, waiting_bytes
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["shared_memory_available", "shared_memory_obstacle"]
@@ -25,8 +26,13 @@ def shared_memory_obstacle() -> str:
     try:
         streams_folder()
         SlotPool().close()
+        near, far = queue()
+        near.send(b"counted")
+        counted = waiting_bytes(far) == len(b"counted")
+        near.close()
+        far.close()
     except AeroDaaSError as error:
         return str(error)
     except OSError as error:
         return f"this system grants no shared memory: {error.strerror}"
-    return ""
+    return "" if counted else "this system does not count what waits in a Unix socket"

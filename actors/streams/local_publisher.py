@@ -8,11 +8,8 @@ messages; a message that no longer fits takes the place of the oldest.
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import select
 import socket
-import sys
-import termios
 import threading
 from collections import deque
 
@@ -28,7 +25,9 @@ from aerodaas.actors.streams.wire import (
     RELEASE,
     SLOT,
     packet,
+    queue,
     send_descriptor,
+    waiting_bytes,
 )
 
 __all__ = ["MAX_BORROWED", "MAX_DEPTH", "LocalPublisher"]
@@ -56,9 +55,7 @@ class _ReaderLink:
         self._knows_pool = False
         self._unread: deque[int] = deque()
         """Sizes of the packets in the queue, oldest first; the reader may have taken some."""
-        self._near, self._far = socket.socketpair(
-            socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK
-        )
+        self._near, self._far = queue()
         try:
             send_descriptor(self.control, stream, self._far.fileno())
         except OSError:
@@ -135,9 +132,7 @@ class _ReaderLink:
         self._far.close()
 
     def _forget_read(self) -> None:
-        left = bytearray(4)
-        fcntl.ioctl(self._far, termios.FIONREAD, left)
-        surplus = sum(self._unread) - int.from_bytes(left, sys.byteorder)
+        surplus = sum(self._unread) - waiting_bytes(self._far)
         while surplus > 0:
             surplus -= self._unread.popleft()
 

@@ -15,8 +15,11 @@ A packet of the queue is a message with `INLINE` at its end, or a slot and `IN_S
 from __future__ import annotations
 
 import array
+import fcntl
 import socket
 import struct
+import sys
+import termios
 
 __all__ = [
     "INLINE",
@@ -27,8 +30,10 @@ __all__ = [
     "RELEASE",
     "SLOT",
     "packet",
+    "queue",
     "receive_descriptor",
     "send_descriptor",
+    "waiting_bytes",
 ]
 
 LONGEST_INLINE = 3072
@@ -44,6 +49,18 @@ RELEASE = struct.Struct("<Q")
 LEAVING = 2**64 - 1
 """In place of an offset: the reader reads no more, and gives back later what it holds."""
 _LONGEST_NAME = 1024
+
+
+def queue() -> tuple[socket.socket, socket.socket]:
+    """Return the near and the far end of a new queue. Raises OSError without descriptors."""
+    return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
+
+
+def waiting_bytes(far: socket.socket) -> int:
+    """Return how many bytes of a queue have not been read at its far end."""
+    count = bytearray(4)
+    fcntl.ioctl(far, termios.FIONREAD, count)
+    return int.from_bytes(count, sys.byteorder)
 
 
 def packet(connection: socket.socket, longest: int) -> bytes | None:

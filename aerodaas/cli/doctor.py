@@ -151,7 +151,7 @@ def _streams() -> Iterator[Finding]:
 
     obstacle = shared_memory_obstacle()
     if not obstacle:
-        yield Finding("streams", "zero-copy in shared memory between actors of this host")
+        yield Finding("streams", "sockets and shared memory between actors of this host")
     else:
         text = "shared memory not available; frames go through Ray's object store"
         yield Finding("streams", text, ok=False, remedy=obstacle)
