@@ -49,36 +49,34 @@ def _publish(scope: str, kind: str, count: int) -> float:
         item: Any = Frame(header, image) if kind == "frame" else {"value": float(number)}
         publisher.measure(item, header, time.monotonic_ns())
     used = _processor() - began
+    publisher.measure(None, Header(0, 0, "the end"), 0)
     publisher.close()
     return used / count
 
 
-def _read(scope: str, kind: str, count: int) -> tuple[list[float], float]:
+def _read(scope: str) -> tuple[list[float], float]:
     """Read the messages; returns their latencies in seconds, and seconds of processor for each."""
     subscriber = Subscriber(scope, {"s": 1})
     print("ready", flush=True)
     latencies: list[float] = []
     began = 0.0
-    while len(latencies) < count // 2 or subscriber._local is None or subscriber._local._links:  # noqa: SLF001
-        for message in subscriber.receive(0.2):
-            if kind == "frame":
+    while True:
+        for message in subscriber.receive(1.0):
+            if message.item is None:
+                return latencies, (_processor() - began) / len(latencies)
+            if isinstance(message.item, Frame):
                 read_frame(message.item.image)
             if message.seq == _WARM_UP:
                 began = _processor()
             if message.seq >= _WARM_UP:
                 latencies.append((time.monotonic_ns() - message.captured) / 1e9)
             del message
-    used = _processor() - began
-    subscriber.close()
-    return latencies, used / len(latencies)
 
 
 def _measure(kind: str, count: int) -> dict[str, float]:
     scope = f"hop/{uuid.uuid4().hex[:8]}"
-    command = [sys.executable, str(Path(__file__)), "--kind", kind, "--scope", scope]
-    with subprocess.Popen(  # noqa: S603 - our own command
-        [*command, "--count", str(count)], stdout=subprocess.PIPE, text=True
-    ) as reader:
+    command = [sys.executable, str(Path(__file__)), "--scope", scope]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as reader:  # noqa: S603 - our own
         assert reader.stdout is not None  # noqa: S101 - asked for
         reader.stdout.readline()
         publishing = _publish(scope, kind, count)
@@ -95,7 +93,6 @@ def main(
     count: Annotated[int, typer.Option(min=100, help="Messages of each kind in a round.")] = 200,
     rounds: Annotated[int, typer.Option(min=1, help="Rounds of each kind, in turn.")] = 3,
     json_path: Annotated[Path | None, typer.Option("--json", help="Write the figures.")] = None,
-    kind: Annotated[str, typer.Option(hidden=True)] = "",
     scope: Annotated[str, typer.Option(hidden=True)] = "",
 ) -> None:
     """Measure one hop: latency, and processor time at both ends, a message.
@@ -103,7 +100,7 @@ def main(
     python benchmarks/hop.py --count 200 --rounds 3
     """
     if scope:
-        print(json.dumps(_read(scope, kind, count)), flush=True)
+        print(json.dumps(_read(scope)), flush=True)
         return
     report = Report(f"one hop, frames of {WIDTH}x{HEIGHT} and small messages", UNITS, packages=())
     found = [[_measure(each, count) for each in _KINDS] for _ in range(rounds)]
