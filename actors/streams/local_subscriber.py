@@ -142,7 +142,7 @@ class LocalSubscriber:
         """
         until = time.monotonic() + timeout if timeout > 0 else 0.0
         self._hear(select.EPOLLIN)
-        found: dict[str, deque[memoryview]] = {}
+        found: dict[_PublisherLink, deque[memoryview]] = {}
         woken, count = False, 0
         while count < _MOST_AT_ONCE:
             ready = self._ready(0.0 if found or woken else until)
@@ -158,7 +158,18 @@ class LocalSubscriber:
                     self._introduce(self._unnamed.pop(descriptor))
                 elif descriptor == self._listener.socket.fileno():
                     self._accept()
-        return found
+        return self._by_stream(found)
+
+    def _by_stream(
+        self, found: dict[_PublisherLink, deque[memoryview]]
+    ) -> dict[str, deque[memoryview]]:
+        """Put all of a publisher that has ended before what its successor has sent."""
+        streams: dict[str, deque[memoryview]] = {}
+        for link, messages in found.items():
+            if link.stream not in streams:
+                streams[link.stream] = deque(maxlen=self._depths[link.stream])
+            streams[link.stream] += messages
+        return streams
 
     def wake(self) -> None:
         """Make a waiting `receive` return; thread-safe."""
@@ -189,7 +200,7 @@ class LocalSubscriber:
         time.sleep(max(0.0, until - time.monotonic()))
         return self._poll.poll(0)
 
-    def _take(self, link: _PublisherLink, found: dict[str, deque[memoryview]]) -> int:
+    def _take(self, link: _PublisherLink, found: dict[_PublisherLink, deque[memoryview]]) -> int:
         try:
             data = link.receive()
         except (ValueError, OSError, struct.error):  # no publisher of ours
@@ -201,9 +212,9 @@ class LocalSubscriber:
             self._poll.unregister(link.queue)
             link.close()
             return 0
-        if link.stream not in found:
-            found[link.stream] = deque(maxlen=self._depths[link.stream])
-        found[link.stream].append(data)
+        if link not in found:
+            found[link] = deque(maxlen=self._depths[link.stream])
+        found[link].append(data)
         return 1
 
     def _hear(self, events: int) -> None:

@@ -137,6 +137,20 @@ class KeepLatest(RuleBasedStateMachine):
         self.subscriber.close()
 
 
+def test_what_a_publisher_sent_before_it_ended_comes_before_its_successors() -> None:
+    """Whichever queue the system names first."""
+    for _ in range(20):
+        scope = scope_of_its_own()
+        subscriber = Subscriber(scope, {"s": 8})
+        for first in (0, 3):
+            publisher = Publisher(scope, "s")
+            for number in range(first, first + 3):
+                publish(publisher, number)
+            publisher.close()
+        assert [number_in(one) for one in subscriber.receive(1.0)] == list(range(6))
+        subscriber.close()
+
+
 TestKeepLatest = KeepLatest.TestCase
 TestKeepLatest.settings = settings(max_examples=40, stateful_step_count=30, deadline=None)
 
