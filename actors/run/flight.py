@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import FIRST_COMPLETED, Future
 from concurrent.futures import wait as wait_for
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -31,6 +31,7 @@ from aerodaas.actors.run.actor_classes import actor_classes
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.run.application_process import ApplicationProcess
 from aerodaas.actors.run.environment_options import environment_options
+from aerodaas.actors.run.flight_state import FlightState
 from aerodaas.actors.run.growth import Growth, growth
 from aerodaas.actors.run.losses import DeadError, SilentError, SuspensionMonitor, drone_lost
 from aerodaas.actors.run.member import Member, ask, require_clock, routes
@@ -41,10 +42,9 @@ from aerodaas.mission.commands import Answer, Command
 from aerodaas.recording.provenance import Provenance
 from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 from aerodaas.types.clock import host_time_ns
-from aerodaas.types.data import Alert
 from aerodaas.types.errors import AeroDaaSError, MissionError
 
-__all__ = ["Flight", "FlightState"]
+__all__ = ["Flight"]
 
 _PREPARE_TIMEOUT = 90.0
 _GROWING = 10.0
@@ -57,22 +57,6 @@ _HELD = 10.0
 _RESTARTS = 3
 _LOOKS = 2
 """Concurrent calls of a cloud executor reserved for probes and pings."""
-
-
-@dataclass(frozen=True)
-class FlightState:
-    """State of a run at one time."""
-
-    robots: dict[str, RobotReport]
-    reports: dict[str, ActorReport]
-    over: bool
-    """True after every mission has ended."""
-
-    @property
-    def alerts(self) -> list[Alert]:
-        """The newest alerts of all actors, oldest first."""
-        alerts = [alert for report in self.reports.values() for alert in report.alerts]
-        return sorted(alerts, key=lambda alert: alert.header.stamp)
 
 
 class Flight:

@@ -13,7 +13,7 @@ from aerodaas.types.status import MissionState
 
 if TYPE_CHECKING:
     from aerodaas.actors.base import ActorReport
-    from aerodaas.actors.run.flight import FlightState
+    from aerodaas.actors.run.flight_state import FlightState
 
 __all__ = ["FlightMeter"]
 

@@ -15,7 +15,7 @@ from aerodaas.protocol.schemas import MissionOut, MissionPhase
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
 if TYPE_CHECKING:
-    from aerodaas.actors.run.flight import FlightState
+    from aerodaas.actors.run.flight_state import FlightState
     from aerodaas.config.model import EnvironmentConfig
     from aerodaas.dataflow.graph import Graph
 

@@ -37,7 +37,8 @@ from aerodaas.types.status import MissionState
 if TYPE_CHECKING:
     from aerodaas.actors.base import ActorReport
     from aerodaas.actors.run.application import Application
-    from aerodaas.actors.run.flight import Flight, FlightState
+    from aerodaas.actors.run.flight import Flight
+    from aerodaas.actors.run.flight_state import FlightState
     from aerodaas.actors.run.plan import FlightPlan
     from aerodaas.console.server import ConsoleServer
     from aerodaas.environment.environment import Environment

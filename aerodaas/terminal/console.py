@@ -23,7 +23,7 @@ from aerodaas.types.errors import RecordingError
 from aerodaas.types.identifiers import is_internal
 
 if TYPE_CHECKING:
-    from aerodaas.actors.run.flight import FlightState
+    from aerodaas.actors.run.flight_state import FlightState
 
 __all__ = [
     "FlightView",

@@ -12,7 +12,7 @@ from aerodaas.types.waypoints import Waypoint
 
 if TYPE_CHECKING:
     from aerodaas.actors.base import ActorReport
-    from aerodaas.actors.run.flight import FlightState
+    from aerodaas.actors.run.flight_state import FlightState
 
 
 def flying_to(target: int, *pending: int) -> FlightState:
