@@ -187,6 +187,17 @@ def test_above_the_head_it_climbs() -> None:
         assert all(one[UP] >= 0.0 for one in drone.gave_way)
 
 
+def test_below_the_head_it_never_climbs() -> None:
+    """Though it would leave most: between people on both sides, before one who comes."""
+    ahead = np.array([1.0, 0.0, 0.0])
+    stands = [(np.array([-0.5, side, 0.0]), np.zeros(3)) for side in (1.0, -1.0)]
+    walks = [(1.2 * ahead, -1.8 * ahead), *stands]
+    for height, climbs in ((contact_guard._HEAD + 0.01, True), (contact_guard._HEAD, False)):
+        guard = ContactGuard(LIMITS)
+        pose = Odometry(np.array([0.0, 0.0, height]), ahead, 0.0)
+        assert bool(guard._choose(ahead, walks, pose)[UP] > 0.0) is climbs
+
+
 def test_it_ends_once_nobody_comes_any_more() -> None:
     """Sooner than it is over for somebody who went out of sight."""
     drone = Drone([lambda time: (1.4 + 1.3 * abs(time - 2.0), 0.0)], follows=True)

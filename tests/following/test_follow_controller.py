@@ -11,6 +11,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from aerodaas.following import follow_controller
 from aerodaas.following.command_shaper import CommandShaper
 from aerodaas.following.follow_controller import FollowController, FollowPhase
 from aerodaas.following.follow_settings import FollowLimits, LostPolicy
@@ -203,3 +204,27 @@ def test_a_command_that_gives_way_has_no_ramp() -> None:
     command = shaper.shape(np.zeros(3), 0.0, 0.1, 1)
     assert not command.evasive
     assert np.hypot(command.forward + limits.backward, command.up - 1.5) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("doubt", "backs_off"), [(follow_controller._DOUBT, True), (math.inf, False)]
+)
+def test_it_brakes_before_it_is_sure_that_they_turn_round(
+    monkeypatch: pytest.MonkeyPatch, doubt: float, *, backs_off: bool
+) -> None:
+    """Half a second after a turn it no longer flies on, as by the smooth filter alone it would."""
+    monkeypatch.setattr(follow_controller, "_DOUBT", doubt)
+    controller = FollowController(4.0, 1.5)
+    east = speed = 0.0
+    for tick in range(46):
+        turned = max(0, tick - 40)
+        person = RelativeTarget(0.0, 4.5 + 0.1 * (tick - turned) - 0.13 * turned - east)
+        state = Odometry(np.array([east, 0.0, 1.5]), np.array([speed, 0.0, 0.0]), 0.0)
+        stamp = tick * NANOSECONDS // 10
+        command = controller.step(Observation(stamp, person, state, people=(person,)))
+        assert command is not None
+        speed = command.forward
+        east += speed / 10
+    assert command is not None
+    assert not command.evasive
+    assert (command.forward < 0.0) is backs_off
