@@ -64,7 +64,7 @@ def _figures(run: SeededRun) -> dict[str, float]:
         figures["waypoints"] = sum(robot["waypoints_visited"] for robot in robots)
         figures["given up"] = sum(robot["waypoints_given_up"] for robot in robots)
         used = [robot["battery_used"] for robot in robots if robot["battery_used"] is not None]
-        figures.update({"battery %": round(100 * max(used), 2)} if used else {})
+        figures.update({"battery used %": round(100 * max(used), 2)} if used else {})
     figures["alerts"] = len(summary["alerts"])
     figures.update({f"{label} seen": count for label, count in summary["detections"].items()})
     figures.update({f"{name} utility": value for name, value in summary["utility"].items()})
