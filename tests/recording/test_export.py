@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import re
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -12,10 +13,13 @@ import cv2
 import numpy as np
 import pyarrow.parquet
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from mcap.writer import Writer
 from synthetic_flight import HOME, PLAN, SyntheticFlight, record
 
 from aerodaas.config.model import RecordingConfig
+from aerodaas.recording.export.output import file_name, new_file
 from aerodaas.recording.export.tabular import table_of, write_csv, write_parquet
 from aerodaas.recording.export.track import write_gpx, write_kml
 from aerodaas.recording.export.video import write_videos
@@ -156,3 +160,17 @@ def test_recording_without_pictures(tmp_path: Path) -> None:
     with Recording.open(path) as recording, pytest.raises(RecordingError, match="no pictures"):
         write_videos(recording, tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+@given(st.text(max_size=400), st.text(max_size=400))
+def test_any_topic_has_a_name_that_a_file_may_have(one: str, other: str) -> None:
+    """A recording may have any names; what is cut stays apart."""
+    names = [file_name(topic) for topic in (one, other, "a" * 300 + one, "a" * 300 + other)]
+    assert all(re.fullmatch(r"[A-Za-z0-9_-]{0,100}", name) for name in names)
+    assert (names[2] == names[3]) is (one == other)
+
+
+def test_a_folder_that_cannot_be_is_named(tmp_path: Path) -> None:
+    """An --out that no system takes is an error with its name, not a traceback."""
+    with pytest.raises(RecordingError, match="cannot make the folder"):
+        new_file(tmp_path / ("x" * 300) / "a.csv")
