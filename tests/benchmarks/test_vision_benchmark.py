@@ -13,7 +13,9 @@ from onnx import TensorProto, helper, numpy_helper, save
 def test_it_prints_a_table_and_writes_the_same_figures(tmp_path: Path) -> None:
     """With units, machine, versions and revision."""
     model = tmp_path / "tiny.onnx"
-    constant = numpy_helper.from_array(np.zeros((1, 6, 84), np.float32), "constant")
+    found = np.full((1, 6, 84), 32.0, np.float32)
+    found[:, 4:] = 0.01
+    constant = numpy_helper.from_array(found, "constant")
     graph = helper.make_graph(
         [helper.make_node("Identity", ["constant"], ["output0"])],
         "tiny",

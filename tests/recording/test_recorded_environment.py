@@ -19,6 +19,7 @@ from synthetic_flight import SyntheticFlight, record
 from aerodaas.cli.flown_tasks import Flown
 from aerodaas.config.model import CameraConfig, EnvironmentConfig
 from aerodaas.config.plugins import load_plugin
+from aerodaas.config.preflight import PreflightConfig
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.tello.settings import TelloSettings
 from aerodaas.recording.export.track import write_gpx
@@ -71,6 +72,8 @@ LOCAL_ALONE = {
     "remote.port",
     "remote.token",
     "simulation.world",
+    # What a take-off is refused for is the policy of who flies.
+    *(f"robots.preflight.{name}" for name in PreflightConfig.model_fields),
 }
 """Fields that no recording brings. A new field of the model belongs here, or into the allow-list
 if it describes where and how the drone flew, and can do nothing on the reader's machine."""
