@@ -219,6 +219,23 @@ def test_detections_come_back_exactly(tmp_path: Path) -> None:
     assert np.array_equal(back.items[0].keypoints, keypoints)
 
 
+def test_velocities_are_those_of_a_body_that_leans(tmp_path: Path) -> None:
+    """Turned back by the recorded attitude they are the local frame's again, roll and pitch too."""
+    leaning = Odometry(np.array([1.0, 2.0, 3.0]), np.array([0.5, -1.0, 0.25]), 2.0, 0.3, -0.2, 0.4)
+    pose = recorded(tmp_path / "lean.mcap", leaning)["/tello/it/odometry"][0].value
+    at = pose.pose.orientation
+    axis = np.array([at.x, at.y, at.z])
+
+    def turned(one: Any) -> np.ndarray[Any, Any]:  # noqa: ANN401 - a protobuf vector
+        inner = np.array([one.x, one.y, one.z])
+        # Rotation by a unit quaternion: v + 2w (q x v) + 2 q x (q x v).
+        cross = np.cross(axis, inner)
+        return np.asarray(inner + 2.0 * at.w * cross + 2.0 * np.cross(axis, cross))
+
+    assert turned(pose.linear_velocity) == pytest.approx(leaning.velocity)
+    assert turned(pose.angular_velocity) == pytest.approx([0.0, 0.0, leaning.yaw_rate])
+
+
 def test_vehicle_state(tmp_path: Path) -> None:
     """Odometry has its velocity in the body's frame, GPS goes to the map, the rest is JSON."""
     state = VehicleState(
@@ -234,9 +251,9 @@ def test_vehicle_state(tmp_path: Path) -> None:
     pose = found["/tello/it/odometry"][0]
     assert pose.captured == state.stamp
     assert (pose.value.pose.position.x, pose.value.pose.position.z) == (1, 3)
-    # Flying north with the nose to the north: forward.
-    assert pose.value.linear_velocity.x == pytest.approx(0.5)
-    assert pose.value.linear_velocity.y == pytest.approx(0.0)
+    # Flying north with the nose to the north: forward, but for the lean.
+    assert pose.value.linear_velocity.x == pytest.approx(0.5, abs=0.05)
+    assert pose.value.linear_velocity.y == pytest.approx(0.0, abs=0.05)
     location = found["/tello/it/location"][0].value
     assert list(location.position_covariance)[::4] == [2.25, 2.25, 9.0]
     value = found["/tello/it/state"][0].value

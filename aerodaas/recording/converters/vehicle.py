@@ -17,7 +17,7 @@ from aerodaas.recording.converters.base import MAP_FRAME, Session, convert, quat
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.rotation import from_rpy
 from aerodaas.types.data import Battery, GpsFix, Odometry
-from aerodaas.types.geometry import enu_to_body
+from aerodaas.types.geometry import rotation_from_rpy
 from aerodaas.types.status import Message, SetpointRecord
 from aerodaas.types.vehicle import FlightEnd, PositionSetpoint, Setpoint, VehicleState
 
@@ -144,15 +144,15 @@ def _pose(item: Odometry, frame: str, stream: str, stamp: int, session: Session)
     time = session.time(stamp)
     position = vector(item.position)
     attitude = quaternion(from_rpy(item.roll, item.pitch, item.yaw))
-    # Foxglove, like ROS, expects velocities in the body frame.
-    velocity = vector(enu_to_body(item.velocity, item.yaw))
+    # Foxglove, like ROS, expects velocities in the frame of the body, which leans.
+    to_body = rotation_from_rpy(item.roll, item.pitch, item.yaw).T
     pose = FoxgloveOdometry(
         timestamp=time,
         frame_id=MAP_FRAME,
         body_frame_id=frame,
         pose=Pose(position=position, orientation=attitude),
-        linear_velocity=velocity,
-        angular_velocity=vector((0.0, 0.0, item.yaw_rate)),
+        linear_velocity=vector(to_body @ item.velocity),
+        angular_velocity=vector(to_body[:, 2] * item.yaw_rate),
     )
     yield Entry(topic(stream, "odometry"), ODOMETRY, pose.encode(), stamp)
     transform = FrameTransform(
