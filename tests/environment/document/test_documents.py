@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flying import FLAT, hop
+from flying import FLAT, hop, robot
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -468,6 +468,28 @@ def test_a_document_is_flown_in_an_environment_that_lies_beside_it(tmp_path: Pat
         path.write_text(json.dumps(document_of(environment=name)))
         with pytest.raises(ConfigError, match=re.escape("give the file of yours by --env")):
             fly_mission(path, RunOptions(view=False))
+
+
+def test_an_application_that_goes_on_in_flight_is_no_mission(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it does there is code of its own; nothing flies to find out."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "env.json").write_text(json.dumps({**FLAT, "robots": [robot()]}))
+    text = """
+from aerodaas import *
+env = Environment("env.json")
+drone = env.get_robot_by_id("drone")
+drone.navigate(AeroListData([Waypoint("a", 2, 0, 2)]))
+drone.start_mission(wait=False)
+drone.wait()
+"""
+    (tmp_path / "app.py").write_text(text)
+    assert compile_application(tmp_path / "app.py", []).navigation
+    (tmp_path / "app.py").write_text(text.replace("drone.wait()", "drone.pause_mission()"))
+    with pytest.raises(GraphError, match=r"app\.py cannot be written.*only `aerodaas run` flies"):
+        compile_application(tmp_path / "app.py", [])
+    assert not (tmp_path / "runs").exists()
 
 
 def test_an_application_that_never_starts_is_no_mission(tmp_path: Path) -> None:
