@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import csv
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from onnx import TensorProto
 from synthetic_models import constant_model, patchwork_model, simcc_model
 from typer.testing import CliRunner, Result
 
 from aerodaas.analytics.models import DETECTOR, POSE
 from aerodaas.analytics.models.registry import REGISTRY
+from aerodaas.analytics.people.pose import PoseAnalytics
 from aerodaas.cli.app import app
 from aerodaas.types.errors import ConfigError, ModelError
 
@@ -82,6 +84,28 @@ def test_doubts_are_told(models: Callable[..., Result]) -> None:
 def test_what_is_no_detector_is_refused(models: Callable[..., Result]) -> None:
     """With the words that an application would get."""
     constant_model(Path("a.onnx"), [np.zeros((1, 1000), np.float32)])
+    assert "the output of no detector" in str(models("check", "a.onnx").exception)
+
+
+@pytest.mark.parametrize(
+    ("shape", "element"),
+    [((1, 3, 64, 48), TensorProto.FLOAT), (("b", 3, 64, 48), TensorProto.UINT8)],
+)
+def test_a_pose_network_that_no_analysis_takes_is_refused(
+    models: Callable[..., Result], shape: Sequence[int | str], element: int
+) -> None:
+    """It runs on several crops at once, given as numbers: one crop, or bytes, are not enough."""
+    outputs = [np.zeros((1, 17, bins), np.float32) for bins in (96, 128)]
+    constant_model(Path("a.onnx"), outputs, shape=shape, element=element)
+    assert "the output of no detector" in str(models("check", "a.onnx").exception)
+    with pytest.raises(ModelError, match="finds no keypoints"):
+        PoseAnalytics("a.onnx")
+
+
+def test_an_output_without_axes_is_refused(models: Callable[..., Result]) -> None:
+    """A count beside something else."""
+    outputs = [np.array(3, np.float32), np.zeros((1, 17, 128), np.float32)]
+    constant_model(Path("a.onnx"), outputs)
     assert "the output of no detector" in str(models("check", "a.onnx").exception)
 
 

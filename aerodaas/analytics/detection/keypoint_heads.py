@@ -115,15 +115,19 @@ class SimccHead:
 
 
 def keypoint_head(model: ModelFile) -> KeypointHead | None:
-    """The conventions of a model's outputs; None for any other."""
+    """The conventions of a model's outputs; None for any other, or one that takes no crops.
+
+    Crops are several at once, and numbers, not bytes.
+    """
+    if not model.batches or model.dtype is np.uint8:
+        return None
     size = (model.size[1], model.size[0])
     if len(model.outputs) == 1:
         fits = model.metadata.get("task") == _TASK and model.size[0] == model.size[1]
         fits = fits and tuple(model.output_shape[1:]) == (POINTS, _NUMBERS)
         return CropHead(size) if fits else None
     shapes = [output.shape for output in model.trial]
-    splits = {axis[-1] / side for axis, side in zip(shapes, size, strict=False)}
-    if [axis[:-1] for axis in shapes] != [(1, POINTS)] * 2 or len(splits) != 1:
+    if [axis[:-1] for axis in shapes] != [(1, POINTS)] * 2:
         return None
-    (split,) = splits
-    return SimccHead(size, int(split)) if split >= 1 and split % 1 == 0 else None
+    split, other = (axis[-1] / side for axis, side in zip(shapes, size, strict=True))
+    return SimccHead(size, int(split)) if split == other >= 1 and split % 1 == 0 else None

@@ -45,7 +45,7 @@ class KeypointModel:
         """
         model = read_model(path)
         head = keypoint_head(model)
-        if head is None or not model.batches or model.dtype is np.uint8:
+        if head is None:
             raise model.refusal(
                 "finds no keypoints in cuts around people",
                 "train one with `python -m tools.training pose`, or take an RTMPose; a YOLO pose "
