@@ -6,7 +6,6 @@ folder of the pictures alone, whatever path an annotation names.
 
 from __future__ import annotations
 
-import math
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,6 +20,7 @@ from aerodaas.types.errors import ConfigError
 from aerodaas.types.picture_size import picture_fits, picture_size
 
 __all__ = [
+    "MOST_SIDE",
     "MOST_THINGS",
     "PICTURE_SUFFIXES",
     "AnnotatedPicture",
@@ -37,10 +37,10 @@ Box = tuple[float, float, float, float]
 
 MOST_THINGS = 2_000_000
 """Most annotations of a dataset: COCO's training set has 860,000."""
+MOST_SIDE = 1e6
+"""Pixels; beyond them no box lies."""
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
 _MOST_PICTURE_BYTES = 64 << 20
-_MOST_SIDE = 1e6
-"""Pixels; beyond them no box lies."""
 _SHOWN = 60
 """Characters of a stranger's text in an error."""
 
@@ -110,11 +110,11 @@ def checked_box(numbers: Sequence[object], place: str) -> Box:
         ConfigError: That names the `place`, for anything but finite numbers of a box with a size.
     """
     plain = [
-        float(one) for one in numbers if isinstance(one, int | float) and not isinstance(one, bool)
+        float(one)
+        for one in numbers
+        if isinstance(one, int | float) and not isinstance(one, bool) and abs(one) <= MOST_SIDE
     ]
-    if len(plain) != len(numbers) or not all(
-        math.isfinite(one) and abs(one) <= _MOST_SIDE for one in plain
-    ):
+    if len(plain) != len(numbers):
         raise ConfigError(f"{place}: a box has four finite numbers, not {shown(list(numbers))}")
     left, top, right, bottom = plain
     if right <= left or bottom <= top:

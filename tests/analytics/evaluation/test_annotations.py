@@ -99,6 +99,15 @@ BAD_COCO: dict[str, tuple[object, str]] = {
     ),
     "text": (coco(annotations=thing(bbox=[1, 2, "a", 3])), "four finite numbers"),
     "empty box": (coco(annotations=thing(bbox=[1, 2, 0, 3])), "the box is empty: 0 x 3"),
+    "400 digits": (coco(annotations=thing(bbox=[1, 2, 10**400, 3])), "four finite numbers"),
+    "400 digits and a fraction": (
+        coco(annotations=thing(bbox=[10**400, 2, 0.5, 3])),
+        "four finite numbers",
+    ),
+    "as many digits as Python reads": (
+        coco(annotations=thing(bbox=[1, 10**4300 - 1, 1, 10**4300 - 1])),
+        "four finite numbers",
+    ),
     "endless": (coco(annotations=thing(bbox=[1, 2, 1e400, 3])), "four finite numbers"),
     "escape": (coco(images=[{"id": 4, "file_name": "../../etc/passwd"}]), "leads out of"),
     "root": (coco(images=[{"id": 4, "file_name": "/etc/passwd"}]), "leads out of"),
@@ -120,6 +129,14 @@ def test_json_that_is_none_names_the_line(folder: Path) -> None:
     (folder / "coco.json").write_text('{"images": [\n\n{"id": ')
     with pytest.raises(ConfigError, match=r"coco.json:3: is not JSON"):
         read_dataset(folder / "coco.json")
+
+
+@pytest.mark.parametrize("area", [10**400, float("inf"), float("nan"), -1, 0, "wide", None])
+def test_an_area_that_is_none_is_not_taken(folder: Path, area: object) -> None:
+    """That of the box counts instead."""
+    (folder / "coco.json").write_text(json.dumps(coco(annotations=thing(area=area))))
+    (picture,) = read_dataset(folder / "coco.json").pictures
+    assert [one.area for one in picture.things] == [None]
 
 
 @pytest.mark.parametrize(
