@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
@@ -48,6 +50,21 @@ def test_a_file_that_is_another_is_not_added(models: Callable[..., Result]) -> N
     assert isinstance(failed.exception, ModelError)
     assert "is shorter than yolox-nano" in str(failed.exception)
     assert "did you mean yolox-s?" in str(models("add", "yolox-nano", "yolox-z").exception)
+
+
+def test_a_model_is_added_from_a_file(
+    models: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its path and licence are what is printed; the bar is not in a script's way."""
+    content = simcc_model(Path("a.onnx")).read_bytes()
+    sha256 = hashlib.sha256(content).hexdigest()
+    model = replace(REGISTRY["yolox-nano"], name="mine", sha256=sha256, size=len(content))
+    monkeypatch.setitem(REGISTRY, "mine", model)
+    result = models("add", "mine", "--from", "a.onnx")
+    assert result.exception is None
+    path = Path("fetched/mine.onnx").absolute()
+    assert result.stdout == f"mine: {path} (Apache-2.0)\n"
+    assert path.read_bytes() == content
 
 
 def test_a_detector_is_described_with_its_use(models: Callable[..., Result]) -> None:
