@@ -7,7 +7,7 @@ folder of the pictures alone, whatever path an annotation names.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,6 +28,7 @@ __all__ = [
     "Dataset",
     "Thing",
     "checked_box",
+    "counted",
     "read_bytes",
     "read_picture",
     "shown",
@@ -123,6 +124,18 @@ def checked_box(numbers: Sequence[object], place: str) -> Box:
             "give it a size"
         )
     return left, top, right, bottom
+
+
+def counted(pictures: Iterable[AnnotatedPicture], place: Path) -> tuple[AnnotatedPicture, ...]:
+    """Collect pictures one by one; raises ConfigError once they have too many annotations."""
+    found = []
+    count = 0
+    for picture in pictures:
+        count += len(picture.things)
+        if count > MOST_THINGS:
+            raise ConfigError(f"{place} has more than {MOST_THINGS:,} annotations")
+        found.append(picture)
+    return tuple(found)
 
 
 def read_bytes(path: Path, most: int) -> bytes:

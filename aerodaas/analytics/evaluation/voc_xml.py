@@ -10,11 +10,11 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from aerodaas.analytics.evaluation.dataset import (
-    MOST_THINGS,
     AnnotatedPicture,
     Dataset,
     Thing,
     checked_box,
+    counted,
     read_bytes,
     shown,
 )
@@ -41,16 +41,9 @@ def read_voc(path: Path, pictures: Path | None = None) -> Dataset:
     texts = path / "Annotations" if (path / "Annotations").is_dir() else path
     beside = texts.parent / "JPEGImages"
     folder = pictures or (beside if beside.is_dir() else texts)
-    found = []
-    count = 0
-    for file in sorted(texts.glob("*.xml")):
-        picture = _picture(file, folder)
-        count += len(picture.things)
-        if count > MOST_THINGS:
-            raise ConfigError(f"{texts} has more than {MOST_THINGS:,} annotations")
-        found.append(picture)
+    found = counted((_picture(file, folder) for file in sorted(texts.glob("*.xml"))), texts)
     labels = sorted({one.label for picture in found for one in picture.things})
-    return Dataset(tuple(found), tuple(labels))
+    return Dataset(found, tuple(labels))
 
 
 def _picture(file: Path, folder: Path) -> AnnotatedPicture:

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from aerodaas.analytics.evaluation import dataset
 from aerodaas.analytics.evaluation.dataset import Dataset
 from aerodaas.analytics.evaluation.reading import read_dataset
 from aerodaas.types.errors import AeroDaaSError, ConfigError
@@ -72,9 +73,9 @@ def test_a_picture_without_a_text_shows_nothing(folder: Path) -> None:
     (folder / "labels/a.txt").unlink()
     (folder / "data.yaml").unlink()
     (folder / "classes.txt").write_text("person\ncar\n")
-    dataset = read_dataset(folder)
-    assert [one.things for one in dataset.pictures] == [()]
-    assert dataset.labels == ("person", "car")
+    found = read_dataset(folder)
+    assert [one.things for one in found.pictures] == [()]
+    assert found.labels == ("person", "car")
 
 
 def thing(**changes: object) -> list[dict[str, Any]]:
@@ -193,6 +194,18 @@ def test_malformed_voc_names_the_object(folder: Path, text: str, problem: str) -
     (folder / "Annotations/a.xml").write_text(text)
     with pytest.raises(ConfigError, match=problem):
         read_dataset(folder / "Annotations")
+
+
+@pytest.mark.parametrize("place", ["Annotations", "data.yaml"])
+def test_annotations_are_counted(folder: Path, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
+    """Over all pictures, as they are read."""
+    monkeypatch.setattr(dataset, "MOST_THINGS", 1)
+    assert len(read_dataset(folder / place).pictures) == 1
+    (folder / "Annotations/b.xml").write_text(XML)
+    for name in ("images/b.png", "labels/b.txt"):
+        (folder / name).write_bytes((folder / name.replace("b.", "a.")).read_bytes())
+    with pytest.raises(ConfigError, match="has more than 1 annotations"):
+        read_dataset(folder / place)
 
 
 def test_what_is_no_dataset_is_told_what_would_be(folder: Path) -> None:
