@@ -20,11 +20,9 @@ from numpy.typing import NDArray
 from aerodaas.analytics.detection.model_file import ModelFile
 from aerodaas.analytics.people.crop import GREY, Region, square_around
 from aerodaas.analytics.people.joints import POINTS
+from aerodaas.types.geometry import Box
 
-__all__ = ["Box", "CropHead", "KeypointHead", "SimccHead", "keypoint_head"]
-
-Box = tuple[float, float, float, float]
-"""Left, top, right, bottom in pixels."""
+__all__ = ["CropHead", "KeypointHead", "SimccHead", "keypoint_head"]
 
 _TASK = "keypoints"
 _NUMBERS = 3

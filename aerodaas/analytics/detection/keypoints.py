@@ -9,15 +9,16 @@ import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
 
-from aerodaas.analytics.detection.keypoint_heads import Box, keypoint_head
+from aerodaas.analytics.detection.keypoint_heads import keypoint_head
 from aerodaas.analytics.detection.model_file import read_model
 from aerodaas.analytics.detection.providers import open_session
 from aerodaas.analytics.models import POSE
 from aerodaas.analytics.people.crop import cut_region
 from aerodaas.analytics.people.joints import MIRRORED
 from aerodaas.types.errors import ModelError
+from aerodaas.types.geometry import Box
 
-__all__ = ["Box", "KeypointModel"]
+__all__ = ["KeypointModel"]
 
 _ASTRAY = 0.1
 """Distance of the two estimates of a joint, in sides of the crop, from which one is doubtful."""

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from aerodaas.config.printable import printable
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import Box
 from aerodaas.types.picture_size import picture_fits, picture_size
 
 __all__ = [
@@ -24,7 +25,6 @@ __all__ = [
     "MOST_THINGS",
     "PICTURE_SUFFIXES",
     "AnnotatedPicture",
-    "Box",
     "Dataset",
     "Thing",
     "checked_box",
@@ -33,8 +33,6 @@ __all__ = [
     "read_picture",
     "shown",
 ]
-
-Box = tuple[float, float, float, float]
 
 MOST_THINGS = 2_000_000
 """Most annotations of a dataset: COCO's training set has 860,000."""
@@ -52,7 +50,6 @@ class Thing:
 
     label: str
     box: Box
-    """Left, top, right, bottom in pixels."""
     ignored: bool = False
     """Need not be found, and may be: COCO's crowds, VOC's difficult objects."""
     area: float | None = None

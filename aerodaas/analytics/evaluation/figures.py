@@ -24,6 +24,7 @@ from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, Dataset, rea
 from aerodaas.config.extras import require_extra
 from aerodaas.types.data import Detection, Frame, Header
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import Box
 
 __all__ = ["LEAST_SCORE", "Bin", "ClassFigures", "Evaluation", "Mistake", "evaluate", "measure"]
 
@@ -81,7 +82,7 @@ class Mistake:
 
     picture: AnnotatedPicture
     label: str
-    box: tuple[float, float, float, float]
+    box: Box
     score: float | None
     """None for a thing that was not found."""
 
@@ -297,9 +298,7 @@ class _Matching:
         yield from sorted(missed, key=lambda one: -_area(one.box))
 
 
-def _entry(
-    key: int, picture: int, number: int, box: tuple[float, float, float, float]
-) -> dict[str, Any]:
+def _entry(key: int, picture: int, number: int, box: Box) -> dict[str, Any]:
     left, top, right, bottom = box
     return {
         "id": key,
@@ -311,7 +310,7 @@ def _entry(
     }
 
 
-def _area(box: tuple[float, float, float, float]) -> float:
+def _area(box: Box) -> float:
     return (box[2] - box[0]) * (box[3] - box[1])
 
 

@@ -6,6 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.types.geometry import Box
+
 __all__ = ["CUT", "GREY", "MARGIN", "Region", "cut_out", "cut_region", "square_around"]
 
 Region = tuple[float, float, float, float]
@@ -21,9 +23,7 @@ GREY = 114
 """Grey level of the crop outside the image, 0 to 255."""
 
 
-def square_around(
-    box: tuple[float, float, float, float], margin: float = MARGIN
-) -> tuple[float, float, float]:
+def square_around(box: Box, margin: float = MARGIN) -> tuple[float, float, float]:
     """Left, top and side, in pixels, of the square around `box` (left, top, right, bottom).
 
     A square shows standing and lying people at one scale.

@@ -16,11 +16,10 @@ from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, Dataset, Thi
 from aerodaas.analytics.evaluation.figures import Evaluation, measure
 from aerodaas.types.data import Detection
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import Box
 
 coco = pytest.importorskip("pycocotools.coco")
 cocoeval = pytest.importorskip("pycocotools.cocoeval")
-
-Box = tuple[float, float, float, float]
 
 
 def dataset(*pictures: list[Thing]) -> Dataset:
