@@ -69,8 +69,7 @@ class CropHead:
 
     def region(self, box: Box) -> Region:
         """A square with a margin of a half."""
-        left, top, side = square_around(box)
-        return left, top, side, side
+        return square_around(box)
 
     def normalise(self, cuts: NDArray[np.uint8]) -> NDArray[np.float32]:
         """0 to 1."""
