@@ -14,7 +14,7 @@ import io
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,17 +149,44 @@ def measure(
             f"dataset has {', '.join(dataset.labels)}; rename with --rename LABEL=CLASS"
         )
     matching = _Matching(dataset, found, labels)
-    rows = tuple(matching.figures(number, min_score) for number in range(len(labels)))
-    scores, right = matching.outcomes(range(len(labels)))
+    outcomes = [matching.outcomes(number) for number in range(len(labels))]
+    rows = tuple(matching.figures(number, one, min_score) for number, one in enumerate(outcomes))
+    every = _Outcomes(
+        np.concatenate([one.scores for one in outcomes]),
+        np.concatenate([one.right for one in outcomes]),
+    )
     return Evaluation(
         pictures=len(dataset.pictures),
         min_score=min_score,
         classes=rows,
-        overall=_overall(rows, matching, min_score),
-        reliability=tuple(_reliability(scores, right)),
+        overall=_overall(rows, every, len(dataset.pictures), min_score),
+        reliability=tuple(_reliability(every)),
         left_out=tuple(label for label in dataset.labels if label not in names),
         mistakes=tuple(matching.mistakes(min_score)),
     )
+
+
+class _Outcomes(NamedTuple):
+    """Boxes that count, whatever their score."""
+
+    scores: NDArray[np.float64]
+    right: NDArray[np.bool_]
+    """Whether each matches an annotation with an IoU of 0.5."""
+
+    def figures(self, things: int, pictures: int, min_score: float) -> dict[str, Any]:
+        """Figures by their names in `ClassFigures`: of the boxes of `min_score` and more.
+
+        The calibration's is of all boxes.
+        """
+        right = self.right[self.scores >= min_score]
+        false = int((~right).sum())
+        return {
+            "recall": float(right.sum()) / things if things else _NAN,
+            "precision": float(right.mean()) if len(right) else _NAN,
+            "false_boxes": false,
+            "false_per_picture": false / pictures,
+            "calibration_error": _calibration_error(self),
+        }
 
 
 class _Matching:
@@ -225,31 +252,25 @@ class _Matching:
         every: list[dict[str, Any] | None] = self._run.evalImgs
         yield from (one for one in every[start : start + pictures] if one is not None)
 
-    def outcomes(
-        self, numbers: Sequence[int], min_score: float = 0.0
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Scores of the boxes of these classes that count, and whether each matches at 0.5."""
+    def outcomes(self, number: int) -> _Outcomes:
+        """The boxes of one class that count, and whether each is right."""
         scores: list[float] = []
         right: list[bool] = []
-        for number in numbers:
-            for one in self.matches(number):
-                for score, match, ignored in zip(
-                    one["dtScores"], one["dtMatches"][0], one["dtIgnore"][0], strict=True
-                ):
-                    if not ignored and score >= min_score:
-                        scores.append(score)
-                        right.append(match > 0)
-        return np.array(scores, np.float64), np.array(right, np.bool_)
+        for one in self.matches(number):
+            for score, match, ignored in zip(
+                one["dtScores"], one["dtMatches"][0], one["dtIgnore"][0], strict=True
+            ):
+                if not ignored:
+                    scores.append(score)
+                    right.append(match > 0)
+        return _Outcomes(np.array(scores, np.float64), np.array(right, np.bool_))
 
-    def figures(self, number: int, min_score: float) -> ClassFigures:
+    def figures(self, number: int, outcomes: _Outcomes, min_score: float) -> ClassFigures:
         """The figures of one class."""
         things = sum(int((one["gtIgnore"] == 0).sum()) for one in self.matches(number))
         ap, small, medium, large = (
             self.average_precision(number, size, slice(None)) for size in range(len(_SIZES))
         )
-        _, right = self.outcomes([number], min_score)
-        false = int((~right).sum())
-        pictures = len(self.dataset.pictures)
         return ClassFigures(
             self.labels[number],
             things,
@@ -258,12 +279,8 @@ class _Matching:
             ap_small=small,
             ap_medium=medium,
             ap_large=large,
-            recall=float(right.sum()) / things if things else _NAN,
-            precision=float(right.mean()) if len(right) else _NAN,
-            false_boxes=false,
-            false_per_picture=false / pictures,
             false_alarms=self._false_alarms(number, min_score),
-            calibration_error=_calibration_error(*self.outcomes([number])),
+            **outcomes.figures(things, len(self.dataset.pictures), min_score),
         )
 
     def _false_alarms(self, number: int, min_score: float) -> float:
@@ -314,15 +331,14 @@ def _area(box: Box) -> float:
     return (box[2] - box[0]) * (box[3] - box[1])
 
 
-def _overall(rows: Sequence[ClassFigures], matching: _Matching, min_score: float) -> ClassFigures:
+def _overall(
+    rows: Sequence[ClassFigures], outcomes: _Outcomes, pictures: int, min_score: float
+) -> ClassFigures:
     def mean(name: str) -> float:
         values = [getattr(row, name) for row in rows if not math.isnan(getattr(row, name))]
         return sum(values) / len(values) if values else _NAN
 
-    numbers = range(len(rows))
-    _, right = matching.outcomes(numbers, min_score)
     things = sum(row.things for row in rows)
-    false = sum(row.false_boxes for row in rows)
     return ClassFigures(
         "all",
         things,
@@ -331,16 +347,13 @@ def _overall(rows: Sequence[ClassFigures], matching: _Matching, min_score: float
         ap_small=mean("ap_small"),
         ap_medium=mean("ap_medium"),
         ap_large=mean("ap_large"),
-        recall=float(right.sum()) / things if things else _NAN,
-        precision=float(right.mean()) if len(right) else _NAN,
-        false_boxes=false,
-        false_per_picture=false / len(matching.dataset.pictures),
         false_alarms=mean("false_alarms"),
-        calibration_error=_calibration_error(*matching.outcomes(numbers)),
+        **outcomes.figures(things, pictures, min_score),
     )
 
 
-def _reliability(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> Iterator[Bin]:
+def _reliability(outcomes: _Outcomes) -> Iterator[Bin]:
+    scores, right = outcomes
     places = np.minimum((scores * _BINS).astype(int), _BINS - 1)
     for place in range(_BINS):
         inside = places == place
@@ -354,8 +367,7 @@ def _reliability(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> Itera
         )
 
 
-def _calibration_error(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> float:
-    if not len(scores):
-        return _NAN
-    bins = [one for one in _reliability(scores, right) if one.boxes]
-    return sum(one.boxes * abs(one.score - one.right) for one in bins) / len(scores)
+def _calibration_error(outcomes: _Outcomes) -> float:
+    bins = [one for one in _reliability(outcomes) if one.boxes]
+    apart = sum(one.boxes * abs(one.score - one.right) for one in bins)
+    return apart / len(outcomes.scores) if bins else _NAN
