@@ -31,6 +31,7 @@ __all__ = [
     "counted",
     "read_bytes",
     "read_picture",
+    "read_size",
     "shown",
 ]
 
@@ -40,6 +41,8 @@ MOST_SIDE = 1e6
 """Pixels; beyond them no box lies."""
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
 _MOST_PICTURE_BYTES = 64 << 20
+_HEAD = 64 << 10
+"""Bytes of a file in which most pictures tell their size; others have more metadata before it."""
 _SHOWN = 60
 """Characters of a stranger's text in an error."""
 
@@ -148,14 +151,35 @@ def read_bytes(path: Path, most: int) -> bytes:
     raise ConfigError(f"{path} is larger than {most / (1 << 20):.3g} MiB; is it what was meant?")
 
 
+def read_size(path: Path) -> tuple[int, int]:
+    """Read a picture's width and height in pixels, without decoding it; raises ConfigError."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD)
+    except OSError as error:
+        raise ConfigError(f"cannot read {path}: {error.strerror}") from None
+    size = picture_size(head) or picture_size(read_bytes(path, _MOST_PICTURE_BYTES))
+    return _checked_size(path, size)
+
+
 def read_picture(path: Path) -> NDArray[np.uint8]:
     """Read a picture as height x width x 3 (BGR), not turned by its EXIF; raises ConfigError."""
     content = read_bytes(path, _MOST_PICTURE_BYTES)
-    size = picture_size(content)
-    if size is not None and not picture_fits(*size):
-        raise ConfigError(f"{path} has {size[0]} x {size[1]} pixels, too many to be read")
+    _checked_size(path, picture_size(content))
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    image = cv2.imdecode(np.frombuffer(content, np.uint8), flags) if size is not None else None
+    image = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
     if image is None:
-        raise ConfigError(f"{path} is no JPEG, PNG or WebP that can be read")
+        raise _unreadable(path)
     return np.asarray(image, np.uint8)
+
+
+def _checked_size(path: Path, size: tuple[int, int] | None) -> tuple[int, int]:
+    if size is None:
+        raise _unreadable(path)
+    if not picture_fits(*size):
+        raise ConfigError(f"{path} has {size[0]} x {size[1]} pixels, too many to be read")
+    return size
+
+
+def _unreadable(path: Path) -> ConfigError:
+    return ConfigError(f"{path} is no JPEG, PNG or WebP that can be read")

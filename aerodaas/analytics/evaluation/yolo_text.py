@@ -20,7 +20,7 @@ from aerodaas.analytics.evaluation.dataset import (
     checked_box,
     counted,
     read_bytes,
-    read_picture,
+    read_size,
     shown,
 )
 from aerodaas.types.errors import ConfigError
@@ -119,8 +119,8 @@ def _things(text: Path, picture: Path, labels: list[str]) -> tuple[Thing, ...]:
     rows = [(number, line.split()) for number, line in enumerate(lines, 1) if line.strip()]
     if not rows:
         return ()
-    height, width = read_picture(picture).shape[:2]
-    return tuple(_thing(f"{text}:{number}", row, labels, (width, height)) for number, row in rows)
+    size = read_size(picture)
+    return tuple(_thing(f"{text}:{number}", row, labels, size) for number, row in rows)
 
 
 def _thing(place: str, row: list[str], labels: list[str], size: tuple[int, int]) -> Thing:

@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from aerodaas.analytics.evaluation import dataset
-from aerodaas.analytics.evaluation.dataset import Dataset
+from aerodaas.analytics.evaluation.dataset import Dataset, read_picture, read_size
 from aerodaas.analytics.evaluation.reading import read_dataset
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
@@ -206,6 +206,40 @@ def test_annotations_are_counted(folder: Path, monkeypatch: pytest.MonkeyPatch, 
         (folder / name).write_bytes((folder / name.replace("b.", "a.")).read_bytes())
     with pytest.raises(ConfigError, match="has more than 1 annotations"):
         read_dataset(folder / place)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "before"), [(".png", 0), (".webp", 0), (".jpg", 0), (".jpg", 3)]
+)
+def test_a_size_is_that_of_the_decoded_picture(tmp_path: Path, suffix: str, before: int) -> None:
+    """However much metadata a JPEG has before it."""
+    content = cv2.imencode(suffix, np.zeros((30, 50, 3), np.uint8))[1].tobytes()
+    content = content[:2] + before * (b"\xff\xe1\xff\xff" + bytes(0xFFFD)) + content[2:]
+    path = tmp_path / "a"
+    path.write_bytes(content)
+    assert read_size(path) == (50, 30) == read_picture(path).shape[1::-1]
+
+
+def test_sizes_that_cannot_be_had_are_refused(tmp_path: Path) -> None:
+    """No file, no picture, and one that claims too much."""
+    path = tmp_path / "a.png"
+    with pytest.raises(ConfigError, match=r"cannot read .*a\.png"):
+        read_size(path)
+    path.write_bytes(b"no picture")
+    with pytest.raises(ConfigError, match="is no JPEG, PNG or WebP"):
+        read_size(path)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + 2 * (20_000).to_bytes(4, "big"))
+    with pytest.raises(ConfigError, match="has 20000 x 20000 pixels, too many"):
+        read_size(path)
+
+
+def test_pictures_are_not_decoded_for_their_size(folder: Path) -> None:
+    """The beginning of one is enough to read YOLO's fractions."""
+    picture = folder / "images/a.png"
+    picture.write_bytes(picture.read_bytes()[:40])
+    only(read_dataset(folder / "data.yaml"))
+    with pytest.raises(ConfigError, match="is no JPEG, PNG or WebP"):
+        read_picture(picture)
 
 
 def test_what_is_no_dataset_is_told_what_would_be(folder: Path) -> None:
