@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -86,6 +87,7 @@ def evaluate_model(
 
     if not LEAST_SCORE <= min_score <= 1:
         raise ConfigError(f"--min-score lies between {LEAST_SCORE} and 1, not at {min_score}")
+    _require_places([path for path in (out_json, out_csv) if path is not None], worst)
     annotated = read_dataset(dataset, pictures).renamed(_renames(rename or ()))
     detector = OnnxDetector(model, min_score=LEAST_SCORE, threads=threads)
     detector.open()
@@ -101,6 +103,19 @@ def evaluate_model(
     if worst is not None:
         files = draw_mistakes(result.mistakes, worst, most)
         typer.echo(f"{len(files)} pictures of mistakes in {worst}")
+
+
+def _require_places(files: Sequence[Path], folder: Path | None) -> None:
+    """Refuse what could not be written before an evaluation, which may take hours."""
+    for path in files:
+        place = path if path.exists() else path.parent
+        if path.is_dir() or not os.access(place, os.W_OK):
+            raise ConfigError(f"cannot write {path}: name a file in a folder that you may write")
+    if folder is not None:
+        with _writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise ConfigError(f"cannot write into {folder}: name a folder that you may write")
 
 
 def _renames(texts: Sequence[str]) -> dict[str, str]:

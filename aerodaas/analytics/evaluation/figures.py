@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, Dataset, read_picture
+from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, Dataset, read_picture, read_size
 from aerodaas.config.extras import require_extra
 from aerodaas.types.data import Detection, Frame, Header
 from aerodaas.types.errors import ConfigError
@@ -112,6 +112,9 @@ def evaluate(
 ) -> Evaluation:
     """Run an opened `detector` on all pictures, and measure.
 
+    What cannot be measured is refused before the first picture is run; only that a picture is
+    damaged shows when it is decoded.
+
     Args:
         detector: With a `min_score` of at most `LEAST_SCORE`, or average precision is cut short.
         dataset: Of which the labels that the detector knows are evaluated.
@@ -122,6 +125,9 @@ def evaluate(
         ConfigError: If no label is known to the model, a picture cannot be read, or pycocotools
             is not installed.
     """
+    _known_labels(dataset, detector.names)
+    for picture in dataset.pictures:
+        read_size(picture.path)
     found = []
     for number, picture in enumerate(dataset.pictures):
         frame = Frame(Header(number, 0, "dataset"), read_picture(picture.path))
@@ -142,12 +148,7 @@ def measure(
     Raises:
         ConfigError: If no label of the dataset is among `names`, or pycocotools is not installed.
     """
-    labels = [label for label in dataset.labels if label in names]
-    if not labels:
-        raise ConfigError(
-            f"the model knows none of the dataset's labels: it finds {', '.join(names)}; the "
-            f"dataset has {', '.join(dataset.labels)}; rename with --rename LABEL=CLASS"
-        )
+    labels = _known_labels(dataset, names)
     matching = _Matching(dataset, found, labels)
     outcomes = [matching.outcomes(number) for number in range(len(labels))]
     rows = tuple(matching.figures(number, one, min_score) for number, one in enumerate(outcomes))
@@ -164,6 +165,18 @@ def measure(
         left_out=tuple(label for label in dataset.labels if label not in names),
         mistakes=tuple(matching.mistakes(min_score)),
     )
+
+
+def _known_labels(dataset: Dataset, names: Sequence[str]) -> list[str]:
+    """The labels to evaluate; raises ConfigError if there is none, or nothing to do it with."""
+    require_extra("evaluation", "the evaluation of models")
+    labels = [label for label in dataset.labels if label in names]
+    if not labels:
+        raise ConfigError(
+            f"the model knows none of the dataset's labels: it finds {', '.join(names)}; the "
+            f"dataset has {', '.join(dataset.labels)}; rename with --rename LABEL=CLASS"
+        )
+    return labels
 
 
 class _Outcomes(NamedTuple):
@@ -195,7 +208,6 @@ class _Matching:
     def __init__(
         self, dataset: Dataset, found: Sequence[Sequence[Detection]], labels: Sequence[str]
     ) -> None:
-        require_extra("evaluation", "the evaluation of models")
         from pycocotools.coco import COCO  # noqa: PLC0415 - an extra
         from pycocotools.cocoeval import COCOeval  # noqa: PLC0415
 
