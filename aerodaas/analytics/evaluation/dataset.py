@@ -138,14 +138,14 @@ def counted(pictures: Iterable[AnnotatedPicture], place: Path) -> tuple[Annotate
     return tuple(found)
 
 
-def read_bytes(path: Path, most: int) -> bytes:
-    """Read a file of at most `most` bytes; raises ConfigError."""
+def read_bytes(path: Path, most: int, head: int | None = None) -> bytes:
+    """Read a file of at most `most` bytes, or its first `head` bytes; raises ConfigError."""
     try:
         with path.open("rb") as file:
             # Python takes the memory for as much as is asked for, however small the file.
             size = os.fstat(file.fileno()).st_size
             if size <= most:
-                return file.read(size)
+                return file.read(size if head is None else min(head, size))
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror}") from None
     raise ConfigError(f"{path} is larger than {most / (1 << 20):.3g} MiB; is it what was meant?")
@@ -153,11 +153,7 @@ def read_bytes(path: Path, most: int) -> bytes:
 
 def read_size(path: Path) -> tuple[int, int]:
     """Read a picture's width and height in pixels, without decoding it; raises ConfigError."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(_HEAD)
-    except OSError as error:
-        raise ConfigError(f"cannot read {path}: {error.strerror}") from None
+    head = read_bytes(path, _MOST_PICTURE_BYTES, _HEAD)
     size = picture_size(head) or picture_size(read_bytes(path, _MOST_PICTURE_BYTES))
     return _checked_size(path, size)
 

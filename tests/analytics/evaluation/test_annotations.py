@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -221,7 +222,7 @@ def test_a_size_is_that_of_the_decoded_picture(tmp_path: Path, suffix: str, befo
 
 
 def test_sizes_that_cannot_be_had_are_refused(tmp_path: Path) -> None:
-    """No file, no picture, and one that claims too much."""
+    """No file, no picture, one that claims too much, and one that is too long."""
     path = tmp_path / "a.png"
     with pytest.raises(ConfigError, match=r"cannot read .*a\.png"):
         read_size(path)
@@ -230,6 +231,9 @@ def test_sizes_that_cannot_be_had_are_refused(tmp_path: Path) -> None:
         read_size(path)
     path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + 2 * (20_000).to_bytes(4, "big"))
     with pytest.raises(ConfigError, match="has 20000 x 20000 pixels, too many"):
+        read_size(path)
+    os.truncate(path, (64 << 20) + 1)
+    with pytest.raises(ConfigError, match="is larger than 64 MiB"):
         read_size(path)
 
 
