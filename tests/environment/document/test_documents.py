@@ -132,12 +132,27 @@ def test_a_model_by_name_is_written_by_its_checksum(
     people = OnnxDetector("mine", classes=["person"]).deploy(edge).analyse(camera(env))
     PersonFollowAnalytics().deploy(edge).analyse(people)
     fly(env)
-    written = write_mission(env, "by name")
+    (fetched / "mine.onnx").rename(tmp_path / "away")
+    written = write_mission(env, "by name")  # its checksum is known: no file is read for it
+    (tmp_path / "away").rename(fetched / "mine.onnx")
     assert f'"sha256": "{sha256}"' in written.text()
     assert again(written, environment(), tmp_path) == written
     monkeypatch.setenv("AERODAAS_MODELS", str(tmp_path))
     with pytest.raises(GraphError, match=r"no model 'mine.onnx' with the SHA-256"):
         again(written, environment(), tmp_path)
+
+
+def test_models_that_a_document_does_not_name_are_not_read(
+    environment: Callable[[], Environment], tmp_path: Path
+) -> None:
+    """One that cannot be read is in no other document's way."""
+    (tmp_path / "broken.onnx").mkdir()
+    env = environment()
+    edge = env.get_compute_resource_by_id("edge")
+    OnnxDetector(DETECTOR).deploy(edge).analyse(camera(env))
+    fly(env)
+    written = write_mission(env, "shipped")
+    assert again(written, environment(), tmp_path) == written
 
 
 def test_settings_of_every_kind_come_back(
