@@ -202,10 +202,10 @@ def _vehicle(
     vehicles: dict[str, Vehicle],
     connected: ExitStack,
 ) -> str:
-    from aerodaas.config.plugins import load_plugin  # noqa: PLC0415 - slow to load
+    from aerodaas.drivers.loading import load_vehicle  # noqa: PLC0415 - slow to load
     from aerodaas.types.health import Verdict  # noqa: PLC0415 - as above
 
-    vehicle: Vehicle = load_plugin("drivers", robot.driver)(robot, environment.config)
+    vehicle = load_vehicle(robot, environment.config)
     connected.callback(vehicle.close)
     vehicle.connect(_CONNECTING)
     vehicles[robot.id] = vehicle
