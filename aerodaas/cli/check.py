@@ -209,12 +209,12 @@ def _vehicle(
     connected.callback(vehicle.close)
     vehicle.connect(_CONNECTING)
     vehicles[robot.id] = vehicle
-    state = vehicle.read()
     items = settled_items(vehicle, robot)
     refused = [one.text for one in items if one.verdict is Verdict.REFUSED]
     if refused:
         raise VehicleError(f"{robot.driver} would not take off: {'; '.join(refused)}")
     warned = "".join(f"; {one.text}" for one in items if one.verdict is Verdict.WARNING)
+    state = vehicle.read()
     charge = 100 * state.battery.fraction
     return f"{robot.driver} answers: {state.mode.value}, battery {charge:.0f} %{warned}"
 

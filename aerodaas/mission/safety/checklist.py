@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from aerodaas.config.model import LimitsConfig, RobotConfig
+from aerodaas.config.model import LimitsConfig
 from aerodaas.config.preflight import PreflightConfig, PreflightLevel
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.supervisor import charge_objection, place_objections
@@ -62,11 +62,6 @@ class Checklist:
         self._policy = policy
         self._fence = Geofence(limits.geofence)
 
-    @classmethod
-    def of(cls, vehicle: Vehicle, robot: RobotConfig) -> Checklist:
-        """The list of `robot`."""
-        return cls(vehicle, robot.limits, robot.preflight)
-
     def examine(self, state: VehicleState) -> list[HealthItem]:
         """Every item that the policy does not ignore; `state` is the newest."""
         told, objections = self._told(), self._vehicle.preflight()
@@ -84,12 +79,7 @@ class Checklist:
         others = [text for text in faults.get("", []) if text not in objections]
         if others:
             items.append(HealthItem("faults", "; ".join(others), "", Verdict.WARNING))
-        return [
-            one
-            if one.verdict in {Verdict.GOOD, Verdict.UNKNOWN}
-            else replace(one, remedy=_REMEDIES.get(one.name, ""))
-            for one in items
-        ]
+        return [_remedied(one) for one in items]
 
     def _told(self) -> HealthReadings:
         if self._measured is not None:
@@ -228,6 +218,12 @@ def _judged(item: HealthItem, level: PreflightLevel, faults: Sequence[str]) -> H
     if item.verdict is Verdict.REFUSED and level == "warn":
         return replace(item, verdict=Verdict.WARNING)
     return item
+
+
+def _remedied(item: HealthItem) -> HealthItem:
+    if item.verdict in {Verdict.GOOD, Verdict.UNKNOWN}:
+        return item
+    return replace(item, remedy=_REMEDIES.get(item.name, ""))
 
 
 def _faults(texts: Sequence[str]) -> dict[str, list[str]]:
