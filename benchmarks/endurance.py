@@ -125,9 +125,26 @@ class Watch:
                 used += path.stat().st_blocks * 512
         self.shared.append((moment, used / 1e6))
 
+    def until_it_ends(
+        self, process: subprocess.Popen[bytes], recording: Path, every: float, limit: float
+    ) -> None:
+        """Sample every so many seconds from when the recording is there, at most for `limit`."""
+        while process.poll() is None and not recording.exists():
+            time.sleep(0.2)
+        began = time.monotonic()
+        number = 0
+        while process.poll() is None and time.monotonic() - began <= limit:
+            self.sample(time.monotonic() - began)
+            number += 1
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                process.wait(max(0.0, began + number * every - time.monotonic()))
+
 
 def fly(folder: Path, seconds: float, every: float, limit: float, *, lockstep: bool) -> Watch:
-    """Fly for `seconds` of mission time and return what was seen, by wall seconds."""
+    """Fly for `seconds` of mission time and return what was seen, by wall seconds.
+
+    Ctrl-C ends it early, with what was seen until then.
+    """
     command = [sys.executable, str(APPLICATION), str(folder), "--seconds", str(seconds)]
     command += ["--lockstep"] if lockstep else []
     with (
@@ -136,18 +153,10 @@ def fly(folder: Path, seconds: float, every: float, limit: float, *, lockstep: b
     ):
         watch = Watch(process.pid)
         recording = folder / "flight" / "flight.mcap"
-        while process.poll() is None and not recording.exists():
-            time.sleep(0.2)
-        began = time.monotonic()
-        number = 0
         try:
-            while process.poll() is None:
-                watch.sample(time.monotonic() - began)
-                number += 1
-                if time.monotonic() - began > (seconds if not lockstep else limit):
-                    break
-                with contextlib.suppress(subprocess.TimeoutExpired):
-                    process.wait(max(0.0, began + number * every - time.monotonic()))
+            # Ctrl-C reaches the flight, too, which then ends by itself.
+            with contextlib.suppress(KeyboardInterrupt):
+                watch.until_it_ends(process, recording, every, limit if lockstep else seconds)
         finally:
             if process.poll() is None:
                 process.terminate()

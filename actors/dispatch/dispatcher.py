@@ -356,10 +356,10 @@ class DispatcherActor(StreamActor):
             self._guarded("finished", task, now)
 
     def _require_decisions(self, now: int) -> None:
-        oldest = next(iter(self._dispatch.undecided.values()), None)
         if self._turns is not None:
             # It decides in its turns, and those that wait for one grow old meanwhile.
             return
+        oldest = next(iter(self._dispatch.undecided.values()), None)
         if oldest is None or self._replaced or now <= oldest.deadline + _FORGOTTEN:
             return
         self._replace(f"left {self._log.label(oldest)} undecided beyond its deadline", now)

@@ -68,17 +68,13 @@ class Attachments:
 
     def shared(self, host: ActiveMission, tenant: str) -> list[str]:
         """Running cameras of a flying mission to which a tenant may attach missions."""
-        grants = host.grants
         if self._most == 0 or host.phase is not MissionPhase.FLYING or host.attached_to:
             return []
-        if tenant != host.row.tenant and tenant not in grants:
-            return []
-        granted = grants.get(tenant, [])
         # Without a link of its own: requests ask for this in any thread.
         streams = {} if host.link is None else host.link.news.streams
         running = [name for name, kind in streams.items() if kind is StreamKind.PICTURES]
         cameras = [name for name in running if name in self._cameras]
-        return [name for name in cameras if not granted or name in granted]
+        return [name for name in cameras if _may_have(tenant, [name], host)]
 
     def begin(self, one: ActiveMission) -> Attached:
         """Have the flight share its cameras with a mission; raises MissionError if it does not."""
@@ -100,7 +96,7 @@ class Attachments:
         host = self._missions.get(str(one.attached_to))
         if host is None or host.phase is not MissionPhase.FLYING:
             self._end(one, "the flight that it was attached to has ended")
-        elif one.row.tenant != host.row.tenant and one.row.tenant not in host.grants:
+        elif not _may_have(one.row.tenant, one.document().sensors, host):
             self._withdraw(host, one)
             self._end(one, f"{host.row.tenant} has withdrawn its grant")
 
@@ -113,17 +109,12 @@ class Attachments:
 
     def granted(self, host: ActiveMission, tenant: str, sensors: list[str]) -> None:
         """Let a tenant attach missions to these cameras; what it has attached to others ends."""
-        self._grant(host, {**host.grants, tenant: sensors})
-        for one in self._of(host, tenant):
-            if sensors and not set(one.document().sensors) <= set(sensors):
-                self._withdraw(host, one)
-                self._end(one, f"{host.row.tenant} has withdrawn its grant")
+        self._grant(host, tenant, {**host.grants, tenant: sensors})
 
     def withdrawn(self, host: ActiveMission, tenant: str) -> None:
         """Share nothing with a tenant any more, from the next picture on."""
-        self._grant(host, {name: one for name, one in host.grants.items() if name != tenant})
-        for one in self._of(host, tenant):
-            self.watch(one)
+        others = {name: one for name, one in host.grants.items() if name != tenant}
+        self._grant(host, tenant, others)
 
     def _beside(self, host: ActiveMission) -> list[ActiveMission]:
         """Missions that are attached to a flight, or are to be."""
@@ -132,24 +123,17 @@ class Attachments:
     def _full(self, host: ActiveMission) -> str:
         return f"{self._most} missions are attached to {host.row.id}, the most that may be"
 
-    def _grant(self, host: ActiveMission, grants: Mapping[str, list[str]]) -> None:
+    def _grant(self, host: ActiveMission, tenant: str, grants: Mapping[str, list[str]]) -> None:
+        """Change the grants; what `tenant` has attached and may have no more ends at once."""
         host.change(request={**host.row.request, "grants": dict(grants)})
-
-    def _of(self, host: ActiveMission, tenant: str) -> list[ActiveMission]:
-        """Missions of another tenant that are attached to a flight."""
-        others = tenant != host.row.tenant
-        return [
-            one
-            for one in self._beside(host)
-            if others and one.row.tenant == tenant and one.phase is MissionPhase.FLYING
-        ]
+        for one in self._beside(host):
+            if one.row.tenant == tenant and one.phase is MissionPhase.FLYING:
+                self.watch(one)
 
     def _host(self, principal: Principal, name: str) -> ActiveMission:
         """The mission to attach to; for whom it neither is nor shares with, there is none."""
         host = self._missions.get(name)
-        own = host is not None and host.row.tenant == principal.tenant
-        granted = host is not None and principal.tenant in host.grants
-        if host is not None and (own or granted):
+        if host is not None and _may_have(principal.tenant, [], host):
             if host.phase is not MissionPhase.FLYING or host.attached_to is not None:
                 what = "senses only" if host.attached_to else f"is {host.phase.value}"
                 raise RefusedError(409, f"{name} {what}: attach to a mission in flight")
@@ -176,6 +160,14 @@ class Attachments:
                 one.follow().ask(do="end", reason=reason)
         elif now - self._told[one.row.id] > _ENDING_SECONDS:
             one.end_flight()
+
+
+def _may_have(tenant: str, sensors: list[str], host: ActiveMission) -> bool:
+    """Whether a tenant may sense by these cameras: its own, or granted, by name or all of them."""
+    if tenant == host.row.tenant:
+        return True
+    granted = host.grants.get(tenant)
+    return granted is not None and (not granted or set(sensors) <= set(granted))
 
 
 def _require_senses_only(document: MissionDocument) -> None:

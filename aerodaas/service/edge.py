@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
-import os
 import socket
 import threading
 import time
@@ -18,6 +17,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from aerodaas.schedulers.analytics.fair_queue import FairQueue
+from aerodaas.service.unix_server import UnixServer, fits_a_socket
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.errors import ConfigError
 
@@ -27,8 +27,8 @@ _LONGEST = 5 * NANOSECONDS
 """A turn that is kept so long is over: its flight hangs, and is asked no more."""
 _LONGEST_HEAD = 1000
 _LOOK_SECONDS = 0.5
-_SOCKET_NAME = 100
-"""Bytes that a Unix socket's path may have on Linux (108), less some."""
+_MOST_FLIGHTS = 1000
+"""Most connections at once; each flight has one."""
 
 
 @dataclass
@@ -58,7 +58,7 @@ class EdgeArbiter:
 
         Raises ConfigError for a path that is too long for a socket.
         """
-        if len(os.fsencode(path)) > _SOCKET_NAME:
+        if not fits_a_socket(path):
             raise ConfigError(f"{path} is too long a path for a socket: use a shorter --state")
         self._slots = slots
         self._lock = threading.Lock()
@@ -67,49 +67,32 @@ class EdgeArbiter:
         """Nanoseconds of each tenant's newest turn, which the next one is expected to take."""
         self._numbers = itertools.count()
         self._flights: list[_Flight] = []
-        self._closed = threading.Event()
-        path.unlink(missing_ok=True)
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._socket.bind(str(path))
-        path.chmod(0o600)
-        self._socket.listen()
+        self._server = UnixServer(path, self._serve, name="edge", most=_MOST_FLIGHTS)
 
     def start(self) -> None:
         """Start giving turns."""
-        threading.Thread(target=self._accept, name="edge", daemon=True).start()
+        self._server.start()
 
     def close(self) -> None:
         """Give no more turns; flights run as they like."""
-        self._closed.set()
-        with contextlib.suppress(OSError):
-            self._socket.shutdown(socket.SHUT_RDWR)
-        self._socket.close()
-
-    def _accept(self) -> None:
-        while not self._closed.is_set():
-            try:
-                connection, _ = self._socket.accept()
-            except OSError:
-                return
-            threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
+        self._server.close()
 
     def _serve(self, connection: socket.socket) -> None:
-        with connection:
-            # Also the pace at which a turn that is kept too long is noticed by those who wait.
-            connection.settimeout(_LOOK_SECONDS)
-            flight = self._met(connection)
-            if flight is None:
-                return
+        # Also the pace at which a turn that is kept too long is noticed by those who wait.
+        connection.settimeout(_LOOK_SECONDS)
+        flight = self._met(connection)
+        if flight is None:
+            return
+        with self._lock:
+            self._flights.append(flight)
+        try:
+            while not self._server.closed.is_set() and self._heard(flight):
+                pass
+        finally:
             with self._lock:
-                self._flights.append(flight)
-            try:
-                while not self._closed.is_set() and self._heard(flight):
-                    pass
-            finally:
-                with self._lock:
-                    self._end(flight)
-                    self._flights.remove(flight)
-                    self._give(time.monotonic_ns())
+                self._end(flight)
+                self._flights.remove(flight)
+                self._give(time.monotonic_ns())
 
     @staticmethod
     def _met(connection: socket.socket) -> _Flight | None:

@@ -59,13 +59,6 @@ def waypoints_text(mission: MissionStatus) -> tuple[float, str]:
     return mission.progress, f"{visited} of {known} waypoints" if known else "no waypoints"
 
 
-def outlook_text(outlook: BatteryOutlook) -> str:
-    """How far the battery lasts, in words."""
-    minutes, seconds = divmod(round(outlook.hover), 60)
-    plan = f"{outlook.plan:.0%}" if outlook.plan <= 1 else "more"
-    return f"returns at {outlook.returns_at:.0%}, in {minutes}:{seconds:02}; plan needs {plan}"
-
-
 def robot_panel(
     robot: RobotSnapshot, path: Sequence[tuple[float, float]], *, ascii_only: bool
 ) -> RenderableType:
@@ -80,7 +73,7 @@ def robot_panel(
     facts.add_row("position", _position(vehicle))
     facts.add_row("battery", _battery(vehicle))
     if mission is not None and mission.outlook is not None:
-        facts.add_row("", outlook_text(mission.outlook))
+        facts.add_row("", _outlook(mission.outlook))
     facts.add_row("progress", _progress(mission))
     facts.add_row("flown", f"{mission.distance:.1f} m" if mission else "")
     facts.add_row("faults", _faults(mission, vehicle))
@@ -151,6 +144,12 @@ def _battery(vehicle: VehicleState | None) -> RenderableType:
         return "unknown"
     style = next(colour for most, colour in _CHARGE_COLOURS if charge <= most)
     return _bar(charge, f"{100 * charge:.0f} %", style)
+
+
+def _outlook(outlook: BatteryOutlook) -> str:
+    minutes, seconds = divmod(round(outlook.hover), 60)
+    plan = f"{outlook.plan:.0%}" if outlook.plan <= 1 else "more"
+    return f"returns at {outlook.returns_at:.0%}, in {minutes}:{seconds:02}; plan needs {plan}"
 
 
 def _progress(mission: MissionStatus | None) -> RenderableType:

@@ -17,7 +17,6 @@ export interface BesideProps {
   missions: [MissionOut, MissionOut];
   recorded: [RecordedOut, RecordedOut];
   token: string;
-  sees: boolean;
   theme: string;
   themes: preact.ComponentChildren;
   onAlone(mission: string): void;
@@ -31,7 +30,7 @@ function titles([one, other]: [MissionOut, MissionOut]): [string, string] {
   return [title(one), title(other)];
 }
 
-export function SideBySide({ missions, recorded, token, sees, theme, themes, onAlone }: BesideProps) {
+export function SideBySide({ missions, recorded, token, theme, themes, onAlone }: BesideProps) {
   const [left, right] = [
     useFlight(missions[0], token, () => new Playback(missions[0], recorded[0], token, momentOfLink())),
     useFlight(missions[1], token, () => new Playback(missions[1], recorded[1], token, null)),
@@ -41,10 +40,11 @@ export function SideBySide({ missions, recorded, token, sees, theme, themes, onA
   useEffect(() => {
     if (left?.source instanceof Playback && right?.source instanceof Playback) {
       left.source.lead(right.source);
+      // A link may name a moment after the end of the first one.
+      left.source.seek(momentOfLink() ?? left.source.time);
     }
   }, [left, right]);
   if (!left || !right || !(left.source instanceof Playback)) return null;
-  const shared = { sees, theme };
   const [one, other] = titles(missions);
   return (
     <div class="page played">
@@ -57,12 +57,12 @@ export function SideBySide({ missions, recorded, token, sees, theme, themes, onA
       </header>
       <main class="besides">
         <Half
-          {...{ ...shared, flight: left, recorded: recorded[0], robot: first, onRobot: setFirst }}
+          {...{ theme, flight: left, recorded: recorded[0], robot: first, onRobot: setFirst }}
           title={one}
           onAlone={() => onAlone(missions[0].id)}
         />
         <Half
-          {...{ ...shared, flight: right, recorded: recorded[1], robot: second, onRobot: setSecond }}
+          {...{ theme, flight: right, recorded: recorded[1], robot: second, onRobot: setSecond }}
           title={other}
           onAlone={() => onAlone(missions[1].id)}
         />
@@ -83,13 +83,12 @@ interface HalfProps {
   flight: Flight;
   recorded: RecordedOut;
   robot: string;
-  sees: boolean;
   theme: string;
   onRobot(robot: string): void;
   onAlone(): void;
 }
 
-function Half({ title, flight, recorded, robot, sees, theme, onRobot, onAlone }: HalfProps) {
+function Half({ title, flight, recorded, robot, theme, onRobot, onAlone }: HalfProps) {
   const place: Place = useMemo(() => placeOf({ ...recorded, robots: [] }), [recorded]);
   const robots = Object.keys(recorded.tracks);
   return (
@@ -120,7 +119,7 @@ function Half({ title, flight, recorded, robot, sees, theme, onRobot, onAlone }:
         drawn={null}
         onDraw={() => undefined}
       />
-      {sees && <Video flight={flight} />}
+      <Video flight={flight} />
       <StatePanel flight={flight} robot={robot} />
       <Charts flight={flight} robot={robot} theme={theme} />
       <AnalyticsCharts flight={flight} theme={theme} />

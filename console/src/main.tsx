@@ -130,7 +130,6 @@ function App() {
                 <SideBySide
                   missions={[mission, other]}
                   recorded={[left, right]}
-                  sees={known.account.scopes.includes("sense")}
                   {...{ token, theme, themes, onAlone: choose }}
                 />
               )}

@@ -104,17 +104,13 @@ class Dispatch:
     def arrived(self, task: Task, now: int) -> None:
         """A task has reached the edge."""
         self.undecided[task.id] = task
-        self._obey(self._task_arrived(task, now), now)
-        if self._ended:
-            self._tell_ends(now)
+        self._carry_out(self._task_arrived(task, now), now)
         if self.running is None:
             self._offer_edge(now)
 
     def timer(self, now: int) -> None:
         """A time asked for with `Host.wake_at` has come."""
-        self._obey(self._timer(now), now)
-        if self._ended:
-            self._tell_ends(now)
+        self._carry_out(self._timer(now), now)
         if self.running is None:
             self._offer_edge(now)
 
@@ -133,9 +129,7 @@ class Dispatch:
         if self._cloud_queue:
             self._fill_cloud(now)
             self._tell_ends(now)
-        self._obey(self._task_finished(result, now), now)
-        if self._ended:
-            self._tell_ends(now)
+        self._carry_out(self._task_finished(result, now), now)
         if self.running is None:
             self._offer_edge(now)
 
@@ -144,9 +138,7 @@ class Dispatch:
         self.resources = resources
         while self._cloud_queue and not resources.cloud_slots:
             self._give_up(self._cloud_queue.popleft().task, now)
-        self._obey(self.guarded(self.scheduler.resources_changed)(resources, now), now)
-        if self._ended:
-            self._tell_ends(now)
+        self._carry_out(self.guarded(self.scheduler.resources_changed)(resources, now), now)
         if self.running is None:
             self._offer_edge(now)
 
@@ -157,9 +149,7 @@ class Dispatch:
         self.start(now)
         self._fill_cloud(now)
         for task in list(self.undecided.values()):
-            self._obey(self._task_arrived(task, now), now)
-            if self._ended:
-                self._tell_ends(now)
+            self._carry_out(self._task_arrived(task, now), now)
         if self.running is None:
             self._offer_edge(now)
 
@@ -180,11 +170,14 @@ class Dispatch:
         undecided = self.undecided
         while self.edge_open and undecided and self.running is None:
             before = len(undecided)
-            self._obey(self._executor_idle(now), now)
-            if self._ended:
-                self._tell_ends(now)
+            self._carry_out(self._executor_idle(now), now)
             if len(undecided) == before:
                 return
+
+    def _carry_out(self, decisions: Iterable[Decision] | None, now: int) -> None:
+        self._obey(decisions, now)
+        if self._ended:
+            self._tell_ends(now)
 
     def _obey(self, decisions: Iterable[Decision] | None, now: int) -> None:
         if decisions is None:

@@ -49,10 +49,9 @@ class TimeEstimates:
 
     def observe(self, profile: Profile, taken: int, now: int) -> None:
         """Learn from one execution."""
-        model = self._models.get(profile.model) or self._model(profile)
+        model = self._model(profile)
         offset, variance, count = model
-        nominal = profile.cloud_time if self._shared else profile.edge_time
-        error = taken - nominal - offset - self.delay
+        error = taken - self._nominal(profile) - offset - self.delay
         if not self._shared:
             error_left = error
             self._cache.pop(profile.model, None)
@@ -73,17 +72,19 @@ class TimeEstimates:
         """The present belief about a model's execution time."""
         found = self._cache.get(profile.model)
         if found is None:
-            offset, variance, _ = self._models.get(profile.model) or self._model(profile)
-            nominal = profile.cloud_time if self._shared else profile.edge_time
-            mean = nominal + offset + self.delay
+            offset, variance, _ = self._model(profile)
+            mean = self._nominal(profile) + offset + self.delay
             spread = variance + self._uncertainty + _LEAST_VARIANCE
             found = self._cache[profile.model] = TimeEstimate(mean, sqrt(spread))
         return found
 
+    def _nominal(self, profile: Profile) -> int:
+        return profile.cloud_time if self._shared else profile.edge_time
+
     def _model(self, profile: Profile) -> list[float]:
         found = self._models.get(profile.model)
         if found is None:
-            nominal = profile.cloud_time if self._shared else profile.edge_time
+            nominal = self._nominal(profile)
             found = self._models[profile.model] = [0.0, (_PRIOR_VARIATION * nominal) ** 2, 0]
         return found
 

@@ -198,8 +198,9 @@ def test_two_flights_show_one_moment(browser: Browser, path: Path, tmp_path: Pat
     robots = [facts(one)[0].robots["tello"] for one in (path, longer)]
     ends = [float(robot.time[-1]) for robot in robots]
     with served(path, longer) as address:
-        page = browser.open(f"{address}&t=20", 1400, 1000)
+        page = browser.open(f"{address}&t={ends[0] + 3.0:.2f}", 1400, 1000)
         page.until("document.querySelectorAll('[data-drone]').length === 2")
+        page.until(f"Math.abs({TIME} - {ends[0] + 3.0:.2f}) < 0.01")
         assert page.run(f"{BAR}.max - {ends[1]}") >= 0
         for time in (20.0, 61.5, 12.25, ends[0] + 4.0):
             page.run(SEEK.format(time))

@@ -9,6 +9,7 @@ __all__ = ["ACCEPTED", "EXCEPTIONS", "is_accepted"]
 ACCEPTED = {
     *("0BSD", "Apache-2.0", "BSD-2-Clause", "BSD-3-Clause", "CC0-1.0", "ISC", "MIT", "MIT-0"),
     *("MIT-CMU", "PSF-2.0", "Unlicense", "Zlib"),
+    "any-OSI",  # any that the Open Source Initiative approves: the choice has MIT among it
     "MPL-2.0",  # asks for the sources of its own files only, which are used unchanged
 }
 """SPDX ids."""

@@ -27,6 +27,7 @@ from aerodaas.protocol.schemas import AnalyticsOut, NavigationIn, StreamKind
 from aerodaas.service.flights.folder import FlightFolder
 from aerodaas.service.flights.sharing import Sharing
 from aerodaas.service.flights.watch import LeaseWatch
+from aerodaas.service.unix_server import UnixServer
 from aerodaas.types.errors import AeroDaaSError, MissionError
 
 __all__ = ["ControlServer", "Flown", "Reader"]
@@ -101,36 +102,18 @@ class ControlServer:
         self._lease = lease
         self._relay = relay
         self._sharing = Sharing()
-        self._places = threading.BoundedSemaphore(_MOST_CONNECTIONS)
-        path = folder.socket
-        path.unlink(missing_ok=True)
-        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
-        self._socket.bind(str(path))
-        path.chmod(0o600)
-        self._socket.listen()
-        self._closed = threading.Event()
+        self._server = UnixServer(
+            folder.socket, self._serve, name="control", most=_MOST_CONNECTIONS
+        )
+        self._closed = self._server.closed
 
     def start(self) -> None:
         """Accept connections, in a thread of its own."""
-        threading.Thread(target=self._accept, name="control", daemon=True).start()
+        self._server.start()
 
     def close(self) -> None:
         """Accept no more, and end the connections at their next message."""
-        self._closed.set()
-        with contextlib.suppress(OSError):
-            self._socket.shutdown(socket.SHUT_RDWR)
-        self._socket.close()
-
-    def _accept(self) -> None:
-        while not self._closed.is_set():
-            try:
-                connection, _ = self._socket.accept()
-            except OSError:
-                return
-            if not self._places.acquire(blocking=False):
-                connection.close()
-                continue
-            threading.Thread(target=self._serve, args=(connection,), daemon=True).start()
+        self._server.close()
 
     def _serve(self, connection: socket.socket) -> None:
         channel = Channel(connection)
@@ -146,9 +129,6 @@ class ControlServer:
             purposes[first["for"]](channel, first)
         except (GuestError, KeyError, OSError):
             return
-        finally:
-            channel.close()
-            self._places.release()
 
     def _commands(self, channel: Channel, _: dict[str, Any]) -> None:
         while not self._closed.is_set():

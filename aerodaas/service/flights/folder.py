@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,12 +11,10 @@ from pydantic import ValidationError
 
 from aerodaas.config.private_file import write_private
 from aerodaas.service.flights.order import FlightOrder, Outcome
+from aerodaas.service.unix_server import fits_a_socket
 from aerodaas.types.errors import MissionError
 
 __all__ = ["FlightFolder"]
-
-_SOCKET_NAME = 100
-"""Bytes that a Unix socket's path may have on Linux (108), less some."""
 
 
 class FlightFolder:
@@ -43,7 +40,7 @@ class FlightFolder:
         Raises MissionError where it would be longer than the system allows.
         """
         path = self.path / "control"
-        if len(os.fsencode(path)) > _SOCKET_NAME:
+        if not fits_a_socket(path):
             raise MissionError(f"{path.parent} is too long a path for a socket: use a shorter one")
         return path
 

@@ -66,6 +66,7 @@ def test_a_licence_is_read_from_old_and_new_metadata(
         ("MIT", True),
         ("Apache-2.0 AND MIT", True),
         ("GPL-3.0-only OR MIT", True),
+        ("any-OSI", True),
         ("GPL-3.0-only", False),
         ("MIT AND GPL-3.0-only", False),
         ("(MIT)", False),
