@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from aerodaas.config.private_file import write_private
+from aerodaas.config.user_folders import state_folder
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.types.errors import VehicleError
 
@@ -39,7 +38,7 @@ class Journal:
 
     def __init__(self, vehicle: str) -> None:
         """Open nothing; `vehicle` names the vehicle and nothing else."""
-        self.path = _state_folder() / "aerodaas" / "vehicles" / f"{vehicle}.json"
+        self.path = state_folder() / "vehicles" / f"{vehicle}.json"
 
     def read(self) -> Changes | None:
         """What is still to be put back; None if nothing. Raises VehicleError."""
@@ -71,9 +70,3 @@ class Journal:
     def clear(self) -> None:
         """Remove it: everything was put back."""
         self.path.unlink(missing_ok=True)
-
-
-def _state_folder() -> Path:
-    """The folder of the XDG base directory specification."""
-    named = os.environ.get("XDG_STATE_HOME", "")
-    return Path(named) if Path(named).is_absolute() else Path.home() / ".local" / "state"
