@@ -12,6 +12,7 @@ import numpy as np
 
 from aerodaas.cameras.settings import camera_model
 from aerodaas.config.checked import checked
+from aerodaas.config.document import public_document
 from aerodaas.config.model import (
     CameraConfig,
     EnvironmentConfig,
@@ -22,7 +23,7 @@ from aerodaas.config.model import (
 from aerodaas.recording.encoded_frame import EncodedFrame
 from aerodaas.recording.images import decode_image, picture_bytes
 from aerodaas.recording.outcome import RecordingSummary
-from aerodaas.recording.provenance import Provenance
+from aerodaas.recording.provenance import Provenance, package_versions
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.bag import BagMessage, RosBag
@@ -95,17 +96,17 @@ def import_bag(
     topics.check(bag.topics)
     beginning = Beginning(bag, topics)
     environment = _environment(bag.path, beginning)
-    provenance = Provenance.collect(config=environment)
-    started = Provenance(
+    # No revision: it is that of an application.
+    provenance = Provenance(
         started_ns=beginning.epoch_ns,
         name=bag.path.stem,
-        config=provenance.config,
-        versions=provenance.versions,
+        config=public_document(environment),
+        versions=package_versions(),
     )
     config = images or RecordingConfig()
     try:
         with FlightRecorder(
-            path, config=config, provenance=started, home=beginning.home
+            path, config=config, provenance=provenance, home=beginning.home
         ) as recorder:
             work = _Import(beginning, recorder)
             work.take(bag)
