@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.cli.application import build_application
+from aerodaas.cli.options import OtherEnvironment, Overrides
 from aerodaas.cli.preflight import settled_items
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions, current_options
@@ -47,13 +48,8 @@ def check(
             help="The application, as for `aerodaas run`; or an environment file alone."
         ),
     ],
-    env: Annotated[
-        Path | None, typer.Option(help="Environment file instead of the application's own.")
-    ] = None,
-    setting: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
-    ] = None,
+    env: OtherEnvironment = None,
+    setting: Overrides = None,
     connect: Annotated[  # noqa: FBT002
         bool,
         typer.Option(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, Overrides
 from aerodaas.cli.robot import connected_robot
 from aerodaas.types.errors import VehicleError
 
@@ -28,11 +29,8 @@ def logs(
         bool, typer.Option("--latest", help="Fetch the newest one.")
     ] = False,
     to: Annotated[Path, typer.Option(help="The folder for what is fetched.")] = Path(),
-    env: Annotated[Path, typer.Option(help="The environment file.")] = Path("environment.json"),
-    setting: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
-    ] = None,
+    env: EnvironmentFile = ENVIRONMENT,
+    setting: Overrides = None,
     as_json: Annotated[  # noqa: FBT002
         bool, typer.Option("--json", help="Print the list, or the files, as JSON.")
     ] = False,

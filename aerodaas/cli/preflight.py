@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, Overrides
 from aerodaas.cli.robot import connected_robot
 
 if TYPE_CHECKING:
@@ -33,11 +33,8 @@ _MARKS = {
 
 def preflight(
     robot: Annotated[str, typer.Argument(help="Id of the robot.")],
-    env: Annotated[Path, typer.Option(help="The environment file.")] = Path("environment.json"),
-    setting: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
-    ] = None,
+    env: EnvironmentFile = ENVIRONMENT,
+    setting: Overrides = None,
     as_json: Annotated[  # noqa: FBT002
         bool, typer.Option("--json", help="Print the list as JSON.")
     ] = False,
