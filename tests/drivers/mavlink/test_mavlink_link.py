@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from aerodaas.drivers.mavlink.settings import KEY_VARIABLE, MavlinkSettings
+from aerodaas.config.secrets import MAVLINK_KEY
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire import forwarding
 from aerodaas.drivers.mavlink.wire import link as module
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -53,7 +54,7 @@ class World:
     """A link, its wire, and other systems on it."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> None:  # noqa: ANN401
-        monkeypatch.delenv(KEY_VARIABLE, raising=False)
+        monkeypatch.delenv(MAVLINK_KEY, raising=False)
         monkeypatch.setattr(MavlinkLink, "_start", lambda _: None)
         self.wire, self.station = _Wire(), _Wire()
         self.opened: list[tuple[str, str]] = []
