@@ -161,7 +161,8 @@ def test_before_it_knows_its_vehicle_it_hears_everybody(world: World) -> None:
     world.says(BEAT, 2, 5)
     world.link.turn(100.0)
     assert world.heard == [("HEARTBEAT", 100.0)] * 2
-    assert world.link.target is None
+    with pytest.raises(AssertionError):
+        _ = world.link.target
     world.link.adopt((2, 5), HERE, 100.0)
     for system, component in ((1, 1), (2, 1), (1, 5), (2, 5)):
         world.says(LOOK, system, component)

@@ -64,7 +64,7 @@ class Parameters:
             return
         encoded = self._autopilot.encode(value, before.kind)
         request = mavlink.MAVLink_param_set_message(
-            *self._target(), _bytes(name), encoded, before.kind
+            *self._link.target, _bytes(name), encoded, before.kind
         )
         for answer in self._answers(name, request):
             if self._same(answer, value):
@@ -78,7 +78,7 @@ class Parameters:
         return next(self._answers(name, self._request(name)), None)
 
     def _request(self, name: str) -> object:
-        return mavlink.MAVLink_param_request_read_message(*self._target(), _bytes(name), -1)
+        return mavlink.MAVLink_param_request_read_message(*self._link.target, _bytes(name), -1)
 
     def _answers(self, name: str, request: object) -> Iterator[_Value]:
         """Values of `name` received after `request`, which is repeated until one arrives."""
@@ -102,10 +102,6 @@ class Parameters:
     def _same(one: _Value, value: float) -> bool:
         # They are single-precision on the autopilot.
         return abs(one.value - value) <= 1e-5 * max(1.0, abs(value))
-
-    def _target(self) -> tuple[int, int]:
-        assert self._link.target is not None  # noqa: S101 - only a known vehicle has parameters
-        return self._link.target
 
 
 def _bytes(name: str) -> bytes:

@@ -61,7 +61,7 @@ def upload(
 
     Blocks; not for use in the link's thread.
     """
-    target = _target(link)
+    target = link.target
     count = mavlink.MAVLink_mission_count_message(*target, len(items), kind)
     names = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
     with link.listen(*names) as inbox:
@@ -97,7 +97,7 @@ def download(
     progress: Progress = _ignore,
 ) -> list[MissionItem]:
     """The vehicle's plan; raises VehicleError. Blocks; not for use in the link's thread."""
-    target = _target(link)
+    target = link.target
     with link.listen("MISSION_COUNT", "MISSION_ITEM_INT") as inbox:
         ask: Any = mavlink.MAVLink_mission_request_list_message(*target, kind)
         reply = _ask(link, inbox, ask, kind, lambda one: one.get_type() == "MISSION_COUNT")
@@ -161,11 +161,6 @@ def _message(item: MissionItem, sequence: int, target: tuple[int, int], kind: in
         item.z,
         kind,
     )
-
-
-def _target(link: MavlinkLink) -> tuple[int, int]:
-    assert link.target is not None  # noqa: S101 - plans go to a known vehicle only
-    return link.target
 
 
 def _name(kind: int) -> str:
