@@ -112,11 +112,11 @@ class Checklist:
         yield _most("compass", told.compass, policy.misfit, "misfit {:.2f}")
         yield self._gps(state, told)
         yield _most("estimator", told.estimator, policy.misfit, "misfit {:.2f}")
-        yield _yes("storage", told.logs, "it writes its log", "it does not write its log")
+        yield self._storage(told.logs)
         yield _most("wind", told.wind, policy.wind_speed, "{:.1f} m/s")
         yield self._daylight(state, told.clock)
         yield _most("link", told.silence, policy.silence, "last word {:.1f} s ago")
-        yield _texts("fallback", told.stranded, "comes home without us")
+        yield _texts("fallback", told.stranded, "able to come home without us")
         yield _texts("remote_id", None if told.remote_id is None else [told.remote_id], "ready")
 
     def _cells(self, cells: tuple[float, ...] | None) -> HealthItem:
@@ -142,6 +142,14 @@ class Checklist:
         known = f"{gps.satellites} satellites" if gps.satellites else "a fix"
         value = f"{known}, within {gps.horizontal_sigma:.1f} m"
         return HealthItem("gps", value, bound, _verdict(good=good))
+
+    @staticmethod
+    def _storage(writes: bool | None) -> HealthItem:  # noqa: FBT001 - a reading
+        bound = "able to write its log"
+        if writes is None:
+            return _unknown("storage", bound)
+        value = "it writes its log" if writes else "it does not write its log"
+        return HealthItem("storage", value, bound, _verdict(good=writes))
 
     def _daylight(self, state: VehicleState, clock: float | None) -> HealthItem:
         least = self._policy.sun_elevation
@@ -189,12 +197,6 @@ def _most(name: str, value: float | None, most: float, form: str) -> HealthItem:
     if value is None or not math.isfinite(value):
         return _unknown(name, bound)
     return HealthItem(name, form.format(value), bound, _verdict(good=value <= most))
-
-
-def _yes(name: str, value: bool | None, yes: str, no: str) -> HealthItem:  # noqa: FBT001 - a reading
-    if value is None:
-        return _unknown(name, yes)
-    return HealthItem(name, yes if value else no, yes, _verdict(good=value))
 
 
 def _texts(name: str, objections: Sequence[str] | None, good: str) -> HealthItem:
