@@ -35,7 +35,9 @@ def logs(
         bool, typer.Option("--json", help="Print the list, or the files, as JSON.")
     ] = False,
 ) -> None:
-    """List the logs on a robot's autopilot, or fetch some of them; on the ground only.
+    """List the logs that a robot's autopilot keeps, or fetch some of them into a folder.
+
+    On the ground only. No parameter and no plan of the vehicle is changed, whatever a flight sets.
 
     aerodaas logs drone
     aerodaas logs drone --latest --to runs/logs
