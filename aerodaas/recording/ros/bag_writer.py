@@ -15,8 +15,9 @@ import numpy as np
 from aerodaas.recording.export.output import new_file
 from aerodaas.recording.pictures import DETECTIONS_SCHEMA, Shot, detections_of, shots
 from aerodaas.recording.reader import Record, Recording
+from aerodaas.recording.reference_frames import MAP_FRAME, base_link
 from aerodaas.recording.ros import typestore
-from aerodaas.recording.ros.outgoing import MAP, MessageBuilder, base_link
+from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.rotation import from_rpy
 from aerodaas.recording.states import state_of
 from aerodaas.types.errors import RecordingError
@@ -160,7 +161,7 @@ class _Conversion:
         value = build.odometry(odometry, stamp, robot)
         yield _Message(f"/{robot}/odometry", typestore.ODOMETRY, value)
         attitude = from_rpy(odometry.roll, odometry.pitch, odometry.yaw)
-        value = build.transform(stamp, MAP, base_link(robot), odometry.position, attitude)
+        value = build.transform(stamp, MAP_FRAME, base_link(robot), odometry.position, attitude)
         yield _Message("/tf", typestore.TRANSFORMS, value)
 
     def _calibration(self, record: Record) -> Iterator[_Message]:
