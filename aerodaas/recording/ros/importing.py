@@ -35,14 +35,12 @@ from aerodaas.types.data import Detections, Frame, Header, Odometry
 from aerodaas.types.errors import AeroDaaSError, RecordingError, SourceError
 from aerodaas.types.geometry import CameraModel
 from aerodaas.types.identifiers import internal
-from aerodaas.types.picture_size import picture_fits, picture_size
+from aerodaas.types.picture_size import picture_fits, picture_format, picture_size
 from aerodaas.types.status import Message
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 __all__ = ["ImportedBag", "import_bag"]
 
-_FORMATS = {b"\xff\xd8": "jpeg", b"\x89P": "png", b"RI": "webp"}
-"""Formats of encoded pictures by their first two bytes."""
 _PREFLIGHT = NANOSECONDS
 """Time on the ground that a mission has for its checks before it takes off."""
 _MOVING = 0.2
@@ -218,7 +216,7 @@ class _Import:
         value = message.value
         if not hasattr(value, "encoding"):
             data = picture_bytes(value)
-            size, kind = picture_size(data), _FORMATS.get(data[:2])
+            size, kind = picture_size(data), picture_format(data)
             if size is None or kind is None or not picture_fits(*size):
                 raise ValueError(f"no JPEG, PNG or WebP of a bearable size ({value.format!r:.40})")
             camera = self._model(message.topic, *size)
