@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 __all__ = [
     "FLU_FROM_OPTICAL",
+    "Box",
     "CameraModel",
     "GeodeticOrigin",
     "Vector",
@@ -39,6 +40,8 @@ __all__ = [
 
 Vector: TypeAlias = NDArray[np.float64]
 """A float64 array of shape (3,)."""
+Box: TypeAlias = tuple[float, float, float, float]
+"""Left, top, right, bottom in pixels of an image."""
 Triple: TypeAlias = tuple[float, float, float]
 
 FLU_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
