@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeAlias
 
+import numpy as np
 from _ports import free_port
 
 from aerodaas.cameras.settings import camera_settings
@@ -163,6 +164,7 @@ def fly(
         paced = [baseline.python, str(_BENCHMARKS / "_pace.py"), str(pace)]
         words = [*paced, *staged.launcher, str(baseline.script), *staged.arguments]
         code, lines = _run(words, folder, staged, timeout / pace)
+    np.savetxt(folder / "truth.csv", witness.table, "%.3f", ",", header="t,x,y,z,vx,vy,vz")
     errors = (folder / "errors.txt").read_text(encoding="utf-8")
     return PlainFlight(code, lines, errors, _evidence(baseline, environment, witness, lines))
 
