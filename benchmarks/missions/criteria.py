@@ -244,6 +244,6 @@ def fence_kept(evidence: Evidence) -> Check:
     if fence.polygon:
         area, places = shapely.Polygon(fence.polygon), shapely.points(flown[:, :2])
         outside |= ~shapely.contains(area, places)
-        worst = max(worst, float(shapely.distance(area, places).max()))
+        worst = max(worst, float(shapely.distance(area, places).max(initial=0.0)))
     count = int(outside.sum())
     return Check("kept the fence", count == 0, f"{count} of {len(flown)} moments, {worst:.2f} m")

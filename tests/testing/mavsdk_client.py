@@ -7,13 +7,13 @@ import sys
 import time
 from collections.abc import Callable
 
-from mavsdk import ComponentType, Configuration, Mavsdk  # type: ignore[import-not-found]
-from mavsdk.plugins.action import Action  # type: ignore[import-not-found]
-from mavsdk.plugins.geofence import Geofence  # type: ignore[import-not-found]
-from mavsdk.plugins.info import Info  # type: ignore[import-not-found]
-from mavsdk.plugins.offboard import Offboard, VelocityNedYaw  # type: ignore[import-not-found]
-from mavsdk.plugins.param import Param  # type: ignore[import-not-found]
-from mavsdk.plugins.telemetry import Telemetry  # type: ignore[import-not-found]
+from mavsdk import ComponentType, Configuration, Mavsdk
+from mavsdk.plugins.action import Action
+from mavsdk.plugins.geofence import Geofence
+from mavsdk.plugins.info import Info
+from mavsdk.plugins.offboard import Offboard, VelocityNedYaw
+from mavsdk.plugins.param import Param
+from mavsdk.plugins.telemetry import Telemetry
 
 _ROUND = 1e-5
 """Degrees of latitude: a metre."""

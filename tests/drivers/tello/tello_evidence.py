@@ -3,43 +3,32 @@
 from __future__ import annotations
 
 import sys
-import threading
 import time
 from dataclasses import replace
 from pathlib import Path
-
-import numpy as np
-from typing_extensions import Self
 
 from aerodaas.testing.tello import EmulatedTello
 
 sys.path.append(str(Path(__file__).parents[3] / "benchmarks"))
 
 from missions.evidence import Evidence
+from missions.witness import Witness
 
-__all__ = ["Witness"]
-
-_PERIOD = 0.05
+__all__ = ["TelloWitness"]
 
 
-class Witness:
-    """Writes down the emulated Tello's true motion, while it is used as a context."""
+class TelloWitness(Witness):
+    """Writes down the emulated Tello's true motion by the film's own time."""
 
     def __init__(self, tello: EmulatedTello) -> None:
         """Watch `tello`."""
+        super().__init__(lambda: tello.truth, self._seconds)
         self._tello = tello
-        self._rows: list[tuple[float, ...]] = []
         self._film_began = 0.0
-        self._leaving = threading.Event()
-        self._thread = threading.Thread(target=self._watch, daemon=True)
 
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._leaving.set()
-        self._thread.join()
+    def _seconds(self) -> float | None:
+        self._film_began = self._tello.film_began or self._film_began
+        return time.monotonic() - self._film_began if self._film_began else None
 
     def evidence(self, recording: Path) -> Evidence:
         """The flight that was recorded, with the truth that was seen, by the film's own time."""
@@ -51,12 +40,5 @@ class Witness:
             replace(band, start=band.start + late, end=band.end + late) for band in robot.bands
         ]
         flight.alerts = [(time + late, name, text) for time, name, text in flight.alerts]
-        table = np.array(self._rows)
+        table = self.table
         return replace(believed, time=table[:, 0], position=table[:, 1:4], velocity=table[:, 4:7])
-
-    def _watch(self) -> None:
-        while not self._leaving.wait(_PERIOD):
-            self._film_began = self._tello.film_began or self._film_began
-            if self._film_began:
-                truth, seconds = self._tello.truth, time.monotonic() - self._film_began
-                self._rows.append((seconds, *truth.position, *truth.velocity))

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from tello_evidence import Witness
+from tello_evidence import TelloWitness
 from tello_flights import free_port
 
 from aerodaas.config.model import EnvironmentConfig
@@ -52,7 +52,7 @@ def judge(application: str, world: str, folder: Path) -> None:
     video = VideoOptions(width=640, height=480, rate=10.0)
     environment = EnvironmentConfig.load(ROOT / f"apps/environments/{world}.json")
     options = TelloOptions(video=video).placed(environment)
-    with EmulatedTello(options) as tello, Witness(tello) as witness:
+    with EmulatedTello(options) as tello, TelloWitness(tello) as witness:
         recording = fly(application, tello, folder)
     evidence = witness.evidence(recording)
     checks = [criterion(evidence) for criterion in MISSIONS[application].criteria]
