@@ -39,7 +39,7 @@ _FAR = 4.0
 """Metres beyond which somebody must seem to come in two frames in a row before the drone gives way:
 a box that is too high for one frame looks like a sprint, and there the drone can wait for one."""
 _HOLD = 0.8
-"""Seconds for which the drone goes on giving way after the last danger, while somebody comes."""
+"""Seconds for which the drone goes on giving way after the last danger, while that person comes."""
 _CLEARLY = 0.15
 """Metres that another manoeuvre must leave more than the one begun to replace it."""
 _TURNS = tuple(math.radians(angle) for angle in (45.0, -45.0))
@@ -69,6 +69,8 @@ class ContactGuard:
         """Velocity at which the drone gives way (ENU, m/s); None if it does not."""
         self._danger_at = 0
         """Mission time of the last sign of danger, nanoseconds."""
+        self._danger_of: int | None = None
+        """Number of the person of whom it was."""
         self._doubted = False
         """Whether the last frame showed a danger beyond `_FAR`."""
         self._comes = False
@@ -117,10 +119,11 @@ class ContactGuard:
         doubted, self._doubted = self._doubted, danger is not None and danger.place.distance > _FAR
         if self._doubted and not (doubted or self.evading):
             danger = None
-        comes = any(one.away < -_CLOSING for one in people)
+        # Somebody else may come from far away.
+        comes = any(one.away < -_CLOSING for one in people if one.number == self._danger_of)
         if danger is not None:
             self._velocity = self._choose(_towards(danger, pose), walks, pose)
-            self._danger_at = stamp
+            self._danger_at, self._danger_of = stamp, danger.number
             self._comes |= not danger.followed or danger.away < -_COMES
         elif not comes or seconds(stamp - self._danger_at) > _HOLD:
             self._velocity, self._comes = None, False

@@ -126,10 +126,13 @@ class FollowController:
         self._approach.see(seen.sighting, seen.others, seen.at_capture, dt)
         self._clearance.see(seen.surfaces, seen.at_capture, dt)
         dt = min(dt, _LONGEST_STEP)
-        self.guard.see(seen.people, seen.at_capture, seen.stamp, dt, target=seen.sighting)
         self._delay = dt + min(seen.latency, _LONGEST_STEP)
         if seen.sighting is not None:
             self._take_in(seen.sighting, seen)
+        # Who falls or gets up seems to leap by a body's length, and comes no nearer.
+        fallen = seen.sighting if self._stood is not None else None
+        people = [one for one in seen.people if one is not fallen]
+        self.guard.see(people, seen.at_capture, seen.stamp, dt, target=seen.sighting)
         self.phase = self._next_phase(seen.stamp)
         if self.phase is FollowPhase.WAITING:
             self._forget()

@@ -6,6 +6,7 @@ to believe it, so each person has a filter here that expects abrupt turns and st
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -44,6 +45,8 @@ people last a frame or two."""
 class Prediction(NamedTuple):
     """A person at a moment, seen from the drone."""
 
+    number: int
+    """The same for the same person, another for everybody else."""
     place: RelativeTarget
     away: float
     """Their speed along the line of sight, m/s."""
@@ -56,6 +59,7 @@ class Prediction(NamedTuple):
 
 @dataclass(eq=False)
 class _Person:
+    number: int
     motion: TargetMotion
     seen: int
     """Mission time of the last detection, nanoseconds."""
@@ -87,6 +91,7 @@ class PeopleTracker:
     def __init__(self) -> None:
         """Start without people."""
         self._people: list[_Person] = []
+        self._numbers = itertools.count()
         self._followed: _Person | None = None
         """Who is followed, as of the last frame that showed them."""
         self._newest = 0
@@ -128,10 +133,12 @@ class PeopleTracker:
             known = self._shown(sighting, free, pose, stamp, followed=sighting is target)
             if known is None and sighting.doubtful:
                 continue
-            person = known or _Person(TargetMotion(_DRIFT / frame, _STARTING), stamp, stamp)
             if known is None:
+                motion = TargetMotion(_DRIFT / frame, _STARTING)
+                person = _Person(next(self._numbers), motion, stamp, stamp)
                 self._people.append(person)
             else:
+                person = known
                 free.remove(person)
             if sighting is target:
                 self._followed = person
@@ -162,7 +169,8 @@ class PeopleTracker:
                 place, away, left = predicted
                 share = min(1.0, _FASTEST / max(math.hypot(away, left), _FASTEST))
                 in_sight, followed = person.seen == self._newest, person is self._followed
-                found.append(Prediction(place, share * away, share * left, followed, in_sight))
+                speeds = share * away, share * left
+                found.append(Prediction(person.number, place, *speeds, followed, in_sight))
         return sorted(found, key=lambda one: one.place.distance)
 
 

@@ -206,6 +206,19 @@ def test_it_ends_once_nobody_comes_any_more() -> None:
     assert drone.commands[26] is None
 
 
+def test_it_ends_though_somebody_else_comes_from_afar() -> None:
+    """It is over with the danger of whom it gave way to."""
+
+    def frames(*others: Walk) -> list[bool]:
+        drone = Drone([lambda time: (1.4 + 1.3 * abs(time - 2.0), 0.0), *others], follows=True)
+        drone.fly(3.0)
+        return [one is not None for one in drone.commands]
+
+    alone = frames()
+    assert any(alone)
+    assert frames(straight((14.0, -2.0), (-1.3, 0.0))) == alone
+
+
 @pytest.mark.parametrize(
     "walk",
     [

@@ -228,3 +228,19 @@ def test_it_brakes_before_it_is_sure_that_they_turn_round(
     assert command is not None
     assert not command.evasive
     assert (command.forward < 0.0) is backs_off
+
+
+@pytest.mark.parametrize("falls", [True, False])
+def test_who_gets_up_does_not_come(*, falls: bool) -> None:
+    """Their box leaps towards the drone by a body's length; of who stood, it is believed."""
+    controller = FollowController(2.0, 1.5)
+    state = odometry()
+    commands = []
+    for tick in range(60):
+        lies, near = 15 <= tick < 40, tick >= 37
+        distance = max(2.0, 3.2 - 0.4 * (tick - 36)) if near else 3.2
+        person = RelativeTarget(0.0, distance, top=0.3 if lies and falls else 1.4)
+        stamp = tick * NANOSECONDS // 5
+        commands.append(controller.step(Observation(stamp, person, state, people=(person,))))
+    evasive = [one is not None and one.evasive for one in commands]
+    assert any(evasive) is not falls
