@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -12,8 +11,6 @@ from aerodaas.cli.models_evaluate import evaluate_model
 from aerodaas.config.printable import printable
 
 if TYPE_CHECKING:
-    from rich.progress import Progress, TaskID
-
     from aerodaas.analytics.detection.detector import OnnxDetector
 
 __all__ = ["app"]
@@ -84,32 +81,14 @@ def add(
         aerodaas models add yolox-s --from https://mirror.example/models/
         aerodaas models add yolox-s --from ~/Downloads/yolox_s.onnx
     """
-    from rich.progress import (  # noqa: PLC0415 - slow to load
-        BarColumn,
-        DownloadColumn,
-        Progress,
-        TextColumn,
-        TimeRemainingColumn,
-    )
-
-    from aerodaas.analytics.models.fetching import fetch_model  # noqa: PLC0415 - as above
+    from aerodaas.analytics.models.fetching import fetch_model  # noqa: PLC0415 - slow to load
     from aerodaas.analytics.models.registry import registered  # noqa: PLC0415
+    from aerodaas.terminal.progress import download_view  # noqa: PLC0415
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        DownloadColumn(),
-        TimeRemainingColumn(),
-    )
     for model in [registered(name) for name in names]:
-        with Progress(*columns, transient=True) as shown:
-            bar = shown.add_task(model.name, total=model.download)
-            path = fetch_model(model.name, source, progress=partial(_advance, shown, bar))
+        with download_view(shown=True, what=model.name) as progress:
+            path = fetch_model(model.name, source, progress=progress)
         typer.echo(f"{model.name}: {path} ({model.licence})")
-
-
-def _advance(shown: Progress, bar: TaskID, done: int, _all: int) -> None:
-    shown.update(bar, completed=done)
 
 
 @app.command()
@@ -170,7 +149,7 @@ def _told(model: str, detector: OnnxDetector) -> list[str]:
     lines += [f"doubt     {doubt}" for doubt in trial.doubts]
     if detector.names[0] == "0":
         lines.append("doubt     it names no classes: give them with names=[…], in its order")
-    named = next((name for name in detector.names if name == "person"), detector.names[0])
+    named = "person" if "person" in detector.names else detector.names[0]
     lines.append(f"use       OnnxDetector({model!r}, classes=[{named!r}])")
     return lines
 

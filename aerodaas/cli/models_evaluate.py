@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import json
 import math
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from aerodaas.cli.rows import write_csv
 from aerodaas.types.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -85,6 +87,7 @@ def evaluate_model(
 
     if not LEAST_SCORE <= min_score <= 1:
         raise ConfigError(f"--min-score lies between {LEAST_SCORE} and 1, not at {min_score}")
+    _require_places([path for path in (out_json, out_csv) if path is not None], worst)
     annotated = read_dataset(dataset, pictures).renamed(_renames(rename or ()))
     detector = OnnxDetector(model, min_score=LEAST_SCORE, threads=threads)
     detector.open()
@@ -95,13 +98,24 @@ def evaluate_model(
         )
     detector.close()
     _show(result, f"{model} on {dataset}")
-    if out_json is not None:
-        _write(out_json, json.dumps(_plain(result, model, dataset), indent=2) + "\n")
-    if out_csv is not None:
-        _write_csv(out_csv, result)
+    if out_json is not None or out_csv is not None:
+        _write(result, model, dataset, out_json, out_csv)
     if worst is not None:
         files = draw_mistakes(result.mistakes, worst, most)
         typer.echo(f"{len(files)} pictures of mistakes in {worst}")
+
+
+def _require_places(files: Sequence[Path], folder: Path | None) -> None:
+    """Refuse what could not be written before an evaluation, which may take hours."""
+    for path in files:
+        place = path if path.exists() else path.parent
+        if path.is_dir() or not os.access(place, os.W_OK):
+            raise ConfigError(f"cannot write {path}: name a file in a folder that you may write")
+    if folder is not None:
+        with _writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+        if not os.access(folder, os.W_OK):
+            raise ConfigError(f"cannot write into {folder}: name a folder that you may write")
 
 
 def _renames(texts: Sequence[str]) -> dict[str, str]:
@@ -141,38 +155,25 @@ def _n(value: float) -> str:
     return "" if math.isnan(value) else f"{value:.3f}"
 
 
-def _plain(result: Evaluation, model: str, dataset: Path) -> Any:  # noqa: ANN401 - JSON
-    content = dataclasses.asdict(dataclasses.replace(result, mistakes=()))
-    content.pop("mistakes")
-    return _without_nan({"model": model, "dataset": str(dataset), **content})
+def _write(
+    result: Evaluation, model: str, dataset: Path, out_json: Path | None, out_csv: Path | None
+) -> None:
+    from aerodaas.recording.encoding import plain  # noqa: PLC0415 - slow to load
+
+    figures = dataclasses.asdict(dataclasses.replace(result, mistakes=()))
+    del figures["mistakes"]
+    content = plain({"model": model, "dataset": str(dataset), **figures})
+    if out_json is not None:
+        with _writing(out_json):
+            out_json.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    if out_csv is not None:
+        with _writing(out_csv):
+            write_csv(out_csv, [*content["classes"], content["overall"]])
 
 
-def _without_nan(value: Any) -> Any:  # noqa: ANN401 - JSON, which has no NaN
-    if isinstance(value, float) and math.isnan(value):
-        return None
-    if isinstance(value, dict):
-        return {key: _without_nan(one) for key, one in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(one) for one in value]
-    return value
-
-
-def _write_csv(path: Path, result: Evaluation) -> None:
-    rows = [dataclasses.asdict(one) for one in (*result.classes, result.overall)]
+@contextmanager
+def _writing(path: Path) -> Iterator[None]:
     try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]))
-            writer.writeheader()
-            writer.writerows(
-                {key: "" if value != value else value for key, value in row.items()}  # noqa: PLR0124 - NaN
-                for row in rows
-            )
-    except OSError as error:
-        raise ConfigError(f"cannot write {path}: {error.strerror}") from None
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
+        yield
     except OSError as error:
         raise ConfigError(f"cannot write {path}: {error.strerror}") from None

@@ -16,7 +16,7 @@ from aerodaas.dataflow.handles import Compute, Here, Sensor
 from aerodaas.dataflow.interfaces import IEnvironment, INavigate, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.environment.mission_run import MissionRun
-from aerodaas.environment.offering import offer
+from aerodaas.environment.offering import Unflown, offer
 from aerodaas.environment.robot import Robot
 from aerodaas.environment.run import Run
 from aerodaas.environment.source import EnvironmentSource
@@ -87,6 +87,11 @@ class Environment(PaperNames, IEnvironment):
     def run(self) -> Run | None:
         """The flight of this process' own runtime; None before it, and where a provider flies."""
         return self._mission if isinstance(self._mission, Run) else None
+
+    @property
+    def unflown(self) -> Unflown | None:
+        """What stands in for the flight of an application that was only built."""
+        return self._mission if isinstance(self._mission, Unflown) else None
 
     def has_env_sensors(self) -> bool:
         """Return True if the environment has sensors."""
@@ -201,7 +206,9 @@ class Environment(PaperNames, IEnvironment):
             each()
         if hook is not None:
             hook()
-        if offer(self):
+        unflown = offer(self)
+        if unflown is not None:
+            self._mission, self.graph.reader = unflown, unflown.read
             return
         self._speed = speed
         run = self.launch_again()

@@ -28,7 +28,7 @@ from aerodaas.config.options import RunOptions
 from aerodaas.dataflow.graph import NavigationEdge, Node, application_line
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.application_file import run_file
-from aerodaas.environment.offering import offered, the_only
+from aerodaas.environment.offering import offered, require_no_more, the_only
 from aerodaas.recording.encoding import plain
 from aerodaas.types.errors import AeroDaaSError, GraphError, failure_line
 from aerodaas.types.guest_item import GuestItem
@@ -117,6 +117,7 @@ def _line(error: BaseException, application: Path) -> str:
 
 
 def _document(environment: Environment) -> GuestDocument:
+    require_no_more(environment)
     graph = environment.graph
     if graph.on_launch:
         raise GraphError(

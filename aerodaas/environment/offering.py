@@ -5,17 +5,20 @@ A guest's process and the compiler of mission documents run an application for i
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
-from aerodaas.types.errors import GraphError
+from aerodaas.environment.mission_run import MissionRun
+from aerodaas.mission.commands import Command
+from aerodaas.types.errors import GoesOnError, GraphError
 
 if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment
+    from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
-__all__ = ["offer", "offered", "the_only"]
+__all__ = ["Unflown", "offer", "offered", "require_no_more", "the_only"]
 
 _offered: ContextVar[list[Environment] | None] = ContextVar("offered", default=None)
 """Receiver of the environments that are ready; None where an application flies."""
@@ -23,22 +26,77 @@ _offered: ContextVar[list[Environment] | None] = ContextVar("offered", default=N
 
 @contextmanager
 def offered() -> Iterator[list[Environment]]:
-    """Have `start_mission()` offer its environment, into the list, instead of flying."""
+    """Have `start_mission()` offer its environment, into the list, instead of flying.
+
+    An application that then wants something of the flight has ended there, see `require_no_more`.
+    """
     found: list[Environment] = []
     token = _offered.set(found)
     try:
-        yield found
+        with suppress(GoesOnError):
+            yield found
     finally:
         _offered.reset(token)
 
 
-def offer(environment: Environment) -> bool:
-    """Offer an environment that is ready; False if it is to fly."""
+def offer(environment: Environment) -> Unflown | None:
+    """Offer an environment that is ready; None if it is to fly."""
     found = _offered.get()
     if found is None:
-        return False
+        return None
     found.append(environment)
-    return True
+    return Unflown()
+
+
+def require_no_more(environment: Environment) -> None:
+    """Raise GoesOnError for an application that is more than the graph which it has offered."""
+    if environment.unflown is not None and environment.unflown.asked:
+        environment.unflown.refuse()
+
+
+class Unflown(MissionRun):
+    """Stands in for the mission of an application that is only built: it never flies."""
+
+    def __init__(self) -> None:
+        """Stand in for one mission."""
+        self.on_end: list[Callable[[], None]] = []
+        self.asked = False
+        """Whether the application wanted something of its flight."""
+
+    @property
+    def over(self) -> bool:
+        """True: nothing flies."""
+        return True
+
+    def start(self) -> NoReturn:
+        """Refuse to fly."""
+        self.refuse()
+
+    def wait(self) -> None:
+        """Return: it is over."""
+
+    def command(self, robot: str, command: Command) -> NoReturn:
+        """Refuse a command."""
+        del robot, command
+        self.refuse()
+
+    def use_scheduler(self, scheduler: TrajectoryScheduler) -> NoReturn:
+        """Refuse a scheduler for a mission in flight."""
+        del scheduler
+        self.refuse()
+
+    def read(self, stream: str) -> NoReturn:
+        """Refuse to open a stream."""
+        del stream
+        self.refuse()
+
+    def refuse(self) -> NoReturn:
+        """Raise GoesOnError."""
+        self.asked = True
+        raise GoesOnError(
+            "it goes on in flight, after start_mission(wait=False), by code of its own: "
+            "only `aerodaas run` flies such an application"
+        )
 
 
 def the_only(found: list[Environment]) -> Environment:

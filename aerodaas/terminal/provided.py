@@ -6,17 +6,16 @@ import math
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 
 import numpy as np
 from rich.console import Console
-from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TransferSpeedColumn
 from typing_extensions import Self
 
 from aerodaas.analytics.remote.schemas import StatusOut
 from aerodaas.protocol.schemas import MissionOut, MissionPhase
 from aerodaas.terminal.live import MissionView
+from aerodaas.terminal.progress import download_view
 from aerodaas.terminal.snapshot import RobotSnapshot, Snapshot
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Battery, Odometry
@@ -130,18 +129,3 @@ def _vehicle(status: StatusOut) -> VehicleState | None:
 
 def _vector(axes: list[float | None] | None) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
     return np.array([math.nan if one is None else one for one in axes or [None] * 3])
-
-
-@contextmanager
-def download_view(*, shown: bool, what: str) -> Iterator[Callable[[int, int | None], None]]:
-    """Show the progress of a download on a terminal; yields what is told of it."""
-    console = Console(stderr=True)
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        DownloadColumn(),
-        TransferSpeedColumn(),
-    )
-    with Progress(*columns, console=console, transient=True, disable=not shown) as progress:
-        task = progress.add_task(what, total=None)
-        yield lambda done, size: progress.update(task, completed=done, total=size)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from aerodaas.types.depth import depth_in_box, nearest_in_cells
 from aerodaas.types.errors import SourceError
-from aerodaas.types.geometry import CameraModel, Vector
+from aerodaas.types.geometry import Box, CameraModel, Vector
 from aerodaas.types.records import fast_pickle
 
 __all__ = [
@@ -160,7 +160,7 @@ class Frame:
 class Detection:
     """One object found in a frame; the box is in the frame's own pixels."""
 
-    box: tuple[float, float, float, float]
+    box: Box
     """Left, top, right, bottom."""
     label: str
     score: float

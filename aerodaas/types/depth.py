@@ -9,6 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.types.geometry import Box
+
 __all__ = ["METRE", "depth_in_box", "nearest_in_cells"]
 
 METRE = 1000.0
@@ -25,7 +27,7 @@ _SPECKLE = 0.05
 """Part of a cell's pixels that may be nearer by mistake."""
 
 
-def depth_in_box(depth: NDArray[np.uint16], box: tuple[float, float, float, float]) -> float | None:
+def depth_in_box(depth: NDArray[np.uint16], box: Box) -> float | None:
     """Metres along the optical axis to the surface in the middle of `box` (pixels), the median.
 
     None where too little of it was measured, or the box is none.

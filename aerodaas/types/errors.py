@@ -16,6 +16,7 @@ __all__ = [
     "ClockError",
     "ConfigError",
     "EndpointError",
+    "GoesOnError",
     "GraphError",
     "InvalidWaypointError",
     "MissionError",
@@ -81,6 +82,10 @@ class GraphError(AeroDaaSError):
     """The dataflow cannot work: wrong type on an edge, missing input, a second navigator."""
 
     exit_code = 2
+
+
+class GoesOnError(GraphError):
+    """An application that is only built, not flown, wants something of its flight."""
 
 
 class InvalidWaypointError(AeroDaaSError, ValueError):

@@ -18,6 +18,7 @@ import pymap3d
 from numpy.typing import NDArray
 
 __all__ = [
+    "Box",
     "CameraModel",
     "GeodeticOrigin",
     "Vector",
@@ -38,6 +39,8 @@ __all__ = [
 
 Vector: TypeAlias = NDArray[np.float64]
 """A float64 array of shape (3,)."""
+Box: TypeAlias = tuple[float, float, float, float]
+"""Left, top, right, bottom in pixels of an image."""
 Triple: TypeAlias = tuple[float, float, float]
 
 _MAJOR = 6378137.0

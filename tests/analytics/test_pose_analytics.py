@@ -13,7 +13,7 @@ from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.detection.keypoints import KeypointModel
 from aerodaas.analytics.models import DETECTOR, POSE
 from aerodaas.analytics.people.body_pose import BodyPoseEmergencyAnalytics
-from aerodaas.analytics.people.crop import CUT, GREY, cut_out, square_around
+from aerodaas.analytics.people.crop import GREY, cut_region, square_around
 from aerodaas.analytics.people.pose import PoseAnalytics, body_around
 from aerodaas.dataflow.graph import AeroStreamData, Graph, Node
 from aerodaas.types.data import Detection, Detections, Frame, Header
@@ -53,6 +53,7 @@ def posing(*items: Detection, most: int = 5) -> PoseAnalytics:
     return pose
 
 
+CUT = 128
 GREY_FRAME = picture(np.full((360, 640, 3), GREY, np.uint8))
 
 
@@ -73,7 +74,7 @@ def test_a_cut_shows_what_lies_in_its_square(
     inside = half <= u < 640 - half and half <= v < 360 - half
     if inside:
         image[round(v) - half : round(v) + half, round(u) - half : round(u) + half] = 255
-    cut = cut_out(image, square)
+    cut = cut_region(image, square, (CUT, CUT))
     assert cut.shape == (CUT, CUT, 3)
     if inside:
         there = np.argwhere(cut[..., 0] > 200).mean(axis=0)[::-1] + 0.5
@@ -82,7 +83,7 @@ def test_a_cut_shows_what_lies_in_its_square(
 
 def test_a_square_beside_the_picture_is_grey() -> None:
     """A box can be anywhere."""
-    assert (cut_out(GREY_FRAME.image, (-900.0, 0.0, 100.0)) == GREY).all()
+    assert (cut_region(GREY_FRAME.image, (-900, 0, 100, 100), (CUT, CUT)) == GREY).all()
 
 
 @pytest.mark.parametrize("vest", [(100.0, 100.0, 140.0, 160.0), (100.0, 100.0, 180.0, 140.0)])

@@ -75,13 +75,21 @@ class Checked:
     ) -> None:
         self._folder, self._patch, self._capture = folder, monkeypatch, capture
 
-    def __call__(self, *words: str, broken: bool = False, **settings: str) -> tuple[int, str]:
-        """Exit code and output, with these drivers of drone and camera."""
+    def __call__(
+        self, *words: str, broken: bool = False, more: str = "", **settings: str
+    ) -> tuple[int, str]:
+        """Exit code and output, with these drivers of drone and camera.
+
+        With `more`, the application goes on after it has started the mission.
+        """
         camera = {"id": "cam", "type": "camera", "settings": {"width": 64, "height": 36}}
         sensors = [{"id": "odom", "type": "odometry"}, {**camera, "driver": settings.get("camera")}]
         drone = {**robot(sensors=sensors), "driver": settings.get("vehicle", "simulated")}
         (self._folder / "environment.json").write_text(json.dumps({**FLAT, "robots": [drone]}))
-        (self._folder / "app.py").write_text(APPLICATION.replace("{broken}", str(broken)))
+        text = APPLICATION.replace("{broken}", str(broken))
+        if more:
+            text = text.replace("start_mission()", f"start_mission(wait=False)\n{more}")
+        (self._folder / "app.py").write_text(text)
         (self._folder / "check_parts.py").write_text(PARTS)
         sys.modules.pop("check_parts", None)
         self._patch.setattr(sys, "argv", ["aerodaas", "check", "app.py", *words])
@@ -129,6 +137,28 @@ def test_a_vehicle_that_would_not_take_off_is_told_and_let_go(checked: Checked) 
     assert "check_parts:Careful would not take off: the propellers are off" in told
     careful = sys.modules["check_parts"].Careful
     assert (careful.closed, careful.moved) == (1, 0)
+
+
+@pytest.mark.parametrize(
+    ("more", "portable"),
+    [
+        ("drone.wait()", True),
+        ("env.wait()", True),
+        ("print(odometry.get_data(timeout=5))", False),
+        ("drone.pause_mission()\ndrone.wait()", False),
+        ("try: drone.end_mission()\nexcept Exception: pass", False),
+    ],
+)
+def test_an_application_that_goes_on_in_flight_is_checked_and_not_flown(
+    checked: Checked, more: str, *, portable: bool
+) -> None:
+    """It ends where it wants something of the flight, which no document can hold."""
+    code, told = checked(vehicle="check_parts:Careful", camera="simulated", more=more)
+    assert code == 1
+    assert "check_parts:Careful would not take off: the propellers are off" in told
+    assert sys.modules["check_parts"].Careful.moved == 0
+    assert not Path("runs").exists()
+    assert ("only `aerodaas run` flies such an application" in told) is not portable
 
 
 def test_a_vehicle_that_does_not_answer_is_told(checked: Checked) -> None:

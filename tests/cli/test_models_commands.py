@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
+from onnx import TensorProto
 from synthetic_models import constant_model, patchwork_model, simcc_model
 from typer.testing import CliRunner, Result
 
 from aerodaas.analytics.models import DETECTOR, POSE
 from aerodaas.analytics.models.registry import REGISTRY
+from aerodaas.analytics.people.pose import PoseAnalytics
 from aerodaas.cli.app import app
 from aerodaas.types.errors import ConfigError, ModelError
 
@@ -46,6 +50,21 @@ def test_a_file_that_is_another_is_not_added(models: Callable[..., Result]) -> N
     assert isinstance(failed.exception, ModelError)
     assert "is shorter than yolox-nano" in str(failed.exception)
     assert "did you mean yolox-s?" in str(models("add", "yolox-nano", "yolox-z").exception)
+
+
+def test_a_model_is_added_from_a_file(
+    models: Callable[..., Result], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its path and licence are what is printed; the bar is not in a script's way."""
+    content = simcc_model(Path("a.onnx")).read_bytes()
+    sha256 = hashlib.sha256(content).hexdigest()
+    model = replace(REGISTRY["yolox-nano"], name="mine", sha256=sha256, size=len(content))
+    monkeypatch.setitem(REGISTRY, "mine", model)
+    result = models("add", "mine", "--from", "a.onnx")
+    assert result.exception is None
+    path = Path("fetched/mine.onnx").absolute()
+    assert result.stdout == f"mine: {path} (Apache-2.0)\n"
+    assert path.read_bytes() == content
 
 
 def test_a_detector_is_described_with_its_use(models: Callable[..., Result]) -> None:
@@ -82,6 +101,28 @@ def test_doubts_are_told(models: Callable[..., Result]) -> None:
 def test_what_is_no_detector_is_refused(models: Callable[..., Result]) -> None:
     """With the words that an application would get."""
     constant_model(Path("a.onnx"), [np.zeros((1, 1000), np.float32)])
+    assert "the output of no detector" in str(models("check", "a.onnx").exception)
+
+
+@pytest.mark.parametrize(
+    ("shape", "element"),
+    [((1, 3, 64, 48), TensorProto.FLOAT), (("b", 3, 64, 48), TensorProto.UINT8)],
+)
+def test_a_pose_network_that_no_analysis_takes_is_refused(
+    models: Callable[..., Result], shape: Sequence[int | str], element: int
+) -> None:
+    """It runs on several crops at once, given as numbers: one crop, or bytes, are not enough."""
+    outputs = [np.zeros((1, 17, bins), np.float32) for bins in (96, 128)]
+    constant_model(Path("a.onnx"), outputs, shape=shape, element=element)
+    assert "the output of no detector" in str(models("check", "a.onnx").exception)
+    with pytest.raises(ModelError, match="finds no keypoints"):
+        PoseAnalytics("a.onnx")
+
+
+def test_an_output_without_axes_is_refused(models: Callable[..., Result]) -> None:
+    """A count beside something else."""
+    outputs = [np.array(3, np.float32), np.zeros((1, 17, 128), np.float32)]
+    constant_model(Path("a.onnx"), outputs)
     assert "the output of no detector" in str(models("check", "a.onnx").exception)
 
 
@@ -128,6 +169,27 @@ def test_a_detector_is_evaluated(models: Callable[..., Result], dataset: Path) -
     assert [path.name for path in Path("worst").iterdir()] == ["001_missed_dark.jpg"]
 
 
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (["--json", "gone/o.json"], "cannot write gone/o.json"),
+        (["--csv", "data"], "cannot write data"),
+        (["--worst", "a.onnx"], "cannot write a.onnx"),
+    ],
+)
+def test_places_that_cannot_be_written_are_refused_first(
+    models: Callable[..., Result], dataset: Path, words: list[str], problem: str
+) -> None:
+    """Before anything is evaluated."""
+    pytest.importorskip("pycocotools")
+    patchwork_model(Path("a.onnx"), shape=(1, 3, 96, 128))
+    rename = ["--rename", "human=person"]
+    failed = models("evaluate", "a.onnx", str(dataset / "coco.json"), *rename, *words)
+    assert isinstance(failed.exception, ConfigError)
+    assert problem in str(failed.exception)
+    assert not failed.output
+
+
 def test_wrong_words_are_told(models: Callable[..., Result], dataset: Path) -> None:
     """No label in common, half a rename, a score that is none."""
     pytest.importorskip("pycocotools")
@@ -138,7 +200,7 @@ def test_wrong_words_are_told(models: Callable[..., Result], dataset: Path) -> N
         (["--rename", "human"], "renamed as --rename"),
         (["--rename", "man=person"], "no label man"),
         (["--min-score", "0"], "--min-score lies between"),
-        (["--pictures", "gone"], "cannot read gone"),
+        (["--pictures", "gone", "--rename", "human=person"], "cannot read gone"),
     ):
         error = models(*words, *more).exception
         assert isinstance(error, ConfigError)

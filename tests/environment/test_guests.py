@@ -54,6 +54,7 @@ watch.analyse(odometry)
 '''
 )
 READY = "drone.start_mission()\n"
+GOES_ON = "drone.start_mission(wait=False)\nstream.get_data()"
 RIGHTS = ("sense:odom_drone", "compute:edge")
 CONTENT = {**FLAT, "schedulers": {"trajectory": "ordered"}}
 
@@ -109,6 +110,11 @@ def refusal(flyer: Flyer, guest: Path, text: str, *rights: str) -> str:
         ("os._exit(3)", (), "ended, with code 3"),
         ("raise RuntimeError('boo')", (), "RuntimeError: boo at theirs.py"),
         ("x = bytearray(1 << 30)", ("memory:400",), "MemoryError"),
+        (
+            "stream = drone.get_sensor_by_id('odom_drone').get_data_stream()\n" + GOES_ON,
+            ("sense:odom_drone",),
+            "only `aerodaas run` flies",
+        ),
         ("this is no python", (), "SyntaxError"),
         ("", (), "never called start_mission"),
     ],

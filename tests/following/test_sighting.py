@@ -12,13 +12,12 @@ from hypothesis import strategies as st
 
 from aerodaas.following.relative_target import TargetSize, sight
 from aerodaas.types.data import Detection, Detections, Header, Odometry
-from aerodaas.types.geometry import CameraModel, rotation_from_rpy
+from aerodaas.types.geometry import Box, CameraModel, rotation_from_rpy
 
 PERSON = TargetSize(1.7, 0.5)
 WIDE, TALL = 1280, 720
 _LEANS = 0.2
 """Pitch of the camera in radians from which on a drone's tilt makes people lean too much."""
-Box = tuple[float, float, float, float]
 
 
 def camera(pitch: float = 0.0) -> CameraModel:

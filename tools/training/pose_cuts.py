@@ -8,14 +8,16 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from aerodaas.analytics.people.crop import CUT, GREY, MARGIN
+from aerodaas.analytics.people.crop import GREY, MARGIN
 from aerodaas.analytics.people.joints import MIRRORED
 from tools.training.augment import spoiled
 from tools.training.dataset import Pictures
 from tools.training.surroundings import surrounded
 
-__all__ = ["Cut", "People"]
+__all__ = ["CUT", "Cut", "People"]
 
+CUT = 128
+"""Side of a cut in pixels."""
 _TALL = 40.0
 """Pixels of a person to learn postures from, at least."""
 

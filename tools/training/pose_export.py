@@ -7,8 +7,8 @@ from pathlib import Path
 import torch
 from torch import Tensor, nn
 
-from aerodaas.analytics.people.crop import CUT
 from tools.training.export import fused, save_onnx
+from tools.training.pose_cuts import CUT
 from tools.training.pose_network import Joints, places
 
 __all__ = ["export_pose"]

@@ -7,13 +7,12 @@ from functools import partial
 
 import torch
 
-from aerodaas.analytics.people.crop import CUT
 from tools.training.card import Card, write_card
 from tools.training.data_parallel import in_processes
 from tools.training.dataset import Pictures
 from tools.training.loop import Progress
 from tools.training.pipeline import Places, spent
-from tools.training.pose_cuts import People
+from tools.training.pose_cuts import CUT, People
 from tools.training.pose_evaluate import PARTS, milliseconds_per_person, placing
 from tools.training.pose_export import export_pose
 from tools.training.pose_train import PoseRecipe, train_pose

@@ -11,6 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.types.geometry import Box
+
 __all__ = ["BoxFilter"]
 
 Array = NDArray[np.float64]
@@ -26,7 +28,7 @@ _SMALLEST = 1.0
 class BoxFilter:
     """Estimate of one box, with its covariance."""
 
-    def __init__(self, box: tuple[float, float, float, float]) -> None:
+    def __init__(self, box: Box) -> None:
         """Initialise at a detected `box` (left, top, right, bottom in pixels), at rest."""
         self.value: Array = _measurement(box)
         self.velocity: Array = np.zeros(4)
@@ -36,7 +38,7 @@ class BoxFilter:
         self._velocity_variance: Array = np.full(4, (_FIRST_VELOCITY * scale) ** 2)
 
     @property
-    def box(self) -> tuple[float, float, float, float]:
+    def box(self) -> Box:
         """Left, top, right, bottom, in pixels."""
         u, v, width, height = self.value.tolist()
         width, height = max(width, _SMALLEST), max(height, _SMALLEST)
@@ -55,7 +57,7 @@ class BoxFilter:
         self._covariance = self._covariance + dt * self._velocity_variance + noise * dt**3 / 2
         self._velocity_variance = self._velocity_variance + noise * dt**2
 
-    def distance(self, box: tuple[float, float, float, float]) -> tuple[float, float]:
+    def distance(self, box: Box) -> tuple[float, float]:
         """Squared Mahalanobis distance of a detected `box`, and log determinant of the covariance.
 
         The covariance is that of the innovation.
@@ -64,7 +66,7 @@ class BoxFilter:
         innovation = _measurement(box) - self.value
         return float(np.sum(innovation**2 / spread)), float(np.sum(np.log(spread)))
 
-    def update(self, box: tuple[float, float, float, float]) -> None:
+    def update(self, box: Box) -> None:
         """Correct the estimate by a detected `box`."""
         spread = self._variance + (_MEASUREMENT * self._scale) ** 2
         innovation = _measurement(box) - self.value
@@ -80,6 +82,6 @@ class BoxFilter:
         return max(float(self.value[3]), _SMALLEST)
 
 
-def _measurement(box: tuple[float, float, float, float]) -> Array:
+def _measurement(box: Box) -> Array:
     left, top, right, bottom = box
     return np.array([(left + right) / 2, (top + bottom) / 2, right - left, bottom - top])

@@ -129,7 +129,7 @@ class OnnxDetector(Analytics[Detections]):
             TensorSpec.of(output.name, np.float32, output.shape) for output in model.outputs
         )
         self._desk = _Desk()
-        self.trial: Trial = try_out(model, self.decoder)
+        self.trial: Trial = try_out(model, self.decoder, self.style)
         """What the model gave for the trial pictures."""
 
     def with_model(self, path: str | Path) -> Self:

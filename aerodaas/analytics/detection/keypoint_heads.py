@@ -20,11 +20,9 @@ from numpy.typing import NDArray
 from aerodaas.analytics.detection.model_file import ModelFile
 from aerodaas.analytics.people.crop import GREY, Region, square_around
 from aerodaas.analytics.people.joints import POINTS
+from aerodaas.types.geometry import Box
 
-__all__ = ["Box", "CropHead", "KeypointHead", "SimccHead", "keypoint_head"]
-
-Box = tuple[float, float, float, float]
-"""Left, top, right, bottom in pixels."""
+__all__ = ["CropHead", "KeypointHead", "SimccHead", "keypoint_head"]
 
 _TASK = "keypoints"
 _NUMBERS = 3
@@ -71,8 +69,7 @@ class CropHead:
 
     def region(self, box: Box) -> Region:
         """A square with a margin of a half."""
-        left, top, side = square_around(box)
-        return left, top, side, side
+        return square_around(box)
 
     def normalise(self, cuts: NDArray[np.uint8]) -> NDArray[np.float32]:
         """0 to 1."""
@@ -115,15 +112,19 @@ class SimccHead:
 
 
 def keypoint_head(model: ModelFile) -> KeypointHead | None:
-    """The conventions of a model's outputs; None for any other."""
+    """The conventions of a model's outputs; None for any other, or one that takes no crops.
+
+    Crops are several at once, and numbers, not bytes.
+    """
+    if not model.batches or model.dtype is np.uint8:
+        return None
     size = (model.size[1], model.size[0])
     if len(model.outputs) == 1:
         fits = model.metadata.get("task") == _TASK and model.size[0] == model.size[1]
         fits = fits and tuple(model.output_shape[1:]) == (POINTS, _NUMBERS)
         return CropHead(size) if fits else None
     shapes = [output.shape for output in model.trial]
-    splits = {axis[-1] / side for axis, side in zip(shapes, size, strict=False)}
-    if [axis[:-1] for axis in shapes] != [(1, POINTS)] * 2 or len(splits) != 1:
+    if [axis[:-1] for axis in shapes] != [(1, POINTS)] * 2:
         return None
-    (split,) = splits
-    return SimccHead(size, int(split)) if split >= 1 and split % 1 == 0 else None
+    split, other = (axis[-1] / side for axis, side in zip(shapes, size, strict=True))
+    return SimccHead(size, int(split)) if split == other >= 1 and split % 1 == 0 else None

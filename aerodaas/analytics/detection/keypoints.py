@@ -9,15 +9,16 @@ import numpy as np
 import onnxruntime as ort
 from numpy.typing import NDArray
 
-from aerodaas.analytics.detection.keypoint_heads import Box, keypoint_head
+from aerodaas.analytics.detection.keypoint_heads import keypoint_head
 from aerodaas.analytics.detection.model_file import read_model
 from aerodaas.analytics.detection.providers import open_session
 from aerodaas.analytics.models import POSE
 from aerodaas.analytics.people.crop import cut_region
 from aerodaas.analytics.people.joints import MIRRORED
 from aerodaas.types.errors import ModelError
+from aerodaas.types.geometry import Box
 
-__all__ = ["Box", "KeypointModel"]
+__all__ = ["KeypointModel"]
 
 _ASTRAY = 0.1
 """Distance of the two estimates of a joint, in sides of the crop, from which one is doubtful."""
@@ -45,7 +46,7 @@ class KeypointModel:
         """
         model = read_model(path)
         head = keypoint_head(model)
-        if head is None or not model.batches or model.dtype is np.uint8:
+        if head is None:
             raise model.refusal(
                 "finds no keypoints in cuts around people",
                 "train one with `python -m tools.training pose`, or take an RTMPose; a YOLO pose "

@@ -9,7 +9,7 @@ nothing, or everything.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -59,18 +59,17 @@ class Trial:
 def preprocessing_for(model: ModelFile, decoder: Decoder) -> Preprocessing:
     """The decoder's preprocessing; an input of bytes is not scaled."""
     style = decoder.preprocessing
-    if model.dtype is not np.uint8:
-        return style
-    return Preprocessing(1.0, style.rgb, style.centred, style.fill, style.stretched)
+    return replace(style, scale=1.0) if model.dtype is np.uint8 else style
 
 
-def try_out(model: ModelFile, decoder: Decoder) -> Trial:
+def try_out(model: ModelFile, decoder: Decoder, style: Preprocessing) -> Trial:
     """Run `model` on the trial pictures and examine what `decoder` makes of it.
+
+    `style` is how pictures become the network's input, by `preprocessing_for`.
 
     Raises:
         ModelError: If its scores or boxes cannot be those of a detector.
     """
-    style = preprocessing_for(model, decoder)
     found: list[Candidates] = []
     for seed in range(_PICTURES):
         outputs = model.run(_pixels(seed, model.size, style, model.dtype))
@@ -80,8 +79,8 @@ def try_out(model: ModelFile, decoder: Decoder) -> Trial:
     invalid = sum(one.invalid for one in found)
     if not len(scores):
         return _nothing(model, decoder, invalid)
-    lowest, highest = float(scores.min()), float(scores.max())
-    _check_scores(model, decoder, scores)
+    spread = float(scores.min()), float(scores.max())
+    _check_scores(model, decoder, scores, spread)
     seen = boxes[scores > 0]
     corners = (float(seen.min()), float(seen.max())) if len(seen) else None
     if corners is not None and max(-corners[0], corners[1]) <= _FRACTION:
@@ -91,8 +90,8 @@ def try_out(model: ModelFile, decoder: Decoder) -> Trial:
             "export it with boxes in pixels of its input, or multiply them in a ModelFamily of "
             "your own in families=",
         )
-    doubts = () if highest > 0 else ("no box scores above zero; a model with NMS may find nothing",)
-    return Trial(len(scores) // _PICTURES, (lowest, highest), corners, invalid, doubts)
+    doubts = () if corners else ("no box scores above zero; a model with NMS may find nothing",)
+    return Trial(len(scores) // _PICTURES, spread, corners, invalid, doubts)
 
 
 def _decoded(
@@ -112,8 +111,10 @@ def _nothing(model: ModelFile, decoder: Decoder, invalid: int) -> Trial:
     return Trial(0, None, None, invalid, ("no box on the trial pictures, which hold nothing",))
 
 
-def _check_scores(model: ModelFile, decoder: Decoder, scores: NDArray[np.float32]) -> None:
-    lowest, highest = float(scores.min()), float(scores.max())
+def _check_scores(
+    model: ModelFile, decoder: Decoder, scores: NDArray[np.float32], spread: tuple[float, float]
+) -> None:
+    lowest, highest = spread
     if lowest < -_ROUNDING or highest > 1 + _ROUNDING:
         problem = f"gives scores from {lowest:.2g} to {highest:.2g} instead of 0 to 1"
         remedy = f"export it with its sigmoid{_stripped(model, decoder)}"

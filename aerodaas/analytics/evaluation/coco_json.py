@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.analytics.evaluation.dataset import (
+    MOST_SIDE,
     MOST_THINGS,
     AnnotatedPicture,
     Dataset,
@@ -109,11 +110,12 @@ def _thing(entry: dict[str, Any], labels: dict[int, str], place: str) -> Thing:
         raise ConfigError(f"{place}.bbox: must be x, y, width, height, not {shown(box)}")
     try:
         left, top, width, height = box
-        corners = [left, top, left + width, top + height]
-    except TypeError:
+        # As floating point, in which a sum has no digits without end.
+        corners = [left, top, 1.0 * left + width, 1.0 * top + height]
+    except (TypeError, OverflowError):
         corners = box
     area = entry.get("area")
-    usable = isinstance(area, int | float) and 0 < area < float("inf")
+    usable = isinstance(area, int | float) and 0 < area <= MOST_SIDE**2
     return Thing(
         labels[category],
         checked_box(corners, f"{place}.bbox"),

@@ -6,9 +6,8 @@ folder of the pictures alone, whatever path an annotation names.
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,29 +17,32 @@ from numpy.typing import NDArray
 
 from aerodaas.config.printable import printable
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import Box
 from aerodaas.types.picture_size import picture_fits, picture_size
 
 __all__ = [
+    "MOST_SIDE",
     "MOST_THINGS",
     "PICTURE_SUFFIXES",
     "AnnotatedPicture",
-    "Box",
     "Dataset",
     "Thing",
     "checked_box",
+    "counted",
     "read_bytes",
     "read_picture",
+    "read_size",
     "shown",
 ]
 
-Box = tuple[float, float, float, float]
-
 MOST_THINGS = 2_000_000
 """Most annotations of a dataset: COCO's training set has 860,000."""
+MOST_SIDE = 1e6
+"""Pixels; beyond them no box lies."""
 PICTURE_SUFFIXES = (".jpg", ".jpeg", ".png", ".webp")
 _MOST_PICTURE_BYTES = 64 << 20
-_MOST_SIDE = 1e6
-"""Pixels; beyond them no box lies."""
+_HEAD = 64 << 10
+"""Bytes of a file in which most pictures tell their size; others have more metadata before it."""
 _SHOWN = 60
 """Characters of a stranger's text in an error."""
 
@@ -51,7 +53,6 @@ class Thing:
 
     label: str
     box: Box
-    """Left, top, right, bottom in pixels."""
     ignored: bool = False
     """Need not be found, and may be: COCO's crowds, VOC's difficult objects."""
     area: float | None = None
@@ -110,11 +111,11 @@ def checked_box(numbers: Sequence[object], place: str) -> Box:
         ConfigError: That names the `place`, for anything but finite numbers of a box with a size.
     """
     plain = [
-        float(one) for one in numbers if isinstance(one, int | float) and not isinstance(one, bool)
+        float(one)
+        for one in numbers
+        if isinstance(one, int | float) and not isinstance(one, bool) and abs(one) <= MOST_SIDE
     ]
-    if len(plain) != len(numbers) or not all(
-        math.isfinite(one) and abs(one) <= _MOST_SIDE for one in plain
-    ):
+    if len(plain) != len(numbers):
         raise ConfigError(f"{place}: a box has four finite numbers, not {shown(list(numbers))}")
     left, top, right, bottom = plain
     if right <= left or bottom <= top:
@@ -125,27 +126,56 @@ def checked_box(numbers: Sequence[object], place: str) -> Box:
     return left, top, right, bottom
 
 
-def read_bytes(path: Path, most: int) -> bytes:
-    """Read a file of at most `most` bytes; raises ConfigError."""
+def counted(pictures: Iterable[AnnotatedPicture], place: Path) -> tuple[AnnotatedPicture, ...]:
+    """Collect pictures one by one; raises ConfigError once they have too many annotations."""
+    found = []
+    count = 0
+    for picture in pictures:
+        count += len(picture.things)
+        if count > MOST_THINGS:
+            raise ConfigError(f"{place} has more than {MOST_THINGS:,} annotations")
+        found.append(picture)
+    return tuple(found)
+
+
+def read_bytes(path: Path, most: int, head: int | None = None) -> bytes:
+    """Read a file of at most `most` bytes, or its first `head` bytes; raises ConfigError."""
     try:
         with path.open("rb") as file:
             # Python takes the memory for as much as is asked for, however small the file.
             size = os.fstat(file.fileno()).st_size
             if size <= most:
-                return file.read(size)
+                return file.read(size if head is None else min(head, size))
     except OSError as error:
         raise ConfigError(f"cannot read {path}: {error.strerror}") from None
     raise ConfigError(f"{path} is larger than {most / (1 << 20):.3g} MiB; is it what was meant?")
 
 
+def read_size(path: Path) -> tuple[int, int]:
+    """Read a picture's width and height in pixels, without decoding it; raises ConfigError."""
+    head = read_bytes(path, _MOST_PICTURE_BYTES, _HEAD)
+    size = picture_size(head) or picture_size(read_bytes(path, _MOST_PICTURE_BYTES))
+    return _checked_size(path, size)
+
+
 def read_picture(path: Path) -> NDArray[np.uint8]:
     """Read a picture as height x width x 3 (BGR), not turned by its EXIF; raises ConfigError."""
     content = read_bytes(path, _MOST_PICTURE_BYTES)
-    size = picture_size(content)
-    if size is not None and not picture_fits(*size):
-        raise ConfigError(f"{path} has {size[0]} x {size[1]} pixels, too many to be read")
+    _checked_size(path, picture_size(content))
     flags = cv2.IMREAD_COLOR | cv2.IMREAD_IGNORE_ORIENTATION
-    image = cv2.imdecode(np.frombuffer(content, np.uint8), flags) if size is not None else None
+    image = cv2.imdecode(np.frombuffer(content, np.uint8), flags)
     if image is None:
-        raise ConfigError(f"{path} is no JPEG, PNG or WebP that can be read")
+        raise _unreadable(path)
     return np.asarray(image, np.uint8)
+
+
+def _checked_size(path: Path, size: tuple[int, int] | None) -> tuple[int, int]:
+    if size is None:
+        raise _unreadable(path)
+    if not picture_fits(*size):
+        raise ConfigError(f"{path} has {size[0]} x {size[1]} pixels, too many to be read")
+    return size
+
+
+def _unreadable(path: Path) -> ConfigError:
+    return ConfigError(f"{path} is no JPEG, PNG or WebP that can be read")

@@ -8,10 +8,11 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, Box, read_picture
+from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, read_picture
 from aerodaas.analytics.evaluation.figures import Mistake
 from aerodaas.config.printable import printable
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import Box
 
 __all__ = ["draw_mistakes"]
 

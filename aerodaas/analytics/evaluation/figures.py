@@ -14,16 +14,17 @@ import io
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, Dataset, read_picture
+from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, Dataset, read_picture, read_size
 from aerodaas.config.extras import require_extra
 from aerodaas.types.data import Detection, Frame, Header
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import Box
 
 __all__ = ["LEAST_SCORE", "Bin", "ClassFigures", "Evaluation", "Mistake", "evaluate", "measure"]
 
@@ -81,7 +82,7 @@ class Mistake:
 
     picture: AnnotatedPicture
     label: str
-    box: tuple[float, float, float, float]
+    box: Box
     score: float | None
     """None for a thing that was not found."""
 
@@ -111,6 +112,9 @@ def evaluate(
 ) -> Evaluation:
     """Run an opened `detector` on all pictures, and measure.
 
+    What cannot be measured is refused before the first picture is run; only that a picture is
+    damaged shows when it is decoded.
+
     Args:
         detector: With a `min_score` of at most `LEAST_SCORE`, or average precision is cut short.
         dataset: Of which the labels that the detector knows are evaluated.
@@ -121,6 +125,9 @@ def evaluate(
         ConfigError: If no label is known to the model, a picture cannot be read, or pycocotools
             is not installed.
     """
+    _known_labels(dataset, detector.names)
+    for picture in dataset.pictures:
+        read_size(picture.path)
     found = []
     for number, picture in enumerate(dataset.pictures):
         frame = Frame(Header(number, 0, "dataset"), read_picture(picture.path))
@@ -141,24 +148,58 @@ def measure(
     Raises:
         ConfigError: If no label of the dataset is among `names`, or pycocotools is not installed.
     """
+    labels = _known_labels(dataset, names)
+    matching = _Matching(dataset, found, labels)
+    outcomes = [matching.outcomes(number) for number in range(len(labels))]
+    rows = tuple(matching.figures(number, one, min_score) for number, one in enumerate(outcomes))
+    every = _Outcomes(
+        np.concatenate([one.scores for one in outcomes]),
+        np.concatenate([one.right for one in outcomes]),
+    )
+    return Evaluation(
+        pictures=len(dataset.pictures),
+        min_score=min_score,
+        classes=rows,
+        overall=_overall(rows, every, len(dataset.pictures), min_score),
+        reliability=tuple(_reliability(every)),
+        left_out=tuple(label for label in dataset.labels if label not in names),
+        mistakes=tuple(matching.mistakes(min_score)),
+    )
+
+
+def _known_labels(dataset: Dataset, names: Sequence[str]) -> list[str]:
+    """The labels to evaluate; raises ConfigError if there is none, or nothing to do it with."""
+    require_extra("evaluation", "the evaluation of models")
     labels = [label for label in dataset.labels if label in names]
     if not labels:
         raise ConfigError(
             f"the model knows none of the dataset's labels: it finds {', '.join(names)}; the "
             f"dataset has {', '.join(dataset.labels)}; rename with --rename LABEL=CLASS"
         )
-    matching = _Matching(dataset, found, labels)
-    rows = tuple(matching.figures(number, min_score) for number in range(len(labels)))
-    scores, right = matching.outcomes(range(len(labels)))
-    return Evaluation(
-        pictures=len(dataset.pictures),
-        min_score=min_score,
-        classes=rows,
-        overall=_overall(rows, matching, min_score),
-        reliability=tuple(_reliability(scores, right)),
-        left_out=tuple(label for label in dataset.labels if label not in names),
-        mistakes=tuple(matching.mistakes(min_score)),
-    )
+    return labels
+
+
+class _Outcomes(NamedTuple):
+    """Boxes that count, whatever their score."""
+
+    scores: NDArray[np.float64]
+    right: NDArray[np.bool_]
+    """Whether each matches an annotation with an IoU of 0.5."""
+
+    def figures(self, things: int, pictures: int, min_score: float) -> dict[str, Any]:
+        """Figures by their names in `ClassFigures`: of the boxes of `min_score` and more.
+
+        The calibration's is of all boxes.
+        """
+        right = self.right[self.scores >= min_score]
+        false = int((~right).sum())
+        return {
+            "recall": float(right.sum()) / things if things else _NAN,
+            "precision": float(right.mean()) if len(right) else _NAN,
+            "false_boxes": false,
+            "false_per_picture": false / pictures,
+            "calibration_error": _calibration_error(self),
+        }
 
 
 class _Matching:
@@ -167,7 +208,6 @@ class _Matching:
     def __init__(
         self, dataset: Dataset, found: Sequence[Sequence[Detection]], labels: Sequence[str]
     ) -> None:
-        require_extra("evaluation", "the evaluation of models")
         from pycocotools.coco import COCO  # noqa: PLC0415 - an extra
         from pycocotools.cocoeval import COCOeval  # noqa: PLC0415
 
@@ -224,31 +264,25 @@ class _Matching:
         every: list[dict[str, Any] | None] = self._run.evalImgs
         yield from (one for one in every[start : start + pictures] if one is not None)
 
-    def outcomes(
-        self, numbers: Sequence[int], min_score: float = 0.0
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Scores of the boxes of these classes that count, and whether each matches at 0.5."""
+    def outcomes(self, number: int) -> _Outcomes:
+        """The boxes of one class that count, and whether each is right."""
         scores: list[float] = []
         right: list[bool] = []
-        for number in numbers:
-            for one in self.matches(number):
-                for score, match, ignored in zip(
-                    one["dtScores"], one["dtMatches"][0], one["dtIgnore"][0], strict=True
-                ):
-                    if not ignored and score >= min_score:
-                        scores.append(score)
-                        right.append(match > 0)
-        return np.array(scores, np.float64), np.array(right, np.bool_)
+        for one in self.matches(number):
+            for score, match, ignored in zip(
+                one["dtScores"], one["dtMatches"][0], one["dtIgnore"][0], strict=True
+            ):
+                if not ignored:
+                    scores.append(score)
+                    right.append(match > 0)
+        return _Outcomes(np.array(scores, np.float64), np.array(right, np.bool_))
 
-    def figures(self, number: int, min_score: float) -> ClassFigures:
+    def figures(self, number: int, outcomes: _Outcomes, min_score: float) -> ClassFigures:
         """The figures of one class."""
         things = sum(int((one["gtIgnore"] == 0).sum()) for one in self.matches(number))
         ap, small, medium, large = (
             self.average_precision(number, size, slice(None)) for size in range(len(_SIZES))
         )
-        _, right = self.outcomes([number], min_score)
-        false = int((~right).sum())
-        pictures = len(self.dataset.pictures)
         return ClassFigures(
             self.labels[number],
             things,
@@ -257,12 +291,8 @@ class _Matching:
             ap_small=small,
             ap_medium=medium,
             ap_large=large,
-            recall=float(right.sum()) / things if things else _NAN,
-            precision=float(right.mean()) if len(right) else _NAN,
-            false_boxes=false,
-            false_per_picture=false / pictures,
             false_alarms=self._false_alarms(number, min_score),
-            calibration_error=_calibration_error(*self.outcomes([number])),
+            **outcomes.figures(things, len(self.dataset.pictures), min_score),
         )
 
     def _false_alarms(self, number: int, min_score: float) -> float:
@@ -297,9 +327,7 @@ class _Matching:
         yield from sorted(missed, key=lambda one: -_area(one.box))
 
 
-def _entry(
-    key: int, picture: int, number: int, box: tuple[float, float, float, float]
-) -> dict[str, Any]:
+def _entry(key: int, picture: int, number: int, box: Box) -> dict[str, Any]:
     left, top, right, bottom = box
     return {
         "id": key,
@@ -311,19 +339,18 @@ def _entry(
     }
 
 
-def _area(box: tuple[float, float, float, float]) -> float:
+def _area(box: Box) -> float:
     return (box[2] - box[0]) * (box[3] - box[1])
 
 
-def _overall(rows: Sequence[ClassFigures], matching: _Matching, min_score: float) -> ClassFigures:
+def _overall(
+    rows: Sequence[ClassFigures], outcomes: _Outcomes, pictures: int, min_score: float
+) -> ClassFigures:
     def mean(name: str) -> float:
         values = [getattr(row, name) for row in rows if not math.isnan(getattr(row, name))]
         return sum(values) / len(values) if values else _NAN
 
-    numbers = range(len(rows))
-    _, right = matching.outcomes(numbers, min_score)
     things = sum(row.things for row in rows)
-    false = sum(row.false_boxes for row in rows)
     return ClassFigures(
         "all",
         things,
@@ -332,16 +359,13 @@ def _overall(rows: Sequence[ClassFigures], matching: _Matching, min_score: float
         ap_small=mean("ap_small"),
         ap_medium=mean("ap_medium"),
         ap_large=mean("ap_large"),
-        recall=float(right.sum()) / things if things else _NAN,
-        precision=float(right.mean()) if len(right) else _NAN,
-        false_boxes=false,
-        false_per_picture=false / len(matching.dataset.pictures),
         false_alarms=mean("false_alarms"),
-        calibration_error=_calibration_error(*matching.outcomes(numbers)),
+        **outcomes.figures(things, pictures, min_score),
     )
 
 
-def _reliability(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> Iterator[Bin]:
+def _reliability(outcomes: _Outcomes) -> Iterator[Bin]:
+    scores, right = outcomes
     places = np.minimum((scores * _BINS).astype(int), _BINS - 1)
     for place in range(_BINS):
         inside = places == place
@@ -355,8 +379,7 @@ def _reliability(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> Itera
         )
 
 
-def _calibration_error(scores: NDArray[np.float64], right: NDArray[np.bool_]) -> float:
-    if not len(scores):
-        return _NAN
-    bins = [one for one in _reliability(scores, right) if one.boxes]
-    return sum(one.boxes * abs(one.score - one.right) for one in bins) / len(scores)
+def _calibration_error(outcomes: _Outcomes) -> float:
+    bins = [one for one in _reliability(outcomes) if one.boxes]
+    apart = sum(one.boxes * abs(one.score - one.right) for one in bins)
+    return apart / len(outcomes.scores) if bins else _NAN

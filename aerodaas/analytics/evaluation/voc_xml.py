@@ -6,25 +6,24 @@ there, and both corners belong to the box.
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
 from aerodaas.analytics.evaluation.dataset import (
-    MOST_THINGS,
     AnnotatedPicture,
     Dataset,
     Thing,
     checked_box,
+    counted,
     read_bytes,
     shown,
 )
+from aerodaas.config.xml_text import XmlError, parse_xml
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["read_voc"]
 
 _MOST_BYTES = 4 << 20
-_MOST_LEVELS = 40
 _CORNERS = ("xmin", "ymin", "xmax", "ymax")
 
 
@@ -42,20 +41,17 @@ def read_voc(path: Path, pictures: Path | None = None) -> Dataset:
     texts = path / "Annotations" if (path / "Annotations").is_dir() else path
     beside = texts.parent / "JPEGImages"
     folder = pictures or (beside if beside.is_dir() else texts)
-    found = []
-    count = 0
-    for file in sorted(texts.glob("*.xml")):
-        picture = _picture(file, folder)
-        count += len(picture.things)
-        if count > MOST_THINGS:
-            raise ConfigError(f"{texts} has more than {MOST_THINGS:,} annotations")
-        found.append(picture)
+    found = counted((_picture(file, folder) for file in sorted(texts.glob("*.xml"))), texts)
     labels = sorted({one.label for picture in found for one in picture.things})
-    return Dataset(tuple(found), tuple(labels))
+    return Dataset(found, tuple(labels))
 
 
 def _picture(file: Path, folder: Path) -> AnnotatedPicture:
-    root = _tree(file)
+    try:
+        root = parse_xml(read_bytes(file, _MOST_BYTES), "VOC")
+    except XmlError as error:
+        place = file if error.line is None else f"{file}:{error.line}"
+        raise ConfigError(f"{place}: {error}") from None
     if root.tag != "annotation":
         raise ConfigError(f"{file}: is XML of the kind {shown(root.tag)!r}, not an annotation")
     name = (root.findtext("filename") or "").strip() or f"{file.stem}.jpg"
@@ -82,25 +78,3 @@ def _thing(place: str, entry: ET.Element) -> Thing:
         ) from None
     box = checked_box([left - 1, top - 1, right, bottom], place)
     return Thing(label, box, (entry.findtext("difficult") or "0").strip() not in ("", "0"))
-
-
-def _tree(file: Path) -> ET.Element:
-    content = read_bytes(file, _MOST_BYTES)
-    if b"<!DOCTYPE" in content or b"<!ENTITY" in content or b"\0" in content:
-        raise ConfigError(f"{file}: declares entities, or is no UTF-8; it is not read")
-    level = 0
-    root: ET.Element | None = None
-    try:
-        # Event by event, so that a bound is met before all of a deep tree is there.
-        for event, element in ET.iterparse(io.BytesIO(content), ["start", "end"]):  # noqa: S314
-            root = element if root is None else root
-            level += 1 if event == "start" else -1
-            if level > _MOST_LEVELS:
-                raise ConfigError(f"{file}: is nested more than {_MOST_LEVELS} levels deep")
-    except ET.ParseError as error:
-        raise ConfigError(f"{file}:{error.position[0]}: is no XML: {error}") from None
-    except (LookupError, ValueError):
-        raise ConfigError(f"{file}: is in an encoding that is not read; use UTF-8") from None
-    if root is None:
-        raise ConfigError(f"{file}: is empty")
-    return root

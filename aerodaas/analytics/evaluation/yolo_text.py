@@ -13,14 +13,14 @@ from typing import Any
 import yaml
 
 from aerodaas.analytics.evaluation.dataset import (
-    MOST_THINGS,
     PICTURE_SUFFIXES,
     AnnotatedPicture,
     Dataset,
     Thing,
     checked_box,
+    counted,
     read_bytes,
-    read_picture,
+    read_size,
     shown,
 )
 from aerodaas.types.errors import ConfigError
@@ -53,15 +53,10 @@ def read_yolo(path: Path, pictures: Path | None = None) -> Dataset:
     if not folder.is_dir():
         raise ConfigError(f"there is no folder {folder}: name the pictures' with --pictures")
     files = [one for one in sorted(folder.rglob("*")) if one.suffix.lower() in PICTURE_SUFFIXES]
-    found = []
-    count = 0
-    for file in files:
-        things = _things(_text_beside(file), file, labels)
-        count += len(things)
-        if count > MOST_THINGS:
-            raise ConfigError(f"{folder} has more than {MOST_THINGS:,} annotations")
-        found.append(AnnotatedPicture(file, things))
-    return Dataset(tuple(found), tuple(dict.fromkeys(labels)))
+    pictures_found = (
+        AnnotatedPicture(file, _things(_text_beside(file), file, labels)) for file in files
+    )
+    return Dataset(counted(pictures_found, folder), tuple(dict.fromkeys(labels)))
 
 
 def _description(path: Path) -> dict[str, Any]:
@@ -124,8 +119,8 @@ def _things(text: Path, picture: Path, labels: list[str]) -> tuple[Thing, ...]:
     rows = [(number, line.split()) for number, line in enumerate(lines, 1) if line.strip()]
     if not rows:
         return ()
-    height, width = read_picture(picture).shape[:2]
-    return tuple(_thing(f"{text}:{number}", row, labels, (width, height)) for number, row in rows)
+    size = read_size(picture)
+    return tuple(_thing(f"{text}:{number}", row, labels, size) for number, row in rows)
 
 
 def _thing(place: str, row: list[str], labels: list[str], size: tuple[int, int]) -> Thing:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import fcntl
 import hashlib
 import http.client
+import io
 import os
 import urllib.error
 import urllib.request
@@ -18,7 +19,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http import HTTPStatus
 from pathlib import Path, PurePosixPath
-from typing import IO, Any
+from typing import IO
 from urllib.parse import urlsplit
 
 from aerodaas.analytics.models.cache import fetched_path, require_fetched
@@ -69,7 +70,7 @@ def fetch_model(
             _receive(file, model, source, progress)
             _check(file, part, model.archive.sha256 if model.archive else model.sha256, name)
             if model.archive is not None:
-                _unpack(file, part, model)
+                _unpack(file, part, model, model.archive.member)
             part.replace(target)
     except OSError as error:
         raise ConfigError(f"cannot write into {target.parent}: {error.strerror}") from None
@@ -106,9 +107,14 @@ def _receive(
     if have == size:
         return
     where = source or model.address
-    with _opened(model, source, have) as (stream, start):
-        file.truncate(start)
-        done = start
+    is_local = source is not None and Path(source).is_file()
+    stream: io.BufferedIOBase
+    if is_local:
+        stream, done = Path(where).open("rb"), 0  # noqa: SIM115 - closed below
+    else:
+        stream, done = _asked(_address(model, source), have)
+    with stream:
+        file.truncate(done)
         progress(done, size)
         for chunk in _chunks(stream, where):
             done += len(chunk)
@@ -117,7 +123,7 @@ def _receive(
             file.write(chunk)
             progress(done, size)
     file.flush()
-    if done > size or (done < size and _is_local(source)):
+    if done > size or (done < size and is_local):
         file.truncate(0)
         longer = "longer" if done > size else "shorter"
         raise ModelError(
@@ -127,24 +133,6 @@ def _receive(
         raise SourceError(
             f"{model.name} was cut off after {done} of {size} bytes: the same command goes on there"
         )
-
-
-def _is_local(source: str | None) -> bool:
-    return source is not None and Path(source).is_file()
-
-
-@contextmanager
-def _opened(
-    model: RegisteredModel, source: str | None, have: int
-) -> Iterator[tuple[IO[bytes], int]]:
-    """A stream of the file, and the byte at which it begins: at `have`, or at 0."""
-    if source is not None and _is_local(source):
-        with Path(source).open("rb") as local:
-            yield local, 0
-        return
-    with _asked(_address(model, source), have) as answer:
-        partial = answer.status == HTTPStatus.PARTIAL_CONTENT
-        yield answer, have if partial and _begins_at(answer, have) else 0
 
 
 def _address(model: RegisteredModel, source: str | None) -> str:
@@ -159,13 +147,12 @@ def _address(model: RegisteredModel, source: str | None) -> str:
     return address + Path(urlsplit(model.address).path).name
 
 
-@contextmanager
-def _asked(address: str, have: int) -> Iterator[Any]:
+def _asked(address: str, have: int) -> tuple[http.client.HTTPResponse, int]:
+    """The answer of a server, and the byte at which it begins: `have`, or 0."""
     headers = {"User-Agent": _AGENT} | ({"Range": f"bytes={have}-"} if have else {})
     request = urllib.request.Request(address, headers=headers)  # noqa: S310 - checked before
     try:
-        with urllib.request.urlopen(request, timeout=_SILENCE) as answer:  # noqa: S310 - as above
-            yield answer
+        answer = urllib.request.urlopen(request, timeout=_SILENCE)  # noqa: S310 - as above
     except urllib.error.HTTPError as error:
         raise SourceError(f"{address} answers with status {error.code}") from None
     except (urllib.error.URLError, http.client.HTTPException, TimeoutError) as error:
@@ -174,13 +161,12 @@ def _asked(address: str, have: int) -> Iterator[Any]:
             f"{address} cannot be reached: {reason}; --from takes a mirror, or a file that was "
             "fetched elsewhere"
         ) from None
+    partial = answer.status == HTTPStatus.PARTIAL_CONTENT
+    begins = answer.headers.get("Content-Range", "").startswith(f"bytes {have}-")
+    return answer, have if partial and begins else 0
 
 
-def _begins_at(answer: http.client.HTTPResponse, have: int) -> bool:
-    return (answer.headers.get("Content-Range") or "").startswith(f"bytes {have}-")
-
-
-def _chunks(stream: IO[bytes], where: str) -> Iterator[bytes]:
+def _chunks(stream: io.BufferedIOBase, where: str) -> Iterator[bytes]:
     """All chunks; what is cut off ends early, which its length tells."""
     while True:
         try:
@@ -209,15 +195,12 @@ def _check(file: IO[bytes], part: Path, wanted: str, name: str) -> None:
         )
 
 
-def _unpack(file: IO[bytes], part: Path, model: RegisteredModel) -> None:
-    """Put the model in the archive's place, and require its checksum."""
-    if model.archive is None:
-        return
+def _unpack(file: IO[bytes], part: Path, model: RegisteredModel, member: str) -> None:
+    """Put the model in its archive's place, and require its checksum."""
     try:
         with zipfile.ZipFile(file) as archive:
-            names = [PurePosixPath(name) for name in archive.namelist()]
-            (member,) = (str(name) for name in names if name.name == model.archive.member)
-            with archive.open(member) as packed:
+            (name,) = (one for one in archive.namelist() if PurePosixPath(one).name == member)
+            with archive.open(name) as packed:
                 content = packed.read(model.size + 1)
     except (zipfile.BadZipFile, ValueError) as error:
         part.unlink()

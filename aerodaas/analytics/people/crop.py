@@ -1,4 +1,4 @@
-"""Square crops around bodies, the input of a keypoint network."""
+"""Crops around bodies, the input of a keypoint network."""
 
 from __future__ import annotations
 
@@ -6,13 +6,12 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CUT", "GREY", "MARGIN", "Region", "cut_out", "cut_region", "square_around"]
+from aerodaas.types.geometry import Box
+
+__all__ = ["GREY", "MARGIN", "Region", "cut_region", "square_around"]
 
 Region = tuple[float, float, float, float]
 """Left, top, width, height of a part of an image, in pixels; it may reach beyond it."""
-
-CUT = 128
-"""Side of the crop in pixels."""
 
 MARGIN = 1.5
 """Ratio of the square's side to the longer side of the body's box, which may omit raised arms."""
@@ -21,24 +20,11 @@ GREY = 114
 """Grey level of the crop outside the image, 0 to 255."""
 
 
-def square_around(
-    box: tuple[float, float, float, float], margin: float = MARGIN
-) -> tuple[float, float, float]:
-    """Left, top and side, in pixels, of the square around `box` (left, top, right, bottom).
-
-    A square shows standing and lying people at one scale.
-    """
+def square_around(box: Box) -> Region:
+    """The square around `box`, with a margin; it shows standing and lying people at one scale."""
     left, top, right, bottom = box
-    side = margin * max(right - left, bottom - top)
-    return (left + right - side) / 2, (top + bottom - side) / 2, side
-
-
-def cut_out(
-    image: NDArray[np.uint8], square: tuple[float, float, float], size: int = CUT
-) -> NDArray[np.uint8]:
-    """Crop a square (left, top, side) of `image` to size x size pixels; grey outside the image."""
-    left, top, side = square
-    return cut_region(image, (left, top, side, side), (size, size))
+    side = MARGIN * max(right - left, bottom - top)
+    return (left + right - side) / 2, (top + bottom - side) / 2, side, side
 
 
 def cut_region(

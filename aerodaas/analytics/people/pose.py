@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from aerodaas.analytics.base import Analytics, Context, ResourceUse
 from aerodaas.analytics.detection.detector import OnnxDetector
-from aerodaas.analytics.detection.keypoints import Box, KeypointModel
+from aerodaas.analytics.detection.keypoints import KeypointModel
 from aerodaas.analytics.models import POSE
 from aerodaas.types.data import Detection, Detections, Frame
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import Box
 
 __all__ = ["PoseAnalytics", "body_around"]
 

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator
 from xml.etree import ElementTree as ET
 
+from aerodaas.config.xml_text import XmlError, parse_xml
 from aerodaas.dataflow.plans.rings import AreaReader
 from aerodaas.types.errors import ConfigError
 
 __all__ = ["parse_kml"]
 
-_MOST_LEVELS = 40
 _MOST_ELEMENTS = 200_000
 _OTHERS = ("Point", "LineString", "Model", "Track", "NetworkLink", "GroundOverlay")
 _BOUNDARIES = {"outerBoundaryIs": 0, "innerBoundaryIs": 1}
@@ -26,7 +25,10 @@ def parse_kml(text: str, reader: AreaReader) -> None:
     Raises:
         ConfigError: If it is no KML, declares entities, or is nested too deep.
     """
-    root = _tree(text)
+    try:
+        root = parse_xml(text, "KML", _MOST_ELEMENTS)
+    except XmlError as error:
+        raise ConfigError(f"it {error}") from None
     if _local(root) != "kml":
         raise ConfigError(f"it is XML of the kind {_local(root)[:40]!r}, not KML")
     for placemark in _all(root, "Placemark"):
@@ -36,30 +38,6 @@ def parse_kml(text: str, reader: AreaReader) -> None:
     for one in root.iter():
         if _local(one) in _OTHERS:
             reader.others[_local(one)] += 1
-
-
-def _tree(text: str) -> ET.Element:
-    """The document's root; entities, which could grow without end, are refused unread."""
-    if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise ConfigError("KML declares no entities; this file is not read")
-    level = elements = 0
-    root: ET.Element | None = None
-    try:
-        # Event by event, so that a bound is met before all of a deep tree is there.
-        pieces = ET.iterparse(io.StringIO(text), ["start", "end"])  # noqa: S314 - has no entities
-        for event, element in pieces:
-            root = element if root is None else root
-            level += 1 if event == "start" else -1
-            elements += event == "start"
-            if level > _MOST_LEVELS or elements > _MOST_ELEMENTS:
-                break
-    except ET.ParseError as error:
-        raise ConfigError(f"it is no XML: {error}") from None
-    if level > _MOST_LEVELS:
-        raise ConfigError(f"it is nested more than {_MOST_LEVELS} levels deep; KML needs 10")
-    if root is None or level:
-        raise ConfigError(f"it has more than {_MOST_ELEMENTS} elements: split it")
-    return root
 
 
 def _rings(polygon: ET.Element) -> list[list[list[float]]]:

@@ -25,6 +25,7 @@ from aerodaas.dataflow.mission_document import (
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.document.values import ValueWriter, registered_name
 from aerodaas.environment.environment import Environment
+from aerodaas.environment.offering import require_no_more
 from aerodaas.environment.robot import Robot
 from aerodaas.types.data import Frame
 from aerodaas.types.errors import GraphError
@@ -102,6 +103,7 @@ class _Compiler:
 
     def _require_data(self) -> None:
         """Raise GraphError for functions of the application that would run in its process."""
+        require_no_more(self._environment)
         hooks = [robot for robot in self._environment.get_env_robots() if _has_hooks(robot)]
         # Where the user's side is there, the application runs its own functions.
         if not self._here and (hooks or self._graph.on_launch):

@@ -132,8 +132,11 @@ class ValueWriter:
         path = Path(str(value))
         if use == "model":
             named = model_named(str(value))
-            path = path if named is None else fetched_path(named)
-            sha256 = _hash_of(path)
+            if named is None:
+                sha256 = _hash_of(path)
+            else:
+                # It was verified when the analysis read it.
+                path, sha256 = fetched_path(named), named.sha256
             self.models[sha256] = path
             return {"$model": path.name, "sha256": sha256}
         if use == "output":
@@ -156,7 +159,8 @@ class ValueReader:
         """Know the `environment` to which values refer, and the folder of further models."""
         self._environment = environment
         self._models = models
-        self._known: dict[str, Path] = {}
+        self._hashes: dict[Path, str] = {}
+        """SHA-256 of the models that were read so far."""
 
     def analysis(self, name: str, settings: Mapping[str, Any]) -> Analytics[Any]:
         """Make a registered analysis; raises GraphError for a setting that it does not take."""
@@ -222,15 +226,18 @@ class ValueReader:
         raise GraphError(f"{place}: a document names no file or address of this machine")
 
     def _model(self, name: str, wanted: str, place: str) -> Path:
-        if not self._known:
-            for folder in (DETECTOR.parent, self._models, model_folder()):
-                self._known |= {_hash_of(one): one for one in sorted(folder.glob("*.onnx"))}
-        if wanted not in self._known:
-            raise GraphError(
-                f"{place}: there is no model {name!r} with the SHA-256 {wanted[:16]}… here: put it "
-                f"into {self._models}"
-            )
-        return self._known[wanted]
+        folders = (model_folder(), self._models, DETECTOR.parent)
+        files = [one for folder in folders for one in sorted(folder.glob("*.onnx"))]
+        # Those so called first: a hash takes the whole file.
+        for path in sorted(files, key=lambda one: one.name not in (name, f"{wanted}.onnx")):
+            if path not in self._hashes:
+                self._hashes[path] = _hash_of(path)
+            if self._hashes[path] == wanted:
+                return path
+        raise GraphError(
+            f"{place}: there is no model {name!r} with the SHA-256 {wanted[:16]}… here: put it "
+            f"into {self._models}"
+        )
 
 
 def _is_mapping(value: object) -> TypeGuard[Mapping[str, object]]:

@@ -56,11 +56,19 @@ def test_both_kinds_make_a_pose_analysis(tmp_path: Path) -> None:
     assert isinstance(pose.keypoints.head, SimccHead)
 
 
-@pytest.mark.parametrize("shapes", [((1, 17, 96), (1, 17, 100)), ((1, 13, 96), (1, 13, 128))])
+@pytest.mark.parametrize(
+    "shapes",
+    [
+        ((1, 17, 96), (1, 17, 100)),
+        ((1, 13, 96), (1, 13, 128)),
+        ((), (1, 17, 128)),
+        ((1, 17, 96), (1, 17, 128), (1, 17, 128)),
+    ],
+)
 def test_other_distributions_are_refused(
     tmp_path: Path, shapes: tuple[tuple[int, ...], ...]
 ) -> None:
-    """Bins that fit no crop, and other skeletons."""
+    """Bins that fit no crop, other skeletons, a number without axes, and a third output."""
     outputs = [np.zeros(shape, np.float32) for shape in shapes]
     path = constant_model(tmp_path / "a.onnx", outputs, shape=("b", 3, 64, 48))
     with pytest.raises(ModelError, match="finds no keypoints"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from aerodaas.analytics.evaluation.dataset import Dataset
+from aerodaas.analytics.evaluation import dataset
+from aerodaas.analytics.evaluation.dataset import Dataset, read_picture, read_size
 from aerodaas.analytics.evaluation.reading import read_dataset
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 
@@ -72,9 +74,9 @@ def test_a_picture_without_a_text_shows_nothing(folder: Path) -> None:
     (folder / "labels/a.txt").unlink()
     (folder / "data.yaml").unlink()
     (folder / "classes.txt").write_text("person\ncar\n")
-    dataset = read_dataset(folder)
-    assert [one.things for one in dataset.pictures] == [()]
-    assert dataset.labels == ("person", "car")
+    found = read_dataset(folder)
+    assert [one.things for one in found.pictures] == [()]
+    assert found.labels == ("person", "car")
 
 
 def thing(**changes: object) -> list[dict[str, Any]]:
@@ -99,6 +101,15 @@ BAD_COCO: dict[str, tuple[object, str]] = {
     ),
     "text": (coco(annotations=thing(bbox=[1, 2, "a", 3])), "four finite numbers"),
     "empty box": (coco(annotations=thing(bbox=[1, 2, 0, 3])), "the box is empty: 0 x 3"),
+    "400 digits": (coco(annotations=thing(bbox=[1, 2, 10**400, 3])), "four finite numbers"),
+    "400 digits and a fraction": (
+        coco(annotations=thing(bbox=[10**400, 2, 0.5, 3])),
+        "four finite numbers",
+    ),
+    "as many digits as Python reads": (
+        coco(annotations=thing(bbox=[1, 10**4300 - 1, 1, 10**4300 - 1])),
+        "four finite numbers",
+    ),
     "endless": (coco(annotations=thing(bbox=[1, 2, 1e400, 3])), "four finite numbers"),
     "escape": (coco(images=[{"id": 4, "file_name": "../../etc/passwd"}]), "leads out of"),
     "root": (coco(images=[{"id": 4, "file_name": "/etc/passwd"}]), "leads out of"),
@@ -120,6 +131,14 @@ def test_json_that_is_none_names_the_line(folder: Path) -> None:
     (folder / "coco.json").write_text('{"images": [\n\n{"id": ')
     with pytest.raises(ConfigError, match=r"coco.json:3: is not JSON"):
         read_dataset(folder / "coco.json")
+
+
+@pytest.mark.parametrize("area", [10**400, float("inf"), float("nan"), -1, 0, "wide", None])
+def test_an_area_that_is_none_is_not_taken(folder: Path, area: object) -> None:
+    """That of the box counts instead."""
+    (folder / "coco.json").write_text(json.dumps(coco(annotations=thing(area=area))))
+    (picture,) = read_dataset(folder / "coco.json").pictures
+    assert [one.area for one in picture.things] == [None]
 
 
 @pytest.mark.parametrize(
@@ -176,6 +195,55 @@ def test_malformed_voc_names_the_object(folder: Path, text: str, problem: str) -
     (folder / "Annotations/a.xml").write_text(text)
     with pytest.raises(ConfigError, match=problem):
         read_dataset(folder / "Annotations")
+
+
+@pytest.mark.parametrize("place", ["Annotations", "data.yaml"])
+def test_annotations_are_counted(folder: Path, monkeypatch: pytest.MonkeyPatch, place: str) -> None:
+    """Over all pictures, as they are read."""
+    monkeypatch.setattr(dataset, "MOST_THINGS", 1)
+    assert len(read_dataset(folder / place).pictures) == 1
+    (folder / "Annotations/b.xml").write_text(XML)
+    for name in ("images/b.png", "labels/b.txt"):
+        (folder / name).write_bytes((folder / name.replace("b.", "a.")).read_bytes())
+    with pytest.raises(ConfigError, match="has more than 1 annotations"):
+        read_dataset(folder / place)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "before"), [(".png", 0), (".webp", 0), (".jpg", 0), (".jpg", 3)]
+)
+def test_a_size_is_that_of_the_decoded_picture(tmp_path: Path, suffix: str, before: int) -> None:
+    """However much metadata a JPEG has before it."""
+    content = cv2.imencode(suffix, np.zeros((30, 50, 3), np.uint8))[1].tobytes()
+    content = content[:2] + before * (b"\xff\xe1\xff\xff" + bytes(0xFFFD)) + content[2:]
+    path = tmp_path / "a"
+    path.write_bytes(content)
+    assert read_size(path) == (50, 30) == read_picture(path).shape[1::-1]
+
+
+def test_sizes_that_cannot_be_had_are_refused(tmp_path: Path) -> None:
+    """No file, no picture, one that claims too much, and one that is too long."""
+    path = tmp_path / "a.png"
+    with pytest.raises(ConfigError, match=r"cannot read .*a\.png"):
+        read_size(path)
+    path.write_bytes(b"no picture")
+    with pytest.raises(ConfigError, match="is no JPEG, PNG or WebP"):
+        read_size(path)
+    path.write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + 2 * (20_000).to_bytes(4, "big"))
+    with pytest.raises(ConfigError, match="has 20000 x 20000 pixels, too many"):
+        read_size(path)
+    os.truncate(path, (64 << 20) + 1)
+    with pytest.raises(ConfigError, match="is larger than 64 MiB"):
+        read_size(path)
+
+
+def test_pictures_are_not_decoded_for_their_size(folder: Path) -> None:
+    """The beginning of one is enough to read YOLO's fractions."""
+    picture = folder / "images/a.png"
+    picture.write_bytes(picture.read_bytes()[:40])
+    only(read_dataset(folder / "data.yaml"))
+    with pytest.raises(ConfigError, match="is no JPEG, PNG or WebP"):
+        read_picture(picture)
 
 
 def test_what_is_no_dataset_is_told_what_would_be(folder: Path) -> None:

@@ -7,20 +7,22 @@ import io
 import math
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from synthetic_models import patchwork_model
 
+from aerodaas.analytics.detection.detector import OnnxDetector
 from aerodaas.analytics.evaluation.dataset import AnnotatedPicture, Dataset, Thing
-from aerodaas.analytics.evaluation.figures import Evaluation, measure
+from aerodaas.analytics.evaluation.figures import Evaluation, evaluate, measure
 from aerodaas.types.data import Detection
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.geometry import Box
 
 coco = pytest.importorskip("pycocotools.coco")
 cocoeval = pytest.importorskip("pycocotools.cocoeval")
-
-Box = tuple[float, float, float, float]
 
 
 def dataset(*pictures: list[Thing]) -> Dataset:
@@ -103,6 +105,25 @@ def test_no_label_in_common_is_an_error_with_the_remedy() -> None:
     assert evaluated(renamed, [Detection(BOX, "person", 0.9)]).overall.recall == 1
     with pytest.raises(ConfigError, match="no label man; it has human"):
         people.renamed({"man": "person"})
+
+
+@pytest.mark.parametrize(
+    ("label", "problem"),
+    [("unicorn", "--rename LABEL=CLASS"), ("person", r"cannot read .*gone\.png")],
+)
+def test_what_cannot_be_measured_is_refused_before_any_picture(
+    tmp_path: Path, label: str, problem: str
+) -> None:
+    """No label in common, or a later picture that is not there."""
+    cv2.imwrite(str(tmp_path / "here.png"), np.zeros((96, 128, 3), np.uint8))
+    detector = OnnxDetector(patchwork_model(tmp_path / "a.onnx", shape=(1, 3, 96, 128)))
+    detector.open()
+    things = (Thing(label, BOX),)
+    pictures = [AnnotatedPicture(tmp_path / name, things) for name in ("here.png", "gone.png")]
+    seen: list[None] = []
+    with pytest.raises(ConfigError, match=problem):
+        evaluate(detector, Dataset(tuple(pictures), (label,)), progress=lambda: seen.append(None))
+    assert not seen
 
 
 def test_labels_that_the_model_does_not_know_are_named() -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from flying import FLAT, hop
+from flying import FLAT, hop, robot
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -132,12 +132,27 @@ def test_a_model_by_name_is_written_by_its_checksum(
     people = OnnxDetector("mine", classes=["person"]).deploy(edge).analyse(camera(env))
     PersonFollowAnalytics().deploy(edge).analyse(people)
     fly(env)
-    written = write_mission(env, "by name")
+    (fetched / "mine.onnx").rename(tmp_path / "away")
+    written = write_mission(env, "by name")  # its checksum is known: no file is read for it
+    (tmp_path / "away").rename(fetched / "mine.onnx")
     assert f'"sha256": "{sha256}"' in written.text()
     assert again(written, environment(), tmp_path) == written
     monkeypatch.setenv("AERODAAS_MODELS", str(tmp_path))
     with pytest.raises(GraphError, match=r"no model 'mine.onnx' with the SHA-256"):
         again(written, environment(), tmp_path)
+
+
+def test_models_that_a_document_does_not_name_are_not_read(
+    environment: Callable[[], Environment], tmp_path: Path
+) -> None:
+    """One that cannot be read is in no other document's way."""
+    (tmp_path / "broken.onnx").mkdir()
+    env = environment()
+    edge = env.get_compute_resource_by_id("edge")
+    OnnxDetector(DETECTOR).deploy(edge).analyse(camera(env))
+    fly(env)
+    written = write_mission(env, "shipped")
+    assert again(written, environment(), tmp_path) == written
 
 
 def test_settings_of_every_kind_come_back(
@@ -468,6 +483,28 @@ def test_a_document_is_flown_in_an_environment_that_lies_beside_it(tmp_path: Pat
         path.write_text(json.dumps(document_of(environment=name)))
         with pytest.raises(ConfigError, match=re.escape("give the file of yours by --env")):
             fly_mission(path, RunOptions(view=False))
+
+
+def test_an_application_that_goes_on_in_flight_is_no_mission(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it does there is code of its own; nothing flies to find out."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "env.json").write_text(json.dumps({**FLAT, "robots": [robot()]}))
+    text = """
+from aerodaas import *
+env = Environment("env.json")
+drone = env.get_robot_by_id("drone")
+drone.navigate(AeroListData([Waypoint("a", 2, 0, 2)]))
+drone.start_mission(wait=False)
+drone.wait()
+"""
+    (tmp_path / "app.py").write_text(text)
+    assert compile_application(tmp_path / "app.py", []).navigation
+    (tmp_path / "app.py").write_text(text.replace("drone.wait()", "drone.pause_mission()"))
+    with pytest.raises(GraphError, match=r"app\.py cannot be written.*only `aerodaas run` flies"):
+        compile_application(tmp_path / "app.py", [])
+    assert not (tmp_path / "runs").exists()
 
 
 def test_an_application_that_never_starts_is_no_mission(tmp_path: Path) -> None:

@@ -13,10 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from aerodaas.analytics.detection.keypoints import KeypointModel
-from aerodaas.analytics.people.crop import CUT, MARGIN
+from aerodaas.analytics.people.crop import MARGIN
 from aerodaas.analytics.people.joints import BONES
 from tools.training.dataset import Pictures, Sample, save_shard
-from tools.training.pose_cuts import People
+from tools.training.pose_cuts import CUT, People
 from tools.training.pose_evaluate import PARTS, placing
 from tools.training.pose_export import export_pose
 from tools.training.pose_network import STRIDE, Joints, places

@@ -22,4 +22,8 @@ FAMILIES: tuple[ModelFamily, ...] = (
     yolo_nas,
     nms_outputs,
 )
-"""All families, the strictest first: those that must match the grid of the input size exactly."""
+"""All families; a file belongs to the first that takes it.
+
+RT-DETR, which is told by its numbers, stands before the end-to-end exports and YOLO-NAS, whose
+shapes its outputs can have.
+"""

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["best_class", "boxes_and_scores", "corners", "sigmoid"]
+__all__ = ["best_class", "boxes_and_scores", "corners", "listed", "sigmoid"]
 
 _AXES, _BOX = 3, 4
 
@@ -31,6 +31,21 @@ def best_class(
     kept = np.flatnonzero(best >= min_score)
     invalid = int(np.count_nonzero(np.isnan(best)))
     return kept, best[kept], scores[:, kept].argmax(axis=0).astype(np.int32), invalid
+
+
+def listed(
+    scores: NDArray[np.float32], classes: NDArray[np.float32], count: int, min_score: float
+) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.int32], int]:
+    """Find the detections of a list that reach `min_score` and are of one of `count` classes.
+
+    Returns their rows, scores and classes, and the number of rows with a NaN score, or of no class
+    though they reach `min_score`.
+    """
+    enough = scores >= min_score
+    known = (classes >= 0) & (classes < count)
+    kept = np.flatnonzero(enough & known)
+    invalid = int(np.count_nonzero(np.isnan(scores) | (enough & ~known)))
+    return kept, scores[kept], classes[kept].astype(np.int32), invalid
 
 
 def boxes_and_scores(shapes: Sequence[tuple[int, ...]]) -> tuple[int, int] | None:

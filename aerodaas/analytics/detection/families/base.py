@@ -3,7 +3,9 @@
 A family is a callable: given a `ModelFile`, it returns a decoder for that file, or None if the
 file belongs to another family. For an unsupported model, write a family and pass it::
 
-    OnnxDetector("rtdetr.onnx", families=[rtdetr, *FAMILIES])
+    from aerodaas.analytics.detection.families import FAMILIES
+
+    OnnxDetector("mine.onnx", families=[my_family, *FAMILIES])
 """
 
 from __future__ import annotations
@@ -75,7 +77,7 @@ class Decoder(Protocol):
 
     @property
     def family(self) -> str:
-        """Name of the family, for the log."""
+        """Name of the family, which `aerodaas models check` tells."""
         ...
 
     @property
@@ -98,7 +100,8 @@ class Decoder(Protocol):
     ) -> Candidates:
         """Decode the outputs for one image, without the batch axis.
 
-        `size` is the height and width of the network's input in pixels.
+        `size` is the height and width of the network's input in pixels. A trial run asks for every
+        box: its `min_score` is minus infinity.
         """
         ...
 

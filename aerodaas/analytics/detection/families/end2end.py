@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.detection.coco import COCO_NAMES
+from aerodaas.analytics.detection.families.arrays import listed
 from aerodaas.analytics.detection.families.base import Candidates, Preprocessing, keep_finite
 from aerodaas.analytics.detection.families.ultralytics import keypoint_shape, read_keypoints
 from aerodaas.analytics.detection.model_file import ModelFile
@@ -42,15 +43,11 @@ class EndToEndDecoder:
         """Keep the rows with a score of at least `min_score` and a valid class."""
         del size
         rows = outputs[0]
-        invalid = int(np.count_nonzero(np.isnan(rows[:, _SCORE])))
-        rows = rows[rows[:, _SCORE] >= min_score]
-        known = (rows[:, _CLASS] >= 0) & (rows[:, _CLASS] < self.classes)
-        invalid += int(np.count_nonzero(~known))
-        rows = rows[known]
-        keypoints = read_keypoints(rows[:, _ROW:], self.keypoints)
-        classes = rows[:, _CLASS].astype(np.int32)
-        found = Candidates(rows[:, :_SCORE], rows[:, _SCORE], classes, keypoints, invalid)
-        return keep_finite(found)
+        kept, scores, classes, invalid = listed(
+            rows[:, _SCORE], rows[:, _CLASS], self.classes, min_score
+        )
+        keypoints = read_keypoints(rows[kept, _ROW:], self.keypoints)
+        return keep_finite(Candidates(rows[kept, :_SCORE], scores, classes, keypoints, invalid))
 
 
 def end_to_end(model: ModelFile) -> EndToEndDecoder | None:

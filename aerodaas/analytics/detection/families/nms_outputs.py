@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.analytics.detection.coco import COCO_NAMES
+from aerodaas.analytics.detection.families.arrays import listed
 from aerodaas.analytics.detection.families.base import Candidates, Preprocessing, keep_finite
 from aerodaas.analytics.detection.model_file import ModelFile
 
@@ -40,13 +41,12 @@ class NmsOutputsDecoder:
         """Keep the detections with a score of at least `min_score` and a valid class."""
         del size
         count, boxes, scores, numbers = outputs
+        # The first ones, so that their numbers hold for the boxes, too.
         given = np.arange(len(scores)) < count.reshape(-1)[0]
-        known = (numbers >= 0) & (numbers < self.classes)
-        unusable = given & ((~known & (scores >= min_score)) | np.isnan(scores))
-        kept = np.flatnonzero(given & known & (scores >= min_score))
-        classes = numbers[kept].astype(np.int32)
-        invalid = int(np.count_nonzero(unusable))
-        return keep_finite(Candidates(boxes[kept], scores[kept], classes, None, invalid))
+        kept, best, classes, invalid = listed(
+            scores[given], numbers[given], self.classes, min_score
+        )
+        return keep_finite(Candidates(boxes[kept], best, classes, None, invalid))
 
 
 def nms_outputs(model: ModelFile) -> NmsOutputsDecoder | None:

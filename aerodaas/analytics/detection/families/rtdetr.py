@@ -21,6 +21,7 @@ from aerodaas.analytics.detection.families.arrays import (
     best_class,
     boxes_and_scores,
     corners,
+    listed,
     sigmoid,
 )
 from aerodaas.analytics.detection.families.base import Candidates, Preprocessing, keep_finite
@@ -54,42 +55,25 @@ class RtDetrDecoder:
     ) -> Candidates:
         """Keep the queries whose score reaches `min_score`, their boxes scaled to pixels."""
         if self.ranked:
-            return self._of(outputs[0], *self._listed(outputs[0], min_score), size)
-        if self.separate is None:
-            boxes, scores = outputs[0][:, :_BOX], outputs[0][:, _BOX:]
+            boxes = outputs[0]
+            found = listed(boxes[:, _SCORE], boxes[:, _CLASS], self.classes, min_score)
         else:
-            boxes, scores = (outputs[number] for number in self.separate)
-        if self.logits:
-            scores = sigmoid(scores)
-        return self._of(boxes, *best_class(scores.T, min_score), size)
-
-    def _listed(
-        self, rows: NDArray[np.float32], min_score: float
-    ) -> tuple[NDArray[np.intp], NDArray[np.float32], NDArray[np.int32], int]:
-        scores, classes = rows[:, _SCORE], rows[:, _CLASS]
-        known = (classes >= 0) & (classes < self.classes)
-        kept = np.flatnonzero(known & (scores >= min_score))
-        invalid = np.isnan(scores) | (~known & (scores >= min_score))
-        return kept, scores[kept], classes[kept].astype(np.int32), int(np.count_nonzero(invalid))
-
-    def _of(
-        self,
-        boxes: NDArray[np.float32],
-        kept: NDArray[np.intp],
-        scores: NDArray[np.float32],
-        classes: NDArray[np.int32],
-        invalid: int,
-        size: tuple[int, int],
-    ) -> Candidates:
+            if self.separate is None:
+                boxes, scores = outputs[0][:, :_BOX], outputs[0][:, _BOX:]
+            else:
+                boxes, scores = (outputs[number] for number in self.separate)
+            found = best_class((sigmoid(scores) if self.logits else scores).T, min_score)
+        kept, best, classes, invalid = found
         height, width = size
-        scale = np.array([width, height, width, height], np.float32)
-        pixels = corners(boxes[kept, :_BOX]) * scale
-        return keep_finite(Candidates(pixels, scores, classes, None, invalid))
+        pixels = corners(boxes[kept, :_BOX]) * np.array([width, height, width, height], np.float32)
+        return keep_finite(Candidates(pixels, best, classes, None, invalid))
 
 
 def rtdetr(model: ModelFile) -> RtDetrDecoder | None:
     """Recognise at most a thousand boxes, all of which the trial picture shows to be fractions."""
-    shapes = [output.shape for output in model.trial] if _may_be(model) else []
+    if not _may_be(model):
+        return None
+    shapes = [output.shape for output in model.trial]
     separate = boxes_and_scores(shapes)
     if separate is not None:
         boxes, scores = (model.trial[number][0] for number in separate)
