@@ -1,4 +1,4 @@
-"""Environment variables of an analysis' own process, which Ray does not learn.
+"""Environment variables of one actor's own process, which Ray does not learn.
 
 Ray writes the variables of a `runtime_env` into a log that every user of the machine can read.
 """
@@ -12,9 +12,9 @@ from typing import Any
 from pydantic import SecretStr
 
 from aerodaas.config.model import RuntimeEnvConfig
-from aerodaas.config.secrets import is_secret_name
+from aerodaas.config.secrets import MAVLINK_KEY, is_secret_name
 
-__all__ = ["ProcessVariables", "private_variables", "ray_variables"]
+__all__ = ["ProcessVariables", "private_variables", "ray_variables", "vehicle_variables"]
 
 _AT_START = ("LD_", "PYTHON", "GLIBC_", "MALLOC_", "OMP_", "OPENBLAS_", "MKL_")
 """Prefixes of variables that loaders, interpreters and libraries read as a process starts."""
@@ -56,6 +56,12 @@ def ray_variables(env: RuntimeEnvConfig) -> dict[str, str]:
     return {
         name: value.get_secret_value() for name, value in env.env_vars.items() if _at_start(name)
     }
+
+
+def vehicle_variables() -> ProcessVariables:
+    """This process' secrets of vehicles, for the actors that fly; a local Ray has none of them."""
+    key = os.environ.get(MAVLINK_KEY, "")
+    return ProcessVariables({MAVLINK_KEY: SecretStr(key)} if key else {})
 
 
 def _at_start(name: str) -> bool:

@@ -10,6 +10,7 @@
 #   AERODAAS_OWN_ADDRESS   where other nodes find this one            (default: the first address)
 #   AERODAAS_OBJECT_STORE  bytes of Ray's object store, within /dev/shm (default: Ray's)
 #   AERODAAS_VENV          Python environment with aerodaas           (default: ~/aerodaas)
+#   AERODAAS_ROOT          1 lets it run as root                      (default: it does not)
 set -eu
 
 fail() {

@@ -20,6 +20,7 @@ from queue import Empty, Queue
 
 from aerodaas.actors.cluster.authentication import make_token, require_authentication
 from aerodaas.actors.private_folder import shared_memory_names
+from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.types.errors import AeroDaaSError
 
 __all__ = ["LocalRay"]
@@ -57,7 +58,7 @@ class LocalRay:
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
             text=True,
-            env={**variables, **os.environ, **_LOOPBACK},
+            env={**variables, **_inherited(), **_LOOPBACK},
             start_new_session=True,
         )
         self._lines: Queue[str] = Queue()
@@ -110,6 +111,11 @@ def _streams() -> tuple[str, str]:
     except AeroDaaSError:
         return "", ""
     return str(folder), prefix
+
+
+def _inherited() -> dict[str, str]:
+    """This process' variables, but for what no actor gets but those that fly."""
+    return {name: value for name, value in os.environ.items() if name != MAVLINK_KEY}
 
 
 def _failure(reason: str) -> str:

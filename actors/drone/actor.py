@@ -16,6 +16,7 @@ from aerodaas.actors.drone.loop_calls import LoopCalls, LoopOverError
 from aerodaas.actors.drone.robot_report import RobotReport
 from aerodaas.actors.drone.vehicle_controller import RobotSpec, VehicleController
 from aerodaas.actors.priority import Slack, punctual, raise_niceness
+from aerodaas.actors.process_variables import ProcessVariables
 from aerodaas.actors.run.losses import ALONE
 from aerodaas.actors.session import (
     CONTROL_PERIOD_NS,
@@ -77,6 +78,11 @@ class DroneActor(StreamActor):
         """Reasons why this machine refuses real-time priority or locked memory."""
         self._heard = time.monotonic()
         self._orphaned = False
+
+    def prepare(self, variables: ProcessVariables | None = None) -> ActorInfo:
+        """Connect the vehicles; `variables` have been set in this process by their arrival."""
+        del variables
+        return super().prepare()
 
     def _open(self) -> None:
         nice = raise_niceness()

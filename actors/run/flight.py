@@ -26,7 +26,7 @@ from aerodaas.actors.dispatch.offload import CloudProcess
 from aerodaas.actors.dispatch.remote_executor import Executor
 from aerodaas.actors.drone.actor import CHANGES, COMMANDS, DroneActor
 from aerodaas.actors.drone.robot_report import RobotReport
-from aerodaas.actors.process_variables import ProcessVariables, private_variables
+from aerodaas.actors.process_variables import ProcessVariables, private_variables, vehicle_variables
 from aerodaas.actors.run.actor_classes import actor_classes
 from aerodaas.actors.run.application import Application
 from aerodaas.actors.run.application_process import ApplicationProcess
@@ -100,7 +100,8 @@ class Flight:
                 if spec.robot.id not in mine
             )
             own = others if plan.conduct is None else plan.conduct
-            self._create(name, self._classes.drone, place, (session, name, specs, own))
+            args, setup = (session, name, specs, own), (vehicle_variables(),)
+            self._create(name, self._classes.drone, place, args, setup=setup)
         self._create_cameras(plan.cameras)
         self._create_analyses(plan.analyses, environments)
         if plan.dispatch is not None:

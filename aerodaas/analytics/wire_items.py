@@ -18,14 +18,14 @@ from aerodaas.types.data import Frame, Header, Odometry
 from aerodaas.types.errors import AeroDaaSError
 from aerodaas.types.geometry import CameraModel
 from aerodaas.types.guest_item import GuestItem
-from aerodaas.types.picture_size import picture_fits, picture_size
+from aerodaas.types.picture_size import picture_fits, picture_format, picture_size
 
 __all__ = ["ItemError", "pack", "unpack"]
 
 _FRAME = "Frame"
 _FRAME_KEYS = {"is", "header", "camera", "odometry", "size", "format", "bytes"}
 _QUALITY = 90
-_SIGNATURES = {"jpeg": b"\xff\xd8", "png": b"\x89PNG\r\n\x1a\n"}
+_FORMATS = ("jpeg", "png")
 _DEPTH_FORMAT = (16, 0)
 """PNG's bit depth and colour type of a depth image: one channel of 16 bits."""
 
@@ -122,8 +122,8 @@ def _depth(data: bytes, size: tuple[int, int]) -> NDArray[np.uint16]:
 
 
 def _decoded(data: bytes, kind: str, size: tuple[int, int], how: int) -> NDArray[Any]:
-    if kind not in _SIGNATURES or not data.startswith(_SIGNATURES[kind]):
-        raise ItemError(f"a picture that is no {' or '.join(_SIGNATURES)}")
+    if kind not in _FORMATS or picture_format(data) != kind:
+        raise ItemError(f"a picture that is no {' or '.join(_FORMATS)}")
     if picture_size(data) != size or not picture_fits(*size):
         raise ItemError("a picture that is too large, or not of the size that it tells of")
     # Without the orientation that a JPEG may name, which would turn the picture.

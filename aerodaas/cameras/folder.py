@@ -18,6 +18,7 @@ from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
 from aerodaas.types.errors import SourceError
 from aerodaas.types.geometry import CameraModel
+from aerodaas.types.picture_size import picture_format
 
 __all__ = ["FolderCamera"]
 
@@ -148,12 +149,13 @@ def _pixels(content: bytes) -> int:
 
     WebP has at most 16383 x 16383 by its format.
     """
-    if content.startswith(b"\x89PNG"):
+    kind = picture_format(content)
+    if kind == "png":
         return int.from_bytes(content[16:20], "big") * int.from_bytes(content[20:24], "big")
     if content.startswith(b"BM"):
         sides = (content[18:22], content[22:26])
         return abs(math.prod(int.from_bytes(one, "little", signed=True) for one in sides))
-    if content.startswith(b"\xff\xd8"):
+    if kind == "jpeg":
         frames = _JPEG_FRAME.finditer(content)
         areas = (int.from_bytes(one[1], "big") * int.from_bytes(one[2], "big") for one in frames)
         return max(areas, default=0)
@@ -165,5 +167,5 @@ def _is_cut_short(content: bytes) -> bool:
 
     Only the second half counts, because a thumbnail before the image has a marker, too.
     """
-    is_jpeg = content.startswith(b"\xff\xd8")
+    is_jpeg = picture_format(content) == "jpeg"
     return is_jpeg and content.rfind(b"\xff\xd9") < len(content) // 2

@@ -19,6 +19,7 @@ from aerodaas.cli.import_bag import import_bag
 from aerodaas.cli.init import init
 from aerodaas.cli.logs import logs
 from aerodaas.cli.new import new
+from aerodaas.cli.options import OtherEnvironment, Overrides
 from aerodaas.cli.preflight import preflight
 from aerodaas.cli.replay import replay
 from aerodaas.cli.report import compare, report
@@ -69,9 +70,7 @@ def run(
             help="The application: a Python file, a mission document, or the name of an example."
         ),
     ],
-    env: Annotated[
-        Path | None, typer.Option(help="Environment file instead of the application's own.")
-    ] = None,
+    env: OtherEnvironment = None,
     speed: Annotated[
         str | None,
         typer.Option(
@@ -122,10 +121,7 @@ def run(
             "Without it, nothing.",
         ),
     ] = None,
-    setting: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
-    ] = None,
+    setting: Overrides = None,
     view: Annotated[  # noqa: FBT002
         bool, typer.Option("--view/--no-view", help="Show the flight on the terminal.")
     ] = True,
@@ -210,9 +206,7 @@ def compile_command(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="The document's file; default: printed.")
     ] = None,
-    env: Annotated[
-        Path | None, typer.Option(help="Environment file instead of the application's own.")
-    ] = None,
+    env: OtherEnvironment = None,
 ) -> None:
     """Write an application as a mission document: data, which others fly without running code.
 
@@ -253,9 +247,7 @@ def graph_command(
     output: Annotated[
         Path | None, typer.Option("--output", "-o", help="A file; default: printed.")
     ] = None,
-    env: Annotated[
-        Path | None, typer.Option(help="Environment file instead of the application's own.")
-    ] = None,
+    env: OtherEnvironment = None,
 ) -> None:
     """Draw an application's graph as a Mermaid flowchart; nothing flies.
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from aerodaas.cli.application import build_application
+from aerodaas.cli.options import OtherEnvironment, Overrides
 from aerodaas.cli.preflight import settled_items
 from aerodaas.cli.shipped import find_application
 from aerodaas.config.options import RunOptions, current_options
@@ -47,13 +48,8 @@ def check(
             help="The application, as for `aerodaas run`; or an environment file alone."
         ),
     ],
-    env: Annotated[
-        Path | None, typer.Option(help="Environment file instead of the application's own.")
-    ] = None,
-    setting: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
-    ] = None,
+    env: OtherEnvironment = None,
+    setting: Overrides = None,
     connect: Annotated[  # noqa: FBT002
         bool,
         typer.Option(
@@ -202,19 +198,19 @@ def _vehicle(
     vehicles: dict[str, Vehicle],
     connected: ExitStack,
 ) -> str:
-    from aerodaas.config.plugins import load_plugin  # noqa: PLC0415 - slow to load
+    from aerodaas.drivers.loading import load_vehicle  # noqa: PLC0415 - slow to load
     from aerodaas.types.health import Verdict  # noqa: PLC0415 - as above
 
-    vehicle: Vehicle = load_plugin("drivers", robot.driver)(robot, environment.config)
+    vehicle = load_vehicle(robot, environment.config)
     connected.callback(vehicle.close)
     vehicle.connect(_CONNECTING)
     vehicles[robot.id] = vehicle
-    state = vehicle.read()
     items = settled_items(vehicle, robot)
     refused = [one.text for one in items if one.verdict is Verdict.REFUSED]
     if refused:
         raise VehicleError(f"{robot.driver} would not take off: {'; '.join(refused)}")
     warned = "".join(f"; {one.text}" for one in items if one.verdict is Verdict.WARNING)
+    state = vehicle.read()
     charge = 100 * state.battery.fraction
     return f"{robot.driver} answers: {state.mode.value}, battery {charge:.0f} %{warned}"
 

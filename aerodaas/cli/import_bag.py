@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -55,6 +54,7 @@ def import_bag(
     """
     from aerodaas.config.checked import checked  # noqa: PLC0415 - slow to load
     from aerodaas.config.model import RecordingConfig  # noqa: PLC0415
+    from aerodaas.environment.mission_run import recording_folder  # noqa: PLC0415
     from aerodaas.recording.ros.bag import RosBag  # noqa: PLC0415
     from aerodaas.recording.ros.importing import import_bag as write  # noqa: PLC0415
     from aerodaas.recording.ros.topics import BagTopics  # noqa: PLC0415
@@ -71,8 +71,7 @@ def import_bag(
         if not taken.taken():
             typer.echo("\n".join(_topics(opened)))
             return
-        now = datetime.now().astimezone()
-        folder = out or Path("runs") / f"import-{bag.stem}-{now:%Y%m%d-%H%M%S}"
+        folder = out or recording_folder(f"import-{bag.stem}")
         config = checked(RecordingConfig, {"images": images}, "--images")
         done = write(opened, taken, folder / "flight.mcap", config)
     typer.echo("\n".join(_told(done)))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, Overrides
 from aerodaas.cli.robot import connected_robot
 from aerodaas.types.errors import VehicleError
 
@@ -28,16 +29,15 @@ def logs(
         bool, typer.Option("--latest", help="Fetch the newest one.")
     ] = False,
     to: Annotated[Path, typer.Option(help="The folder for what is fetched.")] = Path(),
-    env: Annotated[Path, typer.Option(help="The environment file.")] = Path("environment.json"),
-    setting: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
-    ] = None,
+    env: EnvironmentFile = ENVIRONMENT,
+    setting: Overrides = None,
     as_json: Annotated[  # noqa: FBT002
         bool, typer.Option("--json", help="Print the list, or the files, as JSON.")
     ] = False,
 ) -> None:
-    """List the logs on a robot's autopilot, or fetch some of them; on the ground only.
+    """List the logs that a robot's autopilot keeps, or fetch some of them into a folder.
+
+    On the ground only. No parameter and no plan of the vehicle is changed, whatever a flight sets.
 
     aerodaas logs drone
     aerodaas logs drone --latest --to runs/logs
@@ -45,7 +45,7 @@ def logs(
     """
     from aerodaas.types.vehicle_log import LoggingVehicle  # noqa: PLC0415 - slow to load
 
-    with connected_robot(robot, env, setting or ()) as (vehicle, _):
+    with connected_robot(robot, env, setting or (), observing=True) as (vehicle, _):
         if not isinstance(vehicle, LoggingVehicle):
             driver = vehicle.capabilities.driver
             raise VehicleError(f"{robot}: no logs can be fetched by the driver {driver}")

@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 import time
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from aerodaas.cli.options import ENVIRONMENT, EnvironmentFile, Overrides
 from aerodaas.cli.robot import connected_robot
 
 if TYPE_CHECKING:
@@ -33,11 +33,8 @@ _MARKS = {
 
 def preflight(
     robot: Annotated[str, typer.Argument(help="Id of the robot.")],
-    env: Annotated[Path, typer.Option(help="The environment file.")] = Path("environment.json"),
-    setting: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="Lay `id.setting=value` over the environment file."),
-    ] = None,
+    env: EnvironmentFile = ENVIRONMENT,
+    setting: Overrides = None,
     as_json: Annotated[  # noqa: FBT002
         bool, typer.Option("--json", help="Print the list as JSON.")
     ] = False,
@@ -64,20 +61,20 @@ def preflight(
 
 
 def settled_items(vehicle: Vehicle, robot: RobotConfig) -> list[HealthItem]:
-    """The list of a connected vehicle, once nothing more is told."""
+    """The list of a connected vehicle, once its slowest messages have come.
+
+    It is read until then, for drivers watch over who steers by how often they are read.
+    """
     from aerodaas.mission.safety.checklist import Checklist  # noqa: PLC0415 - slow to load
-    from aerodaas.types.health import Verdict  # noqa: PLC0415 - as above
     from aerodaas.types.vehicle import SteppedVehicle  # noqa: PLC0415 - as above
 
-    checklist = Checklist.of(vehicle, robot)
+    checklist = Checklist(vehicle, robot.limits, robot.preflight)
     patience = 0.0 if isinstance(vehicle, SteppedVehicle) else _SETTLING
     until = time.monotonic() + patience
-    while True:
-        items = checklist.examine(vehicle.read())
-        known = all(one.verdict is Verdict.GOOD for one in items)
-        if known or time.monotonic() >= until:
-            return items
+    while time.monotonic() < until:
+        vehicle.read()
         time.sleep(0.1)
+    return checklist.examine(vehicle.read())
 
 
 def _rows(items: Sequence[HealthItem]) -> list[dict[str, str]]:

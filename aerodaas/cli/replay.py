@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import time
-from datetime import datetime
 from itertools import islice
 from pathlib import Path
 from typing import Annotated
@@ -56,6 +55,7 @@ def replay(
         aerodaas replay flight.mcap --app follow.py --model other.onnx
         aerodaas replay flight.mcap --app follow.py --scheduler gems
     """
+    from aerodaas.environment.mission_run import recording_folder  # noqa: PLC0415 - slow to load
     from aerodaas.recording.pictures import shots  # noqa: PLC0415
     from aerodaas.recording.reader import Recording  # noqa: PLC0415
     from aerodaas.recording.recorded_environment import (  # noqa: PLC0415
@@ -73,9 +73,8 @@ def replay(
             f"not taken from the recording: {printable(', '.join(missing))}; "
             + (f"{env} says what is taken instead" if env else "give them with --env FILE")
         )
-    now = datetime.now().astimezone()
     app = find_application(app)
-    folder = out or Path("runs") / f"replay-{app.stem}-{now:%Y%m%d-%H%M%S}"
+    folder = out or recording_folder(f"replay-{app.stem}")
     factor, lockstep = speed_option(speed)
     options = RunOptions(
         environment=env,

@@ -21,7 +21,7 @@ _CONNECTING = 10.0
 
 @contextmanager
 def connected_robot(
-    name: str, file: Path, settings: Iterable[str]
+    name: str, file: Path, settings: Iterable[str], *, observing: bool = False
 ) -> Iterator[tuple[Vehicle, RobotConfig]]:
     """Connect the robot `name` of an environment file for the length of a `with`.
 
@@ -29,6 +29,7 @@ def connected_robot(
         name: Its id.
         file: The environment file.
         settings: `id.setting=value`, laid over the file.
+        observing: Whether nothing is changed at the vehicle, whatever a flight would set there.
 
     Raises:
         ConfigError: For a file or a setting that is wrong.
@@ -36,7 +37,7 @@ def connected_robot(
         VehicleError: If the vehicle does not answer.
     """
     from aerodaas.config.overrides import parse_setting  # noqa: PLC0415 - slow to load
-    from aerodaas.config.plugins import load_plugin  # noqa: PLC0415 - as above
+    from aerodaas.drivers.loading import load_vehicle  # noqa: PLC0415 - as above
     from aerodaas.environment.environment import Environment  # noqa: PLC0415 - as above
 
     overrides = dict(parse_setting(text) for text in settings)
@@ -45,7 +46,6 @@ def connected_robot(
     if name not in robots:
         raise UnknownIdError("robot", name, list(robots))
     robot = robots[name]
-    vehicle: Vehicle = load_plugin("drivers", robot.driver)(robot, config)
-    with closing(vehicle):
+    with closing(load_vehicle(robot, config, observing=observing)) as vehicle:
         vehicle.connect(_CONNECTING)
         yield vehicle, robot

@@ -36,7 +36,7 @@ class PreflightConfig(BaseModel):
     gps: PreflightLevel = "warn"
     """Satellites and accuracy of the GPS."""
     estimator: PreflightLevel = "warn"
-    """How well all sensors fit what the estimator expects."""
+    """How well position, velocity and height fit what the estimator expects."""
     storage: PreflightLevel = "warn"
     """Whether the vehicle can write its own log."""
     wind: PreflightLevel = "warn"

@@ -14,6 +14,7 @@ from pydantic import BaseModel, Secret, SecretBytes, SecretStr
 
 __all__ = [
     "HIDDEN",
+    "MAVLINK_KEY",
     "SecretUrl",
     "cleaned",
     "is_secret_name",
@@ -25,6 +26,10 @@ __all__ = [
 
 HIDDEN = "**********"
 """What stands in the place of a secret, as pydantic shows one."""
+MAVLINK_KEY = "AERODAAS_MAVLINK_KEY"
+"""Environment variable that may hold the signing key of MAVLink vehicles, as 64 hexadecimal digits.
+
+It goes to the processes that fly or watch a vehicle, and to no other."""
 _SCHEME = re.compile(r"[a-z][a-z0-9+.\-]*:/", re.IGNORECASE)
 _PARAMETERS = re.compile(r"[?#;=\s\"']")
 _NAME = re.compile(

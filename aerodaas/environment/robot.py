@@ -110,7 +110,7 @@ class Robot(PaperNames, IRobot):
 
     def wait(self) -> None:
         """Return when the mission has ended; raises the error that it ended with."""
-        self._environment.launched().wait()
+        self._environment.wait()
 
     def on_start(self, hook: Callable[[], None]) -> Callable[[], None]:
         """Register a hook to run before take-off; usable as a decorator."""

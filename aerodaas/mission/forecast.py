@@ -20,8 +20,6 @@ from aerodaas.types.waypoints import Waypoint
 __all__ = ["BatteryForecast"]
 
 _PERIOD = NANOSECONDS
-_FRESH = 2 * _PERIOD
-"""Nanoseconds for which an outlook counts."""
 _PATIENCE = 10 * NANOSECONDS
 """Nanoseconds for which the forecast must find the battery too small before an alert is raised."""
 _MARGIN = 1.1
@@ -44,7 +42,6 @@ class BatteryForecast:
         self._log = log
         self._due = 0
         self._outlook: BatteryOutlook | None = None
-        self._looked = 0
         self._told = False
         self._short_since: int | None = None
         """Mission clock since which every forecast has found the battery too small for the plan."""
@@ -64,7 +61,7 @@ class BatteryForecast:
         position, speed = state.odometry.position, self._limits.cruise_speed
         route = [self._as_flown(stop) for stop in stops]
         needed = self._meter.route(position, route, self._home, speed)
-        self._outlook, self._looked = self._look(state, needed), now
+        self._outlook = self._look(state, needed)
         available = state.battery.fraction - self._limits.battery_land
         if not (route and needed > max(0.0, available) * _MARGIN):
             self.fault, self._short_since = "", None
@@ -82,8 +79,9 @@ class BatteryForecast:
             self._log.alert(now, "unreachable_plan", self.fault)
 
     def outlook(self, now: int) -> BatteryOutlook | None:
-        """How far the battery lasts, if that was looked at just before `now`."""
-        return self._outlook if now - self._looked <= _FRESH else None
+        """How far the battery lasts; None if no forecast is due, or its charge is not known."""
+        # The next one may be late, but has not been left out.
+        return self._outlook if now <= self._due + _PERIOD else None
 
     def _look(self, state: VehicleState, needed: float) -> BatteryOutlook | None:
         """Compare the charge with that at which the supervisor has the drone return."""

@@ -10,11 +10,11 @@ from typing import Any
 
 from pydantic import Field
 
-from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.analytics.remote.schemas import OutlookOut, StatusOut
 from aerodaas.protocol.bases import AnswerModel
 from aerodaas.protocol.schemas import AnalyticsOut, StreamKind
 
-__all__ = ["AlertOut", "PlaceOut", "PlaybackOut", "RecordedOut", "TrackOut"]
+__all__ = ["AlertOut", "GpsOut", "PlaceOut", "PlaybackOut", "RecordedOut", "TrackOut"]
 
 
 class PlaceOut(AnswerModel):
@@ -36,6 +36,14 @@ class AlertOut(AnswerModel):
     text: str
 
 
+class GpsOut(AnswerModel):
+    """What a satellite receiver gives, beside the place."""
+
+    satellites: int | None
+    position_sigma: float | None
+    """Standard deviation of the place along the ground, metres."""
+
+
 class TrackOut(AnswerModel):
     """One robot's flight.
 
@@ -51,6 +59,10 @@ class TrackOut(AnswerModel):
     yaw: list[float | None]
     battery: list[float | None]
     distance: list[float]
+    outlook: list[OutlookOut | None]
+    """How far the battery lasts, by row; null where it was not known."""
+    gps: list[GpsOut | None]
+    """What the satellites give, by row; null without a receiver."""
     statuses: list[StatusOut]
     """One for each change of anything but figures and places, which they do not have."""
     places: list[PlaceOut]

@@ -8,8 +8,9 @@ from collections.abc import Callable, Collection, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from itertools import chain
-from typing import Any
+from typing import Any, NamedTuple
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +31,7 @@ from aerodaas.types.errors import SourceError
 
 __all__ = [
     "DETECTIONS_SCHEMA",
+    "PictureFile",
     "Shot",
     "decoded_ahead",
     "detections",
@@ -48,6 +50,21 @@ _DEPTH = "/aligned_depth"
 """End of the topic of a frame's depth image, next to the topic of its header."""
 _AHEAD = 4
 """Number of images decoded ahead of the reader."""
+_STILL = frozenset({"jpeg", "png", "webp"})
+"""Formats whose pictures are files as recorded."""
+_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95]
+"""Of the files of all others."""
+
+
+class PictureFile(NamedTuple):
+    """A picture as a file that other programs open."""
+
+    data: bytes
+    format: str
+    """`jpeg`, `png` or `webp`."""
+    width: int
+    """Pixels, as is the height, of the picture as it is shown."""
+    height: int
 
 
 @dataclass
@@ -126,6 +143,24 @@ class Shot:
             return image
         width, height = self.size
         return self._of_size(image[:height, :width])
+
+    def file(self) -> PictureFile | None:
+        """The picture as a file: as recorded, if it is one, otherwise encoded as JPEG.
+
+        Returns:
+            The file; None if the picture is broken or its format unknown.
+        """
+        try:
+            image = self.image()
+        except SourceError:
+            return None
+        if image is None:
+            return None
+        height, width = image.shape[:2]
+        if self.video is None and self.format in _STILL:
+            return PictureFile(picture_bytes(self.record.value), self.format, width, height)
+        data = cv2.imencode(".jpeg", image, _QUALITY)[1].tobytes()
+        return PictureFile(data, "jpeg", width, height)
 
     def _of_size(self, image: NDArray[np.uint8] | None) -> NDArray[np.uint8] | None:
         """The image, or None if it has not the recorded size."""

@@ -16,7 +16,7 @@ from typing_extensions import Self
 from aerodaas.config.document import public_document
 from aerodaas.config.model import EnvironmentConfig
 
-__all__ = ["Provenance"]
+__all__ = ["Provenance", "package_versions"]
 
 _PACKAGES = ("aerodaas", "ray", "numpy", "opencv-python-headless", "onnxruntime", "panda3d")
 
@@ -81,7 +81,7 @@ class Provenance:
             document=document,
             app_source=content.decode("utf-8", "replace") if source else "",
             revision=_revision(app.parent if app else Path.cwd()),
-            versions=_versions(),
+            versions=package_versions(),
         )
 
     def as_metadata(self) -> dict[str, str]:
@@ -98,7 +98,8 @@ class Provenance:
         return figures | dict(self.versions)
 
 
-def _versions() -> dict[str, str]:
+def package_versions() -> dict[str, str]:
+    """Versions of Python, the platform and the main packages, by name."""
     found = {"python": platform.python_version(), "platform": platform.platform()}
     return found | {name: number for name in _PACKAGES if (number := _version(name))}
 
@@ -111,18 +112,11 @@ def _version(package: str) -> str:
 
 
 def _revision(folder: Path) -> str:
-    def git(*arguments: str) -> str:
-        return subprocess.run(  # noqa: S603 - fixed arguments
-            ["git", *arguments],  # noqa: S607 - whichever git the user has
-            cwd=folder,
-            capture_output=True,
-            text=True,
-            timeout=5,
-            check=True,
-        ).stdout.strip()
-
+    # Never a tag's name, and the commit's in full.
+    command = ["git", "describe", "--always", "--exclude=*", "--abbrev=40", "--dirty=+"]
     try:
-        changed = git("status", "--porcelain", "--untracked-files=no")
-        return git("rev-parse", "HEAD") + ("+" if changed else "")
+        return subprocess.run(  # noqa: S603 - fixed arguments, whichever git the user has
+            command, cwd=folder, capture_output=True, text=True, timeout=5, check=True
+        ).stdout.strip()
     except (OSError, subprocess.SubprocessError):
         return ""

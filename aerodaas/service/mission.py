@@ -122,7 +122,7 @@ class ActiveMission:
         self.end_rehearsal()
         shutil.rmtree(self.rehearsal.path, ignore_errors=True)
         self._prepare(self.rehearsal, order, models)
-        self._rehearsing = start_process(self.rehearsal, tied=True)
+        self._rehearsing = start_process(self.rehearsal, tied=True, vehicles=False)
         self._rehearsed_since = time.monotonic()
 
     def verdict(self, seconds: float) -> VerdictOut | None:
@@ -155,7 +155,8 @@ class ActiveMission:
     def take_off(self) -> None:
         """Start the flight's process; one that was begun, by whatever service, begins no more."""
         if self._flying is None and not self.flight.begun:
-            self._flying = start_process(self.flight, tied=False)
+            own = self.attached_to is None
+            self._flying = start_process(self.flight, tied=False, vehicles=own)
 
     def _prepare(self, folder: FlightFolder, order: FlightOrder, models: ModelShelf) -> None:
         document = self.document()

@@ -18,6 +18,7 @@ import pymap3d
 from numpy.typing import NDArray
 
 __all__ = [
+    "FLU_FROM_OPTICAL",
     "Box",
     "CameraModel",
     "GeodeticOrigin",
@@ -42,6 +43,9 @@ Vector: TypeAlias = NDArray[np.float64]
 Box: TypeAlias = tuple[float, float, float, float]
 """Left, top, right, bottom in pixels of an image."""
 Triple: TypeAlias = tuple[float, float, float]
+
+FLU_FROM_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+"""Takes a camera's optical vectors (x right, y down, z forward) to its own FLU axes."""
 
 _MAJOR = 6378137.0
 _MINOR = 6356752.314245179
@@ -228,8 +232,8 @@ class CameraModel:
     @property
     def body_from_optical(self) -> NDArray[np.float64]:
         """Rotation (3, 3) that takes optical-frame vectors to the body frame."""
-        axes = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-        rotation: NDArray[np.float64] = rotation_from_rpy(0.0, self.pitch, self.yaw) @ axes
+        mounted = rotation_from_rpy(0.0, self.pitch, self.yaw)
+        rotation: NDArray[np.float64] = mounted @ FLU_FROM_OPTICAL
         return rotation
 
     def ray(self, u: float, v: float) -> Vector:

@@ -27,7 +27,8 @@ class HealthReadings:
     compass: float | None = None
     """Misfit as a share of what the estimator rejects, from 0."""
     estimator: float | None = None
-    """The largest misfit of all sensors, likewise."""
+    """The largest misfit of its position, velocity and height, likewise; with ArduPilot also of the
+    compass."""
     gps_fix: bool | None = None
     """Whether the GPS has a position in space."""
     logs: bool | None = None
@@ -60,7 +61,7 @@ class Verdict(str, enum.Enum):
     WARNING = "warning"
     REFUSED = "refused"
     UNKNOWN = "unknown"
-    """Not told by the vehicle, and not required."""
+    """Nothing is known, and nothing was required to be."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,14 +72,17 @@ class HealthItem:
     value: str
     """What was found; `not known` without a reading."""
     bound: str
-    """What it should be."""
+    """What it should be, to be read after these words; empty where nothing more is to be said."""
     verdict: Verdict
     remedy: str = ""
     """What to do about a warning or a refusal."""
 
     @property
     def text(self) -> str:
-        """One sentence; what the vehicle itself says in its own words."""
+        """One sentence: what was found, and what it should be.
+
+        The vehicle's own objections stand in it alone, as it words them.
+        """
         if self.name == OWN_CHECKS:
             return self.value
         should = f", should be {self.bound}" if self.bound else ""

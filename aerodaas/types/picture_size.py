@@ -1,10 +1,18 @@
-"""Size of a compressed picture from its first bytes, and its bounds, before it is decoded."""
+"""Format and size of a compressed picture from its first bytes, and its bounds, before decoding."""
 
 from __future__ import annotations
 
 import struct
+from typing import Literal
 
-__all__ = ["MAX_PIXELS", "MAX_SCANS", "MAX_SIDE", "picture_fits", "picture_size"]
+__all__ = [
+    "MAX_PIXELS",
+    "MAX_SCANS",
+    "MAX_SIDE",
+    "picture_fits",
+    "picture_format",
+    "picture_size",
+]
 
 MAX_PIXELS = 1 << 25
 """Width times height of a picture, before it is decoded: 8K has 33.2 million, 100 MB as BGR."""
@@ -28,6 +36,15 @@ def picture_fits(width: int, height: int) -> bool:
     return 0 < width <= MAX_SIDE and 0 < height <= MAX_SIDE and width * height <= MAX_PIXELS
 
 
+def picture_format(data: bytes) -> Literal["jpeg", "png", "webp"] | None:
+    """Format of a compressed picture by its signature; None for any other."""
+    if data.startswith(_PNG):
+        return "png"
+    if data.startswith(_JPEG):
+        return "jpeg"
+    return "webp" if data[:4] == b"RIFF" and data[8:12] == b"WEBP" else None
+
+
 def picture_size(data: bytes) -> tuple[int, int] | None:
     """Width and height in pixels of a JPEG, PNG or WebP.
 
@@ -38,13 +55,14 @@ def picture_size(data: bytes) -> tuple[int, int] | None:
         The size; None for another format, a damaged header, or a JPEG of more than `MAX_SCANS`
         passes.
     """
+    kind = picture_format(data)
     try:
-        if data.startswith(_PNG) and data[12:16] == b"IHDR":
+        if kind == "png" and data[12:16] == b"IHDR":
             width, height = struct.unpack_from(">II", data, 16)
             return width, height
-        if data.startswith(_JPEG):
+        if kind == "jpeg":
             return _jpeg(data) if data.count(_SCAN) <= MAX_SCANS else None
-        if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        if kind == "webp":
             return _webp(data)
     except (struct.error, IndexError):
         pass

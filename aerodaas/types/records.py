@@ -12,6 +12,8 @@ import numpy as np
 __all__ = ["fast_pickle", "valued"]
 
 C = TypeVar("C", bound=type[Any])
+_PLAIN = frozenset({bool, float, int, str})
+"""What most fields are; all else is asked what it is, which takes several times as long."""
 _HASHED = 16
 """Elements of an array that its hash uses: enough to tell most apart, few enough to be quick."""
 
@@ -30,7 +32,7 @@ def valued(cls: C) -> C:
             return True
         if type(other) is not type(self):
             return NotImplemented
-        return _same(values(self), values(other))
+        return all(map(_same, values(self), values(other)))
 
     def digest(self: Any) -> int:  # noqa: ANN401 - an instance of `cls`
         return hash((type(self), _key(values(self))))
@@ -66,7 +68,7 @@ def _values_of(cls: type[Any]) -> Callable[[Any], tuple[Any, ...]]:
 
 
 def _same(one: object, other: object) -> bool:
-    if one is other:
+    if one is other or (type(one) in _PLAIN and type(one) is type(other) and one == other):
         return True
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
         return _same_arrays(one, other)

@@ -60,12 +60,13 @@ class BatteryOutlook:
     """How far the battery lasts, by the energy model as this flight scaled it; charges 0 to 1."""
 
     plan: float
-    """Charge that the rest of the plan, the way home and the reserve of a landing need now; more
-    than 1 where no battery has it."""
+    """Charge that it takes from now on to fly the rest of the plan and home, and to have
+    `battery_land` left; more than 1 where no battery has it."""
     returns_at: float
-    """Charge at which the drone would return from where it is."""
+    """Charge at which the drone would return from where it is: `battery_return`, or more where the
+    way home needs it."""
     hover: float
-    """Seconds until then, if it stays where it is; 0 where it is due."""
+    """Seconds of hovering where it is until then; 0 where it is due."""
 
 
 @fast_pickle
@@ -97,7 +98,8 @@ class MissionStatus:
     pilot: str = ""
     """Who flies the drone by hand now; empty for nobody."""
     outlook: BatteryOutlook | None = None
-    """None while it leaves, is on the ground, or does not know its charge or place."""
+    """Forecast before take-off, on the way through the plan, and while paused; None 2 s after that,
+    and where charge or place is not known."""
 
     @property
     def progress(self) -> float:

@@ -59,11 +59,13 @@ class SchedulingType(str, enum.Enum):
 _ON_THE_GLOBE = (WaypointType.GLOBAL, WaypointType.GLOBAL_RELATIVE)
 
 
-def _require_finite(owner: str, **values: float | None) -> None:
-    for name, value in values.items():
-        if value is not None and not (
-            isinstance(value, int | float | np.floating) and math.isfinite(value)
-        ):
+def _require_finite(owner: str, record: object, names: tuple[str, ...]) -> None:
+    for name in names:
+        value = getattr(record, name)
+        # Almost every value; a status has hundreds of them, each time that it is read.
+        if value is None or (type(value) is float and math.isfinite(value)):
+            continue
+        if not (isinstance(value, int | float | np.floating) and math.isfinite(value)):
             message = f"{owner}: {name} must be a finite number, not {value!r}"
             raise InvalidWaypointError(message)
 
@@ -106,13 +108,9 @@ class Waypoint:
         """Check the numbers and turn the type's name into a WaypointType."""
         owner = f"waypoint {self.id!r}"
         _require_names(owner, self.id, self.priority)
-        _require_finite(owner, **{name: getattr(self, name) for name in _NUMBERS})
-        try:
-            object.__setattr__(self, "waypoint_type", WaypointType(self.waypoint_type))
-        except ValueError:
-            choices = ", ".join(kind.value for kind in WaypointType)
-            message = f"{owner}: waypoint_type must be one of {choices}, not {self.waypoint_type!r}"
-            raise InvalidWaypointError(message) from None
+        _require_finite(owner, self, _NUMBERS)
+        if type(self.waypoint_type) is not WaypointType:
+            object.__setattr__(self, "waypoint_type", self._type_named(owner))
         if self.hover_duration < 0:
             message = f"{owner}: hover_duration must not be negative, not {self.hover_duration}"
             raise InvalidWaypointError(message)
@@ -125,6 +123,14 @@ class Waypoint:
         ):
             message = f"{owner}: ({self.x}, {self.y}) is no latitude and longitude in degrees"
             raise InvalidWaypointError(message)
+
+    def _type_named(self, owner: str) -> WaypointType:
+        try:
+            return WaypointType(self.waypoint_type)
+        except ValueError:
+            choices = ", ".join(kind.value for kind in WaypointType)
+            message = f"{owner}: waypoint_type must be one of {choices}, not {self.waypoint_type!r}"
+            raise InvalidWaypointError(message) from None
 
     def resolve(self, takeoff: Vector, origin: GeodeticOrigin | None) -> Waypoint:
         """The same waypoint in the local ENU frame of the environment.
@@ -187,7 +193,7 @@ class VelocityCommand:
     def __post_init__(self) -> None:
         """Refuse numbers that are not finite and a validity that is not positive."""
         names = ("forward", "left", "up", "yaw_rate", "valid_for")
-        _require_finite("velocity command", **{name: getattr(self, name) for name in names})
+        _require_finite("velocity command", self, names)
         if self.valid_for <= 0:
             message = f"velocity command: valid_for must be positive, not {self.valid_for}"
             raise InvalidWaypointError(message)

@@ -249,6 +249,9 @@ class Track {
       yaw: this.track.yaw[row] ?? null,
       battery: this.track.battery[row] ?? null,
       distance: this.track.distance[row] ?? 0,
+      outlook: this.track.outlook[row] ?? null,
+      satellites: this.track.gps[row]?.satellites ?? null,
+      position_sigma: this.track.gps[row]?.position_sigma ?? null,
       places: Object.fromEntries(known),
     };
   }

@@ -285,12 +285,21 @@ export interface AlertOut {
 export interface TrackOut {
   battery: (number | null)[];
   distance: number[];
+  gps: (GpsOut | null)[];
+  outlook: (OutlookOut | null)[];
   places: PlaceOut[];
   position: [number | null, number | null, number | null][];
   statuses: StatusOut[];
   time: number[];
   velocity: [number | null, number | null, number | null][];
   yaw: (number | null)[];
+}
+/**
+ * What a satellite receiver gives, beside the place.
+ */
+export interface GpsOut {
+  position_sigma: number | null;
+  satellites: number | null;
 }
 /**
  * A waypoint of the plan.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,7 +12,12 @@ from flying import FLAT, Flyer, hop
 from pydantic import SecretStr
 
 from aerodaas import Analytics, Environment, Odometry
-from aerodaas.actors.process_variables import private_variables, ray_variables
+from aerodaas.actors.cluster.local_ray import _inherited
+from aerodaas.actors.process_variables import (
+    private_variables,
+    ray_variables,
+    vehicle_variables,
+)
 from aerodaas.analytics.base import Context
 from aerodaas.config.model import RuntimeEnvConfig
 
@@ -73,6 +79,21 @@ def test_a_secret_is_in_the_environment_and_in_no_file(flyer: Flyer) -> None:
     files = [path for path in session.rglob("*") if path.is_file()]
     assert any(EARLY.encode() in path.read_bytes() for path in files)
     assert [path.name for path in files if SECRET.encode() in path.read_bytes()] == []
+
+
+def test_the_key_of_a_vehicle_goes_to_who_flies_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """With the call that has it connect; a local Ray is started without it."""
+    monkeypatch.setenv("AERODAAS_MAVLINK_KEY", SECRET)
+    handed = vehicle_variables()
+    assert SECRET not in repr(handed)
+    assert SECRET not in _inherited().values()
+    assert _inherited()["PATH"] == os.environ["PATH"]
+    sent = pickle.dumps(handed)
+    monkeypatch.delenv("AERODAAS_MAVLINK_KEY")
+    pickle.loads(pickle.dumps(vehicle_variables()))  # noqa: S301 - our own
+    assert "AERODAAS_MAVLINK_KEY" not in os.environ
+    pickle.loads(sent)  # noqa: S301 - as above
+    assert os.environ["AERODAAS_MAVLINK_KEY"] == SECRET
 
 
 @pytest.mark.parametrize(

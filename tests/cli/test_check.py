@@ -9,12 +9,15 @@ from pathlib import Path
 import pytest
 from flying import FLAT, robot
 
-from aerodaas.cli import check
+from aerodaas.cli import check, preflight
 from aerodaas.cli.app import main
 
 PARTS = """
+import math
+from dataclasses import replace
 from aerodaas import *
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.types.data import Battery
 
 class Mine(Analytics[int]):
     accepts = (Odometry,)
@@ -42,6 +45,19 @@ class Careful(SimulatedVehicle):
     def close(self):
         Careful.closed += 1
         super().close()
+
+class Slow(SimulatedVehicle):
+    advance_to = None  # its time is its own
+    reads = asked = 0
+
+    def read(self):
+        Slow.reads += 1
+        state = super().read()
+        return state if Slow.reads > 2 else replace(state, battery=Battery(math.nan))
+
+    def preflight(self):
+        Slow.asked += 1
+        return super().preflight()
 
 class Blind:
     model, finished, skipped = None, False, 0
@@ -137,6 +153,19 @@ def test_a_vehicle_that_would_not_take_off_is_told_and_let_go(checked: Checked) 
     assert "check_parts:Careful would not take off: the propellers are off" in told
     careful = sys.modules["check_parts"].Careful
     assert (careful.closed, careful.moved) == (1, 0)
+
+
+def test_a_vehicle_is_judged_by_what_it_says_in_the_end(
+    checked: Checked, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Some is told late; until then it is read, and once it is judged."""
+    monkeypatch.setattr(preflight, "_SETTLING", 0.5)
+    code, told = checked(vehicle="check_parts:Slow", camera="simulated")
+    assert code == 0, told
+    assert "ok drone check_parts:Slow answers: grounded, battery 100 %" in told
+    slow = sys.modules["check_parts"].Slow
+    assert slow.asked == 1
+    assert slow.reads > 4
 
 
 @pytest.mark.parametrize(

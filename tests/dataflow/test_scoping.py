@@ -205,6 +205,16 @@ def test_navigation_for_the_only_one_needs_no_address(env: Environment) -> None:
     assert queued(env) == {"right": ["wp0", "more"]}
 
 
+def test_who_waits_before_the_start_starts_nothing(env: Environment) -> None:
+    """There is nothing to wait for; only start_mission() flies."""
+    drone = env.get_robot_by_id("left")
+    drone.navigate(hop((1, 0)))
+    drone.wait()
+    env.wait()
+    assert env.run is None
+    assert queued(env) == {"left": ["wp0"]}
+
+
 @pytest.mark.parametrize("early", [True, False])
 def test_navigation_for_one_of_several_must_say_which(env: Environment, *, early: bool) -> None:
     """At the call where two fly already, else at the start; the application's line is told."""

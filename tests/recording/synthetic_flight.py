@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -27,6 +28,7 @@ from aerodaas.types.data import (
 )
 from aerodaas.types.geometry import CameraModel, GeodeticOrigin
 from aerodaas.types.status import (
+    BatteryOutlook,
     Decision,
     Message,
     MissionState,
@@ -133,6 +135,7 @@ class SyntheticFlight:
                     distance,
                     visits=len(visited),
                     waypoint_counts=(len(visited), len(plan)),
+                    outlook=_outlook(state, time),
                 )
                 yield Step(time, at, velocity, yaw, status)
 
@@ -220,6 +223,13 @@ def _picture(odometry: Odometry) -> np.ndarray[Any, np.dtype[np.uint8]]:
     at = (160 + round(10 * odometry.position[0]), 60 + round(6 * odometry.position[1]))
     cv2.circle(image, at, 25, (40, 90, 200), -1)
     return image
+
+
+def _outlook(state: MissionState, time: float) -> BatteryOutlook | None:
+    """Ten minutes from the first second on; no battery has what landing takes."""
+    if state in {MissionState.ENROUTE, MissionState.LOITERING}:
+        return BatteryOutlook(plan=0.2, returns_at=0.1, hover=600.0 - time)
+    return BatteryOutlook(math.inf, 1.0, 0.0) if state is MissionState.LANDING else None
 
 
 def record(

@@ -59,6 +59,20 @@ def test_figures_are_those_of_the_recording(path: Path) -> None:
     assert told.distance[-1] == pytest.approx(FLIGHT_END.distance, abs=0.5)
 
 
+def test_rows_tell_how_far_the_battery_lasts_and_of_satellites(path: Path) -> None:
+    """As the status did just before; what was infinite, or not there, is not known."""
+    told = read(path).tracks["tello"]
+    known = [(time, one) for time, one in zip(told.time, told.outlook, strict=True) if one]
+    assert len(known) > 0.5 * len(told.time)
+    for time, one in known:
+        assert (one.plan, one.returns_at) == (0.2, 0.1)
+        assert one.hover == pytest.approx(600.0 - time, abs=0.11)
+    assert (told.outlook[0], told.outlook[-1]) == (None, None)
+    assert [(one.satellites, one.position_sigma) for one in told.gps if one] == [(12, 1.0)] * len(
+        told.time
+    )
+
+
 def test_statuses_are_those_of_the_mission(path: Path) -> None:
     """At each step: state, reason, target, what lies ahead, what has been visited."""
     told = read(path).tracks["tello"]
@@ -144,6 +158,9 @@ def test_a_long_flight_is_thinned_out(path: Path, monkeypatch: pytest.MonkeyPatc
         assert thin.position[row] == tuple(recorded[time].odometry.position)
         assert thin.battery[row] == recorded[time].battery.fraction
         assert thin.distance[row] == pytest.approx(flown[time], abs=0.1)
+        outlook = thin.outlook[row]
+        assert outlook is None or outlook.hover == pytest.approx(600.0 - time, abs=0.11)
+    assert len(thin.time) == len(thin.outlook) == len(thin.gps)
 
 
 def test_a_page_has_room_for_so_much(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

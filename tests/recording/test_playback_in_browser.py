@@ -115,6 +115,9 @@ def test_scrubbing_moves_map_picture_state_and_charts_together(
             assert said.startswith(f"{time:.1f} of ")
             assert state.replace("_", " ") in said
             assert abs(float(page.text(".state dd").split()[0]) - up) < 0.16
+            told = page.text(".state dl")
+            assert "12 sat., ±1.0 m" in " ".join(told.split())
+            assert ("Returns at" in told) is (state in {"enroute", "loitering"})
             # The picture itself: a red disc where the drone was; the box's edge is drawn on it.
             x, y, _ = pictures[stamp].position
             red, _, blue, _ = pixel(page, 160 + round(10 * x), 60 + round(6 * y))

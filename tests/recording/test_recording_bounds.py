@@ -11,6 +11,7 @@ from contextlib import contextmanager
 from io import BytesIO
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 import zstandard
@@ -29,7 +30,7 @@ from aerodaas.recording.images import check_picture, decode_image
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.report import write_report
 from aerodaas.types.errors import RecordingError
-from aerodaas.types.picture_size import MAX_PIXELS, picture_size
+from aerodaas.types.picture_size import MAX_PIXELS, picture_format, picture_size
 
 MAGIC = b"\x89MCAP0\r\n"
 COMPRESSED = "foxglove.CompressedImage"
@@ -216,6 +217,18 @@ def jpeg(width: int, height: int, scans: int = 1) -> bytes:
 def test_the_size_is_told_before_decoding(data: bytes, size: tuple[int, int] | None) -> None:
     """Of the formats that are decoded; of none that OpenCV would try beside these."""
     assert picture_size(data) == size
+
+
+@pytest.mark.parametrize(
+    ("ending", "kind"),
+    [(".jpg", "jpeg"), (".png", "png"), (".webp", "webp"), (".bmp", None), (".tiff", None)],
+)
+def test_the_format_is_that_of_the_first_bytes(ending: str, kind: str | None) -> None:
+    """As OpenCV writes it; a signature that is cut off is none."""
+    done, content = cv2.imencode(ending, np.zeros((8, 8, 3), np.uint8))
+    assert done
+    assert picture_format(content.tobytes()) == kind
+    assert picture_format(content.tobytes()[:1]) is None
 
 
 @pytest.mark.parametrize("side", [8192, 30_000, 65_000])

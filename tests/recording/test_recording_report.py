@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import subprocess
 from pathlib import Path
 
 import cv2
@@ -126,3 +127,25 @@ def test_provenance_is_collected_without_passwords(tmp_path: Path) -> None:
     asked = config.recording.model_copy(update={"application_source": True})
     found = Provenance.collect(app=app, config=config.model_copy(update={"recording": asked}))
     assert found.app_source == app.read_text()
+
+
+def test_the_revision_is_that_of_the_applications_repository(tmp_path: Path) -> None:
+    """In full, and marked if files of it were changed."""
+
+    def git(*arguments: str) -> str:
+        own = ["git", "-c", "user.name=me", "-c", "user.email=me@example.org", *arguments]
+        done = subprocess.run(own, cwd=tmp_path, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    app = tmp_path / "watch.py"
+    app.write_text("print('hello')\n")
+    git("init", "--quiet")
+    assert Provenance.collect(app=app).revision == ""
+    git("add", "watch.py")
+    git("commit", "--quiet", "--no-gpg-sign", "--message", "first")
+    git("tag", "--annotate", "--no-sign", "v1", "--message", "first")
+    commit = git("rev-parse", "HEAD")
+    (tmp_path / "notes.txt").touch()
+    assert Provenance.collect(app=app).revision == commit
+    app.write_text("print('bye')\n")
+    assert Provenance.collect(app=app).revision == f"{commit}+"

@@ -28,7 +28,7 @@ from aerodaas.service.bookings import Bookings
 from aerodaas.service.desk import MissionDesk
 from aerodaas.service.fleet_view import FleetView
 from aerodaas.service.flights.link import FlightNews
-from aerodaas.service.flights.order import Outcome
+from aerodaas.service.flights.order import FlightOrder, Outcome
 from aerodaas.service.garage import Garage
 from aerodaas.service.models import ModelShelf
 from aerodaas.service.monitor.news import VehicleNews
@@ -94,7 +94,7 @@ class Provider:
             one["sensors"] += [{"id": name, "type": "camera"} for name in ("cam", "belly")]
         path.write_text(json.dumps(fleet(*robots)), encoding="utf-8")
         self.started: list[Any] = []
-        monkeypatch.setattr(missions, "start_process", lambda folder, **_: self._start(folder))
+        monkeypatch.setattr(missions, "start_process", self._start)
         config = EnvironmentConfig.load(path)
         self.settings = ServiceSettings(path, config, folder / "s", rehearse=False, **settings)
         self.settings.state.mkdir()
@@ -114,7 +114,9 @@ class Provider:
         )
         self.fleet = FleetView(config, {}, self.garage, self.bookings, self.desk)
 
-    def _start(self, folder: Any) -> Any:  # noqa: ANN401
+    def _start(self, folder: Any, *, tied: bool, vehicles: bool) -> Any:  # noqa: ANN401
+        senses_only = FlightOrder.read(folder.order).attached is not None
+        assert (tied, vehicles) == (False, not senses_only), "who flies gets the vehicles' secrets"
         self.started.append(folder)
 
         class Process:

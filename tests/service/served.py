@@ -6,6 +6,7 @@ import contextlib
 import json
 import re
 import signal
+import socket
 import subprocess
 import sys
 import tempfile
@@ -21,6 +22,14 @@ from typing_extensions import Self
 START_SECONDS = 60.0
 FLIGHT_SECONDS = 240.0
 OVER = {"landed", "refused", "cancelled", "failed"}
+
+
+def free_port() -> int:
+    """A UDP port that nobody uses at present."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port: int = probe.getsockname()[1]
+        return port
 
 
 def robot(name: str, east: float = 0.0, **limits: object) -> dict[str, Any]:

@@ -63,7 +63,8 @@ class Desk:
         self.store.accounts.add(Account("pilot", "farm", Role.PILOT, frozenset(Scope), 0.0))
         self.open()
 
-    def _start(self, folder: Any, *, tied: bool) -> Process:  # noqa: ANN401 - FlightFolder
+    def _start(self, folder: Any, *, tied: bool, vehicles: bool) -> Process:  # noqa: ANN401 - FlightFolder
+        assert vehicles is not tied, "a rehearsal is connected with no vehicle"
         assert tied == (folder.path.name == "r"), "a flight outlives the service, no rehearsal does"
         self.started.append(folder.path)
         return Process()

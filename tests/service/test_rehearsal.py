@@ -13,10 +13,12 @@ from rehearsed import OtherLease, rehearse, to_the_east
 
 from aerodaas.config.model import validated
 from aerodaas.drivers.simulated import SimulatedVehicle
+from aerodaas.mission.safety.checklist import Checklist
 from aerodaas.service.rehearsal import judge, rehearsal_config
 from aerodaas.service.rehearsal.picture import draw
 from aerodaas.simulation.airframe import Airframe
 from aerodaas.types.errors import ConfigError
+from aerodaas.types.health import Verdict
 
 AHEAD = OtherLease("b7", [(5.0, 4.0), (9.0, 4.0), (9.0, 9.0), (5.0, 9.0)])
 """Another's area around the second waypoint."""
@@ -62,6 +64,23 @@ def test_the_fleet_becomes_a_simulated_one() -> None:
         vehicle.connect()
         assert vehicle.read().battery.fraction == {"px4": 0.5, "tello": 1.0, "own": 0.4}[one.id]
     assert rehearsal_config(whole, {}).simulation == whole.simulation
+
+
+def test_a_twin_is_not_asked_for_what_only_an_autopilot_knows() -> None:
+    """What must be known of a real vehicle is not known of its twin; what is known counts."""
+    policy = {"vibration": "require", "gps": "require", "wind": "require", "link": "refuse"}
+    fleet = [{**one, "preflight": policy} for one in FLEET["robots"]]
+    windy = {**FLEET["simulation"], "wind": [12, 0, 0]}
+    whole = validated({**FLEET, "robots": fleet, "simulation": windy}, "fleet")
+    refused = {}
+    for robot in (config := rehearsal_config(whole, {})).robots:
+        vehicle = SimulatedVehicle(robot, config)
+        vehicle.connect()
+        items = Checklist(vehicle, robot.limits, robot.preflight).examine(vehicle.read())
+        refused[robot.id] = {one.name for one in items if one.verdict is Verdict.REFUSED}
+    assert refused["px4"] == refused["tello"] == {"wind"}
+    assert refused["own"] == {"wind", "vibration", "gps"}, "as it will be in its flight"
+    assert config.robots[2].preflight == whole.robots[2].preflight
 
 
 def test_a_charge_beyond_full_is_refused() -> None:

@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-import socket
 from typing import Any
 
 import pytest
-from served import Served, document, fleet, robot
+from served import Served, document, fleet, free_port, robot
 
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 pytestmark = [pytest.mark.slow, pytest.mark.wall_clock]
-
-
-def free_port() -> int:
-    """A UDP port that nobody uses at present."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        port: int = probe.getsockname()[1]
-        return port
 
 
 def test_a_vehicle_stays_known_between_its_missions() -> None:

@@ -139,6 +139,15 @@ def test_what_it_says_in_a_situation(family: str, situation: str) -> None:
     assert fact.fix in {None, gps.fix_type}
 
 
+@pytest.mark.parametrize(("patience", "leaves"), [(1.0, True), (4.0, False)])
+def test_px4_waits_for_setpoints_as_its_parameter_says(patience: float, leaves: bool) -> None:  # noqa: FBT001
+    """COM_OF_LOSS_T, in seconds."""
+    bench = Bench("px4")
+    bench.firmware.parameters.values["COM_OF_LOSS_T"] = patience
+    bench.enter("setpoints stopped for 3 s")
+    assert bench.firmware.failsafe is leaves
+
+
 @pytest.mark.parametrize(("family", "situation", "order"), ACKS)
 def test_what_it_acknowledges(family: str, situation: str, order: str) -> None:
     """The same result as the real one's."""

@@ -86,7 +86,7 @@ def _copy(instruction: Instruction, out: Path, root: Path) -> None:
 
 
 def _copy_context(target: Path) -> None:
-    """Copy what `.dockerignore` lets through: all its lines but the first say what that is."""
+    """Copy what `.dockerignore` lets through: its lines with a `!` say what that is."""
     target.mkdir()
     for line in (_ROOT / ".dockerignore").read_text(encoding="utf-8").splitlines():
         for source in _ROOT.glob(line[1:]) if line.startswith("!") else ():

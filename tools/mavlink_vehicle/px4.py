@@ -18,8 +18,6 @@ __all__ = ["EmulatedPX4"]
 _OK, _LATER = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_TEMPORARILY_REJECTED
 _ALTITUDE, _POSITION, _AUTO, _OFFBOARD, _TERMINATION = 2, 3, 4, 6, 10
 _TAKE_OFF, _HOLD, _RETURN, _LAND = 2, 3, 5, 6
-_LOSS = 1.0
-"""COM_OF_LOSS_T: seconds without setpoints after which it leaves offboard."""
 _NEAR = 0.7
 """Metres below its altitude at which a take-off counts as done, about NAV_MC_ALT_RAD."""
 _CHECK = mavlink.MAV_SYS_STATUS_PREARM_CHECK
@@ -138,8 +136,12 @@ class EmulatedPX4(Firmware):
 
     def may_arm(self) -> bool:
         """Not in offboard without setpoints, though that mode itself was accepted."""
-        fed = self.now - self._setpoint_at < _LOSS
-        return self.knows_place and not self.terminated and (not self.guided or fed)
+        return self.knows_place and not self.terminated and (not self.guided or self._fed)
+
+    @property
+    def _fed(self) -> bool:
+        """Whether the last setpoint is young enough for offboard."""
+        return self.now - self._setpoint_at <= self.parameters.values["COM_OF_LOSS_T"]
 
     def command(  # noqa: PLR0911 - one for each command
         self, number: int, values: tuple[float, ...], frame: int | None
@@ -207,7 +209,7 @@ class EmulatedPX4(Firmware):
         elif taking_off and self.flight.rise_to(self._altitude) < _NEAR:
             self._sub = _HOLD
             self.flight.hold()
-        if self.guided and self.flight.flying and self.now - self._setpoint_at > _LOSS:
+        if self.guided and self.flight.flying and not self._fed:
             action = self.parameters.values["COM_OBL_RC_ACT"]
             sub = {_RETURN_ACTION: _RETURN, _HOLD_ACTION: _HOLD}.get(action)
             self._event("commander_failsafe_enter_generic", mavlink.MAV_SEVERITY_CRITICAL)

@@ -7,6 +7,7 @@ import os
 from pathlib import Path
 
 from aerodaas.analytics.models.registry import REGISTRY, RegisteredModel, registered
+from aerodaas.config.user_folders import cache_folder
 from aerodaas.types.errors import ModelError
 
 __all__ = ["FOLDER_VARIABLE", "fetched_path", "model_folder", "model_named", "require_fetched"]
@@ -18,12 +19,7 @@ FOLDER_VARIABLE = "AERODAAS_MODELS"
 def model_folder() -> Path:
     """The folder of fetched models: `AERODAAS_MODELS`, or one in the user's cache."""
     named = os.environ.get(FOLDER_VARIABLE, "")
-    if named:
-        return Path(named)
-    cache = os.environ.get("XDG_CACHE_HOME", "")
-    return (Path(cache) if Path(cache).is_absolute() else Path.home() / ".cache") / (
-        "aerodaas/models"
-    )
+    return Path(named) if named else cache_folder() / "models"
 
 
 def model_named(path: str | Path) -> RegisteredModel | None:

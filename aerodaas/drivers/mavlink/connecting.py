@@ -69,7 +69,6 @@ def establish(
     pause: Callable[[], None],
 ) -> Connection:
     """Wait until it is ready, see to its protections and its fence; raises VehicleError."""
-    assert link.target is not None  # noqa: S101 - it was just adopted
     commander.give(autopilot.version(), now=time.monotonic())
     _await_ready(autopilot, commander, telemetry, robot.id, settings, pause)
     frame = _frame(telemetry, robot, settings, home, pause)

@@ -9,10 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, SecretStr, model_validator
 from aerodaas.config.checked import checked
 from aerodaas.config.model import RobotConfig
 
-__all__ = ["KEY_VARIABLE", "MavlinkSettings", "mavlink_settings"]
-
-KEY_VARIABLE = "AERODAAS_MAVLINK_KEY"
-"""Environment variable that may hold the signing key, as 64 hexadecimal digits."""
+__all__ = ["MavlinkSettings", "mavlink_settings"]
 
 _STATION = 255
 """System id of an autopilot's ground station, by default."""

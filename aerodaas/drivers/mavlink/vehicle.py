@@ -404,13 +404,13 @@ class MavlinkVehicle:
         return download(self._connected().link, mavlink.MAV_MISSION_TYPE_MISSION, progress)
 
     def logs(self) -> list[LogEntry]:
-        """The autopilot's own logs, oldest first; blocks, raises VehicleError, also in flight."""
+        """The autopilot's own logs, oldest first; blocks, raises VehicleError, in flight always."""
         return list_logs(self._grounded_link("list logs"))
 
     def fetch_log(
         self, log: LogEntry, folder: Path, progress: Progress = lambda _, __: None
     ) -> Path:
-        """Fetch one of them into `folder`; blocks, raises VehicleError, also in flight."""
+        """Fetch one of them into `folder`; blocks, raises VehicleError, in flight always."""
         return fetch_log(
             self._grounded_link("fetch logs"), self.connection.autopilot, log, folder, progress
         )

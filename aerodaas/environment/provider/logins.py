@@ -10,6 +10,7 @@ from typing import Any
 
 from aerodaas.config.json_text import read_json
 from aerodaas.config.private_file import write_private
+from aerodaas.config.user_folders import config_folder
 from aerodaas.environment.provider.address import INSECURE_VARIABLE, ServiceAddress
 from aerodaas.environment.provider.client import ProviderClient
 from aerodaas.types.errors import ConfigError
@@ -27,7 +28,7 @@ class Logins:
 
     def __init__(self, path: Path | None = None) -> None:
         """Read and write `path`, or `aerodaas/logins.json` in the user's configuration folder."""
-        self.path = path or _config_folder() / "aerodaas" / "logins.json"
+        self.path = path or config_folder() / "logins.json"
 
     def urls(self) -> list[str]:
         """Providers with a token, the newest last."""
@@ -107,9 +108,3 @@ def default_url() -> str:
     raise ConfigError(
         f"which provider? {several}: name it by --at URL or --to URL, or in {URL_VARIABLE}"
     )
-
-
-def _config_folder() -> Path:
-    """The folder of the XDG base directory specification."""
-    named = os.environ.get("XDG_CONFIG_HOME", "")
-    return Path(named) if Path(named).is_absolute() else Path.home() / ".config"

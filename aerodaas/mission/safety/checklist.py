@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from aerodaas.config.model import LimitsConfig, RobotConfig
+from aerodaas.config.model import LimitsConfig
 from aerodaas.config.preflight import PreflightConfig, PreflightLevel
 from aerodaas.mission.safety.geofence import Geofence
 from aerodaas.mission.safety.supervisor import charge_objection, place_objections
@@ -62,11 +62,6 @@ class Checklist:
         self._policy = policy
         self._fence = Geofence(limits.geofence)
 
-    @classmethod
-    def of(cls, vehicle: Vehicle, robot: RobotConfig) -> Checklist:
-        """The list of `robot`."""
-        return cls(vehicle, robot.limits, robot.preflight)
-
     def examine(self, state: VehicleState) -> list[HealthItem]:
         """Every item that the policy does not ignore; `state` is the newest."""
         told, objections = self._told(), self._vehicle.preflight()
@@ -84,12 +79,7 @@ class Checklist:
         others = [text for text in faults.get("", []) if text not in objections]
         if others:
             items.append(HealthItem("faults", "; ".join(others), "", Verdict.WARNING))
-        return [
-            one
-            if one.verdict in {Verdict.GOOD, Verdict.UNKNOWN}
-            else replace(one, remedy=_REMEDIES.get(one.name, ""))
-            for one in items
-        ]
+        return [_remedied(one) for one in items]
 
     def _told(self) -> HealthReadings:
         if self._measured is not None:
@@ -122,11 +112,11 @@ class Checklist:
         yield _most("compass", told.compass, policy.misfit, "misfit {:.2f}")
         yield self._gps(state, told)
         yield _most("estimator", told.estimator, policy.misfit, "misfit {:.2f}")
-        yield _yes("storage", told.logs, "it writes its log", "it does not write its log")
+        yield self._storage(told.logs)
         yield _most("wind", told.wind, policy.wind_speed, "{:.1f} m/s")
         yield self._daylight(state, told.clock)
         yield _most("link", told.silence, policy.silence, "last word {:.1f} s ago")
-        yield _texts("fallback", told.stranded, "comes home without us")
+        yield _texts("fallback", told.stranded, "able to come home without us")
         yield _texts("remote_id", None if told.remote_id is None else [told.remote_id], "ready")
 
     def _cells(self, cells: tuple[float, ...] | None) -> HealthItem:
@@ -152,6 +142,14 @@ class Checklist:
         known = f"{gps.satellites} satellites" if gps.satellites else "a fix"
         value = f"{known}, within {gps.horizontal_sigma:.1f} m"
         return HealthItem("gps", value, bound, _verdict(good=good))
+
+    @staticmethod
+    def _storage(writes: bool | None) -> HealthItem:  # noqa: FBT001 - a reading
+        bound = "able to write its log"
+        if writes is None:
+            return _unknown("storage", bound)
+        value = "it writes its log" if writes else "it does not write its log"
+        return HealthItem("storage", value, bound, _verdict(good=writes))
 
     def _daylight(self, state: VehicleState, clock: float | None) -> HealthItem:
         least = self._policy.sun_elevation
@@ -201,12 +199,6 @@ def _most(name: str, value: float | None, most: float, form: str) -> HealthItem:
     return HealthItem(name, form.format(value), bound, _verdict(good=value <= most))
 
 
-def _yes(name: str, value: bool | None, yes: str, no: str) -> HealthItem:  # noqa: FBT001 - a reading
-    if value is None:
-        return _unknown(name, yes)
-    return HealthItem(name, yes if value else no, yes, _verdict(good=value))
-
-
 def _texts(name: str, objections: Sequence[str] | None, good: str) -> HealthItem:
     if objections is None:
         return _unknown(name, good)
@@ -228,6 +220,12 @@ def _judged(item: HealthItem, level: PreflightLevel, faults: Sequence[str]) -> H
     if item.verdict is Verdict.REFUSED and level == "warn":
         return replace(item, verdict=Verdict.WARNING)
     return item
+
+
+def _remedied(item: HealthItem) -> HealthItem:
+    if item.verdict in {Verdict.GOOD, Verdict.UNKNOWN}:
+        return item
+    return replace(item, remedy=_REMEDIES.get(item.name, ""))
 
 
 def _faults(texts: Sequence[str]) -> dict[str, list[str]]:

@@ -18,10 +18,7 @@ from aerodaas.types.geometry import GeodeticOrigin, Vector
 from aerodaas.types.guest_item import GuestItem
 from aerodaas.types.status import Message
 
-__all__ = ["MAP_FRAME", "Session", "convert", "quaternion", "vector", "xyz"]
-
-MAP_FRAME = "map"
-"""Name of the local ENU reference frame."""
+__all__ = ["Session", "convert", "quaternion", "vector", "xyz"]
 
 VALUE = json_schema("Value", stamp="integer", source="string", type="string", value={})
 

@@ -28,6 +28,7 @@ from aerodaas.recording.converters.vehicle import body_frame, odometry_json
 from aerodaas.recording.encoded_frame import EncodedFrame
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
 from aerodaas.recording.h264 import H264Encoder
+from aerodaas.recording.report.overlay import VISIBLE
 from aerodaas.recording.report.palette import label_colour, rgb
 from aerodaas.recording.rotation import OPTICAL, compose, from_rpy
 from aerodaas.types.data import Detection, Detections, Frame, Header
@@ -55,8 +56,6 @@ DETECTIONS = json_schema(
     items={"type": "array", "items": {"type": "object"}},
 )
 
-_VISIBLE = 0.3
-"""Least confidence of a drawn keypoint; others are only recorded."""
 _BLACK = Color(r=0.0, g=0.0, b=0.0, a=0.7)
 
 
@@ -207,7 +206,7 @@ def _shapes(found: Detection) -> Iterator[PointsAnnotation]:
     if found.keypoints is not None:
         yield PointsAnnotation(
             type=PointsAnnotationType.Points,
-            points=[Point2(x=u, y=v) for u, v, c in found.keypoints.tolist() if c >= _VISIBLE],
+            points=[Point2(x=u, y=v) for u, v, c in found.keypoints.tolist() if c >= VISIBLE],
             outline_color=colour,
             fill_color=colour,
             thickness=5.0,

@@ -31,6 +31,7 @@ MISSION = json_schema(
     distance="number",
     progress="number",
     faults="array",
+    outlook={},
 )
 NAVIGATION = json_schema(
     "Navigation",
@@ -69,6 +70,7 @@ def mission_status(item: MissionStatus, message: Message[Any], session: Session)
         "distance": float(item.distance),
         "progress": item.progress,
         "faults": item.faults,
+        "outlook": item.outlook,
     }
     yield Entry(topic(stream, "mission"), MISSION, json_bytes(value), item.stamp)
     if session.changed("state", stream, item.state):

@@ -23,8 +23,9 @@ from foxglove.messages import (
 )
 
 from aerodaas.config.model import GeofenceConfig
-from aerodaas.recording.converters.base import MAP_FRAME, Session, quaternion, vector
+from aerodaas.recording.converters.base import Session, quaternion, vector
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
+from aerodaas.recording.reference_frames import MAP_FRAME
 from aerodaas.recording.report.palette import OKABE_ITO, rgb
 from aerodaas.recording.rotation import from_rpy
 from aerodaas.types.geometry import GeodeticOrigin

@@ -13,11 +13,11 @@ from foxglove.messages import (
 )
 from foxglove.messages import Odometry as FoxgloveOdometry
 
-from aerodaas.recording.converters.base import MAP_FRAME, Session, convert, quaternion, vector, xyz
+from aerodaas.recording.converters.base import Session, convert, quaternion, vector, xyz
 from aerodaas.recording.encoding import Entry, json_bytes, json_schema, topic
+from aerodaas.recording.reference_frames import MAP_FRAME, base_link, body_twist
 from aerodaas.recording.rotation import from_rpy
 from aerodaas.types.data import Battery, GpsFix, Odometry
-from aerodaas.types.geometry import rotation_from_rpy
 from aerodaas.types.status import Message, SetpointRecord
 from aerodaas.types.vehicle import FlightEnd, PositionSetpoint, Setpoint, VehicleState
 
@@ -60,7 +60,7 @@ SETPOINT = json_schema(
 def body_frame(source: str) -> str:
     """Name of the body frame of the source's robot; the map's for a source without a robot."""
     robot, slash, _ = source.partition("/")
-    return f"{robot}/base_link" if slash else MAP_FRAME
+    return base_link(robot) if slash else MAP_FRAME
 
 
 def odometry_json(odometry: Odometry) -> dict[str, Any]:
@@ -145,14 +145,14 @@ def _pose(item: Odometry, frame: str, stream: str, stamp: int, session: Session)
     position = vector(item.position)
     attitude = quaternion(from_rpy(item.roll, item.pitch, item.yaw))
     # Foxglove, like ROS, expects velocities in the frame of the body, which leans.
-    to_body = rotation_from_rpy(item.roll, item.pitch, item.yaw).T
+    velocity, rates = body_twist(item)
     pose = FoxgloveOdometry(
         timestamp=time,
         frame_id=MAP_FRAME,
         body_frame_id=frame,
         pose=Pose(position=position, orientation=attitude),
-        linear_velocity=vector(to_body @ item.velocity),
-        angular_velocity=vector(to_body[:, 2] * item.yaw_rate),
+        linear_velocity=vector(velocity),
+        angular_velocity=vector(rates),
     )
     yield Entry(topic(stream, "odometry"), ODOMETRY, pose.encode(), stamp)
     transform = FrameTransform(

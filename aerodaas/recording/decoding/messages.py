@@ -100,6 +100,13 @@ class _VehicleState(TypedDict):
     ended: NotRequired[Literal[tuple(end.value for end in FlightEnd)] | None]  # type: ignore[valid-type]
 
 
+@with_config(ConfigDict(extra="ignore"))
+class _Outlook(TypedDict):
+    plan: Gap
+    returns_at: Gap
+    hover: Gap
+
+
 @with_config(_OPEN)
 class _MissionStatus(TypedDict):
     stamp: Stamp
@@ -110,6 +117,7 @@ class _MissionStatus(TypedDict):
     visits: NotRequired[Annotated[int, Field(strict=True, ge=0)]]
     given_up: list[Word]
     distance: Number
+    outlook: NotRequired[_Outlook | None]
 
 
 @with_config(_OPEN)

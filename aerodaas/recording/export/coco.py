@@ -12,25 +12,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import cv2
-
 from aerodaas.recording.decoding.limits import MAX_KEYS
 from aerodaas.recording.export.output import file_name, new_file
 from aerodaas.recording.pictures import Shot, detections_by_frame, shots
 from aerodaas.recording.reader import Recording
+from aerodaas.recording.report.overlay import VISIBLE
 from aerodaas.types.clock import NANOSECONDS, seconds
 from aerodaas.types.data import Detection
-from aerodaas.types.errors import RecordingError, SourceError
+from aerodaas.types.errors import RecordingError
 
 __all__ = ["write_coco"]
 
-_SUFFIXES = {"jpeg": "jpg", "png": "png", "webp": "webp"}
-"""Suffixes by the formats whose pictures are files as recorded."""
-_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95]
-_VISIBLE = 2
+_SEEN = 2
 """COCO's flag of a keypoint that is seen; 0 is one that is not labelled."""
-_SEEN = 0.3
-"""Least confidence of a keypoint that is called seen, as where they are drawn."""
 
 
 def write_coco(recording: Recording, folder: Path, *, interval: float = 1.0) -> Path:
@@ -63,14 +57,15 @@ def write_coco(recording: Recording, folder: Path, *, interval: float = 1.0) -> 
     annotations: list[dict[str, Any]] = []
     try:
         for shot in _spaced(shots(recording), round(interval * NANOSECONDS)):
-            picture = _picture(shot)
+            picture = shot.file()
             if picture is None:
                 continue
-            data, suffix, (width, height) = picture
+            width, height = picture.width, picture.height
+            suffix = "jpg" if picture.format == "jpeg" else picture.format
             source, stamp = shot.header.source, shot.header.stamp
             name = f"{file_name(source) or 'camera'}-{shot.header.id:06}.{suffix}"
             target = new_file(path / "images" / name)
-            target.write_bytes(data)
+            target.write_bytes(picture.data)
             images.append(
                 {
                     "id": len(images) + 1,
@@ -111,20 +106,6 @@ def _spaced(found: Iterator[Shot], gap: int) -> Iterator[Shot]:
             yield shot
 
 
-def _picture(shot: Shot) -> tuple[bytes, str, tuple[int, int]] | None:
-    """File, suffix, width and height of a picture; None for a broken one."""
-    try:
-        image = shot.image()
-    except SourceError:
-        return None
-    if image is None:
-        return None
-    height, width = image.shape[:2]
-    if shot.video is None and shot.format in _SUFFIXES:
-        return bytes(shot.record.value.data), _SUFFIXES[shot.format], (width, height)
-    return cv2.imencode(".jpg", image, _QUALITY)[1].tobytes(), "jpg", (width, height)
-
-
 def _points(found: dict[tuple[str, int], list[Detection]]) -> dict[str, int]:
     """Keypoints by label; labels whose detections differ in their number have none."""
     counts: dict[str, set[int]] = {}
@@ -158,7 +139,7 @@ def _annotation(item: Detection, width: int, height: int, points: int) -> dict[s
         annotation["track_id"] = item.track_id
     if points and item.keypoints is not None:
         seen = [
-            (float(u), float(v), _VISIBLE) if c >= _SEEN and math.isfinite(u + v) else (0.0, 0.0, 0)
+            (float(u), float(v), _SEEN) if c >= VISIBLE and math.isfinite(u + v) else (0.0, 0.0, 0)
             for u, v, c in item.keypoints.tolist()
         ]
         annotation["keypoints"] = [figure for point in seen for figure in point]

@@ -15,7 +15,7 @@ from aerodaas.recording.pictures import Shot, detections, shots
 from aerodaas.recording.reader import Recording
 from aerodaas.types.data import Frame, Header
 from aerodaas.types.errors import SourceError
-from aerodaas.types.picture_size import picture_fits, picture_size
+from aerodaas.types.picture_size import picture_fits, picture_format, picture_size
 
 __all__ = ["Captures", "Film", "Packed"]
 
@@ -196,4 +196,4 @@ def _jpeg(shot: Shot) -> bytes | None:
     data = picture_bytes(shot.record.value)
     size = picture_size(data)
     fits = size is not None and picture_fits(*size) and shot.size in {None, size}
-    return data if fits and data.startswith(b"\xff\xd8") else None
+    return data if fits and picture_format(data) == "jpeg" else None

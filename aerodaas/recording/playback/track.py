@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from aerodaas.analytics.remote.schemas import StatusOut
-from aerodaas.protocol.playback import PlaceOut, TrackOut
+from aerodaas.analytics.remote.schemas import OutlookOut, StatusOut
+from aerodaas.protocol.playback import GpsOut, PlaceOut, TrackOut
 from aerodaas.types.clock import seconds
 
 __all__ = ["ROW_SECONDS", "Room", "TrackBuilder"]
@@ -58,10 +58,11 @@ class TrackBuilder:
         self._room = room
         self._track = TrackOut(
             time=[], position=[], velocity=[], yaw=[], battery=[], distance=[],
-            statuses=[], places=[],
+            outlook=[], gps=[], statuses=[], places=[],
         )  # fmt: skip
         self._interval = ROW_SECONDS
         self._flown = 0.0
+        self._outlook: OutlookOut | None = None
         self._plan: list[str] = []
         self._pending = 0
         self._known: dict[str, tuple[float, float, float]] = {}
@@ -85,15 +86,18 @@ class TrackBuilder:
         track.yaw.append(odometry["yaw"])
         track.battery.append(value["battery"]["fraction"])
         track.distance.append(self._flown)
+        track.outlook.append(self._outlook)
+        track.gps.append(_gps(value.get("gps")))
         if len(track.time) > _MOST_ROWS:
             self._interval *= 2
             for rows in (track.time, track.position, track.velocity, track.yaw, track.battery,
-                         track.distance):  # fmt: skip
+                         track.distance, track.outlook, track.gps):  # fmt: skip
                 del rows[1::2]
 
     def mission(self, value: dict[str, Any]) -> None:
         """Take a mission's status."""
         self._flown = float(value["distance"])
+        self._outlook = _outlook(value.get("outlook"))
         target, pending = value.get("target"), value.get("pending")
         name = target.get("id") if isinstance(target, dict) else None
         self._pending = pending if isinstance(pending, int) and pending > 0 else 0
@@ -145,6 +149,22 @@ class TrackBuilder:
         if self._room.take(1 + sum(map(len, names))):
             self._now = new
             self._track.statuses.append(new)
+
+
+def _outlook(value: dict[str, Any] | None) -> OutlookOut | None:
+    """A recorded outlook, if all of it is known."""
+    return None if value is None or None in value.values() else OutlookOut(**value)
+
+
+def _gps(value: dict[str, Any] | None) -> GpsOut | None:
+    """A recorded fix; zeros stand for what the receiver does not tell."""
+    if value is None:
+        return None
+    satellites = value.get("satellites")
+    return GpsOut(
+        satellites=int(satellites) if satellites else None,
+        position_sigma=value.get("horizontal_sigma") or None,
+    )
 
 
 def _vector(value: dict[str, Any]) -> tuple[float | None, float | None, float | None]:

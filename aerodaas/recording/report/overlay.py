@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from aerodaas.recording.report.palette import label_colour
 from aerodaas.types.data import Detection
 
-__all__ = ["draw_detections", "draw_line"]
+__all__ = ["VISIBLE", "draw_detections", "draw_line"]
 
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
-_VISIBLE = 0.3
-"""Least confidence of a drawn keypoint."""
+VISIBLE = 0.3
+"""Least confidence of a keypoint that is drawn, and that is called seen."""
 _REFERENCE = 640
 """Image width in pixels at which lines are two pixels wide and text has half the font's size."""
 
@@ -33,7 +33,7 @@ def draw_detections(image: Image, found: Iterable[Detection]) -> None:
         cv2.rectangle(image, (left, top), (right, bottom), colour, width)
         if item.keypoints is not None:
             for u, v, confidence in item.keypoints.tolist():
-                if confidence >= _VISIBLE:
+                if confidence >= VISIBLE:
                     cv2.circle(image, (round(u), round(v)), 2 * width, colour, -1)
         track = f" #{item.track_id}" if item.track_id is not None else ""
         text = f"{item.label}{track} {item.score:.2f}"

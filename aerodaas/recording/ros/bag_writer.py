@@ -10,36 +10,31 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
-import cv2
 import numpy as np
 
 from aerodaas.recording.export.output import new_file
 from aerodaas.recording.pictures import DETECTIONS_SCHEMA, Shot, detections_of, shots
 from aerodaas.recording.reader import Record, Recording
+from aerodaas.recording.reference_frames import MAP_FRAME, base_link
 from aerodaas.recording.ros import typestore
-from aerodaas.recording.ros.outgoing import MAP, MessageBuilder, base_link
+from aerodaas.recording.ros.outgoing import MessageBuilder
 from aerodaas.recording.rotation import from_rpy
 from aerodaas.recording.states import state_of
-from aerodaas.types.errors import RecordingError, SourceError
+from aerodaas.types.errors import RecordingError
 from aerodaas.types.geometry import is_finite
 
 if TYPE_CHECKING:
     from rosbags.interfaces import Connection, Qos
     from rosbags.rosbag2 import Writer
 
-__all__ = ["STORAGES", "write_bag"]
+__all__ = ["write_bag"]
 
-STORAGES = ("mcap", "sqlite3")
-"""Storage plug-ins of rosbag2: Jazzy's default and Humble's."""
 _METADATA_VERSION: Final = 8
 """The newest that Humble reads; Jazzy reads it, too."""
 _STATE = "aerodaas.VehicleState"
 _CALIBRATION = "foxglove.CameraCalibration"
 _TRANSFORM = "foxglove.FrameTransform"
 _MOUNT = "/mount"
-_STILL = ("jpeg", "png", "webp")
-_QUALITY = [cv2.IMWRITE_JPEG_QUALITY, 95]
-"""Of pictures that were recorded as a video, which ROS 2 has no message of its own for."""
 _FORBIDDEN = re.compile(r"[^A-Za-z0-9_/]")
 _LEADING_DIGIT = re.compile(r"/(?=[0-9])")
 
@@ -60,7 +55,7 @@ def write_bag(recording: Recording, folder: Path, storage: str = "mcap") -> Path
     Args:
         recording: An open recording of this project.
         folder: Folder of the bag, which is a folder itself, named after the file and the storage.
-        storage: One of `STORAGES`.
+        storage: `mcap` or `sqlite3`, the storage plug-ins that Jazzy and Humble begin with.
 
     Returns:
         The bag.
@@ -166,7 +161,7 @@ class _Conversion:
         value = build.odometry(odometry, stamp, robot)
         yield _Message(f"/{robot}/odometry", typestore.ODOMETRY, value)
         attitude = from_rpy(odometry.roll, odometry.pitch, odometry.yaw)
-        value = build.transform(stamp, MAP, base_link(robot), odometry.position, attitude)
+        value = build.transform(stamp, MAP_FRAME, base_link(robot), odometry.position, attitude)
         yield _Message("/tf", typestore.TRANSFORMS, value)
 
     def _calibration(self, record: Record) -> Iterator[_Message]:
@@ -194,10 +189,11 @@ class _Conversion:
     def _picture(self, shot: Shot) -> Iterator[_Message]:
         stream = shot.record.topic.removesuffix("/image")
         stamp, frame = shot.header.stamp, shot.header.source
-        encoded = _encoded(shot)
-        if encoded is None:
+        # ROS 2 has no message of its own for videos: their frames are files, too.
+        picture = shot.file()
+        if picture is None:
             return
-        image = self._build.compressed_image(*encoded, stamp, frame)
+        image = self._build.compressed_image(picture.data, picture.format, stamp, frame)
         yield _Message(f"{stream}/image/compressed", typestore.COMPRESSED_IMAGE, image)
         if stream in self._lenses:
             info = self._build.camera_info(*self._lenses[stream], stamp, frame)
@@ -210,19 +206,6 @@ class _Conversion:
     def _detections(self, record: Record) -> Iterator[_Message]:
         value = self._build.detections(detections_of(record.value))
         yield _Message(record.topic, typestore.DETECTIONS, value)
-
-
-def _encoded(shot: Shot) -> tuple[bytes, str] | None:
-    """The picture as a file and its format: as recorded, if it is one; None for a broken one."""
-    if shot.video is None and shot.format in _STILL:
-        return bytes(shot.record.value.data), shot.format
-    try:
-        image = shot.image()
-    except SourceError:
-        return None
-    if image is None:
-        return None
-    return cv2.imencode(".jpeg", image, _QUALITY)[1].tobytes(), "jpeg"
 
 
 def ros_name(topic: str) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from aerodaas.cameras.settings import camera_model
 from aerodaas.config.checked import checked
+from aerodaas.config.document import public_document
 from aerodaas.config.model import (
     CameraConfig,
     EnvironmentConfig,
@@ -22,7 +23,7 @@ from aerodaas.config.model import (
 from aerodaas.recording.encoded_frame import EncodedFrame
 from aerodaas.recording.images import decode_image, picture_bytes
 from aerodaas.recording.outcome import RecordingSummary
-from aerodaas.recording.provenance import Provenance
+from aerodaas.recording.provenance import Provenance, package_versions
 from aerodaas.recording.recorder import FlightRecorder
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.ros.bag import BagMessage, RosBag
@@ -34,14 +35,12 @@ from aerodaas.types.data import Detections, Frame, Header, Odometry
 from aerodaas.types.errors import AeroDaaSError, RecordingError, SourceError
 from aerodaas.types.geometry import CameraModel
 from aerodaas.types.identifiers import internal
-from aerodaas.types.picture_size import picture_fits, picture_size
+from aerodaas.types.picture_size import picture_fits, picture_format, picture_size
 from aerodaas.types.status import Message
 from aerodaas.types.vehicle import VehicleMode, VehicleState
 
 __all__ = ["ImportedBag", "import_bag"]
 
-_FORMATS = {b"\xff\xd8": "jpeg", b"\x89P": "png", b"RI": "webp"}
-"""Formats of encoded pictures by their first two bytes."""
 _PREFLIGHT = NANOSECONDS
 """Time on the ground that a mission has for its checks before it takes off."""
 _MOVING = 0.2
@@ -95,17 +94,17 @@ def import_bag(
     topics.check(bag.topics)
     beginning = Beginning(bag, topics)
     environment = _environment(bag.path, beginning)
-    provenance = Provenance.collect(config=environment)
-    started = Provenance(
+    # No revision: it is that of an application.
+    provenance = Provenance(
         started_ns=beginning.epoch_ns,
         name=bag.path.stem,
-        config=provenance.config,
-        versions=provenance.versions,
+        config=public_document(environment),
+        versions=package_versions(),
     )
     config = images or RecordingConfig()
     try:
         with FlightRecorder(
-            path, config=config, provenance=started, home=beginning.home
+            path, config=config, provenance=provenance, home=beginning.home
         ) as recorder:
             work = _Import(beginning, recorder)
             work.take(bag)
@@ -217,7 +216,7 @@ class _Import:
         value = message.value
         if not hasattr(value, "encoding"):
             data = picture_bytes(value)
-            size, kind = picture_size(data), _FORMATS.get(data[:2])
+            size, kind = picture_size(data), picture_format(data)
             if size is None or kind is None or not picture_fits(*size):
                 raise ValueError(f"no JPEG, PNG or WebP of a bearable size ({value.format!r:.40})")
             camera = self._model(message.topic, *size)

@@ -63,9 +63,8 @@ def odometry_of(message: Any) -> Odometry:  # noqa: ANN401
     rate = about_left * math.sin(roll) + about_up * math.cos(roll)
     steep = abs(math.cos(pitch)) < _STEEP
     variance = float(np.max(message.pose.covariance[[0, 7]]))
-    sigma = math.sqrt(variance) if 0 < variance < _FARTHEST else 0.0
     yaw_rate = 0.0 if steep else rate / math.cos(pitch)
-    return Odometry(position, velocity, yaw, roll, pitch, yaw_rate, sigma)
+    return Odometry(position, velocity, yaw, roll, pitch, yaw_rate, _sigma(variance))
 
 
 def euler_of(quaternion: Any) -> tuple[float, float, float]:  # noqa: ANN401

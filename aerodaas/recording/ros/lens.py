@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from aerodaas.recording.ros.incoming import euler_of
-from aerodaas.types.geometry import rotation_from_rpy
+from aerodaas.types.geometry import FLU_FROM_OPTICAL, rotation_from_rpy
 
 __all__ = ["Place", "camera_settings", "info_topic", "place_of"]
 
-_OPTICAL = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
-"""Takes optical vectors (x right, y down, z forward) to FLU."""
 _LONGEST_CHAIN = 32
 _LEVEL = math.radians(2.0)
 """Roll of a camera below which it is level, as ours all are."""
@@ -103,7 +101,7 @@ def _in_body(
 
 def _mount(translation: NDArray[np.float64], rotation: NDArray[np.float64]) -> dict[str, Any]:
     # The camera's own FLU axes in the body's; z-y-x angles as `rotation_from_rpy` has them.
-    turned = rotation @ _OPTICAL.T
+    turned = rotation @ FLU_FROM_OPTICAL.T
     roll = math.atan2(turned[2, 1], turned[2, 2])
     if abs(roll) > _LEVEL:
         return {}

@@ -13,27 +13,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from aerodaas.recording.reference_frames import MAP_FRAME, base_link, body_twist
 from aerodaas.recording.ros import typestore
 from aerodaas.recording.rotation import Rotation, from_rpy
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Battery, Detections, GpsFix, Odometry
-from aerodaas.types.geometry import Vector, rotation_from_rpy
+from aerodaas.types.geometry import Vector
 
 if TYPE_CHECKING:
     from rosbags.typesys.store import Typestore
 
-__all__ = ["MAP", "MessageBuilder", "base_link"]
+__all__ = ["MessageBuilder"]
 
-MAP = "map"
-"""Frame in which the odometry is, by REP 105."""
 _DISTORTION = "plumb_bob"
 """The model whose coefficients, all zero here, mean none."""
 _SERVICE_GPS = 1
-
-
-def base_link(robot: str) -> str:
-    """Name of a robot's body frame."""
-    return f"{robot}/base_link"
 
 
 class MessageBuilder:
@@ -49,7 +43,7 @@ class MessageBuilder:
 
         Of the body's rates only the turn about the vertical is known.
         """
-        to_body = rotation_from_rpy(value.roll, value.pitch, value.yaw).T
+        velocity, rates = body_twist(value)
         covariance = np.zeros(36)
         covariance[[0, 7, 14]] = value.position_sigma**2
         pose = self._make(
@@ -59,12 +53,12 @@ class MessageBuilder:
         )
         twist = self._make(
             "geometry_msgs/msg/Twist",
-            linear=self._vector(to_body @ value.velocity),
-            angular=self._vector(to_body @ np.array([0.0, 0.0, value.yaw_rate])),
+            linear=self._vector(velocity),
+            angular=self._vector(rates),
         )
         return self._make(
             typestore.ODOMETRY,
-            header=self.header(stamp, MAP),
+            header=self.header(stamp, MAP_FRAME),
             child_frame_id=base_link(robot),
             pose=self._make(
                 "geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=covariance

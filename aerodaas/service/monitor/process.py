@@ -105,7 +105,7 @@ class FleetMonitor:
                 stdout=subprocess.PIPE,
                 stderr=log,
                 start_new_session=True,
-                env=service_free_environment(),
+                env=service_free_environment(vehicles=True),
             )
         self._send()
         threading.Thread(target=self._read, args=(process,), name="monitor", daemon=True).start()

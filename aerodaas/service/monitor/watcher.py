@@ -8,7 +8,7 @@ import time
 from collections.abc import Callable
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.config.plugins import load_plugin
+from aerodaas.drivers.loading import load_vehicle
 from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.monitor.news import VehicleNews
 from aerodaas.types.errors import AeroDaaSError, failure_line
@@ -80,8 +80,7 @@ class VehicleWatcher:
             fresh = VehicleNews(held=True, link=LinkState.CONNECTING, since=time.time())
             self._tell(**dict(fresh))
         try:
-            driver = load_plugin("drivers", self._robot.driver)
-            vehicle: Vehicle = driver(self._observed(driver), self._environment)
+            vehicle = load_vehicle(self._robot, self._environment, observing=True)
             vehicle.connect(_CONNECT_SECONDS)
             try:
                 reached = True
@@ -99,11 +98,6 @@ class VehicleWatcher:
         else:
             self._tell(link=LinkState.UNWATCHED, since=time.time(), held=False, reason="")
         return reached
-
-    def _observed(self, driver: object) -> RobotConfig:
-        """The robot, by settings with which its driver changes nothing at the vehicle."""
-        settings = {**self._robot.settings, **getattr(driver, "observing", {})}
-        return self._robot.model_copy(update={"settings": settings})
 
     def _watch(self, vehicle: Vehicle) -> str:
         """Read until it is wanted no more, or silent; returns why it is lost."""

@@ -7,6 +7,7 @@ from typing import Any
 
 from aerodaas.config.checked import checked
 from aerodaas.config.model import EnvironmentConfig, RobotConfig, SensorConfig, validated
+from aerodaas.config.preflight import PreflightConfig
 from aerodaas.simulation.airframe import GRAVITY, Airframe
 from aerodaas.simulation.battery import flight_power
 
@@ -25,7 +26,8 @@ def rehearsal_config(
     """The same environment with every driver and camera simulated.
 
     Limits, fences, starts, the world and its wind stay as they are. A robot with a driver of its
-    own becomes a simulated drone whose full battery hovers for the `endurance` of its limits.
+    own becomes a simulated drone whose full battery hovers for the `endurance` of its limits, and
+    which need not know what only the vehicle can tell: `require` before take-off is `refuse` there.
 
     Args:
         config: Environment of the flight, see `aerodaas.service.limits.limited`.
@@ -41,6 +43,8 @@ def rehearsal_config(
         if robot.id in battery:
             settings["battery"] = battery[robot.id]
         checked(Airframe, settings, f"the rehearsal of {robot.id}")
+        if robot.driver != "simulated":
+            entry["preflight"] = _policy(robot.preflight)
         entry |= {"driver": "simulated", "settings": settings}
         entry["sensors"] = [_sensor(sensor) for sensor in robot.sensors]
     content["recording"]["images"] = "none"
@@ -57,6 +61,11 @@ def _airframe(robot: RobotConfig) -> dict[str, Any]:
     hover = flight_power(usual, (0.0, 0.0, GRAVITY), (0.0, 0.0, 0.0))
     hours = robot.limits.endurance / _HOUR
     return {"capacity": hover * hours / (usual.cells * _CELL_VOLTS)}
+
+
+def _policy(preflight: PreflightConfig) -> dict[str, Any]:
+    levels = preflight.model_dump()
+    return {name: "refuse" if level == "require" else level for name, level in levels.items()}
 
 
 def _sensor(sensor: SensorConfig) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 import threading
@@ -22,6 +23,11 @@ from aerodaas.config.model import EnvironmentConfig
 from aerodaas.drivers.mavlink.autopilots.ardupilot import ArduPilot
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.microservices import journal, parameters, plans
+from aerodaas.drivers.mavlink.microservices.journal import (
+    Changes,
+    Journal,
+    ParameterChange,
+)
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.drivers.mavlink.microservices.way_home import way_home_items
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
@@ -348,6 +354,17 @@ def test_the_way_home_takes_the_owners_mission_for_a_flight() -> None:
             assert mission(pair.autopilot) == [16, 188, 16, 16, 21]
         with again(pair, fallback="ignore") as vehicle:
             assert vehicle.download_mission() == own
+
+
+@pytest.mark.usefixtures("state_folder")
+def test_what_a_mission_leaves_open_is_kept() -> None:
+    """A heading that is not a number is one that the autopilot chooses; JSON has no word for it."""
+    own = MissionItem(16, (0.1, 0.0, math.inf, math.nan), -470_000_000, 2, 2.5, 3)
+    changes = Changes(parameters={"RTL_ALT": ParameterChange(15.1, 0.0)}, mission=[own])
+    Journal("one").write(changes)
+    assert repr(Journal("one").read()) == repr(changes)
+    Journal("one").clear()
+    assert Journal("one").read() is None
 
 
 class Faulty(PlanStore):

@@ -9,7 +9,8 @@ from typing import Any
 
 import pytest
 
-from aerodaas.drivers.mavlink.settings import KEY_VARIABLE, MavlinkSettings
+from aerodaas.config.secrets import MAVLINK_KEY
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire import forwarding
 from aerodaas.drivers.mavlink.wire import link as module
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
@@ -53,7 +54,7 @@ class World:
     """A link, its wire, and other systems on it."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> None:  # noqa: ANN401
-        monkeypatch.delenv(KEY_VARIABLE, raising=False)
+        monkeypatch.delenv(MAVLINK_KEY, raising=False)
         monkeypatch.setattr(MavlinkLink, "_start", lambda _: None)
         self.wire, self.station = _Wire(), _Wire()
         self.opened: list[tuple[str, str]] = []
@@ -160,7 +161,8 @@ def test_before_it_knows_its_vehicle_it_hears_everybody(world: World) -> None:
     world.says(BEAT, 2, 5)
     world.link.turn(100.0)
     assert world.heard == [("HEARTBEAT", 100.0)] * 2
-    assert world.link.target is None
+    with pytest.raises(AssertionError):
+        _ = world.link.target
     world.link.adopt((2, 5), HERE, 100.0)
     for system, component in ((1, 1), (2, 1), (1, 5), (2, 5)):
         world.says(LOOK, system, component)

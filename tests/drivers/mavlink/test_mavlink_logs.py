@@ -170,23 +170,30 @@ def test_not_in_flight(pair: Pair, tmp_path: Path) -> None:
     wait_for(lambda: not pair.vehicle.read().armed)
 
 
-def test_on_the_command_line(
+@pytest.fixture
+def run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+) -> Callable[..., tuple[int, str]]:
+    """The command in a folder of its own: exit code and output."""
+    monkeypatch.chdir(tmp_path)
+
+    def ran(*words: str) -> tuple[int, str]:
+        monkeypatch.setattr(sys, "argv", ["aerodaas", "logs", *words])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        told = capsys.readouterr()
+        return int(ended.value.code or 0), told.out + told.err
+
+    return ran
+
+
+def test_on_the_command_line(tmp_path: Path, run: Callable[..., tuple[int, str]]) -> None:
     """A list, the newest one, and a number that there is not."""
     port = free_port()
     settings = {"url": f"udpin:{LOOPBACK}:{port}", "fallback": "ignore", "failsafes": "ignore"}
     drone = {"id": "drone", "driver": "mavlink", "settings": settings}
     robots = [drone, {"id": "other"}]
     (tmp_path / "environment.json").write_text(json.dumps({"robots": robots}))
-    monkeypatch.chdir(tmp_path)
-
-    def run(*words: str) -> tuple[int, str]:
-        monkeypatch.setattr(sys, "argv", ["aerodaas", "logs", *words])
-        with pytest.raises(SystemExit) as ended:
-            main()
-        told = capsys.readouterr()
-        return int(ended.value.code or 0), told.out + told.err
 
     options = AutopilotOptions(family="ardupilot", peer=(LOOPBACK, port))
     with EmulatedAutopilot(options) as autopilot:
@@ -203,3 +210,27 @@ def test_on_the_command_line(
     code, told = run("other")
     assert code != 0
     assert "no logs can be fetched by the driver simulated" in told
+
+
+def test_the_command_changes_nothing_at_the_vehicle(
+    tmp_path: Path, run: Callable[..., tuple[int, str]]
+) -> None:
+    """Whatever a flight would set: who looks at logs does not fly."""
+    port = free_port()
+    settings = {
+        "url": f"udpin:{LOOPBACK}:{port}",
+        "fallback": "set",
+        "failsafes": "set",
+        "fence": "land",
+    }
+    limits = {"geofence": {"polygon": [[-9, -9], [9, -9], [9, 9], [-9, 9]]}}
+    drone = {"id": "drone", "driver": "mavlink", "limits": limits, "settings": settings}
+    (tmp_path / "environment.json").write_text(json.dumps({"robots": [drone]}))
+    options = AutopilotOptions(family="ardupilot", peer=(LOOPBACK, port))
+    with EmulatedAutopilot(options) as autopilot:
+        autopilot.firmware.logs.logs = {1: DATAFLASH[:90]}
+        code, told = run("drone")
+        assert code == 0, told
+        kinds = {message.get_type() for _, message in autopilot.heard}
+    assert "LOG_REQUEST_LIST" in kinds
+    assert not kinds & {"PARAM_SET", "MISSION_COUNT", "MISSION_CLEAR_ALL"}

@@ -237,6 +237,14 @@ def test_what_leaves_a_vehicle_unprotected(monkeypatch: pytest.MonkeyPatch) -> N
     assert one.failsafe.name == "FS_EKF_ACTION"
 
 
+def test_failsafes_cost_the_time_of_one_value(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those that a vehicle does not know do not add up, nor do other parameters' values."""
+    autopilot = Autopilot(monkeypatch, {})
+    assert unsafe_parameters(autopilot.parameters, ArduPilot()) == []
+    assert autopilot.now <= 102.9
+    assert len({one.param_id for one in autopilot.sent}) == len(ArduPilot.failsafes)
+
+
 def test_several_values_are_asked_for_together(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of each pair of names one is enough; what is not told costs as much time as one value."""
     autopilot = Autopilot(monkeypatch, {"OLD": 4.0, "OTHER": 2.0})
@@ -247,3 +255,6 @@ def test_several_values_are_asked_for_together(monkeypatch: pytest.MonkeyPatch) 
     assert autopilot.now == pytest.approx(101.4, abs=0.1)
     assert [one.param_id for one in autopilot.sent].count("MISSING") == 2
     assert [one.param_id for one in autopilot.sent].count("OTHER") == 2
+    before = autopilot.now
+    assert autopilot.parameters.known([]) == {}
+    assert autopilot.now == before

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from pydantic import SecretStr
 
-from aerodaas.drivers.mavlink.settings import KEY_VARIABLE, MavlinkSettings
+from aerodaas.config.secrets import MAVLINK_KEY
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.signing import load_key, sign_with, signature_fits
 from aerodaas.types.errors import ConfigError
@@ -20,7 +21,7 @@ BEAT = mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3)
 
 @pytest.fixture(autouse=True)
 def _no_key_of_the_host(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delenv(KEY_VARIABLE, raising=False)
+    monkeypatch.delenv(MAVLINK_KEY, raising=False)
 
 
 def sender(key: bytes | None) -> Any:  # noqa: ANN401 - pymavlink has no types
@@ -60,10 +61,10 @@ def test_a_key_in_the_environment_takes_the_files_place(
 ) -> None:
     """Even one that is not there; an empty variable is none, and no key at all is unsigned."""
     settings = MavlinkSettings(signing_key=SecretStr(str(tmp_path / "none")))
-    monkeypatch.setenv(KEY_VARIABLE, KEY.hex())
+    monkeypatch.setenv(MAVLINK_KEY, KEY.hex())
     assert load_key(settings, "d") == KEY
     assert load_key(MavlinkSettings(), "d") == KEY
-    monkeypatch.setenv(KEY_VARIABLE, "")
+    monkeypatch.setenv(MAVLINK_KEY, "")
     assert load_key(MavlinkSettings(), "d") is None
     with pytest.raises(ConfigError, match=r"d: cannot read the file that signing_key names"):
         load_key(settings, "d")
@@ -82,8 +83,8 @@ def test_what_is_no_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, content
     assert str(path) in str(refused.value)
     assert "drone" in str(refused.value)
     assert content.decode("latin-1")[:20] not in str(refused.value) or not content
-    monkeypatch.setenv(KEY_VARIABLE, "beef")
-    with pytest.raises(ConfigError, match=KEY_VARIABLE):
+    monkeypatch.setenv(MAVLINK_KEY, "beef")
+    with pytest.raises(ConfigError, match=MAVLINK_KEY):
         load_key(MavlinkSettings(), "drone")
 
 

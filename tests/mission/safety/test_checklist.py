@@ -92,12 +92,12 @@ ILL: list[tuple[str, dict[str, Any], str]] = [
     ("compass", {"compass": 0.81}, "misfit 0.81"),
     ("gps", {"gps_fix": False}, "no fix"),
     ("estimator", {"estimator": 0.81}, "misfit 0.81"),
-    ("storage", {"logs": False}, "does not write"),
+    ("storage", {"logs": False}, "it does not write its log, should be able to write its log"),
     ("wind", {"wind": 10.1}, "10.1 m/s"),
     ("daylight", {"clock": 1_800_000_000.0 + 43_200.0}, "sun at -"),
     ("link", {"silence": 1.6}, "1.6 s ago"),
-    ("fallback", {"stranded": ("it hovers",)}, "it hovers"),
-    ("remote_id", {"remote_id": "no position"}, "no position"),
+    ("fallback", {"stranded": ("it hovers",)}, "it hovers, should be able to come home without us"),
+    ("remote_id", {"remote_id": "no position"}, "no position, should be ready"),
 ]
 
 

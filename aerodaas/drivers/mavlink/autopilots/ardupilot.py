@@ -9,6 +9,7 @@ from aerodaas.drivers.mavlink.autopilots.autopilot import (
     Failsafe,
     FallbackParameter,
     FenceAction,
+    return_height,
 )
 from aerodaas.drivers.mavlink.microservices.commander import PendingCommand
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
@@ -65,9 +66,6 @@ _WAYS = {
 }
 _LANDS_ON = 1 << 3
 """Bit of FS_OPTIONS: a landing goes on."""
-_LOWEST_RETURN, _BELOW_CEILING = 2.0, 2.0
-"""Metres: its lowest height of a return (RTL_ALT_MIN), and how far below the geofence's ceiling
-we set it."""
 _TALK = 35.0
 """Seconds: longer than the 30 s between its repeated objections."""
 
@@ -193,13 +191,7 @@ class ArduPilot(Autopilot):
                 after,
                 f"it acts later than {after:g} s after our last word",
             ),
-            FallbackParameter(
-                ("RTL_ALT_M", "RTL_ALT"),
-                lambda metres: metres <= ceiling,
-                max(_LOWEST_RETURN, ceiling - _BELOW_CEILING),
-                f"it would return above the geofence's ceiling of {ceiling:g} m",
-                scales=(1.0, 100.0),
-            ),
+            return_height(ceiling, "RTL_ALT_M", "RTL_ALT", scales=(1.0, 100.0)),
             FallbackParameter(
                 ("RTL_ALT_FINAL_M", "RTL_ALT_FINAL"),
                 lambda metres: metres <= 0.0,

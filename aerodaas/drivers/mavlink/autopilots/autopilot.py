@@ -22,10 +22,15 @@ __all__ = [
     "FallbackParameter",
     "FenceAction",
     "older_than",
+    "return_height",
 ]
 
 FenceAction = Literal["warn", "hold", "return", "land"]
 NOT_GIVEN = float("nan")
+_LOWEST_RETURN = 2.0
+"""Metres of a return: ArduPilot's RTL_ALT_MIN."""
+_BELOW_CEILING = 2.0
+"""Metres below the geofence's ceiling at which we set a return's height."""
 ANYWHERE = 0x7FFFFFFF
 """Latitude or longitude of a COMMAND_INT for the vehicle's present position."""
 
@@ -59,6 +64,19 @@ class FallbackParameter:
     """Whether `value` is bits that are added to what is set."""
     beside: str = ""
     """Some versions have it beside this one, and others do not: then nothing depends on it."""
+
+
+def return_height(
+    ceiling: float, *names: str, scales: tuple[float, ...] = (1.0, 1.0)
+) -> FallbackParameter:
+    """The height of its return, which must stay below the geofence's `ceiling`, in metres."""
+    return FallbackParameter(
+        names,
+        lambda metres: metres <= ceiling,
+        max(_LOWEST_RETURN, ceiling - _BELOW_CEILING),
+        f"it would return above the geofence's ceiling of {ceiling:g} m",
+        scales=scales,
+    )
 
 
 def older_than(software: str, *version: int) -> bool:

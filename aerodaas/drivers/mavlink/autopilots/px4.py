@@ -14,6 +14,7 @@ from aerodaas.drivers.mavlink.autopilots.autopilot import (
     FallbackParameter,
     FenceAction,
     older_than,
+    return_height,
 )
 from aerodaas.drivers.mavlink.microservices.commander import PendingCommand
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
@@ -54,8 +55,6 @@ _RETURN, _HOLD = 3.0, 5.0
 """Values of COM_OBL_RC_ACT."""
 _RETURN_ALONE = 2.0
 """Value of NAV_DLL_ACT, and of COM_OBL_ACT, which versions before 1.14 heed without a radio."""
-_LOWEST_RETURN, _BELOW_CEILING = 2.0, 2.0
-"""Metres of height of a return, and how far below the geofence's ceiling we set it."""
 _INTEGER = {
     mavlink.MAV_PARAM_TYPE_UINT8,
     mavlink.MAV_PARAM_TYPE_INT8,
@@ -181,12 +180,7 @@ class PX4(Autopilot):
                 1.0,
                 f"it acts later than {after:g} s after our last setpoint",
             ),
-            FallbackParameter(
-                ("RTL_RETURN_ALT",),
-                lambda value: value <= ceiling,
-                max(_LOWEST_RETURN, ceiling - _BELOW_CEILING),
-                f"it would return above the geofence's ceiling of {ceiling:g} m",
-            ),
+            return_height(ceiling, "RTL_RETURN_ALT"),
             FallbackParameter(
                 ("RTL_LAND_DELAY",),
                 lambda value: value >= 0.0,

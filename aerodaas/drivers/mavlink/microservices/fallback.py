@@ -141,7 +141,7 @@ class Fallback:
                     "%s: %s is left at %g: somebody else has set it", self._name, name, value
                 )
         if changes.mission is not None:
-            upload(self._link, changes.mission_items())
+            upload(self._link, changes.mission)
             _log.warning("%s: the vehicle's own mission is on it again", self._name)
         self._journal.clear()
 
@@ -175,7 +175,7 @@ class Fallback:
             # The plan first: what flies it must not be switched on before it is there.
             if plan:
                 if changes.mission is None:
-                    changes.keep_mission(download(self._link))
+                    changes.mission = download(self._link)
                     self._journal.write(changes)
                 upload_way_home(self._link, plan)
             parameters = Parameters(self._link, self._autopilot)

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-
 from aerodaas.config.model import GeofenceConfig
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, FenceAction
 from aerodaas.drivers.mavlink.microservices.parameters import Parameters
-from aerodaas.drivers.mavlink.microservices.plans import MissionItem, upload
+from aerodaas.drivers.mavlink.microservices.plans import MissionItem, item_place, upload
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.types.geometry import GeodeticOrigin
@@ -33,10 +31,9 @@ def fence_items(fence: GeofenceConfig, origin: GeodeticOrigin) -> list[MissionIt
 def _corner(
     command: int, east: float, north: float, corners: int, origin: GeodeticOrigin
 ) -> MissionItem:
-    latitude, longitude, _ = origin.to_geodetic(np.array([east, north, 0.0]))
     values = (float(corners), 0.0, 0.0, 0.0)
-    frame = mavlink.MAV_FRAME_GLOBAL
-    return MissionItem(command, values, round(latitude * 1e7), round(longitude * 1e7), 0.0, frame)
+    place = item_place(origin, east, north)
+    return MissionItem(command, values, *place, 0.0, mavlink.MAV_FRAME_GLOBAL)
 
 
 def upload_fence(

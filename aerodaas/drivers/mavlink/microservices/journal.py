@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import json
-import math
-import os
-from collections.abc import Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from aerodaas.config.private_file import write_private
+from aerodaas.config.user_folders import state_folder
 from aerodaas.drivers.mavlink.microservices.plans import MissionItem
 from aerodaas.types.errors import VehicleError
 
@@ -25,40 +21,16 @@ class ParameterChange(NamedTuple):
     set_to: float
 
 
-class _Item(NamedTuple):
-    """A mission's item; a parameter that is not a number is null in the file."""
-
-    command: int
-    values: tuple[float | None, float | None, float | None, float | None]
-    x: int
-    y: int
-    z: float
-    frame: int
-
-
 class Changes(BaseModel):
     """What was changed on one vehicle."""
 
-    model_config = ConfigDict(extra="forbid")
+    # What an item leaves open is not a number, which JSON has no word for.
+    model_config = ConfigDict(extra="forbid", ser_json_inf_nan="strings")
 
     parameters: dict[str, ParameterChange] = Field(default_factory=dict)
     """In the order in which they were set."""
-    mission: list[_Item] | None = None
+    mission: list[MissionItem] | None = None
     """The mission that it held before; None: it was left alone."""
-
-    def keep_mission(self, items: Sequence[MissionItem]) -> None:
-        """Remember the vehicle's own mission."""
-        self.mission = [
-            _Item(one.command, _nullable(one.values), one.x, one.y, one.z, one.frame)
-            for one in items
-        ]
-
-    def mission_items(self) -> list[MissionItem]:
-        """The vehicle's own mission."""
-        return [
-            MissionItem(one.command, _numbers(one.values), one.x, one.y, one.z, one.frame)
-            for one in self.mission or ()
-        ]
 
 
 class Journal:
@@ -66,7 +38,7 @@ class Journal:
 
     def __init__(self, vehicle: str) -> None:
         """Open nothing; `vehicle` names the vehicle and nothing else."""
-        self.path = _state_folder() / "aerodaas" / "vehicles" / f"{vehicle}.json"
+        self.path = state_folder() / "vehicles" / f"{vehicle}.json"
 
     def read(self) -> Changes | None:
         """What is still to be put back; None if nothing. Raises VehicleError."""
@@ -77,8 +49,8 @@ class Journal:
         except (OSError, UnicodeDecodeError) as error:
             raise VehicleError(f"cannot read {self.path}: {error}") from None
         try:
-            return Changes.model_validate(json.loads(content))
-        except (ValueError, ValidationError, RecursionError):
+            return Changes.model_validate_json(content)
+        except ValidationError:
             raise VehicleError(
                 f"{self.path} should say what was changed on this vehicle, and cannot be read: "
                 "compare its parameters with your own, then remove the file"
@@ -98,23 +70,3 @@ class Journal:
     def clear(self) -> None:
         """Remove it: everything was put back."""
         self.path.unlink(missing_ok=True)
-
-
-def _state_folder() -> Path:
-    """The folder of the XDG base directory specification."""
-    named = os.environ.get("XDG_STATE_HOME", "")
-    return Path(named) if Path(named).is_absolute() else Path.home() / ".local" / "state"
-
-
-def _nullable(
-    values: tuple[float, float, float, float],
-) -> tuple[float | None, float | None, float | None, float | None]:
-    first, second, third, fourth = (one if math.isfinite(one) else None for one in values)
-    return first, second, third, fourth
-
-
-def _numbers(
-    values: tuple[float | None, float | None, float | None, float | None],
-) -> tuple[float, float, float, float]:
-    first, second, third, fourth = (math.nan if one is None else one for one in values)
-    return first, second, third, fourth

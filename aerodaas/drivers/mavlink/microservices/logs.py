@@ -36,7 +36,7 @@ Progress = Callable[[int, int], None]
 
 def list_logs(link: MavlinkLink) -> list[LogEntry]:
     """The vehicle's logs, oldest first; raises VehicleError. Not for use in the link's thread."""
-    target = _target(link)
+    target = link.target
     found: dict[int, LogEntry] = {}
     total: int | None = None
     with link.listen("LOG_ENTRY") as inbox:
@@ -94,7 +94,7 @@ def _write(link: MavlinkLink, log: LogEntry, file: Path, progress: Progress) -> 
     finally:
         part.unlink(missing_ok=True)
         # Some autopilots write no log, and send nothing else, before they are told.
-        link.send(mavlink.MAVLink_log_request_end_message(*_target(link)))
+        link.send(mavlink.MAVLink_log_request_end_message(*link.target))
 
 
 def _fetch(
@@ -113,9 +113,7 @@ def _fetch(
         tries += 1
         first, last = min(missing), min(end, max(missing) + _PACKET)
         link.send(
-            mavlink.MAVLink_log_request_data_message(
-                *_target(link), log.number, first, last - first
-            )
+            mavlink.MAVLink_log_request_data_message(*link.target, log.number, first, last - first)
         )
         for packet in _heard(inbox, _TIMEOUT):
             if packet.id != log.number or packet.ofs not in missing:
@@ -145,8 +143,3 @@ def _heard(inbox: queue.SimpleQueue[Any], timeout: float) -> Iterator[Any]:
 
 def _when(began: float | None) -> str:
     return "" if began is None else f"-{datetime.fromtimestamp(began, timezone.utc):{_FORM}}"
-
-
-def _target(link: MavlinkLink) -> tuple[int, int]:
-    assert link.target is not None  # noqa: S101 - only a known vehicle has logs
-    return link.target

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot, Failsafe
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
-from aerodaas.drivers.mavlink.wire.link import MavlinkLink
+from aerodaas.drivers.mavlink.wire.link import MavlinkLink, Message
 from aerodaas.types.errors import VehicleError
 
 __all__ = ["Parameters", "UnsafeParameter", "unsafe_parameters"]
@@ -35,8 +35,7 @@ class Parameters:
 
     def get(self, name: str) -> float | None:
         """Value of `name`; None if the vehicle has no such parameter, or does not answer."""
-        found = self._read(name)
-        return None if found is None else found.value
+        return self.known([(name,)]).get(name)
 
     def known(self, wanted: Iterable[tuple[str, ...]], tries: int = _TRIES) -> dict[str, float]:
         """Values by name, asked for together: of each tuple's names the vehicle knows one.
@@ -45,19 +44,15 @@ class Parameters:
         """
         missing, found = set(wanted), dict[str, float]()
         with self._link.listen("PARAM_VALUE") as inbox:
-            for _ in range(tries):
+            for _ in range(tries if missing else 0):
                 for name in sorted(name for names in missing for name in names):
                     self._link.send(self._request(name))
-                deadline = time.monotonic() + _TIMEOUT
-                while missing and (left := deadline - time.monotonic()) > 0.0:
-                    try:
-                        message = inbox.get(timeout=left)
-                    except queue.Empty:
-                        break
-                    kind, value = message.param_type, message.param_value
-                    for names in [one for one in missing if message.param_id in one]:
-                        found[message.param_id] = self._autopilot.decode(value, kind)
-                        missing.discard(names)
+                for name, told in self._told(inbox):
+                    if answered := {names for names in missing if name in names}:
+                        found[name] = told.value
+                        missing -= answered
+                    if not missing:
+                        return found
         return found
 
     def set(self, name: str, value: float) -> None:
@@ -69,7 +64,7 @@ class Parameters:
             return
         encoded = self._autopilot.encode(value, before.kind)
         request = mavlink.MAVLink_param_set_message(
-            *self._target(), _bytes(name), encoded, before.kind
+            *self._link.target, _bytes(name), encoded, before.kind
         )
         for answer in self._answers(name, request):
             if self._same(answer, value):
@@ -83,31 +78,30 @@ class Parameters:
         return next(self._answers(name, self._request(name)), None)
 
     def _request(self, name: str) -> object:
-        return mavlink.MAVLink_param_request_read_message(*self._target(), _bytes(name), -1)
+        return mavlink.MAVLink_param_request_read_message(*self._link.target, _bytes(name), -1)
 
     def _answers(self, name: str, request: object) -> Iterator[_Value]:
         """Values of `name` received after `request`, which is repeated until one arrives."""
         with self._link.listen("PARAM_VALUE") as inbox:
             for _ in range(_TRIES):
                 self._link.send(request)
-                deadline = time.monotonic() + _TIMEOUT
-                while (left := deadline - time.monotonic()) > 0.0:
-                    try:
-                        message = inbox.get(timeout=left)
-                    except queue.Empty:
-                        break
-                    if message.param_id == name:
-                        kind = message.param_type
-                        yield _Value(self._autopilot.decode(message.param_value, kind), kind)
+                yield from (value for told, value in self._told(inbox) if told == name)
+
+    def _told(self, inbox: queue.SimpleQueue[Message]) -> Iterator[tuple[str, _Value]]:
+        """Names and values that arrive within the time for one answer."""
+        deadline = time.monotonic() + _TIMEOUT
+        while (left := deadline - time.monotonic()) > 0.0:
+            try:
+                message = inbox.get(timeout=left)
+            except queue.Empty:
+                return
+            kind = message.param_type
+            yield message.param_id, _Value(self._autopilot.decode(message.param_value, kind), kind)
 
     @staticmethod
     def _same(one: _Value, value: float) -> bool:
         # They are single-precision on the autopilot.
         return abs(one.value - value) <= 1e-5 * max(1.0, abs(value))
-
-    def _target(self) -> tuple[int, int]:
-        assert self._link.target is not None  # noqa: S101 - only a known vehicle has parameters
-        return self._link.target
 
 
 def _bytes(name: str) -> bytes:
@@ -135,9 +129,9 @@ class UnsafeParameter:
 
 def unsafe_parameters(parameters: Parameters, autopilot: Autopilot) -> list[UnsafeParameter]:
     """Failsafes that are off by the vehicle's parameters; each is read from the vehicle."""
-    found = []
-    for failsafe in autopilot.failsafes:
-        value = parameters.get(failsafe.name)
-        if value is not None and value in failsafe.unsafe:
-            found.append(UnsafeParameter(failsafe, value))
-    return found
+    held = parameters.known((one.name,) for one in autopilot.failsafes)
+    return [
+        UnsafeParameter(one, held[one.name])
+        for one in autopilot.failsafes
+        if held.get(one.name) in one.unsafe
+    ]

@@ -9,11 +9,17 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.types.errors import VehicleError
+from aerodaas.types.geometry import GeodeticOrigin
 
-__all__ = ["MissionItem", "Progress", "download", "upload"]
+__all__ = ["DEGREE", "MissionItem", "Progress", "download", "item_place", "upload"]
+
+DEGREE = 1e7
+"""Units of an item's `x` and `y` in a degree."""
 
 _TIMEOUT = 1.5
 """Timeout in seconds, and 0.25 within a transfer (MAVLink's recommendation)."""
@@ -37,7 +43,7 @@ Progress = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class MissionItem:
-    """One item; `x` and `y` are degrees times 10^7 in global frames."""
+    """One item; `x` and `y` are degrees times `DEGREE` in global frames."""
 
     command: int
     values: tuple[float, float, float, float]
@@ -45,6 +51,12 @@ class MissionItem:
     y: int
     z: float
     frame: int = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
+
+
+def item_place(origin: GeodeticOrigin, east: float, north: float) -> tuple[int, int]:
+    """`x` and `y` of an item at a place in metres of the local frame, whose ENU origin is known."""
+    latitude, longitude, _ = origin.to_geodetic(np.array([east, north, 0.0]))
+    return round(latitude * DEGREE), round(longitude * DEGREE)
 
 
 def _ignore(_: int, __: int) -> None:
@@ -61,7 +73,7 @@ def upload(
 
     Blocks; not for use in the link's thread.
     """
-    target = _target(link)
+    target = link.target
     count = mavlink.MAVLink_mission_count_message(*target, len(items), kind)
     names = ("MISSION_REQUEST", "MISSION_REQUEST_INT", "MISSION_ACK")
     with link.listen(*names) as inbox:
@@ -97,7 +109,7 @@ def download(
     progress: Progress = _ignore,
 ) -> list[MissionItem]:
     """The vehicle's plan; raises VehicleError. Blocks; not for use in the link's thread."""
-    target = _target(link)
+    target = link.target
     with link.listen("MISSION_COUNT", "MISSION_ITEM_INT") as inbox:
         ask: Any = mavlink.MAVLink_mission_request_list_message(*target, kind)
         reply = _ask(link, inbox, ask, kind, lambda one: one.get_type() == "MISSION_COUNT")
@@ -161,11 +173,6 @@ def _message(item: MissionItem, sequence: int, target: tuple[int, int], kind: in
         item.z,
         kind,
     )
-
-
-def _target(link: MavlinkLink) -> tuple[int, int]:
-    assert link.target is not None  # noqa: S101 - plans go to a known vehicle only
-    return link.target
 
 
 def _name(kind: int) -> str:

@@ -9,7 +9,13 @@ import numpy as np
 import shapely
 
 from aerodaas.config.model import RobotConfig
-from aerodaas.drivers.mavlink.microservices.plans import MissionItem, download, upload
+from aerodaas.drivers.mavlink.microservices.plans import (
+    DEGREE,
+    MissionItem,
+    download,
+    item_place,
+    upload,
+)
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.mission.safety.geofence import Geofence
@@ -18,7 +24,6 @@ from aerodaas.types.geometry import GeodeticOrigin
 
 __all__ = ["other_way_home", "upload_way_home", "way_home_items"]
 
-_EARTH = 1e7
 _HEIGHT = 0.011
 """Metres by which a height may differ once it was kept: ArduPilot keeps centimetres."""
 
@@ -34,7 +39,7 @@ def way_home_items(
     """
     start = np.array(robot.start, dtype=np.float64)
     _require_allowed(robot, places)
-    here = _place(origin, (start[0], start[1]))
+    here = item_place(origin, start[0], start[1])
     frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
     stand = (0.0, 0.0, 0.0, 0.0)
     return [
@@ -45,7 +50,7 @@ def way_home_items(
             MissionItem(
                 mavlink.MAV_CMD_NAV_WAYPOINT,
                 stand,
-                *_place(origin, (east, north)),
+                *item_place(origin, east, north),
                 round(up - float(start[2]), 2),
                 frame,
             )
@@ -75,7 +80,7 @@ def other_way_home(link: MavlinkLink, items: Sequence[MissionItem]) -> str:
         return f"it holds another way home than ours: {len(held)} items instead of {len(items)}"
     for number, (sent, kept) in enumerate(zip(items, held, strict=True)):
         if number and not _same(sent, kept):
-            place = f"{kept.x / _EARTH:.7f}, {kept.y / _EARTH:.7f}, {kept.z:g} m"
+            place = f"{kept.x / DEGREE:.7f}, {kept.y / DEGREE:.7f}, {kept.z:g} m"
             return (
                 f"it holds another way home than ours: item {number} is command {kept.command} at "
                 f"{place}"
@@ -106,8 +111,3 @@ def _require_allowed(robot: RobotConfig, places: Sequence[tuple[float, float, fl
                 f"{robot.id}: settings.way_home.{number}: the way from there to the next place "
                 "leaves the geofence or crosses a no-fly zone"
             )
-
-
-def _place(origin: GeodeticOrigin, place: tuple[float, float]) -> tuple[int, int]:
-    latitude, longitude, _ = origin.to_geodetic(np.array([*place, 0.0]))
-    return round(latitude * _EARTH), round(longitude * _EARTH)

@@ -94,7 +94,8 @@ class Health:
         """m/s² of the axis that shakes most."""
         self.compass: float | None = None
         self.estimator: float | None = None
-        """Misfits of the compass and of all sensors, as shares of what the estimator rejects."""
+        """Misfits as shares of what the estimator rejects: of the compass, and the largest of
+        position, velocity and height (EKF_STATUS_REPORT: and compass)."""
         self.gps_fix: bool | None = None
         """Whether the GPS has a position in space."""
         self._charges_told = False

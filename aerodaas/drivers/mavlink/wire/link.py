@@ -150,9 +150,11 @@ class MavlinkLink:
         self._thread.start()
 
     @property
-    def target(self) -> Sender | None:
-        """System and component of the vehicle, once it is known."""
-        return self._pins.target
+    def target(self) -> Sender:
+        """System and component of the vehicle, which must be known by now."""
+        target = self._pins.target
+        assert target is not None  # noqa: S101 - nobody asks before it was adopted
+        return target
 
     def adopt(self, target: Sender, peer: Peer, now: float) -> None:
         """Accept only this system's component as the vehicle, and only from the address `peer`."""
@@ -198,7 +200,7 @@ class MavlinkLink:
         self._resources.close()
 
     def _addressees(self) -> tuple[Peer, ...]:
-        if self.target is not None:
+        if self._pins.target is not None:
             return (self._pins.pin.address,)
         return self._pins.addresses
 
@@ -257,10 +259,11 @@ class MavlinkLink:
 
     def _take(self, message: Message, peer: Peer, now: float) -> None:
         sender: Sender = (message.get_srcSystem(), message.get_srcComponent())
-        if sender != self.target:
+        target = self._pins.target
+        if sender != target:
             self._pins.meet(sender, peer)
-        if self.target is not None:
-            if sender != self.target:
+        if target is not None:
+            if sender != target:
                 self.counts.strangers += 1
                 return
             beats = message.get_type() == "HEARTBEAT"

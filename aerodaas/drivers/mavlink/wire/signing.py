@@ -9,7 +9,8 @@ import time
 from pathlib import Path
 from typing import Any
 
-from aerodaas.drivers.mavlink.settings import KEY_VARIABLE, MavlinkSettings
+from aerodaas.config.secrets import MAVLINK_KEY
+from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
 from aerodaas.types.errors import ConfigError
 
@@ -29,9 +30,9 @@ def load_key(settings: MavlinkSettings, name: str) -> bytes | None:
 
     Raises ConfigError for one that cannot be read; the message never holds any of it.
     """
-    text = os.environ.get(KEY_VARIABLE, "")
+    text = os.environ.get(MAVLINK_KEY, "")
     if text:
-        return _key(text.encode(), f"{name}: the variable {KEY_VARIABLE}")
+        return _key(text.encode(), f"{name}: the variable {MAVLINK_KEY}")
     if settings.signing_key is None:
         return None
     path = settings.signing_key.get_secret_value()
