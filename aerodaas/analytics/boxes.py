@@ -15,8 +15,10 @@ __all__ = ["BoxAnalytics", "shipped_detector"]
 O_co = TypeVar("O_co", covariant=True)
 
 
-def shipped_detector(owner: str, labels: Sequence[str]) -> Analytics[Detections]:
-    """Create the shipped detector for those of `labels` that it has classes for.
+def shipped_detector(
+    owner: str, labels: Sequence[str], also: Sequence[str] = ()
+) -> Analytics[Detections]:
+    """Create the shipped detector for `also` and those of `labels` that it has classes for.
 
     Raises GraphError, in the name of `owner`, if it has none of them, and ModelError if its file
     is missing.
@@ -32,7 +34,7 @@ def shipped_detector(owner: str, labels: Sequence[str]) -> Analytics[Detections]
     # onnxruntime is slow to import.
     from aerodaas.analytics.detection.detector import OnnxDetector  # noqa: PLC0415
 
-    return OnnxDetector(classes=known)
+    return OnnxDetector(classes=[*known, *(label for label in also if label not in known)])
 
 
 class BoxAnalytics(Analytics[O_co]):
@@ -43,6 +45,8 @@ class BoxAnalytics(Analytics[O_co]):
 
     Detector: TypeAlias = Analytics[Detections]
     accepts: ClassVar[tuple[type, ...]] = (Detections, Frame)
+    also: ClassVar[tuple[str, ...]] = ()
+    """Labels besides its own that the shipped detector finds for it."""
 
     def __init__(self, labels: Sequence[str], detector: Detector | None) -> None:
         """Select the boxes with one of `labels`; `detector` is for camera streams."""
@@ -52,7 +56,9 @@ class BoxAnalytics(Analytics[O_co]):
 
     def _prepare_for(self, item: type) -> None:
         if issubclass(item, Frame):
-            self.detector = self.detector or shipped_detector(type(self).__name__, self.labels)
+            self.detector = self.detector or shipped_detector(
+                type(self).__name__, self.labels, self.also
+            )
             self.isolated = True
 
     def examine(self, boxes: Detections, context: Context) -> O_co | None:

@@ -36,17 +36,20 @@ class CommandShaper:
         priority: int,
         *,
         braking: bool = False,
+        evasive: bool = False,
     ) -> VelocityCommand:
         """Limit `wanted` (forward, left, up in m/s) and `yaw_rate` (rad/s).
 
         `dt` is the time since the last command in seconds; `braking` applies the limit `stopping`
-        instead of `acceleration`. Numbers that are not finite command an immediate stop.
+        instead of `acceleration`, and `evasive` none. Numbers that are not finite command an
+        immediate stop.
         """
         limits = self.limits
         if not np.isfinite([*wanted, yaw_rate]).all():
             self.reset()
             return VelocityCommand(priority=priority)
-        flat, climb = wanted[:2], _clip(float(wanted[2]), limits.climb)
+        flat = wanted[:2]
+        climb = float(wanted[2]) if evasive else _clip(float(wanted[2]), limits.climb)
         # Half a circle ahead and half an ellipse behind: convex, so that each velocity between two
         # within the limits is within them, too.
         along = limits.forward if flat[0] >= 0 else limits.backward
@@ -55,13 +58,15 @@ class CommandShaper:
             flat = flat / share
         change = np.array([*flat, climb]) - self._velocity
         largest = (limits.stopping if braking else limits.acceleration) * dt
-        if (size := float(np.linalg.norm(change))) > largest:
+        if not evasive and (size := float(np.linalg.norm(change))) > largest:
             change = change * largest / size
         turn = _clip(yaw_rate, limits.yaw_rate) - self._yaw_rate
         self._velocity = self._velocity + change
         self._yaw_rate += _clip(turn, limits.yaw_acceleration * dt)
         forward, left, up = self._velocity.tolist()
-        return VelocityCommand(forward, left, up, self._yaw_rate, priority=priority)
+        return VelocityCommand(
+            forward, left, up, self._yaw_rate, priority=priority, evasive=evasive
+        )
 
 
 def _clip(value: float, limit: float) -> float:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import enum
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,9 @@ from simple_pid import PID
 from aerodaas.following.approach import ApproachLimit
 from aerodaas.following.clearance import Clearance
 from aerodaas.following.command_shaper import CommandShaper
+from aerodaas.following.contact_guard import ContactGuard
 from aerodaas.following.follow_settings import FollowGains, FollowLimits, LostPolicy
+from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.following.target_motion import TargetMotion, place_of, seen_from
 from aerodaas.following.upright import Upright
@@ -30,23 +32,28 @@ from aerodaas.types.clock import seconds
 from aerodaas.types.data import Odometry
 from aerodaas.types.waypoints import DEFAULT_PRIORITY, VelocityCommand
 
-__all__ = ["LYING", "FollowController", "FollowPhase", "Observation"]
+__all__ = ["LYING", "FollowController", "FollowPhase"]
 
 _LONGEST_STEP = 0.5
 """Longest time step in seconds, so that the integrals do not grow over a gap between frames."""
 _FIRST_STEP = 0.1
-_FARTHEST = 1000.0
-"""Greatest plausible distance in metres; no camera detects a person farther away."""
-_FARTHEST_FROM_HOME = 1e5
 LYING = 1.3
 """Greatest distance from the feet to the chest of a lying person in metres, in any direction."""
 _TOPPLING = 0.4
 """Seconds from the beginning of a fall until it is detected."""
+_DOUBT = 0.3
+"""Speed in m/s by which a target must seem slower, from one frame to the next, for the drone to
+slow down at once; below, it is noise."""
+_PACE = 1.5
+"""Time constant of the pace of a walk, seconds."""
 _CRAWL = 0.1
 """Speed in m/s below which the drone counts as blocked."""
 _INTEGRAL_REACH = 1.2
 """Distance error in metres within which the integral is active; the proportional part alone follows
 a person walking at 1 m/s with this error."""
+_FED_REACH = 0.4
+"""The same where the walk is fed forward: the integral has only wind to make up for, and what it
+gathers while catching up would keep the drone too near afterwards."""
 
 
 class FollowPhase(str, enum.Enum):
@@ -58,23 +65,6 @@ class FollowPhase(str, enum.Enum):
     SLOWING = "slowing"
     HOLDING = "holding"
     SEARCHING = "searching"
-
-
-@dataclass(frozen=True, slots=True)
-class Observation:
-    """Input of the controller for one frame: target, and odometry at capture and at present."""
-
-    stamp: int
-    """Mission time at capture, nanoseconds."""
-    sighting: RelativeTarget | None
-    """The target, if detected."""
-    at_capture: Odometry | None = None
-    now: Odometry | None = None
-    now_stamp: int | None = None
-    others: tuple[RelativeTarget, ...] = ()
-    """Other objects with the target's labels."""
-    surfaces: NDArray[np.float64] | None = None
-    """Surfaces at the drone's own height, as returned by `clearance.surfaces`."""
 
 
 class FollowController:
@@ -109,6 +99,7 @@ class FollowController:
         self._shaper = CommandShaper(limits)
         self._approach = ApproachLimit(limits.nearest * distance, limits)
         self._clearance = Clearance(limits, limits.nearest * distance)
+        self.guard = ContactGuard(limits)
         self.blocked = False
         """Whether an obstacle on the path to the target stops the drone."""
         self._upright = Upright()
@@ -120,6 +111,10 @@ class FollowController:
         self._places: deque[tuple[int, tuple[float, float]]] = deque()
         """Timestamps and positions of the target, of the last `_TOPPLING` seconds."""
         self._braking = False
+        self._pace = 0.0
+        """Speed at which the target walks away, over the last seconds, m/s."""
+        self._delay = 0.0
+        """Seconds from a target's turn to the command that answers it, at most."""
 
     def step(self, seen: Observation) -> VelocityCommand | None:
         """Compute the command for one frame; None without a target and for an old timestamp."""
@@ -127,17 +122,23 @@ class FollowController:
             return None
         dt = _FIRST_STEP if self._stamp is None else seconds(seen.stamp - self._stamp)
         self._stamp = seen.stamp
-        seen = _without_nonsense(seen)
+        seen = seen.without_nonsense()
         self._approach.see(seen.sighting, seen.others, seen.at_capture, dt)
         self._clearance.see(seen.surfaces, seen.at_capture, dt)
+        dt = min(dt, _LONGEST_STEP)
+        self._delay = dt + min(seen.latency, _LONGEST_STEP)
         if seen.sighting is not None:
             self._take_in(seen.sighting, seen)
+        # Who falls or gets up seems to leap by a body's length, and comes no nearer.
+        fallen = seen.sighting if self._stood is not None else None
+        people = [one for one in seen.people if one is not fallen]
+        self.guard.see(people, seen.at_capture, seen.stamp, dt, target=seen.sighting)
         self.phase = self._next_phase(seen.stamp)
         if self.phase is FollowPhase.WAITING:
             self._forget()
             return None
-        velocity, yaw_rate = self._wanted(seen, min(dt, _LONGEST_STEP))
-        return self._command(velocity, yaw_rate, seen, min(dt, _LONGEST_STEP))
+        velocity, yaw_rate = self._wanted(seen, dt)
+        return self._command(velocity, yaw_rate, seen, dt)
 
     def give_up(self) -> None:
         """Drop the target at once and wait for another."""
@@ -146,6 +147,7 @@ class FollowController:
 
     def change_target(self) -> None:
         """Drop the target but not the drone's motion, to follow another one from now on."""
+        self._pace = 0.0
         self._seen = self._last = self._stood = None
         self._places.clear()
         self._upright.reset()
@@ -202,6 +204,7 @@ class FollowController:
         self.change_target()
         self._shaper.reset()
         self._approach.reset()
+        self.guard.reset()
 
     def _reset(self) -> None:
         self.motion.reset()
@@ -230,11 +233,16 @@ class FollowController:
         target, away, left = self._target(seen)
         distance = max(target.distance, self.limits.nearest * self.distance)
         yaw_rate = float(self._yaw_pid(-target.bearing, dt=dt) or 0.0) + left / distance
-        error = target.distance - self.distance
+        now = seen.pose
+        error = target.distance - self._headway(away, dt)
+        away = min(away, self.guard.away(now, seen.pose_stamp) + _DOUBT)
         # Far away the integral would only wind up and cause an overshoot.
-        self._distance_pid.Ki = self.gains.distance[1] if abs(error) < _INTEGRAL_REACH else 0.0
+        reach = _INTEGRAL_REACH if now is None else _FED_REACH
+        self._distance_pid.Ki = self.gains.distance[1] if abs(error) < reach else 0.0
+        # What the walk leaves of the speed, so that the integral does not wind up behind the limit.
+        spare = max(0.0, self.limits.forward - max(0.0, away))
+        self._distance_pid.output_limits = (-self.limits.backward, spare)
         speed = float(self._distance_pid(-error, dt=dt) or 0.0) + away
-        now = seen.now or seen.at_capture
         safe = self._approach.speed(target, away, now)
         if target.bound and self._stood is None:
             # The distance is only an upper bound; for a fallen person, the feet are located.
@@ -251,12 +259,16 @@ class FollowController:
         direction = np.array([math.cos(target.bearing), math.sin(target.bearing)])
         return speed * direction, share * yaw_rate
 
+    def _headway(self, away: float, dt: float) -> float:
+        """Distance in metres to keep: more behind a fast walker, who may turn round."""
+        self._pace += min(1.0, dt / _PACE) * (max(away, 0.0) - self._pace)
+        return max(self.distance, self.guard.headway(self._pace, self._delay))
+
     def _target(self, seen: Observation) -> tuple[RelativeTarget, float, float]:
         """Predicted target at present, and its velocity away and to the left, m/s."""
         last = self._last or RelativeTarget(0.0, self.distance)
-        now = seen.now or seen.at_capture
-        stamp = max(seen.stamp, seen.now_stamp or 0) if seen.now else seen.stamp
-        predicted = None if now is None else self.motion.relative_to(now, stamp)
+        now = seen.pose
+        predicted = None if now is None else self.motion.relative_to(now, seen.pose_stamp)
         if last.bound and predicted is not None:
             # A person who came nearer until cut by the image's edge is assumed to keep coming.
             found, away, _ = predicted
@@ -277,41 +289,22 @@ class FollowController:
         self, velocity: NDArray[np.float64], yaw_rate: float, seen: Observation, dt: float
     ) -> VelocityCommand:
         """Add the height control and apply the limits of speed and acceleration."""
-        odometry = seen.now or seen.at_capture
+        odometry = seen.pose
         climb = 0.0
         if odometry is not None:
             climb = self.gains.height * (self.height - odometry.height)
         wanted = np.array([*velocity, climb])
+        evasion = self.guard.evade(odometry, seen.pose_stamp)
+        if evasion is not None:
+            self._distance_pid.reset()
+            wanted = evasion
         if not np.isfinite([*wanted, yaw_rate]).all():
             self._reset()
-        return self._shaper.shape(wanted, yaw_rate, dt, self.priority, braking=self._braking)
+        return self._shaper.shape(
+            wanted, yaw_rate, dt, self.priority, braking=self._braking, evasive=evasion is not None
+        )
 
 
 def _pid(gains: tuple[float, float, float], low: float, high: float) -> PID:
     """A PID that stops integrating at the limits of its output (clamping anti-windup)."""
     return PID(*gains, setpoint=0.0, sample_time=None, output_limits=(low, high))
-
-
-def _without_nonsense(seen: Observation) -> Observation:
-    """Remove sightings and odometry with implausible numbers, which count as not observed."""
-    sighting = seen.sighting if _can_be(seen.sighting) else None
-    others = tuple(filter(_can_be, seen.others))
-    at_capture = seen.at_capture if _is_sane(seen.at_capture) else None
-    now = seen.now if _is_sane(seen.now) else None
-    return replace(seen, sighting=sighting, at_capture=at_capture, now=now, others=others)
-
-
-def _can_be(sighting: RelativeTarget | None) -> bool:
-    return (
-        sighting is not None
-        and abs(sighting.bearing) <= math.pi
-        and 0.0 <= sighting.distance <= _FARTHEST
-    )
-
-
-def _is_sane(odometry: Odometry | None) -> bool:
-    return (
-        odometry is not None
-        and bool((np.abs(odometry.position) <= _FARTHEST_FROM_HOME).all())
-        and math.isfinite(odometry.yaw)
-    )

@@ -48,6 +48,13 @@ class FollowLimits:
     frames, during which no such command is computed, is measured and added."""
     response: float = 0.4
     """Lag of the airframe's velocity behind the commanded one, seconds."""
+    reply: float = 0.22
+    """Lag of the airframe's acceleration behind a sudden command to give way, seconds."""
+    evasion: float = 3.0
+    """Acceleration by which the drone gives way to a person who comes at it, m/s²; commanded at
+    once, without a ramp. The default is an environment's `max_acceleration`."""
+    contact: float = 0.5
+    """Distance from a person's axis that the drone does not fall below, metres."""
     yaw_acceleration: float = 4.0
     """Acceleration of the commanded yaw rate, rad/s²."""
     nearest: float = 0.6

@@ -16,8 +16,8 @@ import numpy as np
 
 from aerodaas.following.clearance import Clearance
 from aerodaas.following.command_shaper import CommandShaper
-from aerodaas.following.follow_controller import Observation
 from aerodaas.following.follow_settings import FollowLimits
+from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.following.target_motion import TargetMotion
 from aerodaas.types.braking import braking_speed

@@ -72,6 +72,8 @@ class RelativeTarget:
     object does not stand on the ground, or is larger than assumed."""
     top: float | None = None
     """Height of its upper edge above home in metres, if that is in the image."""
+    doubtful: bool = False
+    """Whether its box may show somebody who is known by another box."""
 
     @property
     def offset(self) -> Vector:

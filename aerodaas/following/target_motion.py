@@ -51,7 +51,9 @@ class TargetMotion:
 
         With both zero, the target is assumed to be static.
         """
-        self._acceleration, self._speed = acceleration, speed
+        self.acceleration = acceleration
+        """Standard deviation of the target's acceleration, m/s²."""
+        self._speed = speed
         self._state: NDArray[np.float64] | None = None
         self._covariance: NDArray[np.float64] = np.zeros((4, 4))
         self._stamp = 0
@@ -134,5 +136,5 @@ class TargetMotion:
         step = np.eye(4)
         step[0, 2] = step[1, 3] = dt
         push = np.vstack([np.eye(2) * dt**2 / 2, np.eye(2) * dt])
-        covariance = step @ self._covariance @ step.T + self._acceleration**2 * push @ push.T
+        covariance = step @ self._covariance @ step.T + self.acceleration**2 * push @ push.T
         return step @ state, covariance

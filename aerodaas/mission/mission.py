@@ -593,4 +593,5 @@ class Mission:
 
 def _flown(command: VelocityCommand, state: VehicleState) -> VelocitySetpoint:
     """A velocity command in the local frame, by the drone's yaw."""
-    return VelocitySetpoint(body_to_enu(command.velocity, state.odometry.yaw), command.yaw_rate)
+    velocity = body_to_enu(command.velocity, state.odometry.yaw)
+    return VelocitySetpoint(velocity, command.yaw_rate, command.evasive)

@@ -11,4 +11,5 @@ def test_it_comes_down_where_it_should(tmp_path: Path) -> None:
     """The mission ends by itself, and nobody was alarmed."""
     flight = fly(APPLICATION, tmp_path, seed=7)
     assert flight.robots["drone"].outcome.startswith("landed")
-    assert not flight.alerts
+    # A drone that gives way to somebody says so; whatever else it says is worth a look.
+    assert not [one for one in flight.alerts if one[1] != "person_close"]

@@ -76,6 +76,8 @@ class VelocitySetpoint:
 
     velocity: Vector
     yaw_rate: float = 0.0
+    evasive: bool = False
+    """Whether it takes effect at once, within what the vehicle's own controller can do."""
 
 
 Setpoint: TypeAlias = PositionSetpoint | VelocitySetpoint

@@ -186,6 +186,9 @@ class VelocityCommand:
     priority: int = DEFAULT_PRIORITY
     valid_for: float = 0.5
     """Seconds."""
+    evasive: bool = False
+    """Whether it gives way to a person: it takes effect at once, without a ramp of the setpoints.
+    All boundaries hold."""
 
     def __post_init__(self) -> None:
         """Refuse numbers that are not finite and a validity that is not positive."""

@@ -52,7 +52,7 @@ def test_each_has_a_card_with_figures(path: Path) -> None:
 def test_the_detector_is_the_default() -> None:
     """Of any detector, and of the vest's."""
     assert OnnxDetector().names == DETECTOR_CLASSES
-    assert VipDetectionAnalytics().classes == ["vest"]
+    assert VipDetectionAnalytics().classes == ["vest", "person"]
 
 
 def test_a_model_of_ones_own_keeps_all_its_classes() -> None:

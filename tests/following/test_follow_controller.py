@@ -11,9 +11,11 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from aerodaas.following import follow_controller
 from aerodaas.following.command_shaper import CommandShaper
-from aerodaas.following.follow_controller import FollowController, FollowPhase, Observation
+from aerodaas.following.follow_controller import FollowController, FollowPhase
 from aerodaas.following.follow_settings import FollowLimits, LostPolicy
+from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry
@@ -190,3 +192,55 @@ def test_no_velocity_on_the_way_to_another_is_too_fast(
 def test_it_travels_to_its_actor() -> None:
     """PIDs and filters are sent by value."""
     assert pickle.loads(pickle.dumps(FollowController(2.0, 1.5))).distance == 2.0  # noqa: S301
+
+
+def test_a_command_that_gives_way_has_no_ramp() -> None:
+    """It is within the speeds, and said to be evasive; the next one is by the ramp again."""
+    limits = FollowLimits()
+    shaper = CommandShaper(limits)
+    wanted = np.array([-9.0, 0.0, 1.5])
+    command = shaper.shape(wanted, 0.0, 0.1, 1, evasive=True)
+    assert (command.forward, command.up, command.evasive) == (-limits.backward, 1.5, True)
+    command = shaper.shape(np.zeros(3), 0.0, 0.1, 1)
+    assert not command.evasive
+    assert np.hypot(command.forward + limits.backward, command.up - 1.5) < 0.2
+
+
+@pytest.mark.parametrize(
+    ("doubt", "backs_off"), [(follow_controller._DOUBT, True), (math.inf, False)]
+)
+def test_it_brakes_before_it_is_sure_that_they_turn_round(
+    monkeypatch: pytest.MonkeyPatch, doubt: float, *, backs_off: bool
+) -> None:
+    """Half a second after a turn it no longer flies on, as by the smooth filter alone it would."""
+    monkeypatch.setattr(follow_controller, "_DOUBT", doubt)
+    controller = FollowController(4.0, 1.5)
+    east = speed = 0.0
+    for tick in range(46):
+        turned = max(0, tick - 40)
+        person = RelativeTarget(0.0, 4.5 + 0.1 * (tick - turned) - 0.13 * turned - east)
+        state = Odometry(np.array([east, 0.0, 1.5]), np.array([speed, 0.0, 0.0]), 0.0)
+        stamp = tick * NANOSECONDS // 10
+        command = controller.step(Observation(stamp, person, state, people=(person,)))
+        assert command is not None
+        speed = command.forward
+        east += speed / 10
+    assert command is not None
+    assert not command.evasive
+    assert (command.forward < 0.0) is backs_off
+
+
+@pytest.mark.parametrize("falls", [True, False])
+def test_who_gets_up_does_not_come(*, falls: bool) -> None:
+    """Their box leaps towards the drone by a body's length; of who stood, it is believed."""
+    controller = FollowController(2.0, 1.5)
+    state = odometry()
+    commands = []
+    for tick in range(60):
+        lies, near = 15 <= tick < 40, tick >= 37
+        distance = max(2.0, 3.2 - 0.4 * (tick - 36)) if near else 3.2
+        person = RelativeTarget(0.0, distance, top=0.3 if lies and falls else 1.4)
+        stamp = tick * NANOSECONDS // 5
+        commands.append(controller.step(Observation(stamp, person, state, people=(person,))))
+    evasive = [one is not None and one.evasive for one in commands]
+    assert any(evasive) is not falls

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from aerodaas.following.follow_controller import Observation
 from aerodaas.following.inspection import InspectionController, InspectionPlan
+from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.types.clock import NANOSECONDS
 from aerodaas.types.data import Odometry

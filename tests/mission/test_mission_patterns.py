@@ -16,9 +16,9 @@ from aerodaas.types.waypoints import NavigationType, VelocityCommand, Waypoint
 FARM = LimitsConfig(cruise_speed=0.5)
 
 
-def velocity(priority: int = 1, **axes: float) -> StreamItem:
+def velocity(priority: int = 1, forward: float = 0.0, left: float = 0.0) -> StreamItem:
     """One velocity command by stream."""
-    item = VelocityCommand(priority=priority, **axes)
+    item = VelocityCommand(forward, left, priority=priority)
     return StreamItem("drone/follow", AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [item]))
 
 

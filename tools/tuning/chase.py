@@ -118,8 +118,13 @@ class Chase:
         eyes: Perception,
         duration: float,
         watch: Callable[[Detections, Odometry], None] = lambda *_: None,
+        monitor: Callable[[float, Odometry], None] = lambda *_: None,
     ) -> ChaseResult:
-        """Take off and follow until `duration` seconds; `watch` gets what each frame showed."""
+        """Take off and follow until `duration` seconds.
+
+        `watch` gets what each frame showed; `monitor` the true pose at each turn of the setpoint
+        loop, 20 times a second, as a meeting lasts less than a frame.
+        """
         vehicle, loop = self._prepare(follow.controller.height)
         moment = _Moment()
         frames = max(1, round(NANOSECONDS / self.rate / _TICK)) * _TICK
@@ -135,6 +140,8 @@ class Chase:
                 loop.mission.handle(StreamItem(_STREAM, result, seen.header), now)
             if now % _TURN == 0:
                 loop.turn(now)
+                if loop.state is not None:
+                    monitor(seconds(now), loop.state.truth or loop.state.odometry)
             if now % frames == 0:
                 state = vehicle.read()
                 pose = state.truth or state.odometry

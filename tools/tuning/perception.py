@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -18,6 +19,8 @@ _OUTLINE = np.array([0.92, 0.95])
 """Width and height of a person's or vest's outline in parts of the box in space around it."""
 _SMALLEST = 4.0
 """Pixels; no detector finds less."""
+_HIDDEN = 0.6
+"""Part of a box behind another person's body from which on it is not seen."""
 
 Edges = tuple[float, float, float, float]
 
@@ -50,7 +53,10 @@ def box_in_picture(
 
 
 class TruthPerception:
-    """Exact boxes of one thing, with noise of their edges and misses, by seed."""
+    """Exact boxes of a thing and of people around it, with noise of edges and misses, by seed.
+
+    Who is nearer hides who is farther: a box mostly behind another's body is not seen.
+    """
 
     def __init__(
         self,
@@ -58,26 +64,33 @@ class TruthPerception:
         label: str,
         camera: CameraModel,
         *,
+        bystanders: Sequence[Thing] = (),
         seed: int,
         noise: float = 0.02,
         misses: float = 0.03,
     ) -> None:
-        """`noise` is a standard deviation in parts of the box's height, `misses` a share."""
-        self._thing, self._label, self._camera = thing, label, camera
+        """`noise` is a standard deviation in parts of the box's height, `misses` a share.
+
+        `thing` is seen with `label`, each of `bystanders` as a person.
+        """
+        self._labels = [(thing, label), *((one, "person") for one in bystanders)]
+        self._camera = camera
         self._noise, self._misses = noise, misses
         self._random = np.random.default_rng(seed)
 
     def look(
         self, header: Header, pose: Odometry, believed: Odometry, context: Context
     ) -> Detections:
-        """Return the box, unless it is missed or out of the picture."""
+        """Return the boxes, unless they are missed, hidden or out of the picture."""
         del context
-        camera = self._camera
-        edges = box_in_picture(self._thing, self._label, seconds(header.stamp), camera, pose)
-        errors = self._random.normal(0, self._noise, 4)
-        missed = self._random.random() < self._misses
+        camera, time = self._camera, seconds(header.stamp)
         items = []
-        if edges is not None and not missed:
+        for thing, label in self._labels:
+            edges = box_in_picture(thing, label, time, camera, pose)
+            errors = self._random.normal(0, self._noise, 4)
+            missed = self._random.random() < self._misses
+            if edges is None or missed or self._is_hidden(thing, edges, time, pose):
+                continue
             size = [camera.width, camera.height] * 2
             low, high = np.array(edges[:2]), np.array(edges[2:])
             middle, half = (low + high) / 2, _OUTLINE * (high - low) / 2
@@ -85,8 +98,19 @@ class TruthPerception:
             noisy = np.clip(outline + errors * (edges[3] - edges[1]), 0, size)
             left, top, right, bottom = noisy.tolist()
             if min(right - left, bottom - top) > _SMALLEST:
-                items.append(Detection((left, top, right, bottom), self._label, 0.9))
+                items.append(Detection((left, top, right, bottom), label, 0.9))
         return Detections(header, tuple(items), camera.width, camera.height, camera, believed)
+
+    def _is_hidden(self, thing: Thing, edges: Edges, time: float, pose: Odometry) -> bool:
+        """Whether most of a box is behind the body of somebody nearer."""
+        away = _distance(thing, time, pose)
+        for other, _ in self._labels:
+            if other is thing or _distance(other, time, pose) >= away:
+                continue
+            body = box_in_picture(other, "person", time, self._camera, pose)
+            if body is not None and _covered(edges, body) > _HIDDEN:
+                return True
+        return False
 
 
 class DetectorPerception:
@@ -124,3 +148,16 @@ class DetectorPerception:
         """Free the renderer and the detector."""
         self._renderer.close()
         self._detector.close()
+
+
+def _distance(thing: Thing, time: float, pose: Odometry) -> float:
+    state = thing.state(time)
+    return float(np.hypot(state.x - pose.position[0], state.y - pose.position[1]))
+
+
+def _covered(box: Edges, by: Edges) -> float:
+    """Part of `box` inside the box `by`."""
+    across = min(box[2], by[2]) - max(box[0], by[0])
+    down = min(box[3], by[3]) - max(box[1], by[1])
+    area = (box[2] - box[0]) * (box[3] - box[1])
+    return max(0.0, across) * max(0.0, down) / area if area > 0.0 else 0.0

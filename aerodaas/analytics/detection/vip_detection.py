@@ -1,4 +1,4 @@
-"""VipDetectionAnalytics: detection of the hazard vest of the person to be assisted."""
+"""VipDetectionAnalytics: detection of the hazard vest of the person assisted, and of people."""
 
 from __future__ import annotations
 
@@ -14,7 +14,10 @@ __all__ = ["VipDetectionAnalytics"]
 
 
 class VipDetectionAnalytics(OnnxDetector):
-    """An `OnnxDetector` for hazard vests, by default with the shipped model."""
+    """An `OnnxDetector` for hazard vests, by default with the shipped model.
+
+    It finds people, too, as a follower keeps away from everybody.
+    """
 
     resources: ClassVar[Mapping[str, ResourceUse]] = {"model": "model"}
 
@@ -32,8 +35,8 @@ class VipDetectionAnalytics(OnnxDetector):
 
         Args:
             model: ONNX file, or the name of a fetched model; by default the shipped one.
-            classes: Class names to keep; by default `vest` of the shipped model, and every class
-                of any other model.
+            classes: Class names to keep; by default `vest` and `person` of the shipped model, and
+                every class of any other model.
             min_score: Least confidence of a detection, above 0 to 1.
             iou: Overlap of two boxes above which only the better one is kept, above 0 to 1; lower
                 than in other detectors, because people rarely stand chest before chest.
@@ -43,7 +46,7 @@ class VipDetectionAnalytics(OnnxDetector):
         Raises:
             ModelError: If the file or a setting is unsuitable.
         """
-        wanted = ["vest"] if model is None and classes is None else classes
+        wanted = ["vest", "person"] if model is None and classes is None else classes
         super().__init__(
             DETECTOR if model is None else model,
             classes=wanted,

@@ -40,6 +40,20 @@ from the ground, the chest of a person 3 m away is above the image, but that of 
 passer-by is not."""
 _BLOCKED = (3, 10)
 """Frames with an obstacle, of the last 10, that raise an alert."""
+_PERSON, _PERSON_SIZE = "person", TargetSize(1.7, 0.55, widest=0.9)
+"""Label and size of a bystander."""
+_WORN = 0.8
+"""Share of a box, such as a vest's or a body's, within another person's box from which on both show
+the same body. Somebody else in front would hide the vest, so that it would not be detected."""
+_OVERLAPS = 0.4
+"""The same share from which on both may show the same body: a detector that sees half a body puts
+loose boxes around it. Somebody else who comes in front is seen before that."""
+_AS_FAR = 0.6
+"""Least height of such a box in parts of the height that it has at the distance of the other; a
+smaller one is behind, not worn."""
+_SAME_BODY = 0.8
+"""Distance in metres between the target's expected position and that of a person's box, at most,
+for the two to be the same body."""
 _WIDTH_MEMORY = 0.1
 """Weight of the newest measurement in the mean of the target's width, as arms swing."""
 
@@ -53,7 +67,9 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
     """
 
     falls: ClassVar[bool] = True
-    """Whether a target may fall, so that a change of its height is no motion along the ground."""
+    """Whether the target is a person, who may fall, so that a change of its height is no motion
+    along the ground, and may turn round and come at the drone."""
+    also: ClassVar[tuple[str, ...]] = (_PERSON,)
 
     def __init__(
         self,
@@ -122,6 +138,8 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self.target: int | None = None
         """Id of the followed track."""
         self._blocked = Debounce(*_BLOCKED)
+        self._alarmed = False
+        """Whether the drone gave way to somebody who came, in the last frame."""
         self._aloft = 0
         """Number of frames since the drone was high enough to choose a target."""
         self._width = target_width
@@ -140,9 +158,17 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         detection = self._target_in(tracked)
         sighting = None if detection is None else self._sight(detection, item)
         others = self._others(tracked, detection)
-        command = self.controller.step(observation(item, sighting, context, others))
+        bystanders = self._bystanders(item, sighting)
+        people = bystanders
+        if self.falls:
+            people += others if sighting is None else (sighting, *others)
+        others += tuple(one for one in bystanders if not one.doubtful)
+        command = self.controller.step(
+            observation(item, sighting, context, others=others, people=people)
+        )
         self._tell_changes(phase, item, context)
         self._tell_what_blocks(item, context)
+        self._tell_who_comes(item, context)
         if command is None:
             return None
         return AeroNavigation(NavigationType.ANALYTICS_DRIVEN, [command])
@@ -280,12 +306,51 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         seen = (sight(box, tracked, self.size) for box in boxes)
         return tuple(sighting for sighting in seen if sighting is not None)
 
+    def _bystanders(
+        self, item: Detections, target: RelativeTarget | None
+    ) -> tuple[RelativeTarget, ...]:
+        """Locate everybody detected who is not known by the followed labels already.
+
+        A person's box around a box with such a label shows the same body, and so does one where
+        the target is expected while that is not detected. One that overlaps it is doubtful.
+        """
+        if _PERSON in self.labels:
+            return ()
+        parts = [(one, self.size.height) for one in item.labelled(*self.labels)]
+        people = sorted(item.labelled(_PERSON), key=lambda one: -one.score)
+        # A detector may find a body several times, with loose boxes around it.
+        parts += [
+            (one, _PERSON_SIZE.height)
+            for one in people
+            if any(_worn(part, height, one) >= _WORN for part, height in parts)
+        ]
+        odometry, expected = item.odometry, target
+        if expected is None and odometry is not None:
+            expected = self.controller.expected(odometry, item.header.stamp)
+        found = []
+        for box in people:
+            share = max((_worn(part, height, box) for part, height in parts), default=0.0)
+            if share >= _WORN:
+                continue
+            seen = sight(box, item, _PERSON_SIZE)
+            if seen is None or (self.falls and _is_near(seen, expected)):
+                continue
+            found.append(replace(seen, doubtful=share >= _OVERLAPS))
+        return tuple(found)
+
     def _tell_what_blocks(self, item: Detections, context: Context) -> None:
         self._blocked.update(item.header.stamp, self.controller.blocked)
         if self._blocked.began:
             what = " or ".join(self.labels)
             text = f"Something stands in the way to the {what}; the drone waits."
             context.alert(Alert(item.header, "way_blocked", text))
+
+    def _tell_who_comes(self, item: Detections, context: Context) -> None:
+        alarming = self.controller.guard.alarming
+        if alarming and not self._alarmed:
+            text = "Somebody comes at the drone; it gives way."
+            context.alert(Alert(item.header, "person_close", text))
+        self._alarmed = alarming
 
     def _tell_changes(self, before: FollowPhase, item: Detections, context: Context) -> None:
         phase = self.controller.phase
@@ -299,6 +364,27 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             self.target = None
             text = f"The {what} was not found again; following ends."
             context.alert(Alert(item.header, "target_given_up", text))
+
+
+def _worn(part: Detection, height: float, body: Detection) -> float:
+    """Share within a body of the box of a part that is `height` metres high, such as a vest.
+
+    0 for a part too small to be this body's.
+    """
+    low = np.maximum(part.box[:2], body.box[:2])
+    high = np.minimum(part.box[2:], body.box[2:])
+    common = float(np.clip(high - low, 0.0, None).prod())
+    tall, taller = (one.box[3] - one.box[1] for one in (part, body))
+    as_far = tall >= _AS_FAR * taller * height / _PERSON_SIZE.height
+    return common / part.area if as_far and common > 0.0 else 0.0
+
+
+def _is_near(seen: RelativeTarget, expected: RelativeTarget | None) -> bool:
+    """Whether a person's box may show the target, who if fallen lies within a body's length."""
+    if expected is None:
+        return False
+    reach = _SAME_BODY + (LYING if expected.bound else 0.0)
+    return bool(np.linalg.norm(seen.offset - expected.offset) <= reach)
 
 
 def _polygon(area: Sequence[tuple[float, float]]) -> Polygon:

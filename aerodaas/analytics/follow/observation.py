@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from aerodaas.analytics.base import Context
 from aerodaas.following.clearance import surfaces
-from aerodaas.following.follow_controller import Observation
+from aerodaas.following.observation import Observation
 from aerodaas.following.relative_target import RelativeTarget
 from aerodaas.types.data import Detections
 
@@ -15,9 +15,14 @@ def observation(
     boxes: Detections,
     sighting: RelativeTarget | None,
     context: Context,
+    *,
     others: tuple[RelativeTarget, ...] = (),
+    people: tuple[RelativeTarget, ...] = (),
 ) -> Observation:
-    """Combine the `sighting` in `boxes` with the drone's odometry at capture and at present."""
+    """Combine the `sighting` in `boxes` with the drone's odometry at capture and at present.
+
+    `others` and `people` are those of `Observation`.
+    """
     state = context.vehicle()
     return Observation(
         stamp=boxes.header.stamp,
@@ -26,5 +31,6 @@ def observation(
         now=None if state is None else state.odometry,
         now_stamp=None if state is None else state.stamp,
         others=others,
+        people=people,
         surfaces=surfaces(boxes),
     )

@@ -87,7 +87,8 @@ class SetpointFilter:
         velocity, names = self._limit(setpoint.velocity)
         before = odometry.velocity if self._last is None else self._last
         change = limit_length(velocity - before, self.limits.max_acceleration * duration)
-        if not np.array_equal(change, velocity - before):
+        # The ramp would delay giving way by most of a second; the vehicle limits it by itself.
+        if not setpoint.evasive and not np.array_equal(change, velocity - before):
             velocity, names = self._limit(before + change)[0], [*names, "max_acceleration"]
         velocity, bounds = self._stop_before_boundaries(velocity, odometry, neighbours)
         yaw_rate = float(np.clip(setpoint.yaw_rate, -self._yaw_rate, self._yaw_rate))

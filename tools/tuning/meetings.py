@@ -1,0 +1,129 @@
+"""People who meet a follower: a walker who turns round, a stranger who comes, by seed."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from aerodaas.following.contact_guard import ContactGuard
+from aerodaas.simulation.scenario import Scenario
+from aerodaas.simulation.world import Thing, World
+from aerodaas.types.data import Odometry
+from tools.tuning.walk import PERSON
+
+__all__ = ["CONTACT", "STRANGER", "Nearest", "NoGuard", "returning", "stranger"]
+
+CONTACT = 0.35
+"""Distance in metres of the drone's centre from a person's axis below which they touch: half a
+pair of shoulders, and half a small drone."""
+STRANGER = "stranger"
+"""Name of the person without a vest."""
+_BEYOND = 12.0
+"""Metres that a walker goes on, towards the drone and past where it took off."""
+_PACE = 0.7
+"""Speed of the person who is followed while a stranger comes, m/s."""
+
+
+class NoGuard(ContactGuard):
+    """A guard that does nothing, to compare with."""
+
+    def evade(self, now: Odometry | None, stamp: int) -> None:
+        """Give way to nobody."""
+        del now, stamp
+
+    def away(self, now: Odometry | None, stamp: int) -> float:
+        """Know of nobody who turns round."""
+        del now, stamp
+        return math.inf
+
+    def headway(self, pace: float, delay: float) -> float:
+        """Keep no more distance from fast walkers."""
+        del pace, delay
+        return 0.0
+
+
+@dataclass
+class Nearest:
+    """How near the drone came to each of some people, in space."""
+
+    people: Sequence[Thing]
+    least: float = math.inf
+    """Metres from the drone's centre to the nearest point of a person's axis, feet to head."""
+    path: list[tuple[float, ...]] = field(default_factory=list)
+    """Seconds, the drone's place and that of the first person (metres east, north), and the
+    distance to them along the ground, metres."""
+
+    def __call__(self, time: float, pose: Odometry) -> None:
+        """Note the distances at `time`."""
+        east, north, up = pose.position.tolist()
+        for number, person in enumerate(self.people):
+            state = person.state(time)
+            ground = math.hypot(state.x - east, state.y - north)
+            self.least = min(self.least, math.hypot(ground, max(0.0, up - person.height)))
+            if number == 0:
+                self.path.append((time, east, north, state.x, state.y, ground))
+
+
+def returning(speed: float, seed: int) -> tuple[World, float]:
+    """Somebody in a vest turns round within a step and comes back at `speed` m/s.
+
+    Returns the world, and the second at which they turn.
+    """
+    draw = random.Random(f"{seed}/returning")
+    away, aside = draw.uniform(5.0, 10.0) * speed, draw.uniform(-0.3, 0.3)
+    start = 6.0
+    points = [(3.0, 0.0), (3.0 + away, 0.0), (3.0 - _BEYOND, aside)]
+    return World(_scenario([_walker(PERSON, points, speed, start, vest=True)]), seed), (
+        start + away / speed
+    )
+
+
+def stranger(speed: float, seed: int) -> tuple[World, float]:
+    """Somebody without a vest comes at `speed` m/s at a drone that follows another at 0.7 m/s.
+
+    They aim at where the drone will be, from ahead and to one side. Returns the world, and the
+    second at which they set out.
+    """
+    draw = random.Random(f"{seed}/stranger")
+    aside = draw.choice((-1.0, 1.0)) * math.radians(draw.uniform(15.0, 35.0))
+    length, start = max(4.0, 6.0 * speed), 6.0
+    setting_out = start + draw.uniform(4.0, 6.0)
+    drone = 1.0 + _PACE * (setting_out + length / speed - start)
+    towards = np.array([math.cos(aside), math.sin(aside)])
+    points = [tuple(np.array([drone, 0.0]) + far * towards) for far in (length, -_BEYOND)]
+    followed = [(3.0, 0.0), (200.0, 0.0)]
+    people = [
+        _walker(PERSON, followed, _PACE, start, vest=True),
+        _walker(STRANGER, points, speed, setting_out, vest=False),
+    ]
+    return World(_scenario(people), seed), setting_out
+
+
+def _walker(
+    name: str,
+    points: Sequence[tuple[float, ...]],
+    speed: float,
+    start: float,
+    *,
+    vest: bool,
+) -> dict[str, object]:
+    motion = {"points": points, "speed": speed, "start": start, "variation": 0.0, "corner": 0.0}
+    clothes = {"vest": "any"} if vest else {}
+    return {"kind": "person", "id": name, "at": points[0], "motion": motion, **clothes}
+
+
+def _scenario(people: Sequence[Mapping[str, object]]) -> Scenario:
+    """Build a meadow with trees and a house far away, for the picture."""
+    trees = {
+        "kind": "trees",
+        "id": "wood",
+        "count": 20,
+        "area": (-45, -45, 45, 45),
+        "clear": (-30, -30, 30, 30),
+    }
+    house = {"kind": "building", "id": "hall", "at": (38.0, 6.0), "yaw": 80}
+    return Scenario.model_validate({"name": "meeting", "entities": [*people, trees, house]})
