@@ -215,6 +215,7 @@ def test_it_brakes_before_it_is_sure_that_they_turn_round(
     """Half a second after a turn it no longer flies on, as by the smooth filter alone it would."""
     monkeypatch.setattr(follow_controller, "_DOUBT", doubt)
     controller = FollowController(4.0, 1.5)
+    command = None
     east = speed = 0.0
     for tick in range(46):
         turned = max(0, tick - 40)
