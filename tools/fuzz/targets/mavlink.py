@@ -76,7 +76,7 @@ class _Rig:
 
     def send(self, packet: bytes, peers: tuple[object, ...]) -> None:
         """As the wire: obey, if it is for this vehicle alone."""
-        known = self.link is not None and self.link.target is not None
+        known = self.link is not None and self.link._pins.target is not None  # noqa: SLF001
         require(not known or peers == (_OWN,), "told a stranger")
         message = self._ear.decode(bytearray(packet))
         kind = message.get_type()
