@@ -85,7 +85,12 @@ class Environment(PaperNames, IEnvironment):
 
     @property
     def run(self) -> Run | None:
-        """The flight of this process' own runtime; None before it, and where a provider flies."""
+        """The flight of this process' own runtime; None before it, and where a provider flies.
+
+        Raises GoesOnError in an application that is only built.
+        """
+        if self.unflown is not None:
+            self.unflown.refuse()
         return self._mission if isinstance(self._mission, Run) else None
 
     @property

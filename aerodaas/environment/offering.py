@@ -94,7 +94,7 @@ class Unflown(MissionRun):
         """Raise GoesOnError."""
         self.asked = True
         raise GoesOnError(
-            "it goes on in flight, after start_mission(wait=False), by code of its own: "
+            "it goes on after start_mission() by code of its own: "
             "only `aerodaas run` flies such an application"
         )
 
