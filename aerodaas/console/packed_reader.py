@@ -44,7 +44,12 @@ class PackedReader:
 
 
 def drawn_streams(graph: Graph) -> dict[str, StreamKind]:
-    """The streams that a page can draw, by name: pictures, and what was found in them."""
+    """The streams that a page can draw, by name: pictures, and what was found in them.
+
+    None before they can be read.
+    """
+    if graph.reader is None:
+        return {}
     kinds = ((Frame, StreamKind.PICTURES), (Detections, StreamKind.DETECTIONS))
     return {
         node.id: kind

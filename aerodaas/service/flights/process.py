@@ -23,7 +23,6 @@ from aerodaas.config.model import EnvironmentConfig, RemoteConfig
 from aerodaas.config.options import EdgeShare, RunOptions, current_options
 from aerodaas.console.meter import FlightMeter
 from aerodaas.console.packed_reader import PackedReader, drawn_streams
-from aerodaas.dataflow.graph import Graph
 from aerodaas.dataflow.mission_document import MissionDocument, read_mission
 from aerodaas.environment.document.building import build_mission
 from aerodaas.environment.environment import Environment
@@ -214,20 +213,15 @@ class Flying:
 
     def streams(self) -> dict[str, StreamKind]:
         """The streams that can be drawn, by name, once they can be read."""
-        graph = self._live_graph()
-        return {} if graph is None else drawn_streams(graph)
+        environment = self._environment
+        return {} if environment is None else drawn_streams(environment.graph)
 
     def reader(self, stream: str) -> PackedReader:
         """A reader of a stream; raises ConfigError if there is none."""
-        graph = self._live_graph()
+        graph = self._environment.graph if self._environment is not None else None
         if graph is None or stream not in graph.nodes or graph.reader is None:
             raise ConfigError(f"no stream of this mission is called {stream!r}")
         return PackedReader(graph.reader(stream), stream)
-
-    def _live_graph(self) -> Graph | None:
-        """The graph whose streams carry what is flown; None before that."""
-        graph = None if self._environment is None else self._environment.graph
-        return graph if graph is not None and graph.reader is not None else None
 
     @property
     def over(self) -> bool:
