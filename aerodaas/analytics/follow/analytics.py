@@ -138,8 +138,7 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
         self.target: int | None = None
         """Id of the followed track."""
         self._blocked = Debounce(*_BLOCKED)
-        self._alarmed = False
-        """Whether the drone gave way to somebody who came, in the last frame."""
+        self._alarm = Debounce(1, 1)
         self._aloft = 0
         """Number of frames since the drone was high enough to choose a target."""
         self._width = target_width
@@ -346,11 +345,10 @@ class FollowAnalytics(BoxAnalytics[AeroNavigation], NavigableAnalytics):
             context.alert(Alert(item.header, "way_blocked", text))
 
     def _tell_who_comes(self, item: Detections, context: Context) -> None:
-        alarming = self.controller.guard.alarming
-        if alarming and not self._alarmed:
+        self._alarm.update(item.header.stamp, self.controller.guard.alarming)
+        if self._alarm.began:
             text = "Somebody comes at the drone; it gives way."
             context.alert(Alert(item.header, "person_close", text))
-        self._alarmed = alarming
 
     def _tell_changes(self, before: FollowPhase, item: Detections, context: Context) -> None:
         phase = self.controller.phase
