@@ -81,9 +81,9 @@ def vehicle_state(item: VehicleState, message: Message[Any], session: Session) -
     """Write a state as odometry, transform, location and JSON."""
     stream = message.stream
     robot = (message.header.source or stream).partition("/")[0]
-    yield from _pose(item.odometry, f"{robot}/base_link", stream, item.stamp, session)
+    yield from _pose(item.odometry, base_link(robot), stream, item.stamp, session)
     if item.gps is not None:
-        yield _location(item.gps, f"{robot}/base_link", stream, item.stamp, session)
+        yield _location(item.gps, base_link(robot), stream, item.stamp, session)
     state = {
         "stamp": item.stamp,
         "robot": robot,
