@@ -22,7 +22,7 @@ from aerodaas.actors.stream_names import (
 )
 from aerodaas.actors.streams import Publisher
 from aerodaas.config.model import RobotConfig, SensorConfig
-from aerodaas.config.plugins import load_plugin
+from aerodaas.drivers.loading import load_vehicle
 from aerodaas.mission.commands import (
     Answer,
     ClearNavigation,
@@ -47,7 +47,6 @@ from aerodaas.types.vehicle import (
     ClockedVehicle,
     PlayedVehicle,
     SteppedVehicle,
-    Vehicle,
     VehicleState,
 )
 
@@ -108,8 +107,7 @@ class VehicleController:
         self._failures = 0
         """Loop cycles in a row that raised."""
         self._alerts: list[Alert] = []
-        plugin = load_plugin("drivers", spec.robot.driver)
-        self.vehicle: Vehicle = plugin(spec.robot, session.environment)
+        self.vehicle = load_vehicle(spec.robot, session.environment)
         self._stepped: SteppedVehicle | None = None
         self._played: PlayedVehicle | None = None
 

@@ -23,6 +23,7 @@ from aerodaas.config.plugins import (
 )
 from aerodaas.config.secrets import SecretUrl, plain, shown_text
 from aerodaas.dataflow.names import snake_case
+from aerodaas.drivers.loading import load_vehicle
 from aerodaas.types.errors import ConfigError, GraphError
 from aerodaas.types.identifiers import find_scoped
 
@@ -86,7 +87,7 @@ def check_plugins(
         _require_methods("drivers", robot.driver, _VEHICLE, f"robot {robot.id}")
         _check_settings("drivers", robot.driver, robot.settings, f"robot {robot.id}")
         if is_built_in("drivers", robot.driver):
-            load_plugin("drivers", robot.driver)(robot, config)
+            load_vehicle(robot, config)
     for sensor in cameras:
         driver = config.camera_driver(sensor)
         hint = "" if sensor.driver else f"; its robot's driver was taken: {_OWN_CAMERA}"

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 from aerodaas.config.model import RobotConfig
 from aerodaas.config.options import Speed
-from aerodaas.config.plugins import load_plugin
 from aerodaas.dataflow.graph import NavigationEdge, refusal
 from aerodaas.dataflow.handles import Sensor
 from aerodaas.dataflow.interfaces import IAeroData, IRobot, ISensor
 from aerodaas.dataflow.names import PaperNames
 from aerodaas.dataflow.navigation import AeroNavigation
+from aerodaas.drivers.loading import load_vehicle
 from aerodaas.mission.commands import End, Pause, Resume
 from aerodaas.types.errors import GraphError, UnknownIdError
 
@@ -50,9 +50,7 @@ class Robot(PaperNames, IRobot):
 
     def is_navigable(self) -> bool:
         """Return True if the robot is navigable: its driver takes setpoints."""
-        capabilities = load_plugin("drivers", self.config.driver)(
-            self.config, self._environment.config
-        ).capabilities
+        capabilities = load_vehicle(self.config, self._environment.config).capabilities
         return bool(capabilities.position_setpoints or capabilities.velocity_setpoints)
 
     def navigate(self, data: IAeroData[Any]) -> None:

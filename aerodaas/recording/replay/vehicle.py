@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.config.plugins import load_plugin
+from aerodaas.drivers.loading import load_vehicle
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.states import vehicle_states
 from aerodaas.types.errors import ConfigError, VehicleError
@@ -124,5 +124,4 @@ def _capabilities(robot: RobotConfig, environment: EnvironmentConfig) -> Capabil
     recorded = robot.model_copy(
         update={"driver": driver, "settings": robot.settings.get("settings", {})}
     )
-    capabilities: Capabilities = load_plugin("drivers", driver)(recorded, environment).capabilities
-    return replace(capabilities, obeys=False)
+    return replace(load_vehicle(recorded, environment).capabilities, obeys=False)
