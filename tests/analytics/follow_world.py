@@ -145,3 +145,17 @@ class World:
             self.position = self.position + body_to_enu(self.velocity, self.yaw) * dt
             self.yaw += self.yaw_rate * dt
             self.time += dt
+
+
+def vest_world(target: Path, rate: float) -> World:
+    """A vest of an upright person, 4 m ahead, seen as a good detector would."""
+    return World(
+        target,
+        np.array([0.0, 0.0, 1.5]),
+        target_height=0.6,
+        target_width=0.43,
+        target_base=0.85,
+        label="vest",
+        rate=rate,
+        noise=0.01,
+    )
