@@ -138,7 +138,7 @@ class StreamActor:
         logging.captureWarnings(capture=True)
         logging.getLogger("aerodaas").addHandler(_AlertHandler(self))
         self.alerts = self.publisher(alert_stream(self.name), f"{self.name}'s alert")
-        self.subscriber = self.reader(self.name, self._reads)
+        self.subscriber = self.reader(self._reads)
         self._open()
         self._phase = "ready"
         return self.info()
@@ -259,13 +259,13 @@ class StreamActor:
         self.publishers[stream] = Publisher(self.scope, stream, unsendable)
         return self.publishers[stream]
 
-    def reader(self, name: str, depths: dict[str, int], who: str = "") -> Subscriber:
-        """Open streams for reading as `name`; `who` names this reader in alerts."""
+    def reader(self, depths: dict[str, int], who: str = "") -> Subscriber:
+        """Open streams for reading; `who` names this reader in alerts."""
 
         def unreadable(reason: str) -> None:
             self._problem("unreadable", f"{who or self.name} cannot read {reason}")
 
-        return Subscriber(self.scope, name, depths, unreadable)
+        return Subscriber(self.scope, depths, unreadable)
 
     def _problem(self, kind: str, text: str) -> None:
         """Raise an alert, once, for an item that cannot be sent or read; reported at the end."""

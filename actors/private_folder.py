@@ -9,7 +9,7 @@ from pathlib import Path
 
 from aerodaas.types.errors import AeroDaaSError
 
-__all__ = ["private_folder", "shared_memory_names"]
+__all__ = ["private_folder"]
 
 _BASE = "/tmp"  # noqa: S108 - all processes of a user must find it, whatever their TMPDIR
 _OTHERS = stat.S_IRWXG | stat.S_IRWXO
@@ -25,14 +25,6 @@ def private_folder(name: str, base: str = _BASE) -> Path:
     _own(top)
     _own(top / name)
     return top / name
-
-
-def shared_memory_names() -> tuple[Path, str]:
-    """Return the folder and the prefix of names that iceoryx2 uses for this user's streams.
-
-    Raises AeroDaaSError as `private_folder` does.
-    """
-    return private_folder("streams"), f"aerodaas{os.geteuid()}_"
 
 
 def _own(path: Path) -> None:

@@ -97,7 +97,7 @@ class Worker:
     def open(self) -> None:
         """Open streams and analysis; raises the exceptions of its `open`."""
         name = type(self.node.work).__name__
-        self.subscriber = self._actor.reader(f"analytics/{self.node.stream}", self.depths, name)
+        self.subscriber = self._actor.reader(self.depths, name)
         self._results = self._actor.publisher(self.node.stream, f"{name}'s result")
         self._triggers = Triggers(self.node.triggers, self._actor.publisher)
         if self._link is not None:

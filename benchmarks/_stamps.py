@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from aerodaas.actors.drone.vehicle_controller import VehicleController
-from aerodaas.actors.streams import codec, shared_memory
+from aerodaas.actors.streams import codec, local_publisher, local_subscriber, subscriber
 from aerodaas.actors.worker import Worker
 
 __all__ = ["FOLDER", "dump", "install"]
@@ -50,20 +50,23 @@ def _encode(original: Any, self: Any, message: Any) -> None:  # noqa: ANN401
     _note("encoded", message)
 
 
-def _write(original: Any, self: Any, target: Any) -> None:  # noqa: ANN401
-    _note("borrowed", self.traced)
-    original(self, target)
+def _write(original: Any, self: Any, *target: Any) -> Any:  # noqa: ANN401
+    _note("taken", self.traced)
+    written = original(self, *target)
     _note("written", self.traced)
+    return written
 
 
 def _send(original: Any, self: Any, encoded: Any) -> None:  # noqa: ANN401
     original(self, encoded)
-    _note("notified", encoded.traced)
+    _note("sent", encoded.traced)
 
 
-def _wait(original: Any, self: Any, timeout: float) -> None:  # noqa: ANN401
-    original(self, timeout)
-    _latest["awake"] = time.monotonic_ns()
+def _ready(original: Any, self: Any, until: float) -> Any:  # noqa: ANN401
+    ready = original(self, until)
+    if until:
+        _latest["awake"] = time.monotonic_ns()
+    return ready
 
 
 def _decode(original: Any, source: Any) -> Any:  # noqa: ANN401
@@ -93,9 +96,10 @@ def install() -> None:
     _latest["awake"] = 0
     _wrap(codec.Encoded, "__init__", _encode)
     _wrap(codec.Encoded, "write_into", _write)
-    _wrap(shared_memory.SharedPublisher, "send", _send)
-    _wrap(shared_memory.SharedWaiter, "wait", _wait)
-    _wrap(shared_memory, "decode", _decode)
+    _wrap(codec.Encoded, "to_bytes", _write)
+    _wrap(local_publisher.LocalPublisher, "send", _send)
+    _wrap(local_subscriber.LocalSubscriber, "_ready", _ready)
+    _wrap(subscriber, "decode", _decode)
     _wrap(Worker, "_work", _work)
     _wrap(VehicleController, "take", _take)
 

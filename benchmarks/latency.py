@@ -182,7 +182,7 @@ def main(
     python benchmarks/latency.py --seconds 10 --rounds 3 --json latency.json
     """
     title = f"capture to command, {WIDTH}x{HEIGHT} at {RATE}/s, camera-analytics-navigation-drone"
-    packages = ("ray", "iceoryx2", *(("dora-rs",) if dora else ()))
+    packages = ("ray", *(("dora-rs",) if dora else ()))
     report = Report(title, UNITS, packages=packages)
     ours: list[Round] = []
     theirs: list[Round] = []

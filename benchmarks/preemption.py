@@ -129,7 +129,7 @@ def main(
     with tempfile.TemporaryDirectory() as name:
         delays = fly(events, Path(name))
     title = f"preemption: from an event's frame, 1280x720 at {RATE}/s, analysis in its own actor"
-    report = Report(title, UNITS, packages=("ray", "iceoryx2"))
+    report = Report(title, UNITS, packages=("ray",))
     for case, values in (
         ("to the changed setpoint", delays.setpoint),
         ("to the command at the drone", delays.command),

@@ -25,9 +25,9 @@ from latency import measure_ours
 
 _STEPS = {
     "encode": ("encode", "encoded"),
-    "borrow a buffer": ("encoded", "borrowed"),
-    "write": ("borrowed", "written"),
-    "send and notify": ("written", "notified"),
+    "look for readers, take a slot": ("encoded", "taken"),
+    "write": ("taken", "written"),
+    "send": ("written", "sent"),
     "written until the thread is awake": ("written", "awake"),
     "awake until the message is found": ("awake", "decode"),
     "decode": ("decode", "decoded"),
@@ -78,9 +78,7 @@ def main(
         stamps = _read(Path(name))
     worked = [stream for stream, steps in stamps.items() if "work" in steps and "encode" in steps]
     hops = sorted(worked, key=lambda stream: min(stamps[stream]["work"].values()))
-    report = Report(
-        f"steps of a frame, {WIDTH}x{HEIGHT} at {RATE}/s", UNITS, packages=("ray", "iceoryx2")
-    )
+    report = Report(f"steps of a frame, {WIDTH}x{HEIGHT} at {RATE}/s", UNITS, packages=("ray",))
     for step, (begin, end) in _STEPS.items():
         figures = [_between(stamps[stream][begin], stamps[stream][end]) for stream in hops]
         report.row(step, dict(zip(_HOPS, figures, strict=True)))

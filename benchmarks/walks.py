@@ -63,7 +63,7 @@ class _Stream:
 
     def __init__(self, scope: str, name: str) -> None:
         self.publisher = Publisher(scope, name)
-        self._subscriber = Subscriber(scope, f"walk/{name}", {name: 1})
+        self._subscriber = Subscriber(scope, {name: 1})
 
     def newest(self) -> Any:  # noqa: ANN401 - a message of any item
         return self._subscriber.receive(5.0)[-1]

@@ -19,7 +19,7 @@ from pathlib import Path
 from queue import Empty, Queue
 
 from aerodaas.actors.cluster.authentication import make_token, require_authentication
-from aerodaas.actors.private_folder import shared_memory_names
+from aerodaas.actors.private_folder import private_folder
 from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.types.errors import AeroDaaSError
 
@@ -51,7 +51,7 @@ class LocalRay:
         """Start Ray with `variables` as defaults of the environment; returns at once."""
         if require_authentication():
             make_token()
-        command = [sys.executable, "-I", "-S", str(_KEEPER), str(os.getpid()), *_streams()]
+        command = [sys.executable, "-I", "-S", str(_KEEPER), str(os.getpid()), _streams()]
         self._process = subprocess.Popen(  # noqa: S603 - our own file
             [*command, *_OPTIONS, f"--num-cpus={os.cpu_count()}"],
             stdin=subprocess.PIPE,
@@ -104,13 +104,12 @@ class LocalRay:
             return {"flying": True}
 
 
-def _streams() -> tuple[str, str]:
-    """Folder and prefix of this user's streams; empty where shared memory cannot be used."""
+def _streams() -> str:
+    """Folder of the sockets of this user's streams; empty where it cannot be used."""
     try:
-        folder, prefix = shared_memory_names()
+        return str(private_folder("streams"))
     except AeroDaaSError:
-        return "", ""
-    return str(folder), prefix
+        return ""
 
 
 def _inherited() -> dict[str, str]:

@@ -12,12 +12,14 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import errno
 import fcntl
 import json
 import os
 import select
 import shutil
 import signal
+import socket
 import stat
 import subprocess
 import sys
@@ -62,20 +64,11 @@ _RAY = (
     "from ray.scripts.scripts import main; main()"
 )
 
-_NEW_NODE = """
-import sys
-import iceoryx2 as i
-config = i.config.default()
-config.global_cfg.root_path = i.Path.new(sys.argv[1])
-config.global_cfg.prefix = i.FileName.new(sys.argv[2])
-i.NodeBuilder.new().config(config).create(i.ServiceType.Ipc)
-"""
 
-
-def main(application: int, streams: list[str], words: list[str]) -> None:
+def main(application: int, streams: str, words: list[str]) -> None:
     """Run Ray, started by `ray start` with the arguments `words`, for process `application`.
 
-    `streams` are the folder and the prefix of its streams in shared memory; empty without.
+    `streams` is the folder of its streams' sockets; empty without.
     """
     for number in (signal.SIGINT, signal.SIGHUP, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
@@ -277,20 +270,28 @@ def _belongs(pid: int, folder: Path) -> bool:
     return False
 
 
-def _free_streams(streams: list[str]) -> None:
-    """Make iceoryx2 remove the shared memory of dead processes, as it does for each new node."""
-    if not all(streams):
-        return
-    with contextlib.suppress(OSError, subprocess.TimeoutExpired):
-        subprocess.run(  # noqa: S603 - fixed arguments
-            [sys.executable, "-c", _NEW_NODE, *streams],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-            timeout=_DYING_SECONDS,
-            check=False,
-        )
+def _free_streams(folder: str) -> None:
+    """Remove the sockets of streams that processes which were killed have left, and their folders.
+
+    `actors/streams/rendezvous.py` says what is there.
+    """
+    top = Path(folder) if folder else Path(os.devnull)
+    for path in [*top.glob("*/*"), *top.glob("*/*/*")]:
+        with contextlib.suppress(OSError):
+            if not path.exists() or (path.is_socket() and _is_deserted(path)):
+                path.unlink()
+    for path in [*top.glob("*/*"), *top.glob("*")]:
+        with contextlib.suppress(OSError):
+            path.rmdir()
+
+
+def _is_deserted(path: Path) -> bool:
+    """Whether no process has this socket. One that is new may be about to listen to it."""
+    if time.time() - path.stat().st_mtime < _SETTING_UP_SECONDS and path.suffix == ".new":
+        return False
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK) as caller:
+        return caller.connect_ex(str(path)) == errno.ECONNREFUSED
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]), sys.argv[2:4], sys.argv[4:])
+    main(int(sys.argv[1]), sys.argv[2], sys.argv[3:])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import uuid
 import warnings
 from collections import deque
 from collections.abc import Callable
@@ -99,8 +98,7 @@ class LiveReader:
         here = ray.get_runtime_context().get_node_id()
         self._source: _Source
         if here == node and shared_memory_available():
-            name = f"application/{uuid.uuid4().hex[:8]}"
-            self._source = Subscriber(session.scope(here), name, {stream: _DEPTH})
+            self._source = Subscriber(session.scope(here), {stream: _DEPTH})
         else:
             self._source = _Asking(publisher, stream)
             self._source.receive(0.0)

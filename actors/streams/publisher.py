@@ -8,9 +8,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+from aerodaas.actors.streams.availability import shared_memory_available
 from aerodaas.actors.streams.codec import Encoded, UnsendableError
+from aerodaas.actors.streams.local_publisher import LocalPublisher
 from aerodaas.actors.streams.remote import RemoteReader, send_to
-from aerodaas.actors.streams.shared_memory import SharedPublisher, shared_memory_available
 from aerodaas.types.clock import host_time_ns
 from aerodaas.types.data import Header
 from aerodaas.types.status import Message, TraceSpan
@@ -41,7 +42,7 @@ class Publisher:
         self.latencies: deque[float] = deque(maxlen=_LATENCIES_KEPT)
         """Milliseconds from capture to publishing, newest last."""
         self.remote: list[RemoteReader] = []
-        self._shared = SharedPublisher(f"{scope}/{stream}") if shared_memory_available() else None
+        self._local = LocalPublisher(scope, stream) if shared_memory_available() else None
         self._kept: deque[tuple[int, bytes]] | None = None
 
     def measure(self, item: Any, header: Header, captured: int) -> Message[Any]:  # noqa: ANN401
@@ -78,8 +79,8 @@ class Publisher:
             problem = str(error)
             message = replace(message, item=None)
             encoded = Encoded(message)
-        if self._shared is not None:
-            self._shared.send(encoded)
+        if self._local is not None:
+            self._local.send(encoded)
         if self.remote:
             send_to(self.remote, self.stream, encoded)
         if self._kept is not None:
@@ -101,5 +102,5 @@ class Publisher:
 
     def close(self) -> None:
         """Close the stream."""
-        if self._shared is not None:
-            self._shared.close()
+        if self._local is not None:
+            self._local.close()

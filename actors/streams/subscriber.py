@@ -5,17 +5,13 @@ from __future__ import annotations
 import threading
 import warnings
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from queue import SimpleQueue
 from typing import Any
 
+from aerodaas.actors.streams.availability import shared_memory_available
 from aerodaas.actors.streams.codec import UnreadableError, decode
-from aerodaas.actors.streams.shared_memory import (
-    MAX_DEPTH,
-    SharedSubscriber,
-    SharedWaiter,
-    shared_memory_available,
-)
+from aerodaas.actors.streams.local_subscriber import LocalSubscriber
 from aerodaas.types.status import Message
 
 __all__ = ["Subscriber"]
@@ -31,14 +27,13 @@ class Subscriber:
     def __init__(
         self,
         scope: str,
-        name: str,
         depths: Mapping[str, int],
         unreadable: Callable[[str], None] = warnings.warn,
     ) -> None:
         """Subscribe to the streams of `depths`; `scope` is the prefix of their names on this node.
 
-        `name` is the reader's, unique within the scope. A message whose item cannot be rebuilt
-        here is received empty, and `unreadable` is called with the reason, in any thread.
+        A message whose item cannot be rebuilt here is received empty, and `unreadable` is called
+        with the reason, in any thread.
         """
         self._unreadable = unreadable
         self.received: dict[str, int] = dict.fromkeys(depths, 0)
@@ -51,11 +46,8 @@ class Subscriber:
         self._calls = 0
         self._scope = scope
         self._added: SimpleQueue[tuple[Mapping[str, int], threading.Event]] = SimpleQueue()
-        self._subscribers: dict[str, SharedSubscriber] = {}
-        self._waiter: SharedWaiter | None = None
-        if shared_memory_available():
-            self._waiter = SharedWaiter(f"{scope}/subscriber/{name}")
-            self._subscribe(depths)
+        self._local = LocalSubscriber(scope) if shared_memory_available() else None
+        self._subscribe(depths)
 
     def add(self, depths: Mapping[str, int]) -> threading.Event:
         """Request a subscription to further streams; thread-safe.
@@ -81,7 +73,7 @@ class Subscriber:
     @property
     def shared(self) -> bool:
         """True if this subscriber reads shared memory."""
-        return self._waiter is not None
+        return self._local is not None
 
     def receive(self, timeout: float) -> list[Message[Any]]:
         """Return new messages, in order within each stream; wait up to `timeout` seconds.
@@ -90,18 +82,17 @@ class Subscriber:
         subscription, independent of the order of arrival.
         """
         self.subscribe_added()
-        messages = self._collect()
+        if self._local is not None:
+            return self._collect(self._local.receive(timeout))
+        messages = self._collect({})
         if not messages and timeout > 0:
-            self._wait(timeout)
-            messages = self._collect()
+            self._await_call(timeout)
+            messages = self._collect({})
         return messages
 
     def deliver(self, stream: str, data: bytes) -> None:
         """Add a message from another node."""
-        try:
-            message = decode(memoryview(data))
-        except UnreadableError as error:
-            message = self._emptied(error)
+        message = self._decoded(memoryview(data))
         with self._called:
             self._delivered[stream].append(message)
         self.wake()
@@ -111,57 +102,43 @@ class Subscriber:
         with self._called:
             self._calls += 1
             self._called.notify_all()
-        if self._waiter is not None:
-            self._waiter.wake()
+        if self._local is not None:
+            self._local.wake()
 
     def close(self) -> None:
         """Close all streams."""
-        for subscriber in self._subscribers.values():
-            subscriber.close()
-        if self._waiter is not None:
-            self._waiter.close()
+        if self._local is not None:
+            self._local.close()
 
     def _subscribe(self, depths: Mapping[str, int]) -> None:
-        if self._waiter is None:
-            return
-        for stream, depth in depths.items():
-            subscriber = SharedSubscriber(f"{self._scope}/{stream}", min(depth, MAX_DEPTH))
-            self._waiter.attach(subscriber)
-            self._subscribers[stream] = subscriber
+        if self._local is not None:
+            for stream, depth in depths.items():
+                self._local.subscribe(stream, depth)
 
-    def _wait(self, timeout: float) -> None:
-        if self._waiter is not None:
-            self._waiter.wait(timeout)
-            return
+    def _await_call(self, timeout: float) -> None:
         with self._called:
             calls = self._calls
             self._called.wait_for(
                 lambda: self._calls != calls or any(self._delivered.values()), timeout
             )
 
-    def _collect(self) -> list[Message[Any]]:
+    def _collect(self, arrived: Mapping[str, Iterable[memoryview]]) -> list[Message[Any]]:
         messages: list[Message[Any]] = []
         for stream, delivered in self._delivered.items():
             start = len(messages)
-            subscriber = self._subscribers.get(stream)
-            if subscriber is not None:
-                while (message := self._read(subscriber)) is not None:
-                    messages.append(message)
+            messages += map(self._decoded, arrived.get(stream, ()))
             while delivered:
                 messages.append(delivered.popleft())
             for message in messages[start:]:
                 self._count(message)
         return messages
 
-    def _read(self, subscriber: SharedSubscriber) -> Message[Any] | None:
+    def _decoded(self, data: memoryview) -> Message[Any]:
         try:
-            return subscriber.receive()
+            return decode(data)
         except UnreadableError as error:
-            return self._emptied(error)
-
-    def _emptied(self, error: UnreadableError) -> Message[Any]:
-        self._unreadable(str(error))
-        return error.message
+            self._unreadable(str(error))
+            return error.message
 
     def _count(self, message: Message[Any]) -> None:
         stream = message.stream

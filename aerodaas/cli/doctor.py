@@ -25,7 +25,6 @@ __all__ = ["examine", "show_findings"]
 
 _PACKAGES = {
     "ray": "ray",
-    "iceoryx2": "iceoryx2",
     "panda3d": "panda3d.core",
     "onnxruntime": "onnxruntime",
     "opencv-python-headless": "cv2",
@@ -36,7 +35,6 @@ _PACKAGES = {
     "pyvrp": "pyvrp",
 }
 _REMEDIES = {
-    "iceoryx2": "pip install 'iceoryx2==0.10.*', which builds it with Rust where it has no wheel",
     "pyvrp": "for the optimal scheduler and fleets, use Python 3.11 or newer",
 }
 _MEMORY_NEEDED = 1.0
@@ -153,7 +151,7 @@ def _streams() -> Iterator[Finding]:
 
     obstacle = shared_memory_obstacle()
     if not obstacle:
-        yield Finding("streams", "zero-copy in shared memory between actors of this host")
+        yield Finding("streams", "sockets and shared memory between actors of this host")
     else:
         text = "shared memory not available; frames go through Ray's object store"
         yield Finding("streams", text, ok=False, remedy=obstacle)

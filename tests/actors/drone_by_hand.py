@@ -31,7 +31,7 @@ class DroneByHand(DroneActor):
 
     def open_here(self) -> None:
         """What `prepare` does on a node of Ray's."""
-        self.subscriber = Subscriber(self.scope, self.name, self._reads)
+        self.subscriber = Subscriber(self.scope, self._reads)
         self.alerts = self.publisher(f"alerts/{self.name}")
         self._open()
         self._phase = "ready"

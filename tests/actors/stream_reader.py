@@ -39,7 +39,7 @@ class Reader:
 
     def open(self, scope: str, stream: str, depth: int) -> None:
         """Join a stream."""
-        self._subscribers[stream] = Subscriber(scope, f"reader/{stream}", {stream: depth})
+        self._subscribers[stream] = Subscriber(scope, {stream: depth})
         self._kept[stream] = []
 
     def deliver(self, stream: str, data: bytes) -> None:

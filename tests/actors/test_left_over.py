@@ -19,6 +19,7 @@ from flying import FLAT
 from aerodaas.actors.cluster.local_ray import LocalRay
 from aerodaas.actors.cluster.ray_process import LOCKS, VARIABLE
 from aerodaas.actors.cluster.ray_variables import VARIABLES
+from aerodaas.actors.private_folder import private_folder
 from aerodaas.recording.reader import Recording
 from aerodaas.recording.report.flight import RecordedFlight
 
@@ -83,14 +84,14 @@ def gone(processes: set[psutil.Process]) -> bool:
     return not any(one.is_running() for one in processes)
 
 
-def shared_memory(processes: set[psutil.Process]) -> set[Path]:
-    """Files in shared memory that these have open."""
+def stream_folders(processes: set[psutil.Process]) -> set[Path]:
+    """Folders with the sockets of these processes' streams."""
     found = set()
     for process in processes:
         with contextlib.suppress(psutil.Error):
-            maps = process.memory_maps(grouped=False)
-            found |= {Path(one.path) for one in maps if one.path.startswith("/dev/shm/")}  # noqa: S108
-    return {path for path in found if path.exists()}
+            sockets = process.net_connections("unix")
+            found |= {Path(one.laddr).parent for one in sockets if isinstance(one.laddr, str)}
+    return {path for path in found if private_folder("streams") in path.parents}
 
 
 def folders(processes: set[psutil.Process]) -> set[Path]:
@@ -119,10 +120,10 @@ def kill_in_flight(
     time.sleep(3.0)
     everyone = set(psutil.Process(process.pid).children(recursive=True))
     own = folders(everyone)
-    memory = shared_memory(everyone)
+    streams = stream_folders(everyone)
     assert len(actors(process.pid)) >= 2
     assert len(own) == 1
-    assert memory
+    assert streams
     for one in actors(process.pid):
         if also is not None and also in one.cmdline()[0]:
             one.kill()
@@ -130,7 +131,7 @@ def kill_in_flight(
     process.wait()
     until(lambda: gone(everyone), 60.0)
     until(lambda: not any(path.exists() for path in own), 20.0)
-    assert not any(path.exists() for path in memory)
+    assert not any(path.exists() for path in streams)
     if recording is not None:
         with Recording.open(recording) as written:
             assert written.complete

@@ -31,7 +31,7 @@ from aerodaas.types.data import Frame, Header
 from aerodaas.types.status import Message
 
 pytestmark = [
-    needs(shared_memory_available(), "needs iceoryx2 and shared memory: `aerodaas doctor`"),
+    needs(shared_memory_available(), "needs shared memory: `aerodaas doctor`"),
     pytest.mark.wall_clock,
 ]
 
@@ -151,7 +151,7 @@ def test_the_last_message_arrives_though_the_link_was_busy(connect: Connect) -> 
 def test_a_reader_that_never_reads_harms_nobody(connect: Connect) -> None:
     """A reader that is stuck, however deep its queue, does not hold up the others."""
     link = connect(depth=MAX_DEPTH)
-    with_local = Subscriber(link.publisher.scope, "quick", {link.stream: 1})
+    with_local = Subscriber(link.publisher.scope, {link.stream: 1})
     for stamp in range(4 * MAX_DEPTH):
         link.publish(stamp, stamp)
         assert [message.seq for message in with_local.receive(0)] == [stamp]
@@ -191,7 +191,7 @@ def test_frames_of_any_size_pass(connect: Connect, shape: tuple[int, int, int]) 
 def test_a_reader_that_leaves_harms_nobody(connect: Connect) -> None:
     """The publisher goes on after a reader has closed its subscriber."""
     link = connect(depth=2)
-    leaving = Subscriber(link.publisher.scope, "leaving", {link.stream: 2})
+    leaving = Subscriber(link.publisher.scope, {link.stream: 2})
     link.publish(0, "a")
     leaving.close()
     link.publish(1, "b")
@@ -202,7 +202,7 @@ def test_many_readers_see_the_same() -> None:
     """Every reader gets every message."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
     publisher = Publisher(scope, "s")
-    readers = [Subscriber(scope, f"r{i}", {"s": 8}) for i in range(12)]
+    readers = [Subscriber(scope, {"s": 8}) for i in range(12)]
     for stamp in range(5):
         publisher.measure(stamp, Header(stamp, stamp, "c"), 0)
     for subscriber in readers:
@@ -215,7 +215,7 @@ def test_one_subscriber_keeps_the_order_in_which_its_streams_were_named() -> Non
     """Messages that wait together come stream by stream, whatever their order of arrival."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
     publishers = {name: Publisher(scope, name) for name in ("b", "a")}
-    subscriber = Subscriber(scope, "r", {"a": 4, "b": 4})
+    subscriber = Subscriber(scope, {"a": 4, "b": 4})
     for stamp in range(3):
         for name, publisher in publishers.items():
             publisher.measure(f"{name}{stamp}", Header(stamp, stamp, name), 0)
@@ -234,7 +234,7 @@ def test_one_subscriber_keeps_the_order_in_which_its_streams_were_named() -> Non
 def test_a_waiting_reader_wakes_for_a_message_and_for_a_call() -> None:
     """`receive` sleeps, and returns as soon as there is a reason to."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
-    publisher, subscriber = Publisher(scope, "s"), Subscriber(scope, "r", {"s": 1})
+    publisher, subscriber = Publisher(scope, "s"), Subscriber(scope, {"s": 1})
     publisher.measure("x", Header(0, 0, "c"), 0)
     assert [message.item for message in subscriber.receive(60.0)] == ["x"]
     subscriber.wake()
@@ -245,7 +245,7 @@ def test_a_waiting_reader_wakes_for_a_message_and_for_a_call() -> None:
 _VICTIM = """
 import sys, time
 from aerodaas.actors.streams import Subscriber
-subscriber = Subscriber(sys.argv[1], f"victim{sys.argv[2]}", {"s": 64})
+subscriber = Subscriber(sys.argv[1], {"s": 64})
 print("ready", flush=True)
 kept = []
 while True:
@@ -259,7 +259,7 @@ while True:
 def test_a_reader_that_is_killed_harms_nobody() -> None:
     """SIGKILL of readers that hold messages: the publisher and the other readers go on."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
-    publisher, subscriber = Publisher(scope, "s"), Subscriber(scope, "survivor", {"s": 4})
+    publisher, subscriber = Publisher(scope, "s"), Subscriber(scope, {"s": 4})
     root = Path(__file__).resolve().parents[2]
     image = np.zeros((360, 640, 3), np.uint8)
     stamp = 0
@@ -302,7 +302,7 @@ time.sleep(600)
 def test_a_publisher_that_is_killed_and_returns_is_read_again() -> None:
     """A restarted actor's stream goes on for those who read the one that died."""
     scope = f"test/{uuid.uuid4().hex[:8]}"
-    subscriber = Subscriber(scope, "r", {"s": 8})
+    subscriber = Subscriber(scope, {"s": 8})
     root = Path(__file__).resolve().parents[2]
     for _ in range(2):
         command = [sys.executable, "-c", _PUBLISHER, scope]

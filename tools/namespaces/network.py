@@ -18,7 +18,7 @@ from pathlib import Path
 
 from typing_extensions import Self
 
-from aerodaas.actors.private_folder import shared_memory_names
+from aerodaas.actors.private_folder import private_folder
 from aerodaas.types.errors import AeroDaaSError, ConfigError
 from tools.namespaces.links import BRIDGE, NetemLink, RelayLink, ShapedLink, has_netem, plug
 from tools.namespaces.machine import Machine, run
@@ -93,7 +93,7 @@ class LocalNetwork:
         It has the folders in `scratch` to itself, too.
         """
         address = str(next(self._hosts))
-        machine = Machine(name, scratch=[_SHARED_MEMORY, shared_memory_names()[0], *scratch])
+        machine = Machine(name, scratch=[_SHARED_MEMORY, private_folder("streams"), *scratch])
         self._stack.callback(machine.power_off)
         label = f"ad{self._id}{len(self.far)}"
         link: ShapedLink = self._link(label, self._switch, machine, f"{address}/24")
