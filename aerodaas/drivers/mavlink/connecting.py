@@ -77,7 +77,7 @@ def establish(
     if not telemetry.armed:
         _see_to_failsafes(link, autopilot, settings, robot.id)
         origin = global_origin(telemetry, frame)
-        if settings.fence != "off":
+        if settings.fence != "off" and not settings.observe:
             upload_fence(link, autopilot, robot.limits.geofence, origin, settings.fence)
         if settings.fallback != "ignore":
             ways = settings.way_home
@@ -185,7 +185,7 @@ def _see_to_failsafes(
         return
     parameters = Parameters(link, autopilot)
     for unsafe in unsafe_parameters(parameters, autopilot):
-        if settings.failsafes == "set":
+        if settings.failsafes == "set" and not settings.observe:
             parameters.set(unsafe.failsafe.name, unsafe.failsafe.safe)
             _log.warning("%s: %s: set", name, unsafe.text)
         else:
