@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish
+from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish, require_answer
 from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
@@ -154,6 +154,8 @@ class MavlinkVehicle:
                 )
                 self._report.departure = self._departure
                 self._commander = commander
+            if found.signs and not link.signs:
+                require_answer(commander, self._name, self._pause)
             self._connection = establish(
                 link,
                 found.autopilot,

@@ -150,6 +150,11 @@ class MavlinkLink:
         self._thread.start()
 
     @property
+    def signs(self) -> bool:
+        """Whether there is a key, by which what is sent is signed."""
+        return self._key is not None
+
+    @property
     def target(self) -> Sender:
         """System and component of the vehicle, which must be known by now."""
         target = self._pins.target
