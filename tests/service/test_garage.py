@@ -11,7 +11,7 @@ import pytest
 from desks import PILOT, Provider
 
 from aerodaas.analytics.remote.schemas import StatusOut
-from aerodaas.protocol.schemas import LinkState, RobotOut
+from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut
 from aerodaas.service import garage as garages
 
 T0 = 1_800_000_000.0
@@ -104,3 +104,13 @@ def test_the_end_of_a_flight_is_of_its_own_time(provider: Provider, clock: Clock
     clock.now = T0 + 3600.0
     provider.garage.note(status(90.0, state="landed", mode="grounded", battery=0.4), ended=T0)
     assert (seen(provider).battery, seen(provider).heard) == (0.4, T0)
+
+
+def test_a_charge_that_nobody_knows_lasts_for_no_minute(provider: Provider) -> None:
+    """A lease with charge for so long waits until a drone is known to have it."""
+    lease = provider.bookings.request(PILOT, LeaseIn(battery_minutes=1.0, minutes=5.0))
+    assert lease.state is LeaseState.QUEUED
+    provider.monitor.see("two", battery=0.9)
+    provider.bookings.tick()
+    granted = provider.bookings.lease(lease.id)
+    assert (granted.state, granted.robots) == (LeaseState.GRANTED, ("two",))
