@@ -159,8 +159,9 @@ def _words(value: object) -> str:
     if isinstance(value, Enum) and value.name is not None:
         return value.name
     # On Python 3.10 several flags together have no name.
-    if isinstance(value, Flag) and (flags := [one for one in type(value) if one in value]):
-        return "|".join(str(one.name) for one in flags if one.value)
+    if isinstance(value, Flag):
+        flags = [str(one.name) for one in type(value) if one.value and one in value]
+        return "|".join(flags) or str(value)
     if isinstance(value, type) or _wordless(type(value)):
         return f"<{getattr(value, '__qualname__', type(value).__name__)}>"
     text = str(value)

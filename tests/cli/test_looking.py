@@ -7,7 +7,7 @@ import socket
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 
@@ -71,7 +71,7 @@ def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("family", ["ardupilot", "px4"])
 def test_looking_changes_nothing(
-    monkeypatch: pytest.MonkeyPatch, family: str, command: str
+    monkeypatch: pytest.MonkeyPatch, family: Literal["px4", "ardupilot"], command: str
 ) -> None:
     """No parameter, no plan, no mode; and no heartbeat of a ground station that then falls silent.
 

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import pytest
 from mavlink_flights import LOOPBACK, free_port, robot_of, wait_for
@@ -27,6 +27,7 @@ from aerodaas.types.errors import VehicleError
 from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
 
 KEY = bytes(range(32))
+Family: TypeAlias = Literal["px4", "ardupilot"]
 TRUTH = "signs; no key is here"
 
 
@@ -37,7 +38,7 @@ def _no_key_of_the_host(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @contextmanager
-def signing(family: str = "px4", **settings: Any) -> Iterator[EnvironmentConfig]:  # noqa: ANN401
+def signing(family: Family = "px4", **settings: Any) -> Iterator[EnvironmentConfig]:  # noqa: ANN401
     """An autopilot that wants its key, and the environment of its drone."""
     port = free_port()
     options = AutopilotOptions(family=family, peer=(LOOPBACK, port), ready_after=0.0, key=KEY)
@@ -46,7 +47,7 @@ def signing(family: str = "px4", **settings: Any) -> Iterator[EnvironmentConfig]
 
 
 @pytest.mark.parametrize("family", ["px4", "ardupilot"])
-def test_it_is_not_connected_without_its_key(family: str) -> None:
+def test_it_is_not_connected_without_its_key(family: Family) -> None:
     """What it says can be read, and nothing that we say is: found out before it is to fly."""
     with signing(family) as environment:
         vehicle = MavlinkVehicle(environment.robots[0], environment)
