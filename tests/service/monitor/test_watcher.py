@@ -150,12 +150,12 @@ def test_one_whose_driver_hangs_is_not_connected(
     monkeypatch.setattr(watchers, "_SILENT_SECONDS", 0.3)
     watcher.want(wanted=True)
     until(lambda: watcher.news.link is LinkState.CONNECTED)
-    script.stuck = threading.Event()
+    stuck = script.stuck = threading.Event()
     until(lambda: watcher.news.link is LinkState.LOST)
     lost = watcher.news
     assert "has not answered for" in lost.reason
     assert lost.since == lost.heard
-    script.stuck, stuck = None, script.stuck
+    script.stuck = None
     stuck.set()
     until(lambda: watcher.news.link is LinkState.CONNECTED)
     assert watcher.news.reason == ""
