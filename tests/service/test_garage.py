@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,9 +28,9 @@ class Clock:
 @pytest.fixture
 def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
     """Of the garage."""
-    clock, real = Clock(), garages.time
+    clock = Clock()
     names = ("monotonic", "strftime", "gmtime")
-    functions = {name: getattr(real, name) for name in names}
+    functions = {name: getattr(time, name) for name in names}
     monkeypatch.setattr(garages, "time", SimpleNamespace(time=lambda: clock.now, **functions))
     return clock
 
@@ -42,12 +43,12 @@ def provider(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provid
     made.desk.close()
 
 
-def status(time: float, **changes: Any) -> dict[str, StatusOut]:  # noqa: ANN401 - its fields
+def status(at: float, **changes: Any) -> dict[str, StatusOut]:  # noqa: ANN401 - its fields
     """What a mission tells of drone `one` at its own time."""
-    lists = {name: [] for name in ("pending", "visited", "given_up", "faults")}
+    lists: dict[str, Any] = {name: [] for name in ("pending", "visited", "given_up", "faults")}
     counts = dict.fromkeys(("distance", "waypoints_visited", "waypoints_known"), 1)
     flying = {"state": "enroute", "reason": "", "target": None, "mode": "guided", "battery": 0.7}
-    return {"one": StatusOut(time=time, **{**lists, **counts, **flying, **changes})}
+    return {"one": StatusOut(time=at, **{**lists, **counts, **flying, **changes})}
 
 
 def seen(provider: Provider) -> RobotOut:
