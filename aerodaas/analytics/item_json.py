@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from aerodaas.config.annotations import is_subclass
 from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.types import data, geometry, status, vehicle, waypoints
 from aerodaas.types.errors import AeroDaaSError
@@ -204,12 +205,8 @@ def _built(kind: type, fields: dict[str, Any]) -> Any:  # noqa: ANN401 - an inst
 
 def _as_enum(value: Any, hint: Any) -> Any:  # noqa: ANN401 - an annotation
     """The member of an enumeration for its value, where the field is one; `value` otherwise."""
-    kinds = [one for one in (hint, *typing.get_args(hint)) if _is_enum(one)]
+    kinds = [one for one in (hint, *typing.get_args(hint)) if is_subclass(one, enum.Enum)]
     return kinds[0](value) if kinds and value is not None else value
-
-
-def _is_enum(hint: Any) -> bool:  # noqa: ANN401 - an annotation
-    return isinstance(hint, type) and issubclass(hint, enum.Enum)
 
 
 def _names(kind: type) -> tuple[str, ...]:
@@ -242,7 +239,7 @@ def _conforms(value: object, hint: Any) -> bool:  # noqa: ANN401 - an annotation
         return isinstance(value, origin) and _conform_inside(value, origin, hint)
     if hint is Any:
         return True
-    if _is_enum(hint):
+    if is_subclass(hint, enum.Enum):
         words: Iterable[enum.Enum] = hint
         return isinstance(value, str) and value in {one.value for one in words}
     if hint in {int, float} and isinstance(value, int):

@@ -53,7 +53,8 @@ def check(
     connect: Annotated[  # noqa: FBT002
         bool,
         typer.Option(
-            "--connect/--no-connect", help="Connect to vehicles and cameras; they do not move."
+            "--connect/--no-connect",
+            help="Connect to vehicles and cameras; they do not move, and nothing is set there.",
         ),
     ] = True,
 ) -> None:
@@ -201,7 +202,7 @@ def _vehicle(
     from aerodaas.drivers.loading import load_vehicle  # noqa: PLC0415 - slow to load
     from aerodaas.types.health import Verdict  # noqa: PLC0415 - as above
 
-    vehicle = load_vehicle(robot, environment.config)
+    vehicle = load_vehicle(robot, environment.config, observing=True)
     connected.callback(vehicle.close)
     vehicle.connect(_CONNECTING)
     vehicles[robot.id] = vehicle

@@ -45,7 +45,7 @@ def logs(
     """
     from aerodaas.types.vehicle_log import LoggingVehicle  # noqa: PLC0415 - slow to load
 
-    with connected_robot(robot, env, setting or (), observing=True) as (vehicle, _):
+    with connected_robot(robot, env, setting or ()) as (vehicle, _):
         if not isinstance(vehicle, LoggingVehicle):
             driver = vehicle.capabilities.driver
             raise VehicleError(f"{robot}: no logs can be fetched by the driver {driver}")

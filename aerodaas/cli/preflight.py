@@ -39,7 +39,7 @@ def preflight(
         bool, typer.Option("--json", help="Print the list as JSON.")
     ] = False,
 ) -> None:
-    """Print a robot's health before take-off as one list; nothing moves.
+    """Print a robot's health before take-off as one list; nothing moves, and nothing is set there.
 
     Each item has its value, what it should be, what that means, and a remedy. The section
     `preflight` of the robot in the environment file says what refuses a take-off and what only

@@ -21,15 +21,16 @@ _CONNECTING = 10.0
 
 @contextmanager
 def connected_robot(
-    name: str, file: Path, settings: Iterable[str], *, observing: bool = False
+    name: str, file: Path, settings: Iterable[str]
 ) -> Iterator[tuple[Vehicle, RobotConfig]]:
-    """Connect the robot `name` of an environment file for the length of a `with`.
+    """Connect the robot `name` of an environment file for the length of a `with`, to look at it.
+
+    Nothing is changed at the vehicle, whatever a flight would set there, and no video is asked for.
 
     Args:
         name: Its id.
         file: The environment file.
         settings: `id.setting=value`, laid over the file.
-        observing: Whether nothing is changed at the vehicle, whatever a flight would set there.
 
     Raises:
         ConfigError: For a file or a setting that is wrong.
@@ -46,6 +47,7 @@ def connected_robot(
     if name not in robots:
         raise UnknownIdError("robot", name, list(robots))
     robot = robots[name]
-    with closing(load_vehicle(robot, config, observing=observing)) as vehicle:
+    seen = robot.model_copy(update={"sensors": ()})
+    with closing(load_vehicle(seen, config, observing=True)) as vehicle:
         vehicle.connect(_CONNECTING)
         yield vehicle, robot

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, Secret, SecretBytes, SecretStr, ValidationError
 from pydantic_core import ErrorDetails
 
+from aerodaas.config.annotations import is_subclass
 from aerodaas.config.secrets import SecretUrl, cleaned, is_secret_name
 from aerodaas.types.errors import ConfigError
 
@@ -84,7 +85,7 @@ def _is_secret(model: type[BaseModel], place: Sequence[int | str]) -> bool:
 
 
 def _hides(kind: Any) -> bool:  # noqa: ANN401 - an annotation
-    return isinstance(kind, type) and issubclass(kind, Secret | SecretStr | SecretBytes)
+    return is_subclass(kind, Secret, SecretStr, SecretBytes)
 
 
 def _typed_secrets(kind: Any, content: object) -> Iterator[SecretStr]:  # noqa: ANN401
@@ -121,14 +122,14 @@ def _settings_at(model: type[BaseModel], place: Sequence[int | str]) -> list[str
     kinds: list[Any] = [model]
     for part in place:
         kinds = [inner for kind in kinds for inner in _inside(kind, part)]
-    models = (kind for kind in kinds if _is_model(kind))
+    models = (kind for kind in kinds if is_subclass(kind, BaseModel))
     return sorted(
         {field.alias or name for kind in models for name, field in kind.model_fields.items()}
     )
 
 
 def _inside(kind: Any, part: int | str) -> list[Any]:  # noqa: ANN401 - an annotation
-    if _is_model(kind):
+    if is_subclass(kind, BaseModel):
         fields = kind.model_fields
         return _alternatives(fields[part].annotation) if part in fields else []
     arguments = typing.get_args(kind)
@@ -143,7 +144,3 @@ def _alternatives(kind: Any) -> list[Any]:  # noqa: ANN401 - an annotation
     if typing.get_origin(kind) in {typing.Union, types.UnionType}:
         return [one for inner in typing.get_args(kind) for one in _alternatives(inner)]
     return [kind]
-
-
-def _is_model(kind: Any) -> bool:  # noqa: ANN401 - an annotation
-    return isinstance(kind, type) and issubclass(kind, BaseModel)

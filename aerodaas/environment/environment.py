@@ -69,6 +69,7 @@ class Environment(PaperNames, IEnvironment):
         self._flown = 0
         """Number of the graph's navigation edges that went to flights that have ended."""
         self._robots = {robot.id: Robot(self, robot) for robot in self.config.robots}
+        self._start_hook: Callable[[], None] | None = None
         self._trajectory: TrajectoryScheduler | None = None
         self.chosen_trajectory: TrajectoryScheduler | None = None
         """The trajectory scheduler that the application plugged in, if any."""
@@ -97,6 +98,12 @@ class Environment(PaperNames, IEnvironment):
     def unflown(self) -> Unflown | None:
         """What stands in for the flight of an application that was only built."""
         return self._mission if isinstance(self._mission, Unflown) else None
+
+    @property
+    def has_hooks(self) -> bool:
+        """Whether functions of the application are to run before or after its flight."""
+        hooked = any(robot.start_hooks or robot.end_hooks for robot in self._robots.values())
+        return hooked or self._start_hook is not None
 
     def has_env_sensors(self) -> bool:
         """Return True if the environment has sensors."""
@@ -195,6 +202,9 @@ class Environment(PaperNames, IEnvironment):
     ) -> None:
         """Start the mission of every robot that navigates, as `Robot.start_mission` does.
 
+        An application that is only built, as by `aerodaas check`, ends here; with `wait=False`
+        where it wants something of the flight. Its hooks do not run.
+
         Args:
             hook: Called before the flight, after the hooks of all robots' `on_start`.
             wait: Return when the mission has ended; if False, as soon as it flies.
@@ -206,15 +216,17 @@ class Environment(PaperNames, IEnvironment):
             AeroDaaSError: What the mission ended with; the drones are landed and the recording is
                 closed first.
         """
+        self._start_hook = hook
+        # Before any hook: what belongs to the flight does not run where it is only built.
+        if self._only_built():
+            if wait:
+                self.wait()
+            return
         robots = self._robots.values()
         for each in [one for robot in robots for one in robot.start_hooks]:
             each()
         if hook is not None:
             hook()
-        unflown = offer(self)
-        if unflown is not None:
-            self._mission, self.graph.reader = unflown, unflown.read
-            return
         self._speed = speed
         run = self.launch_again()
         run.on_end += [one for robot in robots for one in robot.end_hooks if one not in run.on_end]
@@ -407,15 +419,18 @@ class Environment(PaperNames, IEnvironment):
     def launch(self) -> Run:
         """Start the mission of every robot that navigates, once, by this process' own runtime."""
         mission = self.launched()
+        if self.unflown is not None:
+            self.unflown.refuse()
         if not isinstance(mission, Run):
             raise MissionError(f"the provider at {self.path} flies it: call start_mission()")
         return mission
 
     def launched(self) -> MissionRun:
         """Start the mission of every robot that navigates, once; returns it."""
-        if self._mission is None:
+        if self._mission is None and not self._only_built():
             self._admit()
             return self._start()
+        assert self._mission is not None  # noqa: S101 - it flies, or what stands in for it
         return self._mission
 
     def launch_again(self) -> MissionRun:
@@ -432,6 +447,15 @@ class Environment(PaperNames, IEnvironment):
             old, new = edges[: self._flown], edges[self._flown :]
             edges[:] = [edge for edge in old if edge.navigation.stream is not None] + new
         return self._start()
+
+    def _only_built(self) -> bool:
+        """Whether the application is not to fly; then its environment is offered instead."""
+        unflown = offer(self)
+        if unflown is None:
+            return False
+        if self.unflown is None:
+            self._mission, self.graph.reader = unflown, unflown.read
+        return True
 
     def _start(self) -> MissionRun:
         self.place_entries()

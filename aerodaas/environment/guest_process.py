@@ -124,6 +124,11 @@ def _document(environment: Environment) -> GuestDocument:
             "a guest's file ends before the flight, so subscribe() would never be called back: "
             "make an analysis of it"
         )
+    if environment.has_hooks:
+        raise GraphError(
+            "a guest's file ends before the flight, so hooks of on_start, on_end or start_mission "
+            "would never run: leave them out"
+        )
     environment.place_entries()
     nodes = [_node(one) for one in graph.nodes.values() if one.kind != "sensor"]
     return GuestDocument(

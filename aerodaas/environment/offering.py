@@ -1,6 +1,8 @@
 """Offering of an environment that is ready to start to whoever builds it without flying it.
 
-A guest's process and the compiler of mission documents run an application for its graph.
+`aerodaas check`, `graph`, `compile` and `submit` and a guest's process run an application for its
+graph alone. Its file then runs up to the call that would wait for the flight: no hook runs, nothing
+starts, and what stands after that call does not run either.
 """
 
 from __future__ import annotations
@@ -18,22 +20,30 @@ if TYPE_CHECKING:
     from aerodaas.environment.environment import Environment
     from aerodaas.schedulers.trajectory.base import TrajectoryScheduler
 
-__all__ = ["Unflown", "offer", "offered", "require_no_more", "the_only"]
+__all__ = ["BuildEndedError", "Unflown", "offer", "offered", "require_no_more", "the_only"]
 
 _offered: ContextVar[list[Environment] | None] = ContextVar("offered", default=None)
 """Receiver of the environments that are ready; None where an application flies."""
+
+
+class BuildEndedError(BaseException):
+    """Ends an application that is only built where it would wait for its flight.
+
+    No Exception: it is no failure, and must not have one told to people.
+    """
 
 
 @contextmanager
 def offered() -> Iterator[list[Environment]]:
     """Have `start_mission()` offer its environment, into the list, instead of flying.
 
-    An application that then wants something of the flight has ended there, see `require_no_more`.
+    The application ends where it would wait for its flight, or wants something of it; for the
+    latter see `require_no_more`.
     """
     found: list[Environment] = []
     token = _offered.set(found)
     try:
-        with suppress(GoesOnError):
+        with suppress(GoesOnError, BuildEndedError):
             yield found
     finally:
         _offered.reset(token)
@@ -72,8 +82,9 @@ class Unflown(MissionRun):
         """Refuse to fly."""
         self.refuse()
 
-    def wait(self) -> None:
-        """Return: it is over."""
+    def wait(self) -> NoReturn:
+        """End the application: what comes next belongs to the end of a flight."""
+        raise BuildEndedError
 
     def command(self, robot: str, command: Command) -> NoReturn:
         """Refuse a command."""

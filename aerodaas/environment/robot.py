@@ -111,7 +111,10 @@ class Robot(PaperNames, IRobot):
         self._environment.wait()
 
     def on_start(self, hook: Callable[[], None]) -> Callable[[], None]:
-        """Register a hook to run before take-off; usable as a decorator."""
+        """Register a hook to run before take-off; usable as a decorator.
+
+        It runs when the mission is to fly, never where the application is only built.
+        """
         self.start_hooks.append(hook)
         return hook
 

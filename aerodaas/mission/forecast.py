@@ -34,8 +34,7 @@ class BatteryForecast:
         self, limits: LimitsConfig, home: Vector, meter: EnergyMeter, log: MissionLog
     ) -> None:
         """Forecast by `meter` for a drone that returns to `home`, ENU metres."""
-        self.fault = ""
-        """Why the battery is too small; empty while it is not."""
+        self._fault = ""
         self._limits = limits
         self._home = home
         self._meter = meter
@@ -64,9 +63,9 @@ class BatteryForecast:
         self._outlook = self._look(state, needed)
         available = state.battery.fraction - self._limits.battery_land
         if not (route and needed > max(0.0, available) * _MARGIN):
-            self.fault, self._short_since = "", None
+            self._fault, self._short_since = "", None
             return
-        self.fault = (
+        self._fault = (
             f"at this rate the plan and the way home need {_share(needed)} of a battery, and "
             f"{_share(max(0.0, available))} is there to spend: the drone returns when only the way "
             "home is left"
@@ -76,12 +75,19 @@ class BatteryForecast:
         surely = grounded or now - self._short_since >= _PATIENCE
         if surely and not self._told:
             self._told = True
-            self._log.alert(now, "unreachable_plan", self.fault)
+            self._log.alert(now, "unreachable_plan", self._fault)
 
     def outlook(self, now: int) -> BatteryOutlook | None:
         """How far the battery lasts; None if no forecast is due, or its charge is not known."""
+        return self._outlook if self._goes_on(now) else None
+
+    def fault(self, now: int) -> str:
+        """Why the battery is too small; empty while it is not, or nothing is forecast any more."""
+        return self._fault if self._goes_on(now) else ""
+
+    def _goes_on(self, now: int) -> bool:
         # The next one may be late, but has not been left out.
-        return self._outlook if now <= self._due + _PERIOD else None
+        return now <= self._due + _PERIOD
 
     def _look(self, state: VehicleState, needed: float) -> BatteryOutlook | None:
         """Compare the charge with that at which the supervisor has the drone return."""

@@ -162,7 +162,7 @@ class Mission:
             tuple(self._log.visited),
             tuple(self._log.given_up)[-RECENT:],
             self._log.distance,
-            tuple(text for text in (*texts, self._navigator.fault, self._forecast.fault) if text),
+            tuple(filter(None, (*texts, self._navigator.fault, self._forecast.fault(self._now)))),
             self._log.visits,
             self._log.waypoint_counts(stop.id for stop in stops),
             self._manual.operator(self._now),

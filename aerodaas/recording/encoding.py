@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from collections.abc import Set as AbstractSet
 from contextlib import suppress
 from dataclasses import is_dataclass
-from enum import Enum
+from enum import Enum, Flag
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -158,6 +158,10 @@ def _declared(kind: type) -> tuple[tuple[str, ...], bool]:
 def _words(value: object) -> str:
     if isinstance(value, Enum) and value.name is not None:
         return value.name
+    # On Python 3.10 several flags together have no name.
+    if isinstance(value, Flag):
+        flags = [str(one.name) for one in type(value) if one.value and one in value]
+        return "|".join(flags) or str(value)
     if isinstance(value, type) or _wordless(type(value)):
         return f"<{getattr(value, '__qualname__', type(value).__name__)}>"
     text = str(value)

@@ -145,13 +145,13 @@ class Bookings:
         for robot in self._config.robots:
             state = states[robot.id]
             place = state.position or robot.start
-            charge = 1.0 if state.battery is None else state.battery
-            usable = max(0.0, charge - robot.limits.battery_return)
+            usable = None if state.battery is None else state.battery - robot.limits.battery_return
+            minutes = robot.limits.endurance / 60.0
             fleet[robot.id] = Candidate(
                 robot.id,
                 camera=any(one.type == "camera" for one in robot.sensors),
                 position=(place[0], place[1]),
-                battery_minutes=usable * robot.limits.endurance / 60.0,
+                battery_minutes=None if usable is None else max(0.0, usable) * minutes,
                 objection="" if robot.id in busy else self._garage.objection(robot.id),
                 busy=robot.id in busy,
             )

@@ -491,7 +491,7 @@ class MissionDesk:
             return
         if outcome is None:
             return
-        self._garage.note(outcome.status, now=True)
+        self._garage.note(outcome.status, ended=outcome.ended)
         self._garage.hand(one.row.robots, LinkState.UNWATCHED)
         self._store.usage.put(usage_of(one.row, outcome, one.flight.recording))
         phase = MissionPhase.LANDED if outcome.landed else MissionPhase.FAILED

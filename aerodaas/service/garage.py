@@ -15,6 +15,7 @@ from aerodaas.protocol.schemas import LinkState
 from aerodaas.service.errors import RefusedError, StoreError
 from aerodaas.service.monitor.news import VehicleNews
 from aerodaas.service.store import RobotState, Store
+from aerodaas.types.status import MissionState
 from aerodaas.types.vehicle import VehicleMode
 
 __all__ = ["OUT_OF_SERVICE", "Garage"]
@@ -27,6 +28,9 @@ _STILL_SECONDS = 60.0
 _CHARGE, _METRES = 0.01, 1.0
 """Changes of a drone that stands which are written down earlier."""
 _HOME = (0.0, 0.0, 0.0)
+_SILENT_SECONDS = 5.0
+"""Seconds without a new status of a mission that goes on, after which its drone counts as lost."""
+_OVER = {MissionState.LANDED.value, MissionState.ABORTED.value}
 _DROPOUT_SECONDS = 3.0
 """Seconds for which a link may be lost before its drone counts as out of reach."""
 
@@ -42,6 +46,8 @@ class Garage:
         self._written: dict[str, tuple[float, RobotState]] = {}
         self._return_at = {robot.id: robot.limits.battery_return for robot in config.robots}
         self._news = {robot.id: VehicleNews() for robot in config.robots}
+        self._told: dict[str, tuple[float, float]] = {}
+        """Mission time of each robot's newest status, and the Unix moment at which it came."""
         for robot in config.robots:
             self._states[robot.id] = store.robots.get(robot.id) or RobotState(robot.id)
 
@@ -56,25 +62,39 @@ class Garage:
         with self._lock:
             return self._news[robot]
 
-    def note(self, status: Mapping[str, StatusOut], *, now: bool = False) -> None:
-        """Take over what missions tell of their drones; `now` writes it down at once."""
+    def note(self, status: Mapping[str, StatusOut], *, ended: float | None = None) -> None:
+        """Take over what a mission tells of its drones.
+
+        The same status again is no news: who told it may hang, and with it what keeps the drone.
+
+        Args:
+            status: Newest status by robot.
+            ended: Unix seconds of the end of its flight, of which this is the last status, to be
+                written down at once; None while it goes on.
+        """
         for name, one in status.items():
             if name not in self._news:
                 continue
-            heard = time.time()
-            lost = one.mode == VehicleMode.LOST.value
+            moment = time.time() if ended is None else ended
+            if self._told.get(name, (None, 0.0))[0] != one.time or ended is not None:
+                self._told[name] = one.time, moment
+            told, over = self._told[name][1], one.state in _OVER
+            silent = moment - told > _SILENT_SECONDS and not over
+            lost = silent or one.mode == VehicleMode.LOST.value
             link = LinkState.LOST if lost else LinkState.MISSION
             before = self.news(name)
+            faults = (f"its mission has told nothing since {_moment(told)}",)
             news = VehicleNews(
                 link=link,
-                since=before.since if before.link is link else heard,
-                heard=before.heard if lost else heard,
+                since=before.since if before.link is link else told,
+                heard=before.heard if lost else told,
                 battery=one.battery,
                 position=_known(one.position),
                 mode=one.mode or "",
-                faults=tuple(one.faults),
+                faults=faults if silent else tuple(one.faults),
             )
-            self._take(name, news, heard=heard, least=0.0 if now else _WRITE_SECONDS)
+            least = _WRITE_SECONDS if ended is None else 0.0
+            self._take(name, news, heard=news.heard, least=least)
 
     def observe(self, news: Mapping[str, VehicleNews]) -> None:
         """Take over what the monitor tells of the drones on the ground; without any, it is gone."""
@@ -96,6 +116,7 @@ class Garage:
         with self._lock:
             for name in robots:
                 self._news[name] = VehicleNews(link=link, since=time.time())
+                self._told.pop(name, None)
 
     def objection(self, robot: str) -> str:
         """Why a drone on the ground can be neither leased nor flown now; empty if it can."""

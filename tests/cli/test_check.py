@@ -175,7 +175,8 @@ def test_a_vehicle_is_judged_by_what_it_says_in_the_end(
         ("env.wait()", True),
         ("print(odometry.get_data(timeout=5))", False),
         ("drone.pause_mission()\ndrone.wait()", False),
-        ("env.wait()\nprint(env.run.recording)", False),
+        ("env.wait()\nprint(env.run.recording)", True),
+        ("print(env.run.recording)", False),
         ("try: drone.end_mission()\nexcept Exception: pass", False),
     ],
 )

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from aerodaas.config.annotations import is_subclass
 from aerodaas.config.model import EnvironmentConfig, LimitsConfig, validated
 from aerodaas.config.overrides import located, overridden, parse_setting
 from aerodaas.types.errors import ConfigError
@@ -175,3 +176,12 @@ def test_a_task_without_a_deadline_has_a_second() -> None:
     """Missing figures have a default that a scheduler can work with."""
     content = {"robots": [{"id": "drone"}], "schedulers": {"tasks": {"model": {"benefit": 3}}}}
     assert validated(content, "here").schedulers.tasks["model"].deadline == 1000
+
+
+@pytest.mark.parametrize(
+    ("annotation", "found"),
+    [(bool, True), (int, True), (str, False), (list[int], False), (int | None, False)],
+)
+def test_an_annotation_is_a_class_or_is_not(annotation: object, *, found: bool) -> None:
+    """A parametrised list is none, although Python 3.10 takes it for one."""
+    assert is_subclass(annotation, int) is found

@@ -452,6 +452,22 @@ def test_a_forecast_that_is_short_for_a_moment_only_is_not_told() -> None:
     assert any("at this rate" in fault for fault in one.status.faults)
 
 
+def test_a_forecast_is_told_for_as_long_as_it_is_made() -> None:
+    """A drone that comes home, or has, does not still have a plan that is too long."""
+    limits = LimitsConfig(endurance=600.0, battery_return=0.15, battery_land=0.1)
+    one = flight(live(), limits=limits, vehicle=KinematicVehicle(charge=0.33))
+    one.run(10.0)
+    one.tell(add(Waypoint("far", 90, 0, 1.5)))
+    one.run(2.0)
+    assert any("at this rate" in fault for fault in one.status.faults)
+    one.tell(End("enough"))
+    one.run(4.0)
+    assert one.status.state in {S.LANDING, S.LANDED}
+    assert not one.status.faults
+    one.run_to(S.LANDED)
+    assert not one.status.faults
+
+
 def forecast_of(waypoint: Waypoint, charge: float) -> list[str]:
     """What is told before take-off of a plan of this one waypoint."""
     limits = LimitsConfig(endurance=600.0, battery_return=0.15, battery_land=0.1)

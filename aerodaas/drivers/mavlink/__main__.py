@@ -38,7 +38,8 @@ def main(
     ] = False,
 ) -> None:
     """Connect, and print the vehicle's identity, its objections and its missing protections."""
-    settings = {"url": url, "system": system, "failsafes": "ignore", "fallback": "ignore"}
+    own = {"failsafes": "ignore", "fallback": "ignore"}
+    settings = {"url": url, "system": system, **own, **MavlinkVehicle.observing}
     robot = RobotConfig(id="vehicle", driver="mavlink", settings=settings)
     vehicle = MavlinkVehicle(robot, EnvironmentConfig(robots=[robot]))
     try:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from aerodaas.config.model import RobotConfig
+from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
 from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.microservices.commander import Commander
@@ -28,7 +29,7 @@ from aerodaas.drivers.mavlink.wire.link import MavlinkLink
 from aerodaas.types.errors import VehicleError
 from aerodaas.types.geometry import GeodeticOrigin, Vector, ned_to_enu
 
-__all__ = ["CHECKS", "Connection", "establish"]
+__all__ = ["CHECKS", "Connection", "establish", "require_answer"]
 
 _log = logging.getLogger(__name__)
 
@@ -38,6 +39,8 @@ _WORDS = 40.0
 """Greatest age in seconds of an autopilot's text that explains why it is not ready."""
 _VERSION = 3.0
 """Seconds to wait for the autopilot's version."""
+_ANSWER = 5.0
+"""Seconds in which a vehicle answers the first commands, which are repeated each second."""
 _FAR = 20.0
 """Allowed metres between its position and the environment's home."""
 
@@ -54,6 +57,22 @@ class Connection:
     fallback: Fallback
     target: tuple[int, int]
     """System and component."""
+
+
+def require_answer(commander: Commander, name: str, pause: Callable[[], None]) -> None:
+    """Wait for the first answer of a vehicle that signs, while we have no key.
+
+    Its packets can be read without one, so that all would look well until it is to be flown; but
+    most that sign drop what is unsigned. Raises VehicleError if this one does.
+    """
+    deadline = time.monotonic() + _ANSWER
+    while not commander.answered:
+        if time.monotonic() >= deadline:
+            raise VehicleError(
+                f"{name}: the vehicle is heard, and signs; no key is here, so that it obeys "
+                f"nothing: set {MAVLINK_KEY}, or signing_key in its settings"
+            )
+        pause()
 
 
 def establish(
@@ -77,7 +96,7 @@ def establish(
     if not telemetry.armed:
         _see_to_failsafes(link, autopilot, settings, robot.id)
         origin = global_origin(telemetry, frame)
-        if settings.fence != "off":
+        if settings.fence != "off" and not settings.observe:
             upload_fence(link, autopilot, robot.limits.geofence, origin, settings.fence)
         if settings.fallback != "ignore":
             ways = settings.way_home
@@ -185,7 +204,7 @@ def _see_to_failsafes(
         return
     parameters = Parameters(link, autopilot)
     for unsafe in unsafe_parameters(parameters, autopilot):
-        if settings.failsafes == "set":
+        if settings.failsafes == "set" and not settings.observe:
             parameters.set(unsafe.failsafe.name, unsafe.failsafe.safe)
             _log.warning("%s: %s: set", name, unsafe.text)
         else:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
+from aerodaas.config.secrets import MAVLINK_KEY
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import decoded, mavlink
 from aerodaas.drivers.mavlink.wire.finder import Finder, FoundVehicle
@@ -37,11 +38,16 @@ class HeardVehicle:
     url: str
     """At which a driver hears it; loopback where it speaks from this machine."""
     system: int
+    signs: bool = False
+    """Whether it signs what it sends, and so obeys nobody without its key."""
 
     @property
     def text(self) -> str:
         """One line for people."""
-        return f"{self.family}, system {self.system}, heard at {self.url}"
+        signs = f"; it signs: to be flown it wants its key, by {MAVLINK_KEY} or signing_key"
+        return (
+            f"{self.family}, system {self.system}, heard at {self.url}{signs if self.signs else ''}"
+        )
 
 
 @dataclass(frozen=True)
@@ -120,7 +126,9 @@ class _Ear:
         """Those that can be flown, in the order in which they were heard."""
         for found in (finder.found for finder in self.finders.values()):
             if found is not None:
-                yield HeardVehicle(found.autopilot.name.lower(), self._near(found), found.system)
+                yield HeardVehicle(
+                    found.autopilot.name.lower(), self._near(found), found.system, found.signs
+                )
 
     def notes(self) -> Iterator[str]:
         """Why others cannot."""

@@ -13,6 +13,8 @@ __all__ = ["MavlinkSettings", "mavlink_settings"]
 
 _STATION = 255
 """System id of an autopilot's ground station, by default."""
+_OBSERVERS = (244, 243)
+"""System ids of who only looks; the first that is not a flight's own."""
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
@@ -62,10 +64,30 @@ class MavlinkSettings(BaseModel):
     signing_key: SecretStr | None = None
     """File with the key of MAVLink 2 signing: 32 bytes, or 64 hexadecimal digits. The environment
     variable AERODAAS_MAVLINK_KEY takes its place."""
+    observe: bool = False
+    """Connect only to look, as `aerodaas preflight` does, and a service between missions: nothing
+    is set at the vehicle, whatever `failsafes`, `fallback` and `fence` say, and it cannot be flown.
+    Judged is what a flight by these settings would meet."""
     max_speed: Positive = 10.0
     """m/s that the vehicle itself can do horizontally."""
     max_climb: Positive = 3.0
     """m/s that the vehicle itself can do vertically."""
+
+    @property
+    def sender(self) -> int:
+        """System id of what we send.
+
+        An observer's is no flight's: autopilots wait for the heartbeats of one id, and those of
+        whoever looks must neither hide that the flight is silent nor leave a silence behind.
+        """
+        if not self.observe:
+            return self.own_system
+        return next(one for one in _OBSERVERS if one != self.own_system)
+
+    @property
+    def heard_as_station(self) -> bool:
+        """Whether our heartbeats are a ground station's."""
+        return self.role == "ground_station" and not self.observe
 
     @property
     def way_kind(self) -> Literal["return", "retrace", "plan"]:

@@ -15,7 +15,7 @@ from typing import ClassVar
 import numpy as np
 
 from aerodaas.config.model import EnvironmentConfig, RobotConfig
-from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish
+from aerodaas.drivers.mavlink.connecting import CHECKS, Connection, establish, require_answer
 from aerodaas.drivers.mavlink.control.departure import Departure
 from aerodaas.drivers.mavlink.control.steering import Steering
 from aerodaas.drivers.mavlink.control.watchdog import Watchdog
@@ -66,9 +66,7 @@ class MavlinkVehicle:
     """
 
     settings_model = MavlinkSettings
-    observing: ClassVar[Mapping[str, str]] = {
-        "failsafes": "ignore", "fallback": "ignore", "fence": "off",
-    }  # fmt: skip
+    observing: ClassVar[Mapping[str, bool]] = {"observe": True}
     """Settings with which a connection changes nothing at the vehicle, for who only watches it."""
 
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
@@ -142,7 +140,7 @@ class MavlinkVehicle:
             target = (found.system, found.component)
             link.adopt(target, found.peer, time.monotonic())
             with self._lock:
-                commander = Commander(link.send, target, self._settings.own_system)
+                commander = Commander(link.send, target, self._settings.sender)
                 self._rates = RateKeeper(found.autopilot, commander)
                 self._departure = Departure(
                     commander,
@@ -156,6 +154,8 @@ class MavlinkVehicle:
                 )
                 self._report.departure = self._departure
                 self._commander = commander
+            if found.signs and not link.signs:
+                require_answer(commander, self._name, self._pause)
             self._connection = establish(
                 link,
                 found.autopilot,
@@ -212,7 +212,7 @@ class MavlinkVehicle:
 
     def _put_back(self, connection: Connection) -> None:
         """Give the vehicle its own parameters back, if it stands: they may bring it home else."""
-        if self._settings.fallback != "set":
+        if self._settings.fallback != "set" or self._settings.observe:
             return
         if not self._stands():
             _log.warning(
@@ -285,6 +285,7 @@ class MavlinkVehicle:
                 f"{self._name}: the take-off height must be a positive number of metres, "
                 f"not {height!r}"
             )
+        self._require_control("take off")
         with self._lock:
             connection = self._connected()
             departure = connection.departure
@@ -397,6 +398,7 @@ class MavlinkVehicle:
         self, items: Sequence[MissionItem], progress: Progress = lambda _, __: None
     ) -> None:
         """Replace the mission on the vehicle by `items`; blocks, raises VehicleError."""
+        self._require_control("take a mission")
         upload(self._connected().link, items, mavlink.MAV_MISSION_TYPE_MISSION, progress)
 
     def download_mission(self, progress: Progress = lambda _, __: None) -> list[MissionItem]:
@@ -564,10 +566,15 @@ class MavlinkVehicle:
             raise VehicleError(f"{self._name} is not connected; call connect first")
         return self._connection
 
+    def _require_control(self, deed: str) -> None:
+        if self._settings.observe:
+            raise VehicleError(f'{self._name} cannot {deed}: with "observe" it is only looked at')
+
     def _require_flight(
         self, deed: str, *, climbing: bool = False, landing: bool = False
     ) -> Connection:
         connection, mode = self._connected(), self._report.mode
+        self._require_control(deed)
         if mode is VehicleMode.MANUAL:
             raise VehicleError(f"{self._name} cannot {deed}: a pilot flies it")
         if mode is VehicleMode.FAILSAFE:

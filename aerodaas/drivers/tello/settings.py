@@ -59,6 +59,9 @@ class TelloSettings(BaseModel):
     """Degrees per second that `rc` at 100 % turns."""
     battery_minimum: Fraction = 0.2
     """Charge below which we do not take off; the Tello itself refuses at about 0.1."""
+    observe: bool = False
+    """Connect only to look, as `aerodaas preflight` does, and a service between missions: it cannot
+    be flown, and is not landed when it is let go of in the air."""
 
 
 class TelloCameraSettings(CameraConfig):

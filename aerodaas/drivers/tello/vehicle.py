@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections.abc import Mapping
+from typing import ClassVar
 
 import numpy as np
 
@@ -83,6 +85,8 @@ class TelloVehicle:
     """
 
     settings_model = TelloSettings
+    observing: ClassVar[Mapping[str, bool]] = {"observe": True}
+    """Settings with which it is only looked at."""
 
     def __init__(self, robot: RobotConfig, environment: EnvironmentConfig) -> None:
         """Prepare for `robot`, standing at its start; nothing is sent or opened."""
@@ -158,10 +162,14 @@ class TelloVehicle:
         time.sleep(0.02)
 
     def close(self) -> None:
-        """Disconnect, which takes a moment; a Tello in the air is commanded to land."""
+        """Disconnect, which takes a moment; a Tello in the air is commanded to land.
+
+        One that was only looked at is left to whoever flies it.
+        """
         link, self._link = self._link, None
         if link is not None:
-            link.close(LAND if self._phase.airborne else None)
+            ours = self._phase.airborne and not self._settings.observe
+            link.close(LAND if ours else None)
 
     def read(self) -> VehicleState:
         """Return the newest state; raise VehicleError if not connected."""
@@ -234,6 +242,7 @@ class TelloVehicle:
                 f"{self._name}: the take-off height must be a positive number of metres, "
                 f"not {height!r}"
             )
+        self._require_control("take off")
         with self._lock:
             refusal, self._phase.refusal = self._phase.refusal, ""
             reasons = [refusal] if refusal else self.preflight()
@@ -295,6 +304,7 @@ class TelloVehicle:
     def land(self) -> None:
         """Land here; does nothing on the ground."""
         link = self._connected()
+        self._require_control("land")
         with self._lock:
             if self._phase.airborne:
                 self._phase.to(VehicleMode.LANDING, time.monotonic())
@@ -408,8 +418,13 @@ class TelloVehicle:
             raise VehicleError(f"{self._name} is not connected; call connect first")
         return self._link
 
+    def _require_control(self, deed: str) -> None:
+        if self._settings.observe:
+            raise VehicleError(f'{self._name} cannot {deed}: with "observe" it is only looked at')
+
     def _require_flight(self, deed: str) -> TelloLink:
         link, mode = self._connected(), self._phase.mode
+        self._require_control(deed)
         if mode is VehicleMode.FAILSAFE:
             raise VehicleError(f"{self._name} cannot {deed}: {self._phase.outcome}")
         if mode is VehicleMode.GROUNDED:

@@ -26,7 +26,6 @@ from aerodaas.dataflow.navigation import AeroNavigation
 from aerodaas.environment.document.values import ValueWriter, registered_name
 from aerodaas.environment.environment import Environment
 from aerodaas.environment.offering import require_no_more
-from aerodaas.environment.robot import Robot
 from aerodaas.types.data import Frame
 from aerodaas.types.errors import GraphError
 from aerodaas.types.waypoints import SchedulingType
@@ -104,10 +103,11 @@ class _Compiler:
     def _require_data(self) -> None:
         """Raise GraphError for functions of the application that would run in its process."""
         require_no_more(self._environment)
-        hooks = [robot for robot in self._environment.get_env_robots() if _has_hooks(robot)]
+        hooks = self._environment.has_hooks
         # Where the user's side is there, the application runs its own functions.
         if not self._here and (hooks or self._graph.on_launch):
-            what = "hooks of on_start or on_end" if hooks else "callbacks of subscribe()"
+            kinds = "hooks of on_start, on_end or start_mission"
+            what = kinds if hooks else "callbacks of subscribe()"
             raise GraphError(f"a document has no {what}, which are the application's own code")
         edges = self._graph.navigation
         attached = current_options.get().provider.attach is not None
@@ -247,7 +247,3 @@ def _own_code(what: str, kind: PluginKind) -> GraphError:
         f"{what} is the application's own code, and a document holds registered schedulers by "
         f"name only: register it as an entry point of `aerodaas.{kind}`, or fly the application"
     )
-
-
-def _has_hooks(robot: object) -> bool:
-    return isinstance(robot, Robot) and bool(robot.start_hooks or robot.end_hooks)

@@ -20,6 +20,8 @@ _CONNECT_SECONDS = 5.0
 _READ_SECONDS = 0.5
 _ANEW_SECONDS = 10.0
 """Seconds without a word after which it is connected anew: it may have been replaced."""
+_SILENT_SECONDS = 5.0
+"""Seconds without a reading after which a vehicle is not called connected any more."""
 _PAUSE, _LONGEST_PAUSE = 1.0, 10.0
 """Seconds between two attempts to connect, which grow."""
 
@@ -44,6 +46,8 @@ class VehicleWatcher:
         self._lock = threading.Condition()
         self._wanted = False
         self._news = VehicleNews()
+        self._read_at = -math.inf
+        """Monotonic seconds of the newest reading."""
 
     def start(self) -> None:
         """Start; holds nothing before it is wanted."""
@@ -57,9 +61,15 @@ class VehicleWatcher:
 
     @property
     def news(self) -> VehicleNews:
-        """The vehicle as it was last seen."""
+        """The vehicle as it was last seen; lost, if its driver has hung since."""
         with self._lock:
-            return self._news
+            news, silence = self._news, time.monotonic() - self._read_at
+        if news.link is not LinkState.CONNECTED or silence <= _SILENT_SECONDS:
+            return news
+        reason = f"its driver has not answered for {silence:.0f} s"
+        return news.model_copy(
+            update={"link": LinkState.LOST, "since": news.heard, "reason": reason}
+        )
 
     def _run(self) -> None:
         pause = _PAUSE
@@ -133,6 +143,8 @@ class VehicleWatcher:
         charge = state.battery.fraction
         place = tuple(float(axis) for axis in state.odometry.position)
         connected = self._news.link is LinkState.CONNECTED
+        with self._lock:
+            self._read_at = time.monotonic()
         self._tell(
             link=LinkState.CONNECTED,
             since=self._news.since if connected else now,

@@ -247,6 +247,18 @@ def test_after_a_kill_the_next_flight_puts_it_back(
         assert not list(state_folder.rglob("*.json"))
 
 
+def test_who_only_watches_puts_nothing_back() -> None:
+    """Nor does it, where a flight was killed: that is the next flight's to do."""
+    with flight(ARDUPILOT, fallback="set") as pair:
+        die(pair)
+        with again(pair, fallback="set", **MavlinkVehicle.observing):
+            pass
+        assert values(pair) == OURS
+        with again(pair, fallback="set"):
+            pass
+        assert values(pair) == OWN
+
+
 def test_what_its_owner_sets_meanwhile_stays() -> None:
     """By a ground station beside us: not our value any more, so not ours to put back."""
     with flight(ARDUPILOT, fallback="set") as pair:

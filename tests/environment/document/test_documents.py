@@ -289,7 +289,7 @@ def velocities(env: Environment) -> None:
         (own_scheduler, r"Mine is the application's own code"),
         (own_dispatcher, r"margin:Margin is the application's own code"),
         (packages, r"drone/monitoring: a document has no runtime_env"),
-        (hooks, r"no hooks of on_start or on_end"),
+        (hooks, r"no hooks of on_start, on_end or start_mission"),
         (callbacks, r"no callbacks of subscribe"),
         (own_address, r"RemoteAnalytics\(port=…\) comes from the environment file alone"),
         (velocities, r"velocity commands in a document come from analyses"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
@@ -23,6 +24,8 @@ class Script:
     battery: float = 0.8
     breaks: Exception | None = None
     """What `read` raises."""
+    stuck: threading.Event | None = None
+    """What `read` waits for, as in a driver that hangs."""
     objections: list[str] = field(default_factory=list)
     asked: list[str] = field(default_factory=list)
     sensors: list[Any] = field(default_factory=list)
@@ -54,6 +57,8 @@ class ScriptedVehicle:
 
     def read(self) -> VehicleState:
         """Its state as the script has it."""
+        if SCRIPT.stuck is not None:
+            SCRIPT.stuck.wait()
         if SCRIPT.breaks is not None:
             raise SCRIPT.breaks
         zero = np.zeros(3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 
@@ -140,3 +141,21 @@ def test_what_is_armed_is_not_let_go_of(watcher: VehicleWatcher, script: Script)
     script.mode, script.armed = VehicleMode.GROUNDED, False
     until(lambda: not watcher.news.held)
     assert set(script.asked) == READING
+
+
+def test_one_whose_driver_hangs_is_not_connected(
+    watcher: VehicleWatcher, script: Script, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What it said last is no news of now: it is lost since then, until it is read again."""
+    monkeypatch.setattr(watchers, "_SILENT_SECONDS", 0.3)
+    watcher.want(wanted=True)
+    until(lambda: watcher.news.link is LinkState.CONNECTED)
+    stuck = script.stuck = threading.Event()
+    until(lambda: watcher.news.link is LinkState.LOST)
+    lost = watcher.news
+    assert "has not answered for" in lost.reason
+    assert lost.since == lost.heard
+    script.stuck = None
+    stuck.set()
+    until(lambda: watcher.news.link is LinkState.CONNECTED)
+    assert watcher.news.reason == ""

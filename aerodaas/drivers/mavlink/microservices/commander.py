@@ -83,6 +83,8 @@ class Commander:
         """Send by `send` to `target` (system, component); `ours` is our own system id."""
         self.stray = 0
         """Acknowledgements that were late, repeated, or for another sender."""
+        self.answered = False
+        """Whether a command was ever acknowledged, in whatever way."""
         self._send = send
         self._target = target
         self._ours = ours
@@ -132,6 +134,7 @@ class Commander:
             if pending is None:
                 self.stray += 1
                 return
+            self.answered = True
             if message.result == mavlink.MAV_RESULT_IN_PROGRESS:
                 pending.deadline = now + _PROGRESS
                 return

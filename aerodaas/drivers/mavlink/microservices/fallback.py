@@ -90,9 +90,13 @@ class Fallback:
 
         `plan` is the way home to be uploaded, if any; `ceiling` that of the geofence, in metres,
         and `software` the autopilot's version. Raises VehicleError if it cannot be done: then what
-        was changed before has been put back.
+        was changed before has been put back. An observer changes nothing: what is judged then is
+        what a flight could not change.
         """
         self._remind()
+        if self._settings.fallback == "set" and self._settings.observe:
+            self.obstacles = tuple(self._unsettable(ceiling, software))
+            return
         if self._settings.fallback == "set":
             if unable := self._unable():
                 raise VehicleError(f"{self._name}: {unable}")
@@ -163,6 +167,13 @@ class Fallback:
             return ""
         name = self._autopilot.name
         return f'{name} cannot fly this settings.way_home by itself; take "return"'
+
+    def _unsettable(self, ceiling: float, software: str) -> list[str]:
+        """What keeps it from coming home even in a flight that sets all that can be set."""
+        if unable := self._unable():
+            return [unable]
+        judged = self._judge(self._autopilot.fallback(self._settings, ceiling, software))
+        return [one.text for one in judged if one.value is None]
 
     def _change(self, wanted: Sequence[FallbackParameter], plan: Sequence[MissionItem]) -> None:
         """Set what does not fit; the journal is always ahead of the vehicle."""

@@ -10,6 +10,7 @@ from aerodaas.drivers.mavlink.autopilots.autopilot import Autopilot
 from aerodaas.drivers.mavlink.autopilots.px4 import PX4
 from aerodaas.drivers.mavlink.settings import MavlinkSettings
 from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.drivers.mavlink.wire.framing import signed
 from aerodaas.drivers.mavlink.wire.link import LinkCounts
 from aerodaas.drivers.pin import Peer
 
@@ -38,6 +39,8 @@ class FoundVehicle:
     autopilot: Autopilot
     peer: Peer = None
     """Where its HEARTBEAT came from."""
+    signs: bool = False
+    """Whether its HEARTBEAT was signed."""
 
 
 class Finder:
@@ -53,7 +56,8 @@ class Finder:
         system, component = message.get_srcSystem(), message.get_srcComponent()
         objection, family = self._judge(message, system)
         if family is not None and not objection:
-            self.found = self.found or FoundVehicle(system, component, family(), peer)
+            signs = signed(message.get_msgbuf() or b"\0")
+            self.found = self.found or FoundVehicle(system, component, family(), peer, signs)
         elif len(self._others) < _MOST:
             self._others[system, component] = objection
 

@@ -104,7 +104,7 @@ class MavlinkLink:
         self._on_turn = on_turn
         self._healthy = healthy
         self._key = load_key(settings, name)
-        self._mav: Any = SignedCodec(None, settings.own_system, settings.own_component)
+        self._mav: Any = SignedCodec(None, settings.sender, settings.own_component)
         if self._key is not None:
             sign_with(self._mav, self._key)
         self._stands = stands
@@ -148,6 +148,11 @@ class MavlinkLink:
     def _start(self) -> None:
         self._thread = threading.Thread(target=self._run, name=f"{self._name}-link", daemon=True)
         self._thread.start()
+
+    @property
+    def signs(self) -> bool:
+        """Whether there is a key, by which what is sent is signed."""
+        return self._key is not None
 
     @property
     def target(self) -> Sender:
@@ -277,9 +282,9 @@ class MavlinkLink:
                 inbox.put(message)
 
     def _heartbeat(self) -> Message:
-        ours = self._settings.role == "ground_station"
+        station = self._settings.heard_as_station
         return mavlink.MAVLink_heartbeat_message(
-            mavlink.MAV_TYPE_GCS if ours else mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
+            mavlink.MAV_TYPE_GCS if station else mavlink.MAV_TYPE_ONBOARD_CONTROLLER,
             mavlink.MAV_AUTOPILOT_INVALID,
             0,
             0,

@@ -1,0 +1,158 @@
+"""Commands that look at a vehicle change nothing there, whatever a flight would set."""
+
+from __future__ import annotations
+
+import json
+import socket
+import sys
+import time
+from pathlib import Path
+from typing import Any, Literal
+
+import pytest
+
+from aerodaas.cli import preflight
+from aerodaas.cli.app import main
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.drivers.loading import load_vehicle
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.testing.tello import EmulatedTello
+from aerodaas.types.errors import VehicleError
+from aerodaas.types.health import MeasuredVehicle
+from aerodaas.types.vehicle import Vehicle, VehicleMode
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
+
+LOOPBACK = "127.0.0.1"
+SETTING = {"fallback": "set", "failsafes": "set", "fence": "land", "role": "ground_station"}
+"""Of a flight that sets all there is."""
+COMMANDS = {
+    "preflight": ["preflight", "drone"],
+    "check": ["check", "environment.json"],
+    "logs": ["logs", "drone"],
+}
+CHANGES = {"PARAM_SET", "MISSION_COUNT", "MISSION_CLEAR_ALL", "MISSION_ITEM_INT", "SET_MODE"}
+"""Messages that change a vehicle's parameters, plans or mode."""
+FLIES = {
+    mavlink.MAV_CMD_DO_SET_MODE,
+    mavlink.MAV_CMD_COMPONENT_ARM_DISARM,
+    mavlink.MAV_CMD_NAV_TAKEOFF,
+}
+
+
+def free_port() -> int:
+    """A UDP port that nobody uses at present."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind((LOOPBACK, 0))
+        return int(probe.getsockname()[1])
+
+
+def file_of(settings: dict[str, Any], driver: str = "mavlink") -> EnvironmentConfig:
+    """Write an environment file with one drone here."""
+    content = {"robots": [{"id": "drone", "driver": driver, "settings": settings}]}
+    Path("environment.json").write_text(json.dumps(content))
+    return EnvironmentConfig.model_validate(content)
+
+
+def look(monkeypatch: pytest.MonkeyPatch, command: str) -> int:
+    """Run a command; its exit code."""
+    monkeypatch.setattr(sys, "argv", ["aerodaas", *COMMANDS[command]])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return int(ended.value.code or 0)
+
+
+@pytest.fixture(autouse=True)
+def _here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr(preflight, "_SETTLING", 0.2)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("family", ["ardupilot", "px4"])
+def test_looking_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch, family: Literal["px4", "ardupilot"], command: str
+) -> None:
+    """No parameter, no plan, no mode; and no heartbeat of a ground station that then falls silent.
+
+    A vehicle waits for the heartbeats of its ground station (ArduPilot: of one system id), and
+    comes home when they end.
+    """
+    port = free_port()
+    options = AutopilotOptions(family=family, peer=(LOOPBACK, port), ready_after=0.0)
+    with EmulatedAutopilot(options) as autopilot:
+        before = dict(autopilot.firmware.parameters.values)
+        file_of({"url": f"udpin:{LOOPBACK}:{port}", **SETTING})
+        assert look(monkeypatch, command) == 0
+        heard = [message for _, message in autopilot.heard]
+        assert autopilot.firmware.parameters.values == before
+        assert not any(autopilot.firmware.plans.plans.values())
+    kinds = {message.get_type() for message in heard}
+    assert not kinds & CHANGES
+    ordered = [one for one in heard if one.get_type() in {"COMMAND_LONG", "COMMAND_INT"}]
+    assert not {one.command for one in ordered} & FLIES
+    beats = {(one.type, one.get_srcSystem()) for one in heard if one.get_type() == "HEARTBEAT"}
+    assert beats == {(mavlink.MAV_TYPE_ONBOARD_CONTROLLER, 244)}
+    assert not list(Path("state").rglob("*.json"))
+
+
+def observer(config: EnvironmentConfig) -> Vehicle:
+    """The vehicle of the only robot, to be looked at."""
+    return load_vehicle(config.robots[0], config, observing=True)
+
+
+@pytest.mark.parametrize(
+    ("fallback", "objects"), [("require", True), ("set", False), ("report", False)]
+)
+def test_what_a_flight_would_meet_is_judged(fallback: str, *, objects: bool) -> None:
+    """With "require" a vehicle that would not come home is refused; with "set" a flight sees to it.
+
+    It cannot be flown by who only looks.
+    """
+    port = free_port()
+    options = AutopilotOptions(family="ardupilot", peer=(LOOPBACK, port), ready_after=0.0)
+    with EmulatedAutopilot(options) as autopilot:
+        settings = {"url": f"udpin:{LOOPBACK}:{port}", "fallback": fallback}
+        vehicle = observer(file_of(settings))
+        vehicle.connect()
+        try:
+            said = "; ".join(vehicle.preflight())
+            assert ("would not come home without us: FS_GCS_ENABLE is 0" in said) is objects
+            assert isinstance(vehicle, MeasuredVehicle)
+            assert (vehicle.health().stranded == ()) is (fallback == "set")
+            with pytest.raises(VehicleError, match="only looked at"):
+                vehicle.take_off(2.0)
+        finally:
+            vehicle.close()
+        assert not autopilot.armed
+
+
+def test_a_tello_that_somebody_flies_is_left_in_the_air() -> None:
+    """It is landed by no connection that was only looking, and obeys none."""
+    with EmulatedTello() as tello:
+        settings = {"address": LOOPBACK, "command_port": tello.port, "state_port": free_port()}
+        config = file_of(settings, "tello")
+        pilot = load_vehicle(config.robots[0], config)
+        pilot.connect()
+        pilot.take_off(1.0)
+        until(lambda: pilot.read().mode is VehicleMode.HOLDING)
+        looking = {**settings, "state_port": free_port()}
+        vehicle = observer(file_of(looking, "tello"))
+        vehicle.connect()
+        until(lambda: vehicle.read().armed)
+        with pytest.raises(VehicleError, match="only looked at"):
+            vehicle.hold()
+        with pytest.raises(VehicleError, match="only looked at"):
+            vehicle.land()
+        vehicle.close()
+        assert "land" not in {text for _, text in tello.heard}
+        pilot.close()
+        assert "land" in {text for _, text in tello.heard}
+
+
+def until(condition: Any) -> None:  # noqa: ANN401 - a function without arguments
+    """Wait until something holds."""
+    end = time.monotonic() + 15.0
+    while not condition():
+        assert time.monotonic() < end, "waited in vain"
+        time.sleep(0.02)

@@ -1,0 +1,119 @@
+"""A vehicle that signs, where its key is not: heard, and never taken for one that would obey."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+import pytest
+from mavlink_flights import LOOPBACK, free_port, robot_of, wait_for
+
+from aerodaas.cli.app import main
+from aerodaas.config.model import EnvironmentConfig
+from aerodaas.config.secrets import MAVLINK_KEY
+from aerodaas.drivers.mavlink import connecting
+from aerodaas.drivers.mavlink.autopilots.px4 import PX4
+from aerodaas.drivers.mavlink.discovery import hear_vehicles
+from aerodaas.drivers.mavlink.microservices.commander import Commander
+from aerodaas.drivers.mavlink.vehicle import MavlinkVehicle
+from aerodaas.drivers.mavlink.wire.dialect import mavlink
+from aerodaas.protocol.schemas import LinkState
+from aerodaas.service.monitor.watcher import VehicleWatcher
+from aerodaas.types.errors import VehicleError
+from tools.mavlink_vehicle import AutopilotOptions, EmulatedAutopilot
+
+KEY = bytes(range(32))
+Family: TypeAlias = Literal["px4", "ardupilot"]
+TRUTH = "signs; no key is here"
+
+
+@pytest.fixture(autouse=True)
+def _no_key_of_the_host(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(MAVLINK_KEY, raising=False)
+    monkeypatch.setattr(connecting, "_ANSWER", 2.0)
+
+
+@contextmanager
+def signing(family: Family = "px4", **settings: Any) -> Iterator[EnvironmentConfig]:  # noqa: ANN401
+    """An autopilot that wants its key, and the environment of its drone."""
+    port = free_port()
+    options = AutopilotOptions(family=family, peer=(LOOPBACK, port), ready_after=0.0, key=KEY)
+    with EmulatedAutopilot(options):
+        yield EnvironmentConfig(robots=[robot_of(port, **settings)])
+
+
+@pytest.mark.parametrize("family", ["px4", "ardupilot"])
+def test_it_is_not_connected_without_its_key(family: Family) -> None:
+    """What it says can be read, and nothing that we say is: found out before it is to fly."""
+    with signing(family) as environment:
+        vehicle = MavlinkVehicle(environment.robots[0], environment)
+        with pytest.raises(VehicleError, match=f"{TRUTH}.*{MAVLINK_KEY}.*signing_key"):
+            vehicle.connect()
+        assert not vehicle.connected
+
+
+def test_with_its_key_it_is_connected(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Then it answers."""
+    monkeypatch.setenv(MAVLINK_KEY, KEY.hex())
+    with signing() as environment:
+        vehicle = MavlinkVehicle(environment.robots[0], environment)
+        vehicle.connect()
+        assert vehicle.preflight() == []
+        vehicle.close()
+
+
+def test_one_that_obeys_the_unsigned_is_connected() -> None:
+    """As an autopilot over USB does: it signs, and has answered all the same."""
+    commander = Commander(lambda _: None, (1, 1), 245)
+    commander.give(PX4().version(), now=0.0)
+    answer = mavlink.MAVLink_command_ack_message(
+        mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAV_RESULT_DENIED, target_system=245
+    )
+    connecting.require_answer(commander, "drone", lambda: commander.take(answer, 0.0))
+
+
+def test_the_fleets_state_says_so() -> None:
+    """The monitor calls it lost, with the reason and the remedy; never connected."""
+    with signing() as environment:
+        seen: list[LinkState] = []
+        watcher = VehicleWatcher(environment.robots[0], environment, lambda: None)
+        watcher.start()
+        watcher.want(wanted=True)
+
+        def lost() -> bool:
+            seen.append(watcher.news.link)
+            return watcher.news.link is LinkState.LOST
+
+        wait_for(lost)
+        assert TRUTH in watcher.news.reason
+        assert LinkState.CONNECTED not in seen
+        watcher.want(wanted=False)
+        wait_for(lambda: not watcher.news.held)
+
+
+def test_preflight_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Instead of a list on which all is good."""
+    with signing() as environment:
+        content = environment.model_dump(mode="json", exclude_defaults=True)
+        (tmp_path / "environment.json").write_text(json.dumps(content))
+        monkeypatch.chdir(tmp_path)
+        monkeypatch.setattr(sys, "argv", ["aerodaas", "preflight", "drone"])
+        with pytest.raises(SystemExit) as ended:
+            main()
+    told = " ".join(capsys.readouterr().err.split())
+    assert ended.value.code not in {0, None}
+    assert TRUTH in told
+
+
+def test_discovery_says_so() -> None:
+    """`aerodaas init --discover` finds it, and says what it will want."""
+    with signing() as environment:
+        (heard,) = hear_vehicles(2.5, [environment.robots[0].settings["url"]]).vehicles
+    assert heard.signs
+    assert MAVLINK_KEY in heard.text

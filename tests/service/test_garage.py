@@ -1,0 +1,117 @@
+"""The garage says of a drone what is known of it now, and since when it is known no more."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from desks import PILOT, Provider
+
+from aerodaas.analytics.remote.schemas import StatusOut
+from aerodaas.protocol.schemas import LeaseIn, LeaseState, LinkState, RobotOut
+from aerodaas.service import garage as garages
+
+T0 = 1_800_000_000.0
+"""Unix seconds."""
+
+
+class Clock:
+    """Unix time as a test wants it."""
+
+    now = T0
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    """Of the garage."""
+    clock = Clock()
+    names = ("monotonic", "strftime", "gmtime")
+    functions = {name: getattr(time, name) for name in names}
+    monkeypatch.setattr(garages, "time", SimpleNamespace(time=lambda: clock.now, **functions))
+    return clock
+
+
+@pytest.fixture
+def provider(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Provider]:
+    """Two drones."""
+    made = Provider(tmp_path, monkeypatch)
+    yield made
+    made.desk.close()
+
+
+def status(at: float, **changes: Any) -> dict[str, StatusOut]:  # noqa: ANN401 - its fields
+    """What a mission tells of drone `one` at its own time."""
+    lists: dict[str, Any] = {name: [] for name in ("pending", "visited", "given_up", "faults")}
+    counts = dict.fromkeys(("distance", "waypoints_visited", "waypoints_known"), 1)
+    flying = {"state": "enroute", "reason": "", "target": None, "mode": "guided", "battery": 0.7}
+    return {"one": StatusOut(time=at, **{**lists, **counts, **flying, **changes})}
+
+
+def seen(provider: Provider) -> RobotOut:
+    """Drone `one` of the fleet."""
+    return next(one for one in provider.fleet.seen_by(PILOT).robots if one.id == "one")
+
+
+def test_a_status_that_stands_still_is_no_news(provider: Provider, clock: Clock) -> None:
+    """A flight that hangs: lost since its last word, and nothing of it is as of now."""
+    provider.garage.hand(["one"], LinkState.MISSION)
+    provider.garage.note(status(10.0))
+    assert (seen(provider).link, seen(provider).heard) == (LinkState.MISSION, T0)
+    clock.now = T0 + 4.0
+    provider.garage.note(status(10.0))
+    assert (seen(provider).link, seen(provider).heard) == (LinkState.MISSION, T0)
+    clock.now = T0 + 60.0
+    provider.garage.note(status(10.0))
+    silent = seen(provider)
+    assert (silent.link, silent.since, silent.heard) == (LinkState.LOST, T0, T0)
+    assert silent.faults == ["its mission has told nothing since 2027-01-15 08:00:00 UTC"]
+    provider.garage.note(status(10.1))
+    again = seen(provider)
+    assert (again.link, again.heard, again.faults) == (LinkState.MISSION, T0 + 60.0, [])
+
+
+def test_the_next_mission_is_not_the_last_one(provider: Provider, clock: Clock) -> None:
+    """Its clock may show the same time."""
+    provider.garage.note(status(10.0))
+    clock.now = T0 + 60.0
+    provider.garage.hand(["one"], LinkState.MISSION)
+    provider.garage.note(status(10.0))
+    assert seen(provider).link is LinkState.MISSION
+
+
+def test_a_mission_that_is_over_may_be_silent(provider: Provider, clock: Clock) -> None:
+    """Its drone stands, while the recording is closed and the report drawn."""
+    provider.garage.note(status(10.0, state="landed", mode="grounded"))
+    clock.now = T0 + 60.0
+    provider.garage.note(status(10.0, state="landed", mode="grounded"))
+    assert (seen(provider).link, seen(provider).heard) == (LinkState.MISSION, T0)
+
+
+def test_what_a_lost_vehicle_said_is_not_as_of_now(provider: Provider, clock: Clock) -> None:
+    """Its mission goes on, and has no word from it: charge and place are those of before."""
+    provider.garage.note(status(10.0))
+    clock.now = T0 + 30.0
+    provider.garage.note(status(40.0, mode="lost"))
+    lost = seen(provider)
+    assert (lost.link, lost.heard) == (LinkState.LOST, T0)
+
+
+def test_the_end_of_a_flight_is_of_its_own_time(provider: Provider, clock: Clock) -> None:
+    """Also where the service was away meanwhile."""
+    clock.now = T0 + 3600.0
+    provider.garage.note(status(90.0, state="landed", mode="grounded", battery=0.4), ended=T0)
+    assert (seen(provider).battery, seen(provider).heard) == (0.4, T0)
+
+
+def test_a_charge_that_nobody_knows_lasts_for_no_minute(provider: Provider) -> None:
+    """A lease with charge for so long waits until a drone is known to have it."""
+    lease = provider.bookings.request(PILOT, LeaseIn(battery_minutes=1.0, minutes=5.0))
+    assert lease.state is LeaseState.QUEUED
+    provider.monitor.see("two", battery=0.9)
+    provider.bookings.tick()
+    granted = provider.bookings.lease(lease.id)
+    assert (granted.state, granted.robots) == (LeaseState.GRANTED, ("two",))
