@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import queue
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -28,6 +29,7 @@ __all__ = [
     "FuzzedFlight",
     "ViolationError",
     "clock_of",
+    "queues_of",
     "replaced",
     "require",
 ]
@@ -153,3 +155,26 @@ def replaced(*places: tuple[ModuleType | type, str, Any]) -> Iterator[None]:
 def clock_of(rig: Any, sleep: Any) -> SimpleNamespace:  # noqa: ANN401 - anything with `now`
     """Stand-in for the module `time`, whose clock is the attribute `now` of `rig`."""
     return SimpleNamespace(monotonic=lambda: rig.now, sleep=sleep, time=lambda: 1.7e9 + rig.now)
+
+
+def queues_of(rig: Any) -> SimpleNamespace:  # noqa: ANN401 - anything with `now` and `advance`
+    """Stand-in for the module `queue`, whose readers let the time of `rig` pass while they wait."""
+    return SimpleNamespace(SimpleQueue=lambda: _Queue(rig), Empty=queue.Empty)
+
+
+class _Queue:
+    """A queue that is filled while its reader waits."""
+
+    def __init__(self, rig: Any) -> None:  # noqa: ANN401
+        self._rig = rig
+        self._items: list[Any] = []
+        self.put: Callable[[Any], None] = self._items.append
+
+    def get(self, timeout: float) -> Any:  # noqa: ANN401
+        """The next item, within `timeout` seconds of the clock."""
+        end = self._rig.now + timeout
+        while not self._items:
+            if self._rig.now >= end:
+                raise queue.Empty
+            self._rig.advance()
+        return self._items.pop(0)

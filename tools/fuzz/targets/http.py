@@ -31,8 +31,8 @@ _ENVIRONMENT = EnvironmentConfig.model_validate(
 _STREAM = "drone/remote"
 _REQUESTS = 8
 """Most requests of one input that are made."""
-_TURNS = 12
-"""Turns of the setpoint loop after each request."""
+_BETWEEN, _TURNS = 3, 12
+"""Turns of the setpoint loop between two requests, and after the last one."""
 _CLIMB = 80
 """Turns until the drone is on its way."""
 _OK = 200
@@ -69,7 +69,8 @@ def run(data: bytes) -> None:
         require(code < _SERVERS_FAULT, f"an answer of code {code}")
         if method == "POST":
             require(answer["accepted"] == (code == _OK), "an answer that contradicts its code")
-        link.turn(_TURNS)
+        link.turn(_BETWEEN)
+    link.turn(_TURNS - _BETWEEN)
     kinds = {alert.kind for alert in link.flight.mission.alerts}
     require(not kinds & {"motors_stopped", "geofence", "turn_failed"}, f"alerts {kinds}")
 
