@@ -21,12 +21,15 @@ from aerodaas.mission.commands import Answer, Command, OpenStream, StreamItem
 from aerodaas.types.data import Alert
 from aerodaas.types.status import MissionStatus
 from aerodaas.types.vehicle import VehicleState
-from tools.fuzz.flight import LIMITS, TURN, FuzzedFlight, require
+from tools.fuzz.flight import LIMITS, START, TURN, FuzzedFlight, require
 
 __all__ = ["run", "seeds"]
 
 _ENVIRONMENT = EnvironmentConfig.model_validate(
-    {"robots": [{"id": "drone", "limits": LIMITS}], "simulation": {"world": "empty"}}
+    {
+        "robots": [{"id": "drone", "limits": LIMITS, "start": START}],
+        "simulation": {"world": "empty"},
+    }
 )
 _STREAM = "drone/remote"
 _REQUESTS = 8
@@ -62,6 +65,7 @@ def run(data: bytes) -> None:
     """Make the requests; the loop flies on, and what it sends stays within its limits."""
     link, app, loop = _service()
     link.begin()
+    link.flight.by_hand = bool(len(data) % 2)
     for line in data.split(b"\n")[:_REQUESTS]:
         path, _, body = line.partition(b" ")
         method = "GET" if path in {b"/status", b"/frame.jpg"} else "POST"

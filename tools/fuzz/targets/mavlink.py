@@ -24,6 +24,7 @@ from aerodaas.types.geometry import ned_to_enu
 from aerodaas.types.status import MissionState
 from tools.fuzz.flight import (
     LIMITS,
+    START,
     TURN,
     FuzzedFlight,
     ViolationError,
@@ -41,6 +42,7 @@ _ROBOT = RobotConfig.model_validate(
         "id": "d",
         "driver": "mavlink",
         "limits": LIMITS,
+        "start": START,
         "settings": {"failsafes": "ignore", "ready_timeout": 2.0},
     }
 )
@@ -79,7 +81,8 @@ class _Rig:
         self.early = early
         self.connected = False
         self.armed, self.rising, self.quiet = False, 0, False
-        self.mode = self._told_mode = _GUIDED
+        self.mode = _GUIDED
+        self._told: tuple[object, ...] = ()
         self.up = 0.0
         self.sent: list[Any] = []
         self._mav = mavlink.MAVLink(None, 1, 1)
@@ -161,8 +164,8 @@ class _Rig:
             self.rising, climb = self.rising - 1, 6.0
             self.up += 0.3
         boot = round((self.now - 900.0) * 1e3)
-        changed, self._told_mode = self.mode != self._told_mode, self.mode
-        if not changed and self._turns % 10 and not climb and self._turns > _FIRST:
+        before, self._told = self._told, (self.mode, self.armed, self.up, climb)
+        if self._told == before and self._turns > _FIRST and self._turns % 10:
             return
         armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if self.armed else 0
         for message in (
@@ -204,13 +207,13 @@ def run(data: bytes) -> None:
             return
         try:
             require(not (rig.sent or rig.armed), "flown before the mission")
-            _fly(rig, later)
+            _fly(rig, later, by_hand=bool(len(data) % 2))
         finally:
             rig.quiet = False
             rig.vehicle.close()
 
 
-def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]]) -> None:
+def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]], *, by_hand: bool) -> None:
     assert rig.link is not None  # noqa: S101 - it is connected
     if rig.link._pins.pin.address != _OWN:  # noqa: SLF001
         return  # it was a stranger who was met first
@@ -220,6 +223,7 @@ def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]]) -> None:
         _turn(rig, flight)
         if flight.state is MissionState.ENROUTE:
             break
+    flight.by_hand = by_hand
     for kind, rest, body in heard:
         rig.hear_record(kind, body)
         for _ in range(1 + rest % _LONGEST_REST):

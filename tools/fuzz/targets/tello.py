@@ -20,6 +20,7 @@ from aerodaas.types.errors import VehicleError
 from aerodaas.types.status import MissionState
 from tools.fuzz.flight import (
     LIMITS,
+    START,
     TURN,
     FuzzedFlight,
     ViolationError,
@@ -32,7 +33,9 @@ from tools.fuzz.records import EARLY, QUIET, early, record, records
 
 __all__ = ["mutate", "run", "seeds"]
 
-_ROBOT = RobotConfig.model_validate({"id": "t", "driver": "tello", "limits": LIMITS})
+_ROBOT = RobotConfig.model_validate(
+    {"id": "t", "driver": "tello", "limits": LIMITS, "start": START}
+)
 _OWN = ("192.168.10.1", 8889)
 _STICKS = re.compile(r"rc (-?\d{1,3}) (-?\d{1,3}) (-?\d{1,3}) (-?\d{1,3})")
 _LONGEST_BODY = 2000
@@ -76,7 +79,7 @@ class _Rig:
             self.flies, self.height = False, 0
         self.commands.append((b"20" if text == "sdk?" else b"ok", *_OWN))
 
-    def hear(self, kind: int, body: bytes) -> None:
+    def hear_record(self, kind: int, body: bytes) -> None:
         """Let the driver hear a record."""
         self.quiet = bool(kind & QUIET)
         host, port = ("192.168.10.66", 8889) if kind & 2 else _OWN
@@ -90,7 +93,7 @@ class _Rig:
         self.motors += TURN * self.flies
         if self.early:
             kind, _, body = self.early.popleft()
-            self.hear(kind, body)
+            self.hear_record(kind, body)
         if not self.quiet and self._turns % 2:
             self.states.append((_state(h=self.height, time=int(self.motors)), *_OWN))
         if self.link is not None:
@@ -149,20 +152,21 @@ def run(data: bytes) -> None:
         except VehicleError:
             return
         try:
-            _fly(rig, later)
+            _fly(rig, later, by_hand=bool(len(data) % 2))
         finally:
             rig.quiet = False
             rig.vehicle.close()
 
 
-def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]]) -> None:
+def _fly(rig: _Rig, heard: list[tuple[int, int, bytes]], *, by_hand: bool) -> None:
     flight = FuzzedFlight(rig.vehicle, _ROBOT)
     for _ in range(60):
         _turn(rig, flight)
         if flight.state is MissionState.ENROUTE:
             break
+    flight.by_hand = by_hand
     for kind, rest, body in heard:
-        rig.hear(kind, body)
+        rig.hear_record(kind, body)
         for _ in range(1 + rest % _LONGEST_REST):
             _turn(rig, flight)
 
