@@ -123,9 +123,9 @@ class _Rig:
 
     def hear(self, message: Any) -> None:  # noqa: ANN401 - pymavlink has no types
         """Let the driver hear a message of the vehicle."""
-        self.bytes(bytes(message.pack(self._mav)), _OWN)
+        self.arrive(bytes(message.pack(self._mav)), _OWN)
 
-    def bytes(self, content: bytes, peer: tuple[str, int]) -> None:
+    def arrive(self, content: bytes, peer: tuple[str, int]) -> None:
         """Let the driver hear a datagram."""
         if peer == _OWN:
             self._was_silent, self._spoke_at = self._may_move(), self.now
@@ -140,11 +140,11 @@ class _Rig:
         self.quiet = bool(kind & QUIET)
         sender = kind & 3
         if sender == _BYTES:
-            self.bytes(body, _OWN)
+            self.arrive(body, _OWN)
         elif body:
             number, system = _KINDS[body[0] % len(_KINDS)], 2 if sender == _OTHER else 1
             peer = _STRANGER if sender == _FORGED else _OWN
-            self.bytes(_packet(number, body[1:], system), peer)
+            self.arrive(_packet(number, body[1:], system), peer)
 
     def advance(self, _: float = 0.0) -> None:
         """Let a turn's time pass at both ends."""
